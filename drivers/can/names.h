@@ -11,6 +11,7 @@ typedef enum wm_dimension {
   WM_DIM_ANGULAR_RATE,
   WM_DIM_ANGLE,
   WM_DIM_LENGTH,
+  WM_DIM_ACCELERATION,
 } wm_dimension;
 
 // SI units of a dimension, as a text for messages: "m/s, km/h, mph", ...

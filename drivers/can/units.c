@@ -77,6 +77,13 @@ static const struct {
     {"mm", WM_DIM_LENGTH, 0.001},
     {"in", WM_DIM_LENGTH, 0.0254},
     {"inch", WM_DIM_LENGTH, 0.0254},
+    {"m/s2", WM_DIM_ACCELERATION, 1.0},
+    {"m/s^2", WM_DIM_ACCELERATION, 1.0},
+    {"m/s/s", WM_DIM_ACCELERATION, 1.0},
+    {"mps2", WM_DIM_ACCELERATION, 1.0},
+    {"meterpersecondsquared", WM_DIM_ACCELERATION, 1.0},
+    {"g", WM_DIM_ACCELERATION, 9.80665},
+    {"mg", WM_DIM_ACCELERATION, 0.00980665},
 };
 
 enum { kLongestUnit = 32 };
@@ -119,6 +126,7 @@ const char *wm_dimension_units(wm_dimension dimension) {
     case WM_DIM_ANGULAR_RATE: return "rad/s, deg/s, rpm";
     case WM_DIM_ANGLE: return "rad, deg";
     case WM_DIM_LENGTH: return "m, cm, mm";
+    case WM_DIM_ACCELERATION: return "m/s2, g, mg";
   }
   return "";
 }
@@ -132,7 +140,12 @@ wm_dimension wm_quantity_dimension(int quantity) {
     case WM_Q_WHEEL_SPEED_REAR_LEFT:
     case WM_Q_WHEEL_SPEED_REAR_RIGHT:
     case WM_Q_VEHICLE_SPEED: return WM_DIM_SPEED;
+    case WM_Q_ROLL_RATE:
+    case WM_Q_PITCH_RATE:
     case WM_Q_YAW_RATE: return WM_DIM_ANGULAR_RATE;
+    case WM_Q_ACCELERATION_X:
+    case WM_Q_ACCELERATION_Y:
+    case WM_Q_ACCELERATION_Z: return WM_DIM_ACCELERATION;
     case WM_Q_STEERING_WHEEL:
     case WM_Q_ROAD_WHEEL: return WM_DIM_ANGLE;
     case WM_Q_STEERING_ACTUATOR: return WM_DIM_LENGTH;

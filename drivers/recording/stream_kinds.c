@@ -203,9 +203,18 @@ static const char *fill_depth(const fill_context *self, const csv_row *row, wm_e
 }
 
 static const char *fill_imu(const fill_context *self, const csv_row *row, wm_event *out) {
-  const double *w = &row->number[FIRST], *up = self->imu_up;
-  out->as.quantities = (wm_quantities){.count = 1, .id = {WM_Q_YAW_RATE}};
-  out->as.quantities.value[0] = up[0] * w[0] + up[1] * w[1] + up[2] * w[2];
+  static const uint8_t kOrder[] = {WM_Q_YAW_RATE,       WM_Q_ROLL_RATE,      WM_Q_PITCH_RATE,
+                                   WM_Q_ACCELERATION_X, WM_Q_ACCELERATION_Y, WM_Q_ACCELERATION_Z};
+  static const uint8_t kAxis[] = {2, 0, 1, 0, 1, 2};
+  const double *w = &row->number[FIRST], *a = w + 3;
+  const int whole = isfinite(a[0]) && isfinite(a[1]) && isfinite(a[2]);
+  wm_quantities *q = &out->as.quantities;
+  *q = (wm_quantities){.count = whole ? 6 : 3};
+  for (uint8_t i = 0; i < q->count; i++) {
+    const double *axis = self->imu_axes[kAxis[i]], *of = i < 3 ? w : a;
+    q->id[i] = kOrder[i];
+    q->value[i] = axis[0] * of[0] + axis[1] * of[1] + axis[2] * of[2];
+  }
   return NULL;
 }
 
@@ -263,7 +272,8 @@ const stream_kind kStreamImu = {
       OPTIONAL("sigma_ax_mps2", SIGMA), OPTIONAL("sigma_ay_mps2", SIGMA), OPTIONAL("sigma_az_mps2", SIGMA),
       OPTIONAL("temperature_c", TEMPERATURE)}},
     .fill = fill_imu,
-    .quantities = BIT(WM_Q_YAW_RATE)};
+    .quantities = BIT(WM_Q_YAW_RATE) | BIT(WM_Q_ROLL_RATE) | BIT(WM_Q_PITCH_RATE) | BIT(WM_Q_ACCELERATION_X) |
+                  BIT(WM_Q_ACCELERATION_Y) | BIT(WM_Q_ACCELERATION_Z)};
 
 const stream_kind kStreamSightings = {"sightings.csv",
                                       "sightings",
@@ -347,9 +357,12 @@ const stream_kind kStreamGnss = {"gnss.csv",
 
 void fill_context_imu(fill_context *self, const wm_mounting *imu) {
   const double *rpy = imu->rpy_rad;
-  self->imu_up[0] = -sin(rpy[1]);
-  self->imu_up[1] = cos(rpy[1]) * sin(rpy[0]);
-  self->imu_up[2] = cos(rpy[1]) * cos(rpy[0]);
+  const double sr = sin(rpy[0]), cr = cos(rpy[0]), sp = sin(rpy[1]), cp = cos(rpy[1]), sy = sin(rpy[2]),
+               cy = cos(rpy[2]);
+  const double axes[3][3] = {{cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr},
+                             {sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr},
+                             {-sp, cp * sr, cp * cr}};
+  memcpy(self->imu_axes, axes, sizeof axes);
 }
 
 // ── rows from elsewhere ─────────────────────────────────────────────────────────────────────────────────────────────

@@ -16,7 +16,7 @@ enum { T, ARRIVAL, FIRST };
 typedef struct fill_context {
   uint16_t sensor_index;
   const wm_corner_reader *corners;  // of kStreamCorners
-  double imu_up[3];                 // base_link's z axis in the axes of the IMU
+  double imu_axes[3][3];            // base_link's x, y and z axis in the axes of the IMU
 } fill_context;
 
 void fill_context_imu(fill_context *self, const wm_mounting *imu);

@@ -13,8 +13,9 @@ namespace {
 // Beyond these, as beyond kSpeedMost_mps and kRateMost_radps, a value is a decoding fault.
 constexpr double kSteeringMost_rad = 200.0;  // of a steering wheel: 32 turns
 constexpr double kActuatorMost_m = 10.0;
-constexpr double kTicksMost = 1e15;         // doubles still count singly there
-constexpr double kRoadWheelMost_rad = 1.5;  // tan is finite; no wheel is turned across
+constexpr double kAccelerationMost_mps2 = 2000.0;  // 200 g: the largest range of accelerometers of vehicles
+constexpr double kTicksMost = 1e15;                // doubles still count singly there
+constexpr double kRoadWheelMost_rad = 1.5;         // tan is finite; no wheel is turned across
 
 // Sensors without a sign give zero errors of either; the largest seen is 0.05 m/s. Not swept.
 constexpr double kSignedBelow_mps = -0.1;
@@ -34,7 +35,12 @@ double limit_of(int quantity) {
   switch (quantity) {
     case WM_Q_WHEEL_TICKS_LEFT:
     case WM_Q_WHEEL_TICKS_RIGHT: return kTicksMost;
+    case WM_Q_ROLL_RATE:
+    case WM_Q_PITCH_RATE:
     case WM_Q_YAW_RATE: return kRateMost_radps;
+    case WM_Q_ACCELERATION_X:
+    case WM_Q_ACCELERATION_Y:
+    case WM_Q_ACCELERATION_Z: return kAccelerationMost_mps2;
     case WM_Q_STEERING_WHEEL:
     case WM_Q_ROAD_WHEEL: return kSteeringMost_rad;
     case WM_Q_STEERING_ACTUATOR: return kActuatorMost_m;
@@ -376,6 +382,8 @@ void motion_front_end::push_input(wm_time_ns t_ns, double a, double b, bool doub
   input.doubtful = doubtful;
   mark_refused(&input);
   note_samples(&input);
+  input.sampling[1] += static_cast<float>(missed_turn_rad2_);
+  missed_turn_rad2_ = 0.0;
   input.standing = still_since_ns_ != WM_TIME_NONE && !doubtful && !input.refused &&
                    wm_seconds_between(still_since_ns_, t_ns) >= params_->standstill_after_s;
   if (ticks_drive() && !counts_wrapped()) {
@@ -413,6 +421,7 @@ void motion_front_end::note_samples(motion_input *input) {
                          known && (twist || stamp_ns_[WM_Q_YAW_RATE] == input->t_ns) && model_ != WM_MOTION_ACKERMANN};
   const bool follows = !history_.empty() && history_.newest().model == model_ && !history_.is_overdue(input->t_ns);
   if (!follows) sampled_ns_[0] = sampled_ns_[1] = WM_TIME_NONE;  // both: the first one after a gap may be the other one
+  if (input->holonomic && twist && fresh[0]) return note_holonomic(input);
   for (int k = 0; k < 2; k++) {
     if (!fresh[k]) continue;
     const double changed = k ? input->b - history_.newest().b : input->a - history_.newest().a;
@@ -420,7 +429,35 @@ void motion_front_end::note_samples(motion_input *input) {
     if (sampled_ns_[k] != WM_TIME_NONE)
       input->sampling[k] = static_cast<float>((square(changed) + square(aside)) *
                                               square(wm_seconds_between(sampled_ns_[k], input->t_ns)) / 12.0);
+    if (k == 0) input->side_sampling = input->sampling[0];
     sampled_ns_[k] = input->t_ns;
+  }
+}
+
+// Twists of a holonomic drive: each axis on its own, and of a change only what the samples' own noise does not explain,
+// two of which are in it. The mean of the squares over some samples, since one alone says little.
+void motion_front_end::note_holonomic(motion_input *input) {
+  const double dt_s = sampled_ns_[0] == WM_TIME_NONE ? 0.0 : wm_seconds_between(sampled_ns_[0], input->t_ns);
+  sampled_ns_[0] = sampled_ns_[1] = input->t_ns;
+  if (!(dt_s > 0.0)) {
+    for (double &mean : change2_) mean = 0.0;
+    return;
+  }
+  const motion_input &before = history_.newest();
+  const planar_twist now = {input->a, input->side_mps, input->b};
+  const double changed[3] = {now.v - before.a, now.u - before.side_mps, now.w - before.b};
+  const stated_noise stated = stated_noise_now();
+  const rate_noise white = rate_noise_of(*params_, kind());
+  const double own[3] = {(finite(stated.distance_m2) ? stated.distance_m2 : square(params_->noise_speed_mps)) +
+                             square(white.speed_rel * now.v),
+                         (finite(stated.lateral_m2) ? stated.lateral_m2 : square(params_->noise_sideways_mps)) +
+                             square(params_->noise_sideways_rel * now.u),
+                         (finite(stated.rotation_rad2) ? stated.rotation_rad2 : square(white.yaw_rate_radps)) +
+                             square(white.yaw_rate_rel * now.w)};
+  for (int k = 0; k < 3; k++) {
+    change2_[k] += kPeriodGain * (square(changed[k]) - 2.0 * own[k] / dt_s - change2_[k]);
+    const double real2 = change2_[k] > 0.0 ? change2_[k] : 0.0;
+    (k == 1 ? input->side_sampling : input->sampling[k / 2]) = static_cast<float>(real2 * square(dt_s) / 12.0);
   }
 }
 
@@ -457,9 +494,10 @@ void motion_front_end::watch_yaw_rate(wm_time_ns t_ns, double speed_mps, bool fr
   if (!is_still(speed_mps) || turns) w.moved_ns = t_ns;
   const bool moves = w.moved_ns != WM_TIME_NONE && wm_seconds_between(w.moved_ns, t_ns) < params_->standstill_after_s;
   const double yaw = value_[WM_Q_YAW_RATE];
-  if (yaw != w.rate_radps || !moves || w.since_ns == WM_TIME_NONE) {
+  const bool changed = yaw != w.rate_radps || w.since_ns == WM_TIME_NONE;
+  if (changed || !moves) {
     w = {yaw, t_ns, t_ns, w.moved_ns, 0.0, 0.0, 0.0};
-    health_ &= ~WM_MOTION_HEALTH_YAW_RATE_STUCK;
+    if (changed) health_ &= ~WM_MOTION_HEALTH_YAW_RATE_STUCK;  // a stop alone shows nothing of it
     return;
   }
   const double dt = wm_seconds_between(w.until_ns, t_ns), way = std::fabs(speed_mps) * dt;
@@ -473,7 +511,10 @@ void motion_front_end::watch_yaw_rate(wm_time_ns t_ns, double speed_mps, bool fr
   const double same_s = wm_seconds_between(w.since_ns, t_ns);
   const bool alone = same_s > kYawStuckAlone_s && w.way_m > kYawStuckAlone_m;
   const bool against = same_s > kYawStuckAgainst_s && std::fabs(w.apart_rad) > kYawStuckTurn_rad + w.allowed_rad;
-  if (alone || against) health_ |= WM_MOTION_HEALTH_YAW_RATE_STUCK;
+  if (!alone && !against) return;
+  // Until it was found, the heading has missed the turn that the other sensor measured.
+  if (!(health_ & WM_MOTION_HEALTH_YAW_RATE_STUCK)) missed_turn_rad2_ = square(w.apart_rad);
+  health_ |= WM_MOTION_HEALTH_YAW_RATE_STUCK;
 }
 
 bool motion_front_end::read_other_turn_rate(double speed_mps, double *rate_radps) const {

@@ -161,6 +161,7 @@ class motion_front_end {
   void push_input(wm_time_ns t_ns, double a, double b, bool doubtful, bool miscounted, double side_mps = 0.0);
   void push_ticks(wm_time_ns t_ns, bool doubtful, bool miscounted);
   void note_samples(motion_input *input);
+  void note_holonomic(motion_input *input);
   void note_integrated(const motion_segment &segment);
   void drop_silent_distance(wm_time_ns t_ns, double dt_s);
   void take_wrapped(const wm_quantities &q, wm_time_ns t_ns);
@@ -200,6 +201,7 @@ class motion_front_end {
   wm_time_ns twist_ns_;
   planar_twist twist_;          // the newest plausible one
   wm_time_ns twist_sample_ns_;  // stamp of the newest twist, whatever model drives
+  double change2_[3];           // of a holonomic twist: mean square of the changes less the samples' noise
   wm_time_ns sampled_ns_[2];    // newest sample of the speed and of the turn rate that the model uses
   wm_time_ns still_since_ns_;   // speed below the threshold since; WM_TIME_NONE while moving
   // While the gyro's value has the same bits.
@@ -210,6 +212,7 @@ class motion_front_end {
     double way_m;
     double apart_rad, allowed_rad;  // the turn by the other sensor less the gyro's; what its errors explain of it
   } yaw_watch_;
+  double missed_turn_rad2_;  // variance of the heading for the next input: what a stuck gyro has missed
   uint64_t outliers_;
   uint32_t health_;
   uint8_t model_;

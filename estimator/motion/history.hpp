@@ -27,12 +27,13 @@ struct motion_input {
   // Of increments: variance per s of distance, of sideways and of rotation, and their covariances; NaN: not given.
   float increment_noise[6];
   float sampling[2];    // variances of distance and rotation by the changes since the samples before
+  float side_sampling;  // the same to the side, of a holonomic drive
   float period_s;       // between increments; 0: that between the inputs
   float response[2];    // of commands: speed and turn rate of the drive at t_ns (commands.hpp)
   uint8_t beside_gyro;  // a twist whose turn rate stands in for a gyro's
   uint8_t uncounted;    // no count gives the distance until the next input's t_ns
   uint8_t holonomic;    // of a twist: the drive moves sideways
-  uint8_t unused;
+  uint8_t unused[5];
   uint8_t model;     // wm_motion_model; AUTO: nothing known yet
   uint8_t standing;  // the robot is known to stand
   uint8_t doubtful;  // of a frozen counter, a dead encoder

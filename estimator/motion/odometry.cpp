@@ -18,6 +18,7 @@ struct wm_odometry {
   uint64_t count;
   uint64_t points_before_gap;  // points at the beginning of a gap, until a count gives its distance; 0: no gap
   // Only where twists in space come: their history, and the pose that they add up to since the first one.
+  wm::spatial_source source;
   wm::spatial_history spatial;
   wm_time_ns spatial_ns;  // of that pose; WM_TIME_NONE: none came
   wm::pose3 pose_odom_base;
@@ -64,7 +65,13 @@ struct spatial_point {
 };
 
 void feed_spatial(wm_odometry *self, const wm_event &event) {
-  const wm::spatial_twist twist = {wm::vec_of(event.as.twist6.v_mps), wm::vec_of(event.as.twist6.w_radps)};
+  const bool quantities = event.kind == WM_EVENT_QUANTITIES;
+  if (!quantities && event.kind != WM_EVENT_TWIST6) return;
+  wm::spatial_twist twist = {};
+  if (!quantities) twist = {wm::vec_of(event.as.twist6.v_mps), wm::vec_of(event.as.twist6.w_radps)};
+  const bool changes = self->source.take(event, &twist);
+  // Of quantities, only an IMU's rates beside twists in space.
+  if (!changes || (quantities && !(self->source.rates_are_fresh() && self->source.is_held()))) return;
   if (!self->spatial.feed(event.t_ns, twist)) return;
   if (self->spatial_ns != WM_TIME_NONE)
     self->spatial.advance(self->spatial_ns, event.t_ns, [self](const wm::spatial_piece &piece, wm_time_ns) {
@@ -185,6 +192,7 @@ wm_status wm_odometry_init(wm_odometry *self, const wm_motion_params *params, co
   self->head.t_ns = self->spatial_ns = WM_TIME_NONE;
   // A twist in space holds as long as a planar one.
   const double after_s = wm::motion_history::kOverdueS;
+  self->source.init(params->hold_max_s);
   self->spatial.init({after_s, params->hold_max_s, false, params->limits_mps2, params->limits_radps2});
   self->pose_odom_base = wm::kNoMotion;
   return WM_OK;
@@ -200,7 +208,7 @@ wm_status wm_odometry_feed(wm_odometry *self, const wm_event *event) {
   if (status != WM_OK) return status;
   if (self->front.is_overdue(event->t_ns) && self->points_before_gap == 0) self->points_before_gap = self->count;
   self->front.feed(*event);
-  if (event->kind == WM_EVENT_TWIST6) feed_spatial(self, *event);
+  feed_spatial(self, *event);
   wm_odom_point &head = self->head;
   self->front.advance(event->t_ns, self->calibration,
                       [&head](const wm::motion_segment &piece, const wm::motion_twist &twist,

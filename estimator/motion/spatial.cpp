@@ -12,6 +12,8 @@ constexpr double kGapAfter_s = 0.2;
 // Random walks of the velocity and of the turn rates over a gap, per sqrt(s): accelerations of a vehicle in water or of
 // a head. Not swept.
 constexpr double kGapWalk_mps = 0.3, kGapWalk_radps = 0.3;
+// Turn rate of an axis that nothing measures, rad/s per sqrt(s): a vehicle on its way turns by 6 degrees in a second.
+constexpr double kUnmeasured_radps = 0.1;
 constexpr double kFirstPeriod_s = 0.02;  // of a sensor that has given one sample; 50 a second
 // Of the low-pass behind a time offset's derivative. Chosen on seabed-a (offset 15 ms); not swept.
 constexpr double kSmoothing_s = 0.3;
@@ -111,6 +113,7 @@ void spatial_motion::init(const wm_motion_params *params, const wm_wheels *wheel
   std::memset(static_cast<void *>(this), 0, sizeof *this);
   front_.init(params, wheels);
   const wm_motion_params &p = front_.params();
+  source_.init(p.hold_max_s);
   history_.init({kGapAfter_s, p.hold_max_s, true, p.limits_mps2, p.limits_radps2});
   noise_ = noise;
 }
@@ -131,6 +134,7 @@ void spatial_motion::feed(const wm_event &event) {
     now.v.y = twist.u;
     now.w.z = twist.w;
   }
+  if (!source_.take(event, &now)) return;
   const bool first = history_.samples() == 0;
   if (!history_.feed(event.t_ns, now) || !first) return;
   steady_[0] = steady_[1] = now;
@@ -161,21 +165,27 @@ bool spatial_motion::sample_now(spatial_twist *now, spatial_twist *slope) const 
 }
 
 // A sample's error is the same while it holds, T, and new in the next: a white density of variance times T.
-spatial_step spatial_motion::step_of(const spatial_piece &piece) const {
+spatial_step spatial_motion::step_of(const spatial_piece &piece, wm_time_ns end_ns) const {
   spatial_step s = {piece.dt_s, piece.twist.v, piece.twist.w, {}, {}};
   const double speed = length(s.v_mps), rate = length(s.w_radps);
   const double held_s2 = s.dt_s * (s.dt_s > history_.period_s() ? s.dt_s : history_.period_s());
   const wm_motion_params &p = front_.params();
-  const spatial_twist changed = history_.last_change();
+  spatial_twist changed = history_.last_change();
+  double v_held_s2 = held_s2, walk_s3 = piece.walk_s3;
+  if (source_.is_held()) {
+    changed.v = source_.velocity_change();
+    v_held_s2 = s.dt_s * (s.dt_s > source_.twist_period_s() ? s.dt_s : source_.twist_period_s());
+    walk_s3 += source_.unmeasured_s3(s.dt_s, end_ns);
+  }
   for (int i = 0; i < 3; i++) {
     const double v_var =
         variance_of(noise_.v_mps[i], noise_.v_rel, speed) + held_variance(changed.v[i], noise_.v_mps[i]);
     const double w_var =
         variance_of(noise_.w_radps[i], noise_.w_rel, rate) + held_variance(changed.w[i], noise_.w_radps[i]);
-    s.place_m2[i] =
-        v_var * held_s2 + square(kGapWalk_mps) * piece.walk_s3 + square(p.limits_mps2) * piece.refused_s4 / 3.0;
+    s.place_m2[i] = v_var * v_held_s2 + square(kGapWalk_mps) * walk_s3 + square(p.limits_mps2) * piece.refused_s4 / 3.0;
     s.turn_rad2[i] =
         w_var * held_s2 + square(kGapWalk_radps) * piece.walk_s3 + square(p.limits_radps2) * piece.refused_s4 / 3.0;
+    if (source_.is_unmeasured(i)) s.turn_rad2[i] += square(kUnmeasured_radps) * s.dt_s;
   }
   return s;
 }

@@ -6,13 +6,10 @@
 
 #include "math/se3.hpp"
 #include "motion/front_end.hpp"
+#include "motion/spatial_source.hpp"
 #include "motion/steady_rate.hpp"
 
 namespace wm {
-
-struct spatial_twist {
-  vec3 v, w;  // m/s, rad/s, in body axes
-};
 
 struct spatial_sample {
   wm_time_ns t_ns;
@@ -102,14 +99,15 @@ class spatial_motion {
   // Whether a motion event can be taken; changes nothing.
   wm_status check(const wm_event &event) const { return front_.check(event); }
 
-  // Takes a motion event. A planar twist, and what wheels and gyro give, has no other components.
+  // Takes a motion event. A planar twist, and what wheels and gyro give, has no other components, but the rates of an
+  // IMU with three axes.
   void feed(const wm_event &event);
   // Hands the steps from `from_ns` to `to_ns` (at most the last sample's stamp or later than it) to `visit`.
   template <class Visit>
   void walk(wm_time_ns from_ns, wm_time_ns to_ns, Visit visit) {
-    history_.advance(from_ns, to_ns, [&](const spatial_piece &piece, wm_time_ns) {
+    history_.advance(from_ns, to_ns, [&](const spatial_piece &piece, wm_time_ns end_ns) {
       smooth(piece);
-      visit(step_of(piece));
+      visit(step_of(piece, end_ns));
     });
   }
 
@@ -139,13 +137,18 @@ class spatial_motion {
   // Variances of one sample's components.
   void sample_noise(vec3 *v_var, vec3 *w_var) const;
   uint64_t outliers() const { return front_.outliers() + history_.outliers(); }
-  uint32_t health() const { return front_.health() | (history_.refused_lately() ? WM_MOTION_HEALTH_IMPLAUSIBLE : 0u); }
+  uint32_t health() const {
+    return front_.health() | (history_.refused_lately() ? WM_MOTION_HEALTH_IMPLAUSIBLE : 0u) |
+           (source_.is_stuck() ? WM_MOTION_HEALTH_YAW_RATE_STUCK : 0u);
+  }
+  const spatial_source &source() const { return source_; }
 
  private:
-  spatial_step step_of(const spatial_piece &piece) const;
+  spatial_step step_of(const spatial_piece &piece, wm_time_ns end_ns) const;
   void smooth(const spatial_piece &piece);
 
   motion_front_end front_;
+  spatial_source source_;
   spatial_history history_;
   spatial_noise noise_;
   steady_rate smooth_v_[3], smooth_w_[3];

@@ -303,7 +303,7 @@ void add_overdue_noise(const motion_segment &segment, const wm_motion_params &p,
 void add_sampling_noise(const motion_input &input, motion_noise *noise) {
   noise->distance_m2 += static_cast<double>(input.sampling[0]);
   noise->rotation_rad2 += static_cast<double>(input.sampling[1]);
-  if (has_own_axes(input)) noise->lateral_m2 += static_cast<double>(input.sampling[0]);
+  if (has_own_axes(input)) noise->lateral_m2 += static_cast<double>(input.side_sampling);
 }
 
 void add_center_noise(const wm_motion_calibration &calibration, motion_noise *noise) {

@@ -8,12 +8,23 @@
 #include "waymark/look.h"
 #include "waymark/pose.h"
 
-static const char *const kQuantities[] = {"wheel_ticks_left",       "wheel_ticks_right",
-                                          "wheel_speed_front_left", "wheel_speed_front_right",
-                                          "wheel_speed_rear_left",  "wheel_speed_rear_right",
-                                          "vehicle_speed",          "yaw_rate",
-                                          "steering_wheel",         "road_wheel",
-                                          "steering_actuator",      "gear"};
+static const char *const kQuantities[] = {"wheel_ticks_left",
+                                          "wheel_ticks_right",
+                                          "wheel_speed_front_left",
+                                          "wheel_speed_front_right",
+                                          "wheel_speed_rear_left",
+                                          "wheel_speed_rear_right",
+                                          "vehicle_speed",
+                                          "yaw_rate",
+                                          "steering_wheel",
+                                          "road_wheel",
+                                          "steering_actuator",
+                                          "gear",
+                                          "roll_rate",
+                                          "pitch_rate",
+                                          "acceleration_x",
+                                          "acceleration_y",
+                                          "acceleration_z"};
 static const char *const kStates[] = {"searching", "tracking", "dead_reckoning", "lost", "degraded"};
 static const char *const kCauses[] = {"",           "contradicted",       "refused", "inconsistent", "biased",
                                       "lost_again", "unknown_identities", "silent",  "off_map", "turn"};

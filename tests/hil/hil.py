@@ -5,7 +5,7 @@ real (emulated) CAN controller, under qemu's instruction clock, fed from a recor
 
 usage: hil.py [--arch arm64|armhf] [--package DEB] WORK WAYMARK WAYMARK_SIMULATE [PART ...]
 
-WORK keeps the guest's image from run to run; WAYMARK is this computer's; parts: can, camera, libcamera, landmarks, edges, walls,
+WORK keeps the guest's image from run to run; WAYMARK is this computer's; parts: can, camera, libcamera, landmarks, motion, edges, walls,
 service, power; all of them but power where none is named. Without --arch the guest runs WAYMARK itself, under systemd the package; else the package in all parts.
 The service and power parts run the package under systemd; without one they are left out. armhf is arm64's kernel with armhf's programs.
 
@@ -24,6 +24,7 @@ import time
 import drives
 import edges
 import landmarks
+import motion
 import service
 import vimc
 import walls
@@ -255,6 +256,7 @@ PARTS = {
     "camera": [("camera", scenario_camera, judge_camera, DISK, SLOW, "")],
     "libcamera": [("libcamera", lambda work, _: vimc.prepare(work), lambda work, _: vimc.judge(work), [], SLOW, "")],
     "landmarks": [("landmarks", OF_ROOT(landmarks.prepare), AT_ROOT(landmarks.judge), CAN, FAST, "")],
+    "motion": [("motion", OF_ROOT(motion.prepare), AT_ROOT(motion.judge), CAN, FAST, "")],
     "edges": [("edges", OF_ROOT(edges.prepare), AT_ROOT(edges.judge), CAN, FAST, "")],
     "walls": [("walls", OF_ROOT(walls.prepare), AT_ROOT(walls.judge), CAN, FAST, "")],
     "service": [("service", OF_ROOT(service.prepare_service), service.judge_service, CAN, FAST, "systemd")],

@@ -2,10 +2,10 @@
 // play TIMELINE PICTURES CAN DEVICE WIDTH HEIGHT DELAY [FROM UNTIL]: a recording's CAN frames, pictures and sightings,
 // each at its own time, by one clock, which neither canplayer nor a camera's steady rate can do. A line of TIMELINE is
 // "NANOSECONDS c ID HEXDATA", "NANOSECONDS p OFFSET BYTES" (of PICTURES, an MJPEG picture) or "NANOSECONDS l STAMP
-// OFFSET BYTES" (of PICTURES, an observations_t for LCM, which is stamped anew), "NANOSECONDS x" (the device is closed)
-// or "NANOSECONDS o" (it is opened again as soon as it is there), rising; lines before FROM and from UNTIL on are left
-// out. The formats are set at once (DEVICE "-": there are no pictures); the first line is due after DELAY seconds.
-// Prints how far CLOCK_MONOTONIC is ahead of the timeline, and at the end how late it was at most.
+// OFFSET BYTES [CHANNEL]" (of PICTURES, a message for LCM, by default of sightings, stamped anew), "NANOSECONDS x" (the
+// device is closed) or "NANOSECONDS o" (it is opened again as soon as it is there), rising; lines before FROM and from
+// UNTIL on are left out. The formats are set at once (DEVICE "-": there are no pictures); the first line is due after
+// DELAY seconds. Prints how far CLOCK_MONOTONIC is ahead of the timeline, and at the end how late it was at most.
 #include <arpa/inet.h>
 #include <fcntl.h>
 #include <limits.h>
@@ -28,6 +28,7 @@ typedef struct item {
   struct can_frame frame;
   size_t offset, bytes;
   long long stamp_ns;
+  char channel[32];
 } item;
 
 static char *read_file(const char *path, size_t *length) {
@@ -49,7 +50,10 @@ static int parse(const char *line, item *out) {
   memset(out, 0, sizeof *out);
   if (sscanf(line, "%lld %c%n", &out->t_ns, &out->kind, &used) != 2) return 0;
   if (out->kind == 'x' || out->kind == 'o') return 1;
-  if (out->kind == 'l') return sscanf(line + used, "%lld %zu %zu", &out->stamp_ns, &out->offset, &out->bytes) == 3;
+  if (out->kind == 'l') {
+    (void)snprintf(out->channel, sizeof out->channel, "WAYMARK_SIGHTINGS");
+    return sscanf(line + used, "%lld %zu %zu %31s", &out->stamp_ns, &out->offset, &out->bytes, out->channel) >= 3;
+  }
   if (out->kind == 'p') return sscanf(line + used, "%zu %zu", &out->offset, &out->bytes) == 2;
   if (sscanf(line + used, "%x %16s", &id, data) < 1) return 0;
   out->frame.can_id = id;
@@ -83,19 +87,19 @@ static int open_video(const char *device, unsigned width, unsigned height) {
 
 // One datagram. Source: LCM's protocol, "LC02", sequence number, channel, message; a message is its type's fingerprint
 // and, here, a stamp, in network order.
-static int say_sighting(int fd, char *message, size_t bytes, long long stamp_ns) {
+static int say(int fd, const char *channel, char *message, size_t bytes, long long stamp_ns) {
   static unsigned sequence;
   static char packet[4096];
-  static const char kChannel[] = "WAYMARK_SIGHTINGS";
+  const size_t named = strlen(channel) + 1;
   const struct sockaddr_in to = {
       .sin_family = AF_INET, .sin_port = htons(7667), .sin_addr.s_addr = inet_addr("239.255.76.67")};
   unsigned head[2] = {htonl(0x4c433032), htonl(sequence++)};
-  size_t length = sizeof head + sizeof kChannel + bytes;
+  size_t length = sizeof head + named + bytes;
   if (bytes < 16 || length > sizeof packet) return 0;
   for (int i = 0; i < 8; i++) message[8 + i] = (char)(stamp_ns >> (56 - 8 * i));
   memcpy(packet, head, sizeof head);
-  memcpy(packet + sizeof head, kChannel, sizeof kChannel);
-  memcpy(packet + sizeof head + sizeof kChannel, message, bytes);
+  memcpy(packet + sizeof head, channel, named);
+  memcpy(packet + sizeof head + named, message, bytes);
   return sendto(fd, packet, length, 0, (const struct sockaddr *)&to, sizeof to) == (ssize_t)length;
 }
 
@@ -140,7 +144,7 @@ int main(int argc, char **argv) {
     if (it->kind == 'p' && it->offset + it->bytes <= pictures_length)
       failed += write(video, pictures + it->offset, it->bytes) != (ssize_t)it->bytes;
     if (it->kind == 'l' && it->offset + it->bytes <= pictures_length)
-      failed += !say_sighting(lcm, pictures + it->offset, it->bytes, begin_ns + it->stamp_ns - items[0].t_ns);
+      failed += !say(lcm, it->channel, pictures + it->offset, it->bytes, begin_ns + it->stamp_ns - items[0].t_ns);
   }
   printf("played %zu, %lld not written, %.3f ms late at most\n", count, failed, (double)worst_ns * 1e-6);
   return failed != 0;

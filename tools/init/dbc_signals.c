@@ -13,11 +13,9 @@ static void copy(wm_text from, char *out, size_t capacity) {
 }
 
 static void fill_unit(const dbc_signal *s, init_signal *out) {
-  static const init_dimension kOurs[] = {[WM_DIM_NONE] = INIT_NO_UNIT,
-                                         [WM_DIM_SPEED] = INIT_SPEED,
-                                         [WM_DIM_ANGULAR_RATE] = INIT_ANGULAR_RATE,
-                                         [WM_DIM_ANGLE] = INIT_ANGLE,
-                                         [WM_DIM_LENGTH] = INIT_LENGTH};
+  static const init_dimension kOurs[] = {
+      [WM_DIM_NONE] = INIT_NO_UNIT, [WM_DIM_SPEED] = INIT_SPEED,   [WM_DIM_ANGULAR_RATE] = INIT_ANGULAR_RATE,
+      [WM_DIM_ANGLE] = INIT_ANGLE,  [WM_DIM_LENGTH] = INIT_LENGTH, [WM_DIM_ACCELERATION] = INIT_OTHER_UNIT};
   wm_dimension dimension;
   out->si = 1;
   out->dimension = s->unit.length > 0 ? INIT_OTHER_UNIT : INIT_NO_UNIT;

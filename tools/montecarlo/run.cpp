@@ -7,6 +7,7 @@
 #include "montecarlo/montecarlo.h"
 #include "montecarlo/simulated.h"
 #include "simulate/angle.h"
+#include "simulate/measured.h"
 #include "simulate/simulate.h"
 
 namespace wm::montecarlo {
@@ -59,21 +60,35 @@ void run_one(const std::vector<SmallEvent> &events, const sim::Recording &record
               estimate.state == WM_STATE_SEARCHING;
 }
 
+// Adds the bound along a drive, as that of so many drives.
+void add_bound(const sim::Scenario &scenario, const sim::Drive &drive, size_t landmarks, double drives,
+               Statistics &out) {
+  std::vector<double> times;
+  for (const Step &step : out.steps) times.push_back(step.t_s);
+  const std::vector<Bound> bounds = bound(scenario, drive, landmarks, times);
+  for (size_t i = 0; i < bounds.size(); i++) {
+    out.steps[i].bound_position_sq_m2 += drives * (bounds[i].x_var_m2 + bounds[i].y_var_m2);
+    out.steps[i].bound_heading_sq_rad2 += drives * bounds[i].heading_var_rad2;
+  }
+}
+
+// Where the seed draws the centre of rotation, base_link's way is another one in each drive, and its bound, too.
+bool draws_the_way(const sim::Scenario &scenario) {
+  return scenario.motion.base == sim::Motion::Base::skid_steer && scenario.errors.rotation_center_m > 0;
+}
+
 wm_status prepare(const sim::Scenario &scenario, size_t landmarks, uint64_t seeds, Statistics &out, wm_error *err) {
   sim::Drive drive;
   if (const wm_status s = sim::Drive::plan(scenario.route, drive, err); s != WM_OK) return s;
-  std::vector<double> times;
-  for (int k = 1; k * kStep_s < drive.duration_s(); k++) times.push_back(k * kStep_s);
-  const std::vector<Bound> bounds = bound(scenario, drive, landmarks, times);
+  drive = sim::on_base(scenario.motion, 0, drive);
   out = Statistics{};
   out.landmarks = std::min(landmarks, scenario.landmarks.size());
-  for (size_t i = 0; i < times.size(); i++) {
+  for (int k = 1; k * kStep_s < drive.duration_s(); k++) {
     Step step;
-    step.t_s = times[i];
-    step.bound_position_sq_m2 = static_cast<double>(seeds) * (bounds[i].x_var_m2 + bounds[i].y_var_m2);
-    step.bound_heading_sq_rad2 = static_cast<double>(seeds) * bounds[i].heading_var_rad2;
+    step.t_s = k * kStep_s;
     out.steps.push_back(step);
   }
+  if (!draws_the_way(scenario)) add_bound(scenario, drive, landmarks, static_cast<double>(seeds), out);
   return WM_OK;
 }
 
@@ -91,6 +106,7 @@ wm_status run(const sim::Scenario &scenario, const wm_config &config, size_t lan
     SimulatedFilter filter(config, recording, scenario.robot.wheels);
     if (const wm_status s = filter.init(err); s != WM_OK) return s;
     run_one(events, recording, filter, out);
+    if (draws_the_way(scenario)) add_bound(scenario, recording.drive, landmarks, 1, out);
     out.runs++;
     if (progress) progress(i + 1);
   }

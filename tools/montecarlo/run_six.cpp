@@ -62,6 +62,15 @@ std::vector<wm_event> events_of(const sim::Recording &recording) {
     std::copy(m.v_mps, m.v_mps + 3, e.as.twist6.v_mps);
     std::copy(m.w_radps, m.w_radps + 3, e.as.twist6.w_radps);
   }
+  static constexpr uint8_t kImu[] = {WM_Q_ROLL_RATE,      WM_Q_PITCH_RATE,     WM_Q_YAW_RATE,
+                                     WM_Q_ACCELERATION_X, WM_Q_ACCELERATION_Y, WM_Q_ACCELERATION_Z};
+  for (const sim::ImuRow &row : recording.imu) {
+    wm_quantities &q = add(row, WM_EVENT_QUANTITIES, 0).as.quantities;
+    q.count = 6;
+    std::copy(kImu, kImu + 6, q.id);
+    std::copy(row.w_radps, row.w_radps + 3, q.value);
+    std::copy(row.a_mps2, row.a_mps2 + 3, q.value + 3);
+  }
   for (const sim::Sighting &s : recording.sightings)
     add(s, WM_EVENT_SIGHTING, 1).as.sighting = {s.sensor, s.id, s.bearing_rad, s.range_m, NAN, NAN, NAN, NAN};
   for (const sim::StereoSeen &s : recording.stereo)

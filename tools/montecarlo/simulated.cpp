@@ -21,6 +21,31 @@ struct Decoder_free {
   void operator()(wm_can_decoder *decoder) const { wm_can_decoder_free(decoder); }
 };
 
+// Twists and the IMU, as the streams motion and imu of a recording.
+void add_measured(const sim::Recording &recording, std::vector<SmallEvent> &out) {
+  for (const sim::Command &c : recording.commands) {
+    wm_event e{};
+    e.t_ns = e.arrival_ns = recording.clock_start_ns + static_cast<wm_time_ns>(std::llround(c.t_s * 1e9));
+    if (c.side_mps == 0) {
+      e.kind = WM_EVENT_TWIST2;
+      e.as.twist2 = {c.v_mps, c.w_radps};
+    } else {
+      e.kind = WM_EVENT_TWIST6;
+      e.as.twist6 = {{c.v_mps, c.side_mps, 0}, {0, 0, c.w_radps}};
+    }
+    out.emplace_back(e);
+  }
+  for (const sim::ImuRow &row : recording.imu) {
+    wm_event e{};
+    e.t_ns = e.arrival_ns = row.t_ns;
+    e.kind = WM_EVENT_QUANTITIES;
+    e.as.quantities.count = 1;
+    e.as.quantities.id[0] = WM_Q_YAW_RATE;
+    e.as.quantities.value[0] = row.w_radps[2];
+    out.emplace_back(e);
+  }
+}
+
 }  // namespace
 
 wm_status make_events(const sim::Recording &recording, std::vector<SmallEvent> &out, wm_error *err) {
@@ -42,6 +67,7 @@ wm_status make_events(const sim::Recording &recording, std::vector<SmallEvent> &
     e.kind = WM_EVENT_QUANTITIES;
     out.emplace_back(e);
   }
+  add_measured(recording, out);
   const auto event = [](const auto &seen, wm_event_kind kind) {
     wm_event e{};
     e.t_ns = seen.t_ns;

@@ -13,6 +13,7 @@ namespace wm::sim {
 // A row of motion.csv, seconds from the start.
 struct Command {
   double t_s, v_mps, w_radps;
+  double side_mps = 0;  // to the left
 };
 
 // What the robot really drives of `planned` with `robot.actuators`, and the commands as they are published.

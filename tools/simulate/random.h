@@ -54,6 +54,15 @@ enum class Stream : uint64_t {
   elevation_outlier,
   tilt,
   command_delay,
+  wheel_noise,
+  twist_scale,
+  twist_noise,
+  rotation_center,
+  gyro_noise,
+  accelerometer_noise,
+  accelerometer_bias,
+  vibration,
+  bump,
 };
 
 class Random {

@@ -156,6 +156,7 @@ State Drive::between_samples(double t_s) const {
   const bool stands = t_s < 0 || t_s > planned_s_;
   s.speed_mps = stands ? 0 : mean(&State::speed_mps);
   s.yaw_rate_radps = stands ? 0 : mean(&State::yaw_rate_radps);
+  s.side_mps = stands ? 0 : mean(&State::side_mps);
   s.curvature_1pm = a.curvature_1pm;
   return s;
 }

@@ -18,6 +18,7 @@ struct State {
   double yaw_rate_radps;
   double curvature_1pm;                               // tan(road wheel angle) / wheelbase
   double carried_way_m = 0, carried_heading_rad = 0;  // of these it was carried so much: no wheel, no gyro says so
+  double side_mps = 0;                                // to the left, of a base that can
 };
 
 class Drive {

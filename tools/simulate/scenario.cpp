@@ -330,6 +330,10 @@ void read_errors(Reader &r, const wm_yaml_node &map, Errors &out) {
                                       "start_within_m",
                                       "compass_deg",
                                       "tilt_deg",
+                                      "side_percent",
+                                      "turn_percent",
+                                      "rotation_center_m",
+                                      "wheel_noise_mm_per_sqrt_m",
                                       nullptr};
   if (!r.ok() || !wm_yaml_there(&map)) return;
   r.keys(map, known);
@@ -353,6 +357,10 @@ void read_errors(Reader &r, const wm_yaml_node &map, Errors &out) {
   r.number(map, "frame_stamp_jitter_ms", 0, 100, kMilli, out.frame_stamp_jitter_s);
   r.number(map, "speed_percent", 0, 20, kPercent, out.speed);
   r.number(map, "speed_noise_mps", 0, 10, 1, out.speed_noise_mps);
+  r.number(map, "side_percent", 0, 50, kPercent, out.side);
+  r.number(map, "turn_percent", 0, 50, kPercent, out.turn);
+  r.number(map, "rotation_center_m", 0, 10, 1, out.rotation_center_m);
+  r.number(map, "wheel_noise_mm_per_sqrt_m", 0, 1000, kMilli, out.wheel_noise_sqrtm);
 }
 
 // The map under `key`, with the stretch of time that it must give.
@@ -391,6 +399,7 @@ void read_faults(Reader &r, const wm_yaml_node &map, Faults &out) {
                                       "lights_off",
                                       "wheel_slip",
                                       "kidnap",
+                                      "gyro_stuck",
                                       nullptr};
   static const char *const known_dead[] = {"wheel", "from_s", nullptr};
   static const char *const known_start[] = {"x_m", "y_m", "heading_deg", nullptr};
@@ -427,6 +436,7 @@ void read_faults(Reader &r, const wm_yaml_node &map, Faults &out) {
   static const char *const known_kidnap[] = {"at_s", "forward_s", nullptr};
   read_span(r, map, "camera_dropout", known_span, out.camera_dropout);
   read_span(r, map, "frozen_picture", known_span, out.frozen_picture);
+  read_span(r, map, "gyro_stuck", known_span, out.gyro_stuck);
   const wm_yaml_node lights = read_span(r, map, "lights_off", known_lights, out.lights_off);
   if (r.ok() && wm_yaml_there(&lights)) r.number(lights, "left_percent", 0, 100, kPercent, out.lights_left);
   const wm_yaml_node slip = read_span(r, map, "wheel_slip", known_slip, out.wheel_slip);
@@ -462,7 +472,7 @@ void read_faults(Reader &r, const wm_yaml_node &map, Faults &out) {
 void read_scenario(Reader &r, const wm_yaml_node &root, Scenario &out) {
   static const char *const known[] = {"format", "name",     "about",   "seed", "clock_start_s", "world",
                                       "robot",  "cameras",  "route",   "path", "bus",           "errors",
-                                      "faults", "pictures", "sensors", nullptr};
+                                      "faults", "pictures", "sensors", "motion", nullptr};
   r.keys(root, known);
   std::string format;
   r.text(root, "format", format, true);
@@ -492,6 +502,7 @@ void read_scenario(Reader &r, const wm_yaml_node &root, Scenario &out) {
     r.fail(pictures, "there are pictures only in a world that has a `kind`");
   const bool steered = out.world.kind == "crossing" || out.world.kind == "corridor";
   if (!six) read_robot(r, robot, steered, out.robot);
+  read_motion(r, r.child(root, "motion", false), out);
   if (pictured)
     read_pixel_cameras(r, cameras, out);
   else
@@ -533,6 +544,9 @@ void make_perfect(Scenario &scenario) {
   scenario.errors = Errors{};
   scenario.faults = Faults{};
   scenario.bus.stamp_jitter_s = 0;
+  Motion &m = scenario.motion;
+  m.speed_noise_mps = m.side_noise_mps = m.turn_noise_radps = m.speed_noise = m.side_noise = m.turn_noise = 0;
+  m.accelerometer_noise_mps2 = m.accelerometer_bias_mps2 = m.vibration_mps2 = m.bump_mps2 = 0;
   scenario.pictures.noise_scale = 0;
   scenario.pictures.gain_drift = 0;
   for (Camera &camera : scenario.cameras) {

@@ -46,6 +46,24 @@ struct Actuators {
   double speed_scale = 1, turn_scale = 1;  // true over commanded
 };
 
+// What the base can do, and what measures its motion beside or in place of the bus.
+struct Motion {
+  enum class Base { rolling, holonomic, skid_steer };
+  Base base = Base::rolling;
+  double crab_rad = 0, crab_m = 6;  // holonomic: heading against the way, a sine of the way with this period
+  double track_scale = 1;           // skid_steer: effective track over wheels.track_m
+  double twist_hz = 0;              // above 0: motion.csv has measured twists, in place of the bus
+  // White noise of the twist per sqrt(s): constant, and relative to the component.
+  double speed_noise_mps = 0, side_noise_mps = 0, turn_noise_radps = 0;
+  double speed_noise = 0, side_noise = 0, turn_noise = 0;
+  double log_hz = 50;     // six degrees of freedom: rows of motion6.csv
+  bool log_rates = true;  // ... with rates of its own; else they are 0 there
+  double imu_hz = 0;      // above 0: imu.csv
+  // Accelerometer: noise of a sample; a constant error of each axis; an even shaking; bumps of that size, so many per s
+  double accelerometer_noise_mps2 = 0, accelerometer_bias_mps2 = 0, vibration_mps2 = 0, bump_mps2 = 0, bumps_hz = 0;
+  bool is_there() const { return base != Base::rolling || twist_hz > 0 || imu_hz > 0; }
+};
+
 struct Robot {
   wm_wheels wheels = {};      // as calibration.yaml says; the true ones differ by what `errors` draws
   bool sends_speeds = false;  // the bus gives the wheels' speeds, without sign, instead of rolling counts
@@ -188,6 +206,9 @@ struct Errors {
   double frame_stamp_jitter_s = 0;  // each picture
   double speed = 0;                 // six degrees of freedom: scale of the velocity, relative
   double speed_noise_mps = 0;       // each axis and sample
+  double side = 0, turn = 0;        // scales of a measured twist's sideways speed and turn rate, relative
+  double rotation_center_m = 0;     // skid_steer: place of the centre of rotation ahead of base_link
+  double wheel_noise_sqrtm = 0;     // each counted wheel, m per sqrt(m): uneven floor
 };
 
 // A stretch of time, from the start of the recording.
@@ -221,6 +242,7 @@ struct Faults {
   int wheel_slip_wheel = 0;                      // 0 left, 1 right
   double wheel_slip_share = 0;                   // relative
   double kidnap_at_s = 0, kidnap_forward_s = 0;  // carried to where it would be so much later; 0: not
+  Span gyro_stuck;                               // imu.csv repeats the last rates
 };
 
 struct Scenario {
@@ -233,6 +255,7 @@ struct Scenario {
   Scatter scatter;
   Mapped mapped = Mapped::all;
   Robot robot;
+  Motion motion;
   std::vector<Camera> cameras;
   std::vector<Sensor> sensors;
   std::vector<PixelCamera> pixel_cameras;

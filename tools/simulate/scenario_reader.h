@@ -113,5 +113,7 @@ void read_pixel_cameras(Reader &r, const wm_yaml_node &list, Scenario &out);
 void read_sensors(Reader &r, const wm_yaml_node &list, Scenario &out);
 void read_scatter(Reader &r, const wm_yaml_node &map, Scenario &out);
 void read_path(Reader &r, const wm_yaml_node &map, Scenario &out);
+// The base, and what measures its motion.
+void read_motion(Reader &r, const wm_yaml_node &map, Scenario &out);
 
 }  // namespace wm::sim

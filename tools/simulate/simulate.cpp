@@ -9,6 +9,7 @@
 #include "simulate/angle.h"
 #include "simulate/bus.h"
 #include "simulate/faults.h"
+#include "simulate/measured.h"
 #include "simulate/motion.h"
 #include "simulate/random.h"
 #include "simulate/scatter.h"
@@ -29,6 +30,7 @@ Drawn draw_constants(const Scenario &sc, const Random &random) {
   for (uint64_t i = 0; i < 2; i++) d.wheel_radius[i] = sc.errors.wheel_radius * random.normal(Stream::wheel_radius, i);
   d.track = sc.errors.track * random.normal(Stream::track, 0);
   d.yaw_rate_bias_radps = sc.errors.yaw_rate_bias_radps * random.normal(Stream::yaw_rate_bias, 0);
+  d.rotation_center_m = sc.errors.rotation_center_m * random.normal(Stream::rotation_center, 0);
   d.steering_offset_rad = sc.errors.steering_offset_rad * random.normal(Stream::steering_offset, 0);
   for (uint64_t i = 0; i < sc.cameras.size(); i++)
     d.camera_yaw_rad.push_back(sc.errors.camera_yaw_rad * random.normal(Stream::camera_yaw, i));
@@ -176,7 +178,7 @@ void make_start(const Scenario &sc, const Random &random, Recording &out) {
 }  // namespace
 
 Messages messages_of(const Scenario &sc) {
-  if (sc.robot.commanded) return {};
+  if (sc.robot.commanded || sc.motion.twist_hz > 0) return {};
   Messages sent = {sc.robot.sends_speeds ? Bus_message::wheel_speeds : Bus_message::wheels};
   if (sc.bus.yaw_rate_hz > 0) sent.push_back(Bus_message::yaw_rate);
   if (sc.bus.steering_hz > 0 && sc.robot.wheels.steering_table_count >= 2) sent.push_back(Bus_message::steering);
@@ -194,13 +196,14 @@ wm_status simulate_drive(const Scenario &sc, uint64_t seed, Recording &out, wm_e
   if (const wm_status status = Drive::plan(sc.route, out.drive, err); status != WM_OK) return status;
   const Random random(seed);
   if (sc.robot.commanded) out.drive = obey(sc, random, out.drive, out.commands);
+  out.drawn = draw_constants(sc, random);
+  out.drive = on_base(sc.motion, out.drawn.rotation_center_m, out.drive);
   if (sc.faults.kidnap_forward_s > 0)
     if (const wm_status s = out.drive.carry(sc.faults.kidnap_at_s, sc.faults.kidnap_forward_s, err); s != WM_OK)
       return s;
   if (sc.duration_s > 0) out.drive.cut(sc.duration_s);
   out.duration_s = out.drive.duration_s();
   out.length_m = out.drive.length_m();
-  out.drawn = draw_constants(sc, random);
   make_start(sc, random, out);
 
   const Wheels wheels(sc, random, out.drive, out.drawn);
@@ -217,6 +220,8 @@ wm_status simulate_drive(const Scenario &sc, uint64_t seed, Recording &out, wm_e
   std::stable_sort(out.can.begin(), out.can.end(),
                    [](const wm_can_frame &a, const wm_can_frame &b) { return a.t_ns < b.t_ns; });
   fault_can(sc.faults, random, out.can);
+  if (sc.motion.twist_hz > 0) measure_twist(sc, random, out);
+  if (sc.motion.imu_hz > 0) measure_imu(sc, random, out);
   for (uint64_t k = 0; static_cast<double>(k) / kTruth_hz <= out.drive.duration_s(); k++) {
     const double t_s = static_cast<double>(k) / kTruth_hz;
     out.truth.push_back({out.clock_start_ns + to_ns(t_s), out.drive.at(t_s)});

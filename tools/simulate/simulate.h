@@ -70,6 +70,12 @@ struct Twist6 {
   double v_mps[3], w_radps[3];
 };
 
+// A row of imu.csv, in axes of base_link.
+struct ImuRow {
+  wm_time_ns t_ns;
+  double w_radps[3], a_mps2[3];
+};
+
 // What the seed drew: for tests and for the bound, never for an estimator.
 struct Drawn {
   double wheel_radius[2];  // relative, left and right
@@ -77,6 +83,7 @@ struct Drawn {
   double yaw_rate_bias_radps;
   double steering_offset_rad;
   std::vector<double> camera_yaw_rad;
+  double rotation_center_m;
 };
 
 struct Recording {
@@ -84,7 +91,7 @@ struct Recording {
   Drive drive;  // the truth at any time since clock_start_ns
   wm_time_ns clock_start_ns;
   std::vector<wm_can_frame> can;    // by arrival
-  std::vector<Command> commands;    // of robot.commands, in place of `can`
+  std::vector<Command> commands;    // rows of motion.csv: of robot.commands, or measured twists; in place of `can`
   std::vector<Sighting> sightings;  // by arrival, as all that follows
   std::vector<MarkerSeen> markers;
   std::vector<StereoSeen> stereo;
@@ -98,6 +105,7 @@ struct Recording {
   Path6 path;  // six degrees of freedom: instead of the drive
   std::vector<Truth6> truth6;
   std::vector<Twist6> motion6;
+  std::vector<ImuRow> imu;
   std::string camera_calibration;            // text of calibration.yaml on cameras with pixels
   std::vector<std::string> picture_streams;  // files of pictures, map and labels, for recording.yaml
   wm_start start;                            // as recording.yaml says

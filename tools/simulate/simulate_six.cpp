@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "math/elementary.hpp"
+#include "simulate/measured.h"
 #include "simulate/motion.h"
 #include "simulate/random.h"
 #include "simulate/simulate.h"
@@ -10,7 +11,7 @@
 namespace wm::sim {
 namespace {
 
-constexpr double kMotion_hz = 50, kTruth_hz = 50;
+constexpr double kTruth_hz = 50;
 
 wm_time_ns to_ns(double s) { return static_cast<wm_time_ns>(std::llround(s * 1e9)); }
 
@@ -27,7 +28,7 @@ void quaternion(const std::array<double, 3> &rpy, double q[4]) {
 // A twist holds from its stamp to the next one, so a sample is that of the interval's middle.
 void send_motion(const Scenario &sc, const Random &random, Recording &out) {
   const Errors &e = sc.errors;
-  const double step_s = 1 / kMotion_hz, scale = 1 + e.speed * random.normal(Stream::velocity_scale, 0);
+  const double step_s = 1 / sc.motion.log_hz, scale = 1 + e.speed * random.normal(Stream::velocity_scale, 0);
   double bias[3];
   for (uint64_t i = 0; i < 3; i++) bias[i] = e.yaw_rate_bias_radps * random.normal(Stream::rate_bias, i);
   for (uint64_t k = 0; static_cast<double>(k) * step_s <= out.duration_s; k++) {
@@ -38,6 +39,7 @@ void send_motion(const Scenario &sc, const Random &random, Recording &out) {
     for (uint64_t i = 0; i < 3; i++) {
       m.v_mps[i] = scale * s.velocity_body_mps[i] + e.speed_noise_mps * random.normal(Stream::velocity_noise, k, i);
       m.w_radps[i] = s.rate_body_radps[i] + bias[i] + e.yaw_rate_noise_radps * random.normal(Stream::rate_noise, k, i);
+      if (!sc.motion.log_rates) m.w_radps[i] = 0;
       bias[i] += e.yaw_rate_bias_walk * std::sqrt(step_s) * random.normal(Stream::yaw_rate_walk, k, i);
     }
     out.motion6.push_back(m);
@@ -76,6 +78,7 @@ void simulate_six(const Scenario &sc, uint64_t seed, const Path6 &path, Recordin
   out.duration_s = sc.duration_s > 0 ? std::min(sc.duration_s, path.duration_s()) : path.duration_s();
   const Random random(seed);
   send_motion(sc, random, out);
+  if (sc.motion.imu_hz > 0) measure_imu(sc, random, out);
   for (uint64_t k = 0; static_cast<double>(k) / kTruth_hz <= out.duration_s; k++) {
     const double t_s = static_cast<double>(k) / kTruth_hz;
     const State6 s = path.at(t_s);

@@ -17,10 +17,10 @@ constexpr double kSlipMemory_s = 5;  // slip wanders with this correlation time
 
 Wheels::Wheels(const Scenario &sc, const Random &random, const Drive &drive, const Drawn &drawn) : drive_(drive) {
   const wm_wheels &w = sc.robot.wheels;
-  track_m_ = w.track_m * (1 + drawn.track);
+  track_m_ = w.track_m * sc.motion.track_scale * (1 + drawn.track);
   heading0_rad_ = drive.at(0).heading_rad;
   for (int side = 0; side < 2; side++) radius_m_[side] = w.radius_m * (1 + drawn.wheel_radius[side]);
-  if (sc.errors.slip > 0 || sc.faults.wheel_slip.to_s > sc.faults.wheel_slip.from_s) slip(sc, random);
+  if (sc.errors.slip > 0 || sc.errors.wheel_noise_sqrtm > 0 || sc.faults.wheel_slip.to_s > sc.faults.wheel_slip.from_s) slip(sc, random);
 }
 
 // First-order Gauss-Markov: stationary, of the deviation that the scenario says.
@@ -38,6 +38,9 @@ void Wheels::slip(const Scenario &sc, const Random &random) {
       const State now = drive_.at(t_s);
       const double rim_mps = now.speed_mps + (side == 0 ? -0.5 : 0.5) * track_m_ * now.yaw_rate_radps;
       sum += slip * rim_mps * kStep_s;
+      if (sc.errors.wheel_noise_sqrtm > 0)
+        sum += sc.errors.wheel_noise_sqrtm * std::sqrt(std::fabs(rim_mps) * kStep_s) *
+               random.normal(Stream::wheel_noise, k, side);
       share = keep * share + fresh * random.normal(Stream::slip, k + 1, side);
     }
   }

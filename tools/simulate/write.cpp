@@ -83,11 +83,16 @@ bool has_map(const Scenario &sc, const Recording &r) {
 }
 bool has_landmarks(const Scenario &sc, const Recording &r) { return !r.landmarks.empty() || has_map(sc, r); }
 
+bool has_twists(const Scenario &sc, const Recording &r) {
+  return r.motion6.empty() && (sc.robot.commanded || sc.motion.twist_hz > 0);
+}
+
 // The files that are there, as `streams` of recording.yaml lists them.
 std::string streams(const Scenario &sc, const Recording &r) {
-  std::string text = !r.motion6.empty()   ? "motion6.csv"
-                     : sc.robot.commanded ? "motion.csv"
-                                          : "can.log, vehicle.dbc, can-signals.yaml";
+  std::string text = !r.motion6.empty()  ? "motion6.csv"
+                     : has_twists(sc, r) ? "motion.csv"
+                                         : "can.log, vehicle.dbc, can-signals.yaml";
+  if (!r.imu.empty()) text += ", imu.csv";
   text += ", calibration.yaml";
   if (has_map(sc, r)) text += ", landmarks.csv";
   if (has_sightings(sc)) text += ", sightings.csv";
@@ -122,7 +127,9 @@ wm_status write_recording_yaml(const Scenario &sc, const Recording &r, const std
     f.print("sigma_xy_m: %.6g, sigma_heading_rad: %.6g}\n", r.start.sigma_xy_m, r.start.sigma_heading_rad);
     return f.close(err);
   }
-  if (turns_on_the_spot(sc))
+  if (sc.motion.base == Motion::Base::holonomic)
+    f.text("vehicle:\n  kind: holonomic\n");
+  else if (turns_on_the_spot(sc))
     f.print("vehicle:\n  kind: differential\n  track_m: %.6g\n", sc.robot.wheels.track_m);
   else
     f.print("vehicle:\n  kind: car-like\n  wheelbase_m: %.6g\n  track_m: %.6g\n", sc.robot.wheels.wheelbase_m,
@@ -177,7 +184,7 @@ wm_status write_calibration(const Scenario &sc, const Recording &r, const std::s
       f.print("motion6: {sigma_v_mps: [%.6g, %.6g, %.6g], sigma_w_radps: [%.6g, %.6g, %.6g]}\n", v, v, v, w, w, w);
     return f.close(err);
   }
-  if (sc.robot.commanded) return f.close(err);
+  if (has_twists(sc, r)) return f.close(err);
   const wm_wheels &w = sc.robot.wheels;
   f.print("wheels:\n  radius_m: %.6g\n  ticks_per_turn: %.6g\n  track_m: %.6g\n", w.radius_m, w.ticks_per_turn,
           w.track_m);
@@ -271,12 +278,24 @@ wm_status write_motion6(const Recording &r, const std::string &path, wm_error *e
   return f.close(err);
 }
 
-wm_status write_commands(const Recording &r, const std::string &path, wm_error *err) {
+wm_status write_commands(const Scenario &sc, const Recording &r, const std::string &path, wm_error *err) {
   File f(path);
-  f.text("t_ns,v_mps,w_radps\n");
-  for (const Command &c : r.commands)
-    f.print("%" PRId64 ",%.6f,%.6f\n", r.clock_start_ns + static_cast<wm_time_ns>(std::llround(c.t_s * 1e9)), c.v_mps,
-            c.w_radps);
+  const bool sideways = sc.motion.base == Motion::Base::holonomic;
+  f.print("t_ns,v_mps,%sw_radps\n", sideways ? "vy_mps," : "");
+  for (const Command &c : r.commands) {
+    f.print("%" PRId64 ",%.6f,", r.clock_start_ns + static_cast<wm_time_ns>(std::llround(c.t_s * 1e9)), c.v_mps);
+    if (sideways) f.print("%.6f,", c.side_mps);
+    f.print("%.6f\n", c.w_radps);
+  }
+  return f.close(err);
+}
+
+wm_status write_imu(const Recording &r, const std::string &path, wm_error *err) {
+  File f(path);
+  f.text("t_ns,wx_radps,wy_radps,wz_radps,ax_mps2,ay_mps2,az_mps2\n");
+  for (const ImuRow &m : r.imu)
+    f.print("%" PRId64 ",%.6f,%.6f,%.6f,%.6f,%.6f,%.6f\n", m.t_ns, m.w_radps[0], m.w_radps[1], m.w_radps[2],
+            m.a_mps2[0], m.a_mps2[1], m.a_mps2[2]);
   return f.close(err);
 }
 
@@ -308,13 +327,14 @@ wm_status write_sensors(const Scenario &sc, const Recording &r, const std::strin
   wm_status status = WM_OK;
   if (six) {
     status = write_motion6(r, in("motion6.csv"), err);
-  } else if (sc.robot.commanded) {
-    status = write_commands(r, in("motion.csv"), err);
+  } else if (has_twists(sc, r)) {
+    status = write_commands(sc, r, in("motion.csv"), err);
   } else {
     status = write_text(dbc_text(sent), in("vehicle.dbc"), err);
     if (status == WM_OK) status = write_text(can_signals_text(sent), in("can-signals.yaml"), err);
     if (status == WM_OK) status = write_can(r, in("can.log"), err);
   }
+  if (status == WM_OK && !r.imu.empty()) status = write_imu(r, in("imu.csv"), err);
   if (status == WM_OK) status = write_calibration(sc, r, in("calibration.yaml"), err);
   if (status == WM_OK && has_map(sc, r)) status = write_landmarks(r.map, in("landmarks.csv"), err);
   if (status == WM_OK && has_sightings(sc)) status = write_sightings(r, in("sightings.csv"), err);

@@ -189,9 +189,25 @@ void stereo_ekf::fuse_twist(const wm_event &motion) {
   spatial_twist now, per_s;
   motion_.sample_noise(&v_var, &w_var);
   if (!motion_.sample_now(&now, &per_s)) return;
-  const bool planar = motion.kind == WM_EVENT_TWIST2;
-  (void)filter_.fuse(twist_rows(kVelocity, now.v, per_s.v, v_var, planar), limits());
-  (void)filter_.fuse(twist_rows(kRates, now.w, per_s.w, w_var, planar), limits());
+  const bool planar = motion.kind == WM_EVENT_TWIST2, gyro = motion_.source().by_gyro();
+  if (motion.kind != WM_EVENT_QUANTITIES)
+    (void)filter_.fuse(twist_rows(kVelocity, now.v, per_s.v, v_var, planar), limits());
+  if (motion.kind == WM_EVENT_QUANTITIES || !gyro)
+    (void)filter_.fuse(twist_rows(kRates, now.w, per_s.w, w_var, planar && !gyro), limits());
+}
+
+// The direction of gravity, once a second: a second of specific force less the acceleration by the velocity.
+void stereo_ekf::fuse_gravity() {
+  const bool rates = constant_velocity();
+  const vec3 v = rates ? filter_.head3(kVelocity) : filter_.velocity_of(motion_.v_mps());
+  const vec3 w = rates ? filter_.head3(kRates) : filter_.rates_of(motion_.w_radps());
+  vec3 v_var, w_var, force;
+  double variance[3];
+  motion_.sample_noise(&v_var, &w_var);
+  const bool known = rates || motion_.source().velocity_is_known(now_ns_);
+  if (!gravity_.add(now_ns_, motion_.source().force_mps2(), v, w, known ? &v_var : nullptr, &force, variance)) return;
+  if (life_.searching()) return;
+  (void)filter_.fuse(gravity_rows(force, variance), limits());
 }
 
 }  // namespace wm

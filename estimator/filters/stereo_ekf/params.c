@@ -71,6 +71,14 @@ static const wm_param kParams[] = {
     F64("states.twist_lag_sigma_s", twist_lag_sigma, 0, 0, 0.2,
         "Start sigma of two time offsets, s: by how much the measured velocity and the measured rates are ahead of the "
         "vehicle. With constant_velocity only. 0: off."),
+    F64("states.accelerometer_bias_sigma_mps2", accelerometer_bias_sigma, 0, 0, 10,
+        "Start sigma of an accelerometer's constant error on each axis, m/s2 (of cheap ones 0.1 to 0.5). Above 0 the "
+        "direction of gravity by `imu` corrects roll and pitch, once a second. 0: the accelerometer is not used."),
+    F64("states.accelerometer_bias_walk", accelerometer_bias_walk, 0.0005, 0, 1,
+        "Random walk of that error, m/s2 per sqrt(s)."),
+    F64("noise.accelerometer_mps2", accelerometer_mps2, 0.03, 1e-4, 10,
+        "Sigma of the mean of a second of specific force, m/s2, besides what its scatter in that second (vibration, "
+        "bumps) and the velocity's noise add: scales, axes, the arm from base_link."),
     F64("noise.pixel_px", pixel_px, 0, 0, 1000,
         "Sigma of one coordinate of a point in a picture, px. 0: calibration.yaml's stereo.sigma_px, or 0.5 without "
         "that."),

@@ -28,8 +28,10 @@ typedef struct wm_stereo_ekf_params {
   double increment_scale_sigma, increment_direction_sigma;
   double range_bias_sigma, bearing_bias_sigma;
   double twist_lag_sigma;
+  double accelerometer_bias_sigma, accelerometer_bias_walk;
   // noise of one row
   double pixel_px;
+  double accelerometer_mps2;
   double gate_soft, gate_hard;
   // points found on the way
   int32_t increments;  // motion between pictures by tracks that are no points of the state

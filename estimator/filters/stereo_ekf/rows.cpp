@@ -95,6 +95,21 @@ bool stereo_ekf::point_rows(const wm_stereo &seen, const vec3 &place, double pla
   return true;
 }
 
+// Specific force at rest, R'g z + bias; R_true = Exp(dr) R changes it by g R'(z x dr).
+row_block stereo_ekf::gravity_rows(const vec3 &force, const double variance[3]) const {
+  row_block out;
+  const mat3 Rt = transposed(filter_.R());
+  const vec3 up = kGravity_mps2 * (Rt * vec3{0, 0, 1}), bias = filter_.head3(kForceBias);
+  const mat3 by_turn = kGravity_mps2 * (Rt * skew(vec3{0, 0, 1}));
+  const int turn = out.add_columns(kTurn, 3), own = out.add_columns(filter_.at(kForceBias), 3);
+  for (int i = 0; i < 3; i++) {
+    const int row = out.add_row(WM_RESIDUAL_X, force[i], force[i] - up[i] - bias[i], variance[i]);
+    for (int j = 0; j < 3; j++) out.by[row][turn + j] = by_turn.m[i][j];
+    out.by[row][own + i] = 1.0;
+  }
+  return out;
+}
+
 // Columns of the pose: `by_end`, derivatives by the end of `arm` (in the body) in map; `by_turn`, by a rotation of the
 // body about that end.
 void stereo_ekf::add_pose_columns(row_block *block, const past_pose &past, const vec3 &arm, const double (*by_end)[3],

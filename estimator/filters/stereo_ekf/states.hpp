@@ -30,6 +30,7 @@ enum head_state {
   kBearingBias,
   kVelocityLag,  // s: the measured velocity is ahead of the state of velocity by this
   kRateLag,
+  kForceBias,  // m/s2, of the accelerometer
   kHeadStates
 };
 
@@ -108,6 +109,13 @@ inline constexpr head_spec kHeadSpecs[kHeadStates] = {
     {1, 0, {"bearing.bias_rad"}, &stereo_params::bearing_bias_sigma, nullptr, nullptr, head_use::always},
     {1, 0, {"motion.velocity_lag_s"}, &stereo_params::twist_lag_sigma, nullptr, nullptr, head_use::with_rates},
     {1, 0, {"motion.rate_lag_s"}, &stereo_params::twist_lag_sigma, nullptr, nullptr, head_use::with_rates},
+    {3,
+     0,
+     {"motion.force_bias_x_mps2", "motion.force_bias_y_mps2", "motion.force_bias_z_mps2"},
+     &stereo_params::accelerometer_bias_sigma,
+     &stereo_params::accelerometer_bias_walk,
+     nullptr,
+     head_use::always},
 };
 
 constexpr int head_width_max() {

@@ -124,6 +124,7 @@ void stereo_ekf::init(const wm_stereo_ekf_params &params, const wm_setup &setup)
   setup_ = &setup;
   for (int i = 0; i < 4; i++) sigma_px_[i] = pixel_sigma(params, rig_, i);
   motion_.init(setup.motion, &setup.wheels, twist_noise_of(params, setup.rig));
+  gravity_.init(params.accelerometer_mps2);
   head_model models[kHeadStates];
   models_of(params_, models);
   filter_.init(behind.filter, models, params_.points_max);
@@ -178,7 +179,9 @@ wm_status stereo_ekf::predict(const wm_event &motion) {
   }
   if (now_ns_ != WM_TIME_NONE && start_ns_ != WM_TIME_NONE && now_ns_ < start_ns_) now_ns_ = start_ns_;
   move_to(motion.t_ns);
-  if (constant_velocity() && motion.kind != WM_EVENT_QUANTITIES) fuse_twist(motion);
+  if (constant_velocity() && (motion.kind != WM_EVENT_QUANTITIES || motion_.source().rates_are_fresh()))
+    fuse_twist(motion);
+  if (filter_.at(kForceBias) >= 0 && motion_.source().force_is_fresh()) fuse_gravity();
   return WM_OK;
 }
 

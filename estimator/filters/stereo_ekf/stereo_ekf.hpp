@@ -9,6 +9,7 @@
 #include "filters/core/record_list.hpp"
 #include "filters/core/rollback.hpp"
 #include "filters/relocalize/pose_consensus.hpp"
+#include "filters/stereo_ekf/gravity.hpp"
 #include "filters/stereo_ekf/params.h"
 #include "filters/stereo_ekf/picture_motion.hpp"
 #include "filters/stereo_ekf/space_filter.hpp"
@@ -86,6 +87,7 @@ class stereo_ekf {
   wm_status fuse_position(const wm_event &event, record_list records);
   wm_status fuse_heading(const wm_event &event, record_list records);
   void fuse_twist(const wm_event &motion);
+  void fuse_gravity();
   row_verdict fuse_point(const wm_stereo &seen, const vec3 &place, double place_sigma_m, int slot,
                          const wm_innovation &blank, record_list records);
   row_verdict fuse_rows(const row_block &block, const wm_innovation &blank, record_list records);
@@ -103,6 +105,7 @@ class stereo_ekf {
   bool heading_rows(const wm_heading &h, row_block *out) const;
   row_block twist_rows(head_state which, const vec3 &measured, const vec3 &slope_per_s, const vec3 &variance,
                        bool planar) const;
+  row_block gravity_rows(const vec3 &force, const double variance[3]) const;
   void add_pose_columns(row_block *block, const past_pose &past, const vec3 &arm, const double (*by_end)[3],
                         const double (*by_turn)[3]) const;
   void add_bias_column(row_block *block, int row, head_state which) const;
@@ -156,6 +159,7 @@ class stereo_ekf {
 
   space_filter filter_;
   spatial_motion motion_;
+  gravity_window gravity_;
   stereo_rig rig_;
   wm_stereo_ekf_params params_;
   const wm_setup *setup_;

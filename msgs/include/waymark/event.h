@@ -55,6 +55,11 @@ typedef enum wm_quantity {
   WM_Q_ROAD_WHEEL,               // rad at the road wheel
   WM_Q_STEERING_ACTUATOR,        // m, position of the linear actuator
   WM_Q_GEAR,                     // -1 reverse, 0 neutral, 1 forward
+  WM_Q_ROLL_RATE,                // rad/s about base_link's x axis, as the next ones on base_link's axes
+  WM_Q_PITCH_RATE,               // rad/s about y; yaw_rate is the one about z
+  WM_Q_ACCELERATION_X,           // m/s2, specific force: what an accelerometer measures, 9.8 upwards at rest
+  WM_Q_ACCELERATION_Y,           // m/s2
+  WM_Q_ACCELERATION_Z,           // m/s2
   WM_Q_COUNT
 } wm_quantity;
 

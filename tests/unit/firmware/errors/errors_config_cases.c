@@ -198,6 +198,7 @@ const error_case kErrorCases[] = {
      "rec/can-signals.yaml:1: [0].quantity: 'vehicle_sped' is unknown; did you mean 'vehicle_speed'? (one of: "
      "wheel_ticks_left, wheel_ticks_right, wheel_speed_front_left, wheel_speed_front_right, wheel_speed_rear_left, "
      "wheel_speed_rear_right, vehicle_speed, yaw_rate, steering_wheel, road_wheel, steering_actuator, gear, "
+     "roll_rate, pitch_rate, acceleration_x, acceleration_y, acceleration_z, "
      "gnss_latitude, gnss_longitude, gnss_altitude, gnss_sigma_xy, gnss_sigma_z, gnss_valid, gnss_altitude_valid)"},
     {REC, "Binding without a signal", "can-signals.yaml", "- {quantity: vehicle_speed, message: SPEED}\n",
      "rec/can-signals.yaml:1: [0]: signal: is missing"},

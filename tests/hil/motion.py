@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A holonomic robot without CAN: its twist comes at 50 Hz over LCM from another program, as do the bearings of landmarks, each when it
+arrived in the recording; landmark_ekf."""
+import csv
+import shutil
+
+import drives
+import landmarks
+import messages
+
+WORLD = "yard-holonomic"
+
+
+def twists(work, recording):
+    """(t_ns, message) of motion.csv."""
+    waymark = messages.types(work)
+    with open(recording / "motion.csv", newline="") as f:
+        for row in csv.DictReader(f):
+            said = waymark.motion_t()
+            said.t_ns = int(row["t_ns"])
+            said.v_mps, said.vy_mps, said.w_radps = (float(row[name]) for name in ("v_mps", "vy_mps", "w_radps"))
+            yield said.t_ns, said.encode()
+
+
+def prepare(work, root, here, simulate):
+    recording, scenario = drives.make(work, "motion", simulate, root / f"config/worlds/{WORLD}.yaml")
+    items, blob = [], bytearray()
+
+    def say(due_ns, t_ns, message, channel):
+        items.append((due_ns, f"l {t_ns} {len(blob)} {len(message)} {channel}"))
+        blob.extend(message)
+
+    for t_ns, message in twists(work, recording):
+        say(t_ns, t_ns, message, "WAYMARK_MOTION")
+    seconds = (items[-1][0] - items[0][0]) * 1e-9
+    for arrival_ns, t_ns, message in landmarks.sightings(work, recording):
+        say(arrival_ns, t_ns, message, "WAYMARK_SIGHTINGS")
+    drives.write(scenario, here, items, blob, seconds)
+    for name in ("calibration.yaml", "landmarks.csv"):
+        shutil.copy(recording / name, scenario)
+    (scenario / "robot.yaml").write_text(
+        (root / f"config/datasets/{WORLD}.yaml").read_text() + f"\ninitial_pose: {drives.start_of(recording)}\n"
+        "calibration: calibration.yaml\nlandmarks: landmarks.csv\n"
+        f"publish: {{lcm_url: '{drives.URL}'}}\nrealtime: {{priority: 40}}\n"
+        "devices: {lcm: [{stream: motion}], sightings: lcm}\n")
+
+
+def judge(work, waymark, root):
+    seconds = float((work / "share/motion/duration").read_text())
+    return drives.judge("motion", work, waymark, work / "motion-recording", root / f"config/datasets/{WORLD}.yaml", seconds)

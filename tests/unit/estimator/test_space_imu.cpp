@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: Apache-2.0
+// An IMU with three axes in space: its rates beside a velocity log, an axis that sticks, silence; gravity for roll and
+// pitch, with vibration and bumps.
+#include "motion/spatial_source.hpp"
+#include "stereo_scene.hpp"
+#include "waymark/health.h"
+
+namespace {
+
+constexpr double kG = 9.80665;
+
+wm_event imu(double t_s, const vec3 &w, const vec3 &a) {
+  return make::quantities(t_s, {{WM_Q_YAW_RATE, w.z},
+                                {WM_Q_ROLL_RATE, w.x},
+                                {WM_Q_PITCH_RATE, w.y},
+                                {WM_Q_ACCELERATION_X, a.x},
+                                {WM_Q_ACCELERATION_Y, a.y},
+                                {WM_Q_ACCELERATION_Z, a.z}});
+}
+
+wm_event velocity_log(double t_s, const vec3 &v, const vec3 &w = {0, 0, 0}) {
+  wm_event e = make::empty(t_s, WM_EVENT_TWIST6);
+  e.as.twist6 = {{v.x, v.y, v.z}, {w.x, w.y, w.z}};
+  return e;
+}
+
+double jitter(int i) { return i % 2 ? 1e-6 : -1e-6; }
+
+// stereo_ekf without pictures, from level, for `seconds`: the log ten times a second, the IMU a hundred times.
+struct vehicle : scene {
+  explicit vehicle(double bias_sigma_mps2 = 0.1) : scene(10) {
+    set("states.accelerometer_bias_sigma_mps2", bias_sigma_mps2);
+    set("noise.w_radps", 0.01);
+    setup.start.sigma_heading_rad = 0.1;
+    begin();
+  }
+  template <class Rates, class Force>
+  void go(double seconds, const vec3 &v, const vec3 &log_rates, Rates rates, Force force) {
+    const int end = (int)std::lround(seconds * 100);
+    for (int i = 0; i < end; i++, step_++) {
+      const double t = 0.01 * step_;
+      if (step_ % 10 == 0) take(velocity_log(t, v, log_rates));
+      const vec3 w = rates(step_);
+      if (std::isfinite(w.x)) take(imu(t, w, force(step_)));
+    }
+  }
+  void take(const wm_event &e) { TEST_ASSERT_EQUAL(WM_OK, ekf->predict(state, &e)); }
+  wm_estimate now() const {
+    wm_estimate out;
+    ekf->estimate(state, &out);
+    return out;
+  }
+  // Roll and pitch: of the body's axes, how far they leave the level.
+  void tilt(double *roll, double *pitch) const {
+    const wm_estimate e = now();
+    const mat3 R = matrix_of(quat_of(e.pose_map_base.q_xyzw));
+    *roll = R.m[2][1];
+    *pitch = -R.m[2][0];
+  }
+  // Of a rotation about an axis of the map.
+  double sigma_about(const vec3 &axis) const {
+    const wm_estimate e = now();
+    const vec3 in_body = transposed_times(matrix_of(quat_of(e.pose_map_base.q_xyzw)), axis);
+    double sum = 0;
+    for (int i = 0; i < 3; i++)
+      for (int j = 0; j < 3; j++) sum += in_body[i] * in_body[j] * e.covariance[wm_cov_index(3 + i, 3 + j)];
+    return std::sqrt(sum);
+  }
+  int step_ = 0;
+};
+
+vec3 at_rest(int) { return {0, 0, kG}; }
+
+void test_the_rates_are_the_imus_and_the_velocity_the_logs(void) {
+  vehicle v(0);
+  v.go(2, {0.5, 0, 0}, {0, 0, 0}, [](int i) { return vec3{jitter(i), jitter(i), 0.2}; }, at_rest);
+  const wm_estimate e = v.now();
+  TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.2 * 1.99, e.heading_rad);
+  TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.5 / 0.2 * std::sin(0.398), e.pose_map_base.p_m[0]);
+  TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.5 / 0.2 * (1 - std::cos(0.398)), e.pose_map_base.p_m[1]);
+}
+
+void test_a_silent_imu_yields_to_the_logs_rates(void) {
+  vehicle v(0);
+  v.go(1, {0, 0, 0}, {0, 0, 0.1}, [](int i) { return vec3{jitter(i), jitter(i), 0.3}; }, at_rest);
+  const double before = v.now().heading_rad;
+  v.go(3, {0, 0, 0}, {0, 0, 0.1}, [](int) { return vec3{NAN, 0, 0}; }, at_rest);
+  TEST_ASSERT_DOUBLE_WITHIN(0.07, before + 0.3, v.now().heading_rad);  // a quarter of a second until it is noticed
+}
+
+// A velocity that holds while the gyro goes on is not certain for ever.
+void test_a_silent_log_beside_an_imu_makes_the_place_uncertain(void) {
+  vehicle v(0);
+  const auto turning = [](int i) { return vec3{jitter(i), jitter(i), 0.1}; };
+  v.go(2, {0.5, 0, 0}, {0, 0, 0}, turning, at_rest);
+  const double before_m = std::sqrt(v.now().covariance[0]);
+  for (int i = 0; i < 1000; i++, v.step_++) v.take(imu(0.01 * v.step_, turning(v.step_), {0, 0, kG}));
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.1, before_m);
+  TEST_ASSERT_GREATER_THAN_DOUBLE(1.0, std::sqrt(v.now().covariance[0]));
+}
+
+void test_a_stuck_axis_is_found(void) {
+  spatial_source source;
+  source.init(2);
+  bool stuck = false;
+  for (int i = 0; i < 500 && !stuck; i++) {
+    const double t = 0.01 * i;
+    spatial_twist log = {{0, 0, 0}, {0.2, 0, 0}}, none = {};
+    if (i % 10 == 0) (void)source.take(velocity_log(t, {0, 0, 0}, {0.2, 0, 0}), &log);
+    (void)source.take(imu(t, {0.0, jitter(i), jitter(i)}, {0, 0, kG}), &none);
+    stuck = source.is_stuck();
+    if (stuck) TEST_ASSERT_DOUBLE_WITHIN(0.2, 3.0, t);
+  }
+  TEST_ASSERT_TRUE(stuck);
+  spatial_twist now = {};
+  TEST_ASSERT_TRUE(source.take(imu(6, {0.0, 0.1, 0.3}, {0, 0, kG}), &now));
+  TEST_ASSERT_EQUAL_DOUBLE(0.2, now.w.x);
+  TEST_ASSERT_EQUAL_DOUBLE(0.3, now.w.z);
+  TEST_ASSERT_TRUE(source.take(imu(6.01, {0.19, 0.1, 0.3}, {0, 0, kG}), &now));
+  TEST_ASSERT_FALSE(source.is_stuck());
+  TEST_ASSERT_EQUAL_DOUBLE(0.19, now.w.x);
+}
+
+void test_the_filter_reports_a_stuck_axis(void) {
+  vehicle v(0);
+  v.go(12, {0, 0, 0}, {0, 0, 0}, [](int i) { return vec3{0.05, jitter(i), jitter(i)}; }, at_rest);
+  TEST_ASSERT_TRUE(v.ekf->motion_health(v.state) & WM_MOTION_HEALTH_YAW_RATE_STUCK);
+}
+
+// Specific force of a vehicle that rolls by 0.05 and pitches by -0.08 rad, whose filter begins level.
+vec3 tilted(int) {
+  return {kG * std::sin(0.08), kG * std::cos(0.08) * std::sin(0.05), kG * std::cos(0.08) * std::cos(0.05)};
+}
+vec3 still(int i) { return {jitter(i), jitter(i), jitter(i)}; }
+
+void test_gravity_levels(void) {
+  vehicle v(0.01);
+  v.go(20, {0, 0, 0}, {0, 0, 0}, still, tilted);
+  double roll, pitch;
+  v.tilt(&roll, &pitch);
+  TEST_ASSERT_DOUBLE_WITHIN(0.003, 0.05, roll);
+  TEST_ASSERT_DOUBLE_WITHIN(0.003, -0.08, pitch);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.005, v.sigma_about({1, 0, 0}));
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.005, v.sigma_about({0, 1, 0}));
+  TEST_ASSERT_GREATER_THAN_DOUBLE(0.08, v.sigma_about({0, 0, 1}));  // gravity shows no heading
+}
+
+void test_without_the_state_gravity_is_not_used(void) {
+  vehicle v(0);
+  v.go(5, {0, 0, 0}, {0, 0, 0}, still, tilted);
+  double roll, pitch;
+  v.tilt(&roll, &pitch);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-4, 0, roll);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-4, 0, pitch);
+}
+
+// 3 m/s2 at 23 Hz, and a bump of 30 m/s2 every two seconds: the tilt stays within its sigma.
+void test_vibration_and_bumps_tilt_nothing(void) {
+  vehicle v(0.01);
+  v.go(20, {0, 0, 0}, {0, 0, 0}, still, [](int i) {
+    const double shaken = 3 * std::sin(2 * M_PI * 23 * 0.01 * i), bump = i % 200 < 5 ? 30.0 : 0.0;
+    return vec3{shaken + 0.3 * bump, shaken, kG + shaken + bump};
+  });
+  double roll, pitch;
+  v.tilt(&roll, &pitch);
+  const double sigma = std::sqrt(v.now().covariance[wm_cov_index(4, 4)]);
+  TEST_ASSERT_DOUBLE_WITHIN(2 * sigma, 0, pitch);
+  TEST_ASSERT_DOUBLE_WITHIN(0.03, 0, roll);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.05, sigma);
+}
+
+// The log's change of velocity is no tilt: 1 m/s2 forwards for 2 s.
+void test_an_acceleration_that_the_log_measures_is_no_tilt(void) {
+  vehicle v(0.01);
+  v.go(2, {0, 0, 0}, {0, 0, 0}, still, at_rest);
+  for (int i = 0; i < 200; i++, v.step_++) {
+    const double t = 0.01 * v.step_;
+    if (v.step_ % 10 == 0) v.take(velocity_log(t, {0.01 * i + 0.05, 0, 0}));
+    v.take(imu(t, still(v.step_), {1, 0, kG}));
+  }
+  v.go(1, {2, 0, 0}, {0, 0, 0}, still, at_rest);
+  double roll, pitch;
+  v.tilt(&roll, &pitch);
+  TEST_ASSERT_DOUBLE_WITHIN(0.01, 0, pitch);
+}
+
+}  // namespace
+
+void setUp(void) {}
+void tearDown(void) {}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(test_the_rates_are_the_imus_and_the_velocity_the_logs);
+  RUN_TEST(test_a_silent_imu_yields_to_the_logs_rates);
+  RUN_TEST(test_a_silent_log_beside_an_imu_makes_the_place_uncertain);
+  RUN_TEST(test_a_stuck_axis_is_found);
+  RUN_TEST(test_the_filter_reports_a_stuck_axis);
+  RUN_TEST(test_gravity_levels);
+  RUN_TEST(test_without_the_state_gravity_is_not_used);
+  RUN_TEST(test_vibration_and_bumps_tilt_nothing);
+  RUN_TEST(test_an_acceleration_that_the_log_measures_is_no_tilt);
+  return UNITY_END();
+}
