@@ -6,7 +6,7 @@ docs.py references checks alone, that
 - each reference cited as [Author2015] stands once in docs/references.md;
 - what docs/glossary.md, docs/design.md and docs/runtime.md name in code is there;
 - docs/runtime.md names all files of the robot's rooms that have atomics, locks or shared memory;
-- docs/faults.md's table of faults names tests that there are;
+- docs/failures.md's table of faults names tests that there are;
 - docs/troubleshooting.md has a section for each finding, and no other;
 - docs/images/threads.svg is what its script draws."""
 import collections
@@ -154,17 +154,17 @@ def named_files():
 
 
 def fault_tests():
-    """Prints tests in the last column of docs/faults.md's table of faults that are not there; returns how many."""
+    """Prints tests in the last column of docs/failures.md's table of faults that are not there; returns how many."""
     made = "".join(path.read_text() for pattern in ("CMakeLists.txt", "*.cmake") for path in (ROOT / "tests").rglob(pattern))
     drives = re.search(r"DRIVES = \{.*?\}", (ROOT / "tests/faults/faults.py").read_text(), re.DOTALL)[0]
     parts = (ROOT / "tests/hil/hil.py").read_text()
-    faults, rows = 0, re.findall(r"(?m)^\| [^|]+ \|[^|]*\|[^|]*\|[^|]*\| ([^|]+) \|$", (ROOT / "docs/faults.md").read_text().split("## While CAN")[0])
+    faults, rows = 0, re.findall(r"(?m)^\| [^|]+ \|[^|]*\|[^|]*\|[^|]*\| ([^|]+) \|$", (ROOT / "docs/failures.md").read_text().split("## While CAN")[0])
     for name in (name.split(" (")[0] for row in rows for name in row.split(", ") if name not in ("test", "---")):
         kind, _, what = name.partition(" ")
         found = {"faults": f'"{what}"' in drives, "hil": f'"{what}": [' in parts}.get(kind, re.search(rf"\b{kind.removeprefix('test_estimator_')}\b", made))
         if not found:
             faults += 1
-            print(f"docs/faults.md: there is no test {name}")
+            print(f"docs/failures.md: there is no test {name}")
     return faults if len(rows) > 20 else 1
 
 
