@@ -13,9 +13,10 @@
 static const char kHelp[] =
     "usage: waymark play RECORDING [options]\n"
     "\n"
-    "Plays a recording into real interfaces, each datum at its own time by one clock: CAN frames into SocketCAN,\n"
-    "pictures into V4L2 output devices (v4l2loopback), all other streams over LCM, stamped on this computer's\n"
-    "monotonic clock. States at the end how late each stream was, and what has no place. Ctrl-C ends it.\n"
+    "Plays a recording into CAN, cameras and LCM, each datum at its own time by one clock.\n"
+    "CAN frames go into SocketCAN, pictures into V4L2 output devices (v4l2loopback), all other streams over LCM with\n"
+    "stamps of this computer's monotonic clock. At the end it states how late each stream was, and what has no place.\n"
+    "Ctrl-C ends it with this summary.\n"
     "\n"
     "  --config FILE    a run's configuration: its `devices:` are where the data go\n"
     "  --can RECORDED=INTERFACE\n"
