@@ -50,10 +50,9 @@ def write_recording(folder):
         (folder / f"video/{name}.csv").write_text("frame,t_ns\n" + "".join(rows))
 
 
-def prepare(work, root, here, simulate):
-    scenario = work / "share/play"
+def write_scenario(scenario, work, root, simulate):
+    """The recording, and the configuration of who records it."""
     write_recording(scenario / "recording")
-    shutil.copy(simulate.with_name("waymark-play"), scenario)
     world = work / "play-world"
     shutil.rmtree(world, ignore_errors=True)
     subprocess.run([simulate, root / "config/worlds/crossing.yaml", "--no-video", "--duration", "2", "--out", world], check=True)
@@ -67,6 +66,12 @@ def prepare(work, root, here, simulate):
         "devices:\n  can: [{interface: vcan0}, {interface: vcan1}]\n  cameras:\n"
         f"  - {{name: left, device: /dev/video10, format: MJPG, rate_hz: {PICTURES_HZ}}}\n"
         f"  - {{name: right, device: /dev/video11, format: GREY, rate_hz: {PICTURES_HZ}}}\n")
+
+
+def prepare(work, root, here, simulate):
+    scenario = work / "share/play"
+    write_scenario(scenario, work, root, simulate)
+    shutil.copy(simulate.with_name("waymark-play"), scenario)
     (scenario / "faults.yaml").write_text(
         "format: waymark-faults/1\nfaults:\n"
         "- {name: down, fault: bus_down, bus: can0, from_s: 1, until_s: 2}\n"
@@ -96,20 +101,21 @@ def percentile(values, share):
     return sorted(values)[min(len(values) - 1, int(share * len(values)))]
 
 
-def judge_whole(out, played):
+def judge_whole(recorded, recording, offset_ns):
+    """What was recorded is what was played, `offset_ns` later."""
     failures, late = [], {}
     for name, to in (("can0", "vcan0"), ("can1", "vcan1")):
         sent = [(t, f) for t, i, f in sorted(frames()) if i == name]
-        heard = read_can(out / "rec/can.log", to)
+        heard = read_can(recorded / "can.log", to)
         same = [f for _, f in sent] == [f for _, f in heard]
-        late[name] = [h[0] - s[0] - played["offset_ns"] for s, h in zip(sent, heard)]
+        late[name] = [h[0] - s[0] - offset_ns for s, h in zip(sent, heard)]
         print(f"play: {to}: {len(heard)} frames recorded of {len(sent)}, {'the same in their order' if same else 'NOT the same'}")
         if not same:
             failures.append(f"play: {to} has other frames than the recording")
     for name in ("left", "right"):
-        wanted = read_stamps(out.parent.parent / f"play/recording/video/{name}.csv")
-        heard = read_stamps(out / f"rec/video/{name}.csv")
-        late[name] = [h - w - played["offset_ns"] for w, h in zip(wanted, heard)]
+        wanted = read_stamps(recording / f"video/{name}.csv")
+        heard = read_stamps(recorded / f"video/{name}.csv")
+        late[name] = [h - w - offset_ns for w, h in zip(wanted, heard)]
         print(f"play: {name}: {len(heard)} pictures recorded of {len(wanted)}")
         if len(heard) != len(wanted):
             failures.append(f"play: {name}: {len(heard)} pictures of {len(wanted)}")
@@ -120,9 +126,11 @@ def judge_whole(out, played):
     # Of each picture against the frame of can0 that was due just before it.
     at = {s[0]: x for s, x in zip(sorted(f for f in frames() if f[1] == "can0"), late["can0"])}
     times = sorted(at)
-    wanted = read_stamps(out.parent.parent / "play/recording/video/left.csv")
+    wanted = read_stamps(recording / "video/left.csv")
     skews = [abs(x - at[max(t for t in times[max(0, (w - FIRST_NS) * RATE_HZ // 10**9 - 3):(w - FIRST_NS) * RATE_HZ // 10**9 + 3] if t <= w)]) / 1e6
              for w, x in zip(wanted, late["left"])]
+    if not skews:
+        return failures + ["play: there are no pictures"]
     print(f"play: skew between CAN and pictures {percentile(skews, 0.99):.3f} ms (p99), between the two cameras {percentile(pairs, 0.99):.3f} ms (p99)")
     if percentile(skews, 0.99) > SKEW_MS or percentile(pairs, 0.99) > SKEW_MS:
         failures.append("play: the skew is too large")
@@ -132,7 +140,7 @@ def judge_whole(out, played):
 def judge(work, waymark, root):
     out = work / "share/out/play"
     played = json.loads((out / "played.json").read_text())
-    failures = judge_whole(out, played)
+    failures = judge_whole(out / "rec", work / "share/play/recording", played["offset_ns"])
     broken = json.loads((out / "broken.json").read_text())
     done = {f["name"]: f["done"] for f in broken["faults"]}
     print(f"play: with faults: {done}; {[(s['name'], s['sent'], s['failed']) for s in broken['streams']]}")
