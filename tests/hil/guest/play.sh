@@ -10,7 +10,7 @@ for can in vcan0 vcan1; do
   ip link add $can type vcan
   ip link set $can up
 done
-for tool in "waymark check robot.yaml" "waymark play --help" "waymark record --help"; do $tool >/dev/null 2>&1; done
+for tool in "chrt -h" "waymark check robot.yaml" "waymark play --help" "waymark record --help"; do $tool >/dev/null 2>&1; done
 cat recording/can.log recording/video/*.avi >/dev/null
 fails=0
 fail() { echo "FAIL: $*"; fails=$((fails + 1)); }
@@ -20,7 +20,7 @@ played() {
   local name=$1 json=$2
   shift 2
   # The player has the devices first: a camera's format is that of its writer.
-  waymark play recording --can can0=vcan0 --can can1=vcan1 --camera left=/dev/video10,MJPG --camera right=/dev/video11,GREY --lcm off \
+  chrt -f 45 waymark play recording --can can0=vcan0 --can can1=vcan1 --camera left=/dev/video10,MJPG --camera right=/dev/video11,GREY --lcm off \
     --start-at $(($(cut -d. -f1 /proc/uptime) * 1000000000 + 6000000000)) --json "$json" "$@" >"$name.txt" 2>&1 &
   local player=$!
   sleep 1
