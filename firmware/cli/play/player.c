@@ -156,6 +156,7 @@ static void *send_in_time(void *context) {
   (void)prctl(PR_SET_TIMERSLACK, 1UL, 0UL, 0UL, 0UL);  // else sleeps end up to 50 us late
   while (take(self, &w)) {
     const wm_time_ns due_ns = player_monotonic_ns(self, w.item.due_ns);
+    atomic_store(&self->next_ns, due_ns);
     if (sleep_until(self, due_ns)) give_out(self, &w.item, due_ns);
     atomic_store(&self->at_ns, w.item.due_ns);
     free(w.data);
