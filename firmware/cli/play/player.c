@@ -57,9 +57,19 @@ static void put(player *self, const wm_play_item *item, uint8_t *copy) {
   (void)pthread_mutex_unlock(&t->lock);
 }
 
+// Under a real-time policy (chrt) decoding and encoding must not keep the sending thread waiting.
+static void step_back(void) {
+  int policy;
+  struct sched_param param;
+  if (pthread_getschedparam(pthread_self(), &policy, &param) != 0 || policy == SCHED_OTHER) return;
+  if (param.sched_priority > 1) param.sched_priority--;
+  (void)pthread_setschedparam(pthread_self(), policy, &param);
+}
+
 static void *read_ahead(void *context) {
   player *self = context;
   struct player_threads *t = self->threads;
+  step_back();
   wm_status status = WM_OK;
   while (status == WM_OK && !atomic_load(&self->stop)) {
     wm_play_item item;
