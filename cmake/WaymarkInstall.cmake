@@ -9,7 +9,7 @@ endif()
 set(WM_PACKAGE_DIR ${CMAKE_SOURCE_DIR}/toolchain/package)
 
 # ── the robot's ──────────────────────────────────────────────────────────────────────────────────────────────────────
-install(TARGETS waymark DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT runtime)
+install(TARGETS waymark waymark-play DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT runtime)
 install(DIRECTORY config/etc/ DESTINATION etc/waymark COMPONENT runtime)
 install(FILES config/waymark.service DESTINATION lib/systemd/system COMPONENT runtime)
 install(FILES ${WM_PACKAGE_DIR}/60-waymark.rules DESTINATION lib/udev/rules.d COMPONENT runtime)
@@ -19,8 +19,8 @@ install(FILES ${WM_PACKAGE_DIR}/completion/_waymark DESTINATION ${CMAKE_INSTALL_
   COMPONENT runtime)
 file(GLOB examples CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/config/*.yaml)
 install(FILES ${examples} DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/waymark/examples COMPONENT runtime)
-install(DIRECTORY config/datasets DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/waymark/examples COMPONENT runtime)
-install(FILES docs/config.md docs/live.md docs/motion-sources.md docs/errors.md DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/waymark COMPONENT runtime)
+install(DIRECTORY config/datasets config/faults DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/waymark/examples COMPONENT runtime)
+install(FILES docs/config.md docs/live.md docs/motion-sources.md docs/errors.md docs/play.md docs/faults.md DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/waymark COMPONENT runtime)
 
 # Manual pages are compressed as Debian wants them: without a time, so that the same sources give the same bytes.
 function(wm_install_compressed file name where component)
@@ -31,6 +31,7 @@ function(wm_install_compressed file name where component)
   install(FILES ${made} DESTINATION ${CMAKE_INSTALL_DATADIR}/${where} COMPONENT ${component})
 endfunction()
 wm_install_compressed(${WM_PACKAGE_DIR}/man/waymark.1 waymark.1 man/man1 runtime)
+wm_install_compressed(${WM_PACKAGE_DIR}/man/waymark-play.1 waymark-play.1 man/man1 runtime)
 if(TARGET waymark-camera)
   install(TARGETS waymark-camera DESTINATION lib/waymark COMPONENT runtime)
 endif()

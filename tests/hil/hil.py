@@ -5,7 +5,7 @@ real (emulated) CAN controller, under qemu's instruction clock, fed from a recor
 
 usage: hil.py [--arch arm64|armhf] [--package DEB] WORK WAYMARK WAYMARK_SIMULATE [PART ...]
 
-WORK keeps the guest's image from run to run; WAYMARK is this computer's; parts: can, camera, libcamera, landmarks, motion, edges, walls,
+WORK keeps the guest's image from run to run; WAYMARK is this computer's; parts: can, camera, libcamera, play, landmarks, motion, edges, walls,
 service, power; all of them but power where none is named. Without --arch the guest runs WAYMARK itself, under systemd the package; else the package in all parts.
 The service and power parts run the package under systemd; without one they are left out. armhf is arm64's kernel with armhf's programs.
 
@@ -25,6 +25,7 @@ import drives
 import edges
 import landmarks
 import motion
+import player
 import service
 import vimc
 import walls
@@ -255,6 +256,7 @@ PARTS = {
     "can": [("can", scenario_can, judge_can, CAN, SLOW, "")],
     "camera": [("camera", scenario_camera, judge_camera, DISK, SLOW, "")],
     "libcamera": [("libcamera", lambda work, _: vimc.prepare(work), lambda work, _: vimc.judge(work), [], SLOW, "")],
+    "play": [("play", OF_ROOT(player.prepare), AT_ROOT(player.judge), [], FAST, "")],
     "landmarks": [("landmarks", OF_ROOT(landmarks.prepare), AT_ROOT(landmarks.judge), CAN, FAST, "")],
     "motion": [("motion", OF_ROOT(motion.prepare), AT_ROOT(motion.judge), CAN, FAST, "")],
     "edges": [("edges", OF_ROOT(edges.prepare), AT_ROOT(edges.judge), CAN, FAST, "")],
