@@ -19,6 +19,18 @@ size_t jpeg_bytes_max(uint32_t width_px, uint32_t height_px) {
   return tjBufSize((int)width_px, (int)height_px, TJSAMP_444);
 }
 
+#define QUALITY 95  // errors of some grey levels at most
+
+size_t jpeg_encode_grey(const uint8_t *grey, uint32_t width_px, uint32_t height_px, uint8_t *out) {
+  unsigned long length = tjBufSize((int)width_px, (int)height_px, TJSAMP_444);
+  tjhandle handle = tjInitCompress();
+  if (!handle) return 0;
+  const int failed = tjCompress2(handle, grey, (int)width_px, (int)width_px, (int)height_px, TJPF_GRAY, &out, &length,
+                                 TJSAMP_GRAY, QUALITY, TJFLAG_ACCURATEDCT | TJFLAG_NOREALLOC);
+  (void)tjDestroy(handle);
+  return failed ? 0 : length;
+}
+
 jpeg_verdict jpeg_size(jpeg_decoder *self, const uint8_t *data, size_t length, uint32_t *width_px,
                        uint32_t *height_px) {
   int width, height, sampling, space;

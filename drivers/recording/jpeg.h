@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// JPEG to grey by libturbojpeg.
+// JPEG to grey, and grey to JPEG, by libturbojpeg.
 #ifndef WM_RECORDING_JPEG_H
 #define WM_RECORDING_JPEG_H
 
@@ -26,6 +26,8 @@ jpeg_verdict jpeg_size(jpeg_decoder *self, const uint8_t *data, size_t length, u
 // SIMD and without. `why` gets the reason of a verdict that isn't good.
 jpeg_verdict jpeg_decode(jpeg_decoder *self, const uint8_t *data, size_t length, uint32_t width_px, uint32_t height_px,
                          uint8_t *grey, uint32_t stride_bytes, char *why, size_t why_bytes);
+// Encodes packed rows of grey pixels at the quality 95; `out` holds jpeg_bytes_max. Returns the length, 0 on failure.
+size_t jpeg_encode_grey(const uint8_t *grey, uint32_t width_px, uint32_t height_px, uint8_t *out);
 // Most bytes of a JPEG of this size: a larger one is invalid.
 size_t jpeg_bytes_max(uint32_t width_px, uint32_t height_px);
 

@@ -7,6 +7,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "about.h"
 #include "calibration.h"
 #include "can_stream.h"
 #include "streams.h"
@@ -49,7 +50,7 @@ static wm_status choose(const wm_recording *self, const char *override, const ch
   return status;
 }
 
-static wm_status check_format(const wm_yaml_node *root, wm_error *err) {
+wm_status recording_check_format(const wm_yaml_node *root, wm_error *err) {
   char format[64];
   wm_yaml_node node = wm_yaml_get(root, "format");
   if (!wm_yaml_there(&node))
@@ -134,7 +135,7 @@ static wm_status read_about(wm_recording *self, wm_error *err) {
   wm_yaml_node name = wm_yaml_get(&root, "name"), duration = wm_yaml_get(&root, "duration_s"),
                offset = wm_yaml_get(&root, "truth_offset_m"), streams = wm_yaml_get(&root, "streams");
   double offset_m[3];
-  status = check_format(&root, err);
+  status = recording_check_format(&root, err);
   if (status == WM_OK && wm_yaml_there(&name)) status = wm_yaml_string(&name, self->name, sizeof self->name, err);
   if (status == WM_OK && wm_yaml_there(&duration)) status = wm_yaml_f64(&duration, 0, 1e9, &self->duration_s, err);
   if (status == WM_OK && wm_yaml_there(&offset)) status = wm_yaml_f64_list(&offset, 3, 3, offset_m, NULL, err);

@@ -14,6 +14,7 @@
 #include "csv.h"
 #include "decoded.h"
 #include "jpeg.h"
+#include "video_raw.h"
 
 #define PICTURE_SIDE_MAX 16384  // pixels
 #define INTERVALS 9             // the usual period is their median
@@ -534,3 +535,13 @@ void wm_video_close(wm_video *self) {
 }
 
 const wm_video_counts *wm_video_counted(const wm_video *self) { return &self->counts; }
+
+// ── as they are stored ──────────────────────────────────────────────────────────────────────────────────────────────
+
+const container *video_container(const wm_video *self) { return &self->file; }
+const payload *video_peeked(const wm_video *self) { return &self->next.picture; }
+
+void video_size(const wm_video *self, uint32_t *width_px, uint32_t *height_px) {
+  *width_px = self->width_px;
+  *height_px = self->height_px;
+}

@@ -45,6 +45,7 @@ static const struct {
     {"init", "make the configuration of a new robot from what it has", "waymark-tools"},
     {"map", "make, check and survey maps; print markers", "waymark-tools"},
     {"mine", "what black boxes hold, by place and by cause", "waymark-fleet"},
+    {"play", "play a recording into CAN, cameras and LCM, with faults", "waymark"},
     {"reference", "smooth a run into a reference trajectory", "waymark-tools"},
     {"report", "show a run as one page", "waymark-tools"},
     {"ros2", "give a run's poses to ROS 2, and its data to the run", "waymark-ros2"},

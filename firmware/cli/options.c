@@ -8,7 +8,7 @@
 
 #include "waymark/text.h"
 
-#define OPTIONS_MAX 16  // of a command
+#define OPTIONS_MAX 24  // of a command
 
 static const option *find(const option *options, size_t count, const char *name, size_t length) {
   for (size_t i = 0; i < count; i++)
@@ -34,6 +34,14 @@ static wm_status set(const option *o, const char *value, wm_error *err) {
       if (!*value) return wm_fail(err, WM_BAD_USAGE, "%s: is empty", o->name);
       *(const char **)o->out = value;
       return WM_OK;
+    case OPTION_TEXTS: {
+      option_texts *texts = o->out;
+      if (!*value) return wm_fail(err, WM_BAD_USAGE, "%s: is empty", o->name);
+      if (texts->count == OPTION_TEXTS_MAX)
+        return wm_fail(err, WM_BAD_USAGE, "%s: appears more than %d times", o->name, OPTION_TEXTS_MAX);
+      texts->text[texts->count++] = value;
+      return WM_OK;
+    }
     case OPTION_U64: {
       unsigned long long v = strtoull(value, &rest, 10);
       if (*value < '0' || *value > '9' || *rest || errno)
@@ -41,10 +49,12 @@ static wm_status set(const option *o, const char *value, wm_error *err) {
       *(uint64_t *)o->out = v;
       return WM_OK;
     }
-    case OPTION_F64: {
+    case OPTION_F64:
+    case OPTION_F64_FROM_0: {
       double v = strtod(value, &rest);
-      if (!*value || *rest || !isfinite(v) || v <= 0)
-        return wm_fail(err, WM_BAD_USAGE, "%s: '%s' is not a number above 0", o->name, value);
+      if (!*value || *rest || !isfinite(v) || v < 0 || (v == 0 && o->kind == OPTION_F64))
+        return wm_fail(err, WM_BAD_USAGE, "%s: '%s' is not a number %s", o->name, value,
+                       o->kind == OPTION_F64 ? "above 0" : "from 0 on");
       *(double *)o->out = v;
       return WM_OK;
     }
