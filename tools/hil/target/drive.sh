@@ -6,6 +6,7 @@
 #   buses    RUN=PLAYER ...    bitrate  bit/s   has_fd 1: FD    cameras  devices
 #   where    local guest host  played   1: the program has a recording in the place of the kernel's drivers
 #   url      of LCM            priority of the estimator        faults   1: faults.sh has those that happen to the computer
+#   from_s   of the recording  lead_s   before the first datum
 # It ends when standard input does: then the desk is gone. Whatever ends it, interfaces, modules and processes are as before.
 set -u
 cd "$(dirname "$(readlink -f "$0")")/.." || exit 2
@@ -113,7 +114,7 @@ interfaces() {
 }
 
 # ── what is measured beside the run ─────────────────────────────────────────────────────────────────────────────────
-exec {idle}<> <(:) # never readable: `read -t` on it sleeps without a process
+mkfifo state/idle && exec {idle}<>state/idle # nothing comes: `read -t` on it sleeps without a process
 nap() { read -rt "$1" _ <&"$idle"; }
 
 sample_computer() { # T
@@ -214,24 +215,23 @@ step begin
 start_run || exit 1
 start_ns=$(($(now_ns) + ${lead_s}000000000))
 echo "$start_ns" >out/start_ns
-real_time=""
-chrt -f 45 true 2>/dev/null && real_time="chrt -f 45"
 if [ "$played" = 1 ]; then
   echo "$start_ns" >played/begin.new && mv played/begin.new played/begin
 fi
-# shellcheck disable=SC2086
-$real_time "$waymark" play recording "${play[@]}" --start-at "$start_ns" --json out/played.json >out/played.txt 2>&1 &
+"$waymark" play recording "${play[@]}" --start-at "$start_ns" --json out/played.json >out/played.txt 2>&1 &
 player=$!
 begun "$player"
 sample "$start_ns" 3>&1 >out/samples.txt &
 begun $!
 if [ "$faults" = 1 ]; then
   . ./target/faults.sh
-  break_things "$start_ns" &
+  break_things "$(awk -v start="$start_ns" -v from="$from_s" 'BEGIN {printf "%.0f", start - from * 1e9}')" &
   breaker=$!
   begun "$breaker"
 fi
 wake_ups
+nap $((lead_s - 2))
+chrt -a -f -p 45 "$player" 2>/dev/null # not before: reading the recording at this priority would hold the run up
 step drive
 wait "$player"
 code=$?

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 # By drive.sh: what happens to the computer and its processes, at the times of faults.plan. A line there is "NUMBER FROM UNTIL KIND A B TEXT":
-# seconds since the start, numbers of the fault, and a text ("-": none). What was done when is written to out/faults.txt; a fault that this
+# seconds since the recording's first datum, numbers of the fault, and a text ("-": none). What was done when is written to out/faults.txt; a fault that this
 # target does not have is written there as "absent", with the reason.
 
 wait_until() { # SECONDS since start_ns
@@ -92,7 +92,7 @@ fault_bus_removed() {
     before=$(ls /sys/class/net)
     echo 1 | as_root tee /sys/bus/pci/rescan >/dev/null
     sleep 0.3
-    after=$(comm -13 <(sort <<<"$before") <(ls /sys/class/net | sort) | head -1)
+    after=$(ls /sys/class/net | grep -vxF "$before" | head -1)
     [ "$after" = "$one" ] || as_root ip link set "$after" name "$one"
     as_root ip link set "$one" up type can bitrate "$bitrate" restart-ms 100
   else

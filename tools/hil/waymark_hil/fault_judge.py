@@ -9,6 +9,7 @@ from . import lcm_log
 _HEALTH_PERIOD_S = 1.0  # health is sent once a second: a state is seen up to so much later
 # A pose is as good as before when its sigma is at most three times that of before: the filter narrows it further for seconds.
 _AS_BEFORE = 3
+_COUNTED_S = 0.2  # a gap is counted when the next datum comes
 FLAGS = {"motion_stale": 1, "fusion_stale": 2, "jumped": 4}
 CAUSES = ["none", "contradicted", "refused", "inconsistent", "biased", "lost_again", "unknown_identities", "silent", "off_map"]
 
@@ -106,7 +107,7 @@ def _holds(checks, group, name, heard, statement, fault):
 def _counts(checks, group, name, heard, statement, fault):
     from_s, until_s = _span(fault, heard)
     before = [h for t, h in heard.healths if t <= from_s]
-    after = [h for t, h in heard.healths if t >= until_s] or [h for _, h in heard.healths[-1:]]
+    after = [h for t, h in heard.healths if t >= until_s + _COUNTED_S] or [h for _, h in heard.healths[-1:]]
     ends = []
     for health in (before[-1:], after[:1]):
         source = lcm_log.source(health[0], statement["source"]) if health else None

@@ -64,9 +64,9 @@ def _faults(given, waymark):
     """The faults file, checked by `waymark play`."""
     if not given.faults:
         return []
-    done = subprocess.run([waymark, "play", given.recording, "--faults", given.faults, "--check-faults"], capture_output=True, text=True, check=False)
+    done = subprocess.run([waymark, "play", given.recording, "--faults", given.faults, "--print-faults"], capture_output=True, text=True, check=False)
     if done.returncode:
-        raise HilError((done.stderr.strip() or f"waymark play --check-faults: exit code {done.returncode}").removeprefix("waymark: "))
+        raise HilError((done.stderr.strip() or f"waymark play --print-faults: exit code {done.returncode}").removeprefix("waymark: "))
     return json.loads(done.stdout)["faults"]
 
 
@@ -95,7 +95,7 @@ def _quote(values):
     return " ".join(shlex.quote(str(value)) for value in values)
 
 
-def _runner_plan(faults, seconds):
+def _runner_plan(faults, until_s):
     """faults.plan: those that happen to the computer and its processes."""
     lines = []
     for number, fault in enumerate(faults):
@@ -126,18 +126,18 @@ def _write_plan(folder, given, target, rec, faults, derived):
     play += ["--from", f"{from_s:g}"] if from_s else []
     play += ["--until", f"{until_s:g}"] if given.until_s is not None else []
     bits = max((bus.bits / max(rec.seconds, 1) for bus in rec.buses), default=0)
-    runner = _runner_plan(faults, seconds)
+    runner = _runner_plan(faults, until_s)
     (folder / "faults.plan").write_text(runner)
     program = "waymark" if target.where != "local" else str(target.program)
     lines = {"waymark": program, "seconds": f"{seconds:.2f}", "buses": " ".join(f"{run}={player[run]}" for _, run in buses),
              "bitrate": 500000 if bits < 400000 else 1000000, "has_fd": int(any(bus.has_fd for bus in rec.buses)),
              "cameras": " ".join(camera["device"] for camera in cameras), "where": target.where, "played": int(bool(target.played)),
-             "url": config["publish"]["lcm_url"], "priority": (config.get("realtime") or {}).get("priority", "80"), "faults": int(bool(runner)), "lead_s": targets.LEAD_S}
+             "url": config["publish"]["lcm_url"], "priority": (config.get("realtime") or {}).get("priority", "80"), "from_s": f"{from_s:g}", "faults": int(bool(runner)), "lead_s": targets.LEAD_S}
     (folder / "plan.sh").write_text("".join(f"{key}={shlex.quote(str(value))}\n" for key, value in lines.items()) + f"play=({_quote(play)})\n")
     shutil.copytree(targets.SCRIPTS, folder / "target")
     played = {f"can:{name}" for name, _ in buses} | {f"camera:{camera['name']}" for camera in cameras} | set(rec.streams)
     unused = [*rec.not_played, *(bus.name for bus in rec.buses if f"can:{bus.name}" not in played), *(camera.name for camera in rec.cameras if f"camera:{camera.name}" not in played)]
-    return {"recording": rec.path.resolve(), "seconds": seconds, "where": target.where, "played": bool(target.played), "buses": buses, "faults": faults,
+    return {"recording": rec.path.resolve(), "seconds": seconds, "from_s": from_s, "until_s": until_s, "is_cut": until_s < rec.seconds, "where": target.where, "played": bool(target.played), "buses": buses, "faults": faults,
             "prefix": config["publish"].get("channel_prefix", "WAYMARK_"), "rate_hz": float(config["publish"].get("rate_hz", 50)), "unused": unused,
             "map": str((folder / config["map"]).resolve()) if "map" in config else None}
 

@@ -31,7 +31,8 @@ class Judge:
         self.played = load(self.out / "played.json", {})
         self.said = (self.out / "said.txt").read_text(errors="replace") if (self.out / "said.txt").exists() else ""
         start = (self.out / "start_ns").read_text().strip() if (self.out / "start_ns").exists() else ""
-        self.start_ns = int(start) if start.isdigit() else None
+        # The recording's first datum on the target's clock; --from is due at the stamp of the file.
+        self.start_ns = int(start) - round(facts["from_s"] * 1e9) if start.isdigit() else None
         self.faults = facts.get("faults") or []
         self.before_faults_s = min((fault["from_s"] for fault in self.faults), default=float("inf"))
 
@@ -134,10 +135,11 @@ class Judge:
         self.offset_ns = int(re.search(r"clock is (-?\d+) ns ahead", said).group(1))
         rows = poses.table(self.folder / "same/published.csv")
         begun_ns = rows[0][0] + self.offset_ns + poses.BEGIN_NS if rows else 0
-        until_ns = self.start_ns + int(min(self.before_faults_s, self.facts["seconds"] + 0.5) * 1e9)
+        # The replay has data beyond --until.
+        until_ns = self.start_ns + int(min(self.before_faults_s, self.facts["until_s"] + (-0.3 if self.facts["is_cut"] else 0.5)) * 1e9)
         live = [row for row in lcm_log.rows(self.heard) if begun_ns < row[0] < until_ns]
         apart = list(poses.apart_of(live, rows, self.offset_ns))
-        judged_s = (until_ns - max(begun_ns, self.start_ns)) * 1e-9
+        judged_s = (until_ns - max(begun_ns, self.start_ns + int(self.facts["from_s"] * 1e9))) * 1e-9
         enough = len(apart) >= min(_MIN_RATE_HZ, 0.6 * self.facts["rate_hz"]) * max(judged_s - 1, 0.1)
         worst_m, worst_deg = max((m for _, m, _ in apart), default=None), max((d for *_, d in apart), default=None)
         text = (f"{len(apart)} of {len(self.heard)} poses over LCM, in {judged_s:.0f} s" + (" before the first fault" if self.faults else "")
@@ -150,7 +152,7 @@ class Judge:
                              "heading_rmse_deg": poses.rms(d for *_, d in apart)}
         self.series["apart_m"] = [((t - self.start_ns) * 1e-9, m) for t, m, _ in apart]
         first = next((p for p in self.heard if p.state == 1), None)
-        self.figures["first_pose_s"] = (first.t_ns - self.start_ns) * 1e-9 if first else None
+        self.figures["first_pose_s"] = (first.t_ns - self.start_ns) * 1e-9 - self.facts["from_s"] if first else None
         self._truth(live)
         self.reference, self.reference_is = self._reference(self.offset_ns)
 
@@ -256,6 +258,8 @@ class Judge:
             found = by_name.get(fault["name"])
             if found and found.get("done"):
                 done[number] = {"done": True}
+            elif found and found.get("failure"):
+                done[number] = {"done": False, "why": f"the player could not do it: {found['failure']}"}
         for line in (self.out / "faults.txt").read_text().splitlines() if (self.out / "faults.txt").exists() else []:
             number, event, _, *why = line.split(" ", 3)
             if event == "absent":
@@ -276,7 +280,7 @@ class Judge:
         def at(t_ns):
             return (t_ns - self.start_ns) * 1e-9
         heard = fault_judge.Heard([(at(p.t_ns), p) for p in self.heard], [(at(h.t_ns), h) for h in self.healths], self.reference, self.said,
-                                  self.facts["seconds"])
+                                  self.facts["until_s"])
         done = self._done()
         for number, fault in enumerate(self.faults):
             fault_judge.judge(self.checks, fault, heard, done.get(number, {}), f"by the {self.reference_is}")
@@ -288,7 +292,7 @@ class Judge:
         """Devices work while nothing is broken: from three seconds on, away from faults and three seconds after them."""
         broken = [(fault["from_s"] - 0.1, (fault.get("until_s") or heard.end_s) + _SETTLED_S + 1) for fault in self.faults]
         wrong, judged = {}, 0
-        for t, health in heard.healths_between(_SETTLED_S, heard.end_s - 0.5):
+        for t, health in heard.healths_between(self.facts["from_s"] + _SETTLED_S, heard.end_s - 0.5):
             if any(a <= t < b for a, b in broken):
                 continue
             judged += 1

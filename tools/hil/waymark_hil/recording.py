@@ -105,6 +105,12 @@ def _stamps(path):
                 yield int(text)
 
 
+def _is_jpeg(video):
+    """Whether the head of a video names MJPEG."""
+    with video.open("rb") as file:
+        return b"MJPG" in file.read(4096)
+
+
 def _cameras(folder):
     cameras, stamps = [], []
     for table in sorted((folder / "video").glob("*.csv")):
@@ -115,8 +121,7 @@ def _cameras(folder):
             continue
         steps = sorted(b - a for a, b in zip(times, times[1:]))
         # Recorded pictures that are JPEG are played as they are; the player converts others.
-        is_jpeg = is_folder or b"MJPG" in videos[0].open("rb").read(4096)
-        cameras.append(Camera(table.stem, len(times), 1e9 / max(steps[len(steps) // 2], 1), is_jpeg))
+        cameras.append(Camera(table.stem, len(times), 1e9 / max(steps[len(steps) // 2], 1), is_folder or _is_jpeg(videos[0])))
         stamps += [times[0], times[-1]]
     return cameras, stamps
 

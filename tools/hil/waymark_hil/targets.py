@@ -123,6 +123,7 @@ class Guest(Target):
             shutil.copy(self.package, share / "waymark.deb")
         else:
             shutil.copy(self.program, share / "waymark")
+            shutil.copy(self.program.parent / "waymark-play", share / "waymark-play")
         with tarfile.open(share / "test.tar", "w", dereference=True) as tar:
             for path in sorted(folder.iterdir()):
                 if path.name not in ("share", "out", "state"):
@@ -180,7 +181,7 @@ class Host(Target):
             code = _run(self._ssh(f"exec bash {place}/target/drive.sh"), folder / "target.log", progress)
             fetched = subprocess.Popen(self._ssh(f"tar -C {place} -cf - out"), stdout=subprocess.PIPE, stdin=subprocess.DEVNULL)
             with tarfile.open(fileobj=fetched.stdout, mode="r|") as tar:
-                tar.extractall(folder, filter="data")
+                tar.extractall(folder, **({"filter": "data"} if hasattr(tarfile, "data_filter") else {}))
             if fetched.wait():
                 raise HilError(f"{self.address}: out/ could not be copied back")
             return code == 0
