@@ -4,9 +4,10 @@
 # judged at the desk in out/. Needs Waymark, and what `waymark doctor` asks for. The desk wrote plan.sh:
 #   waymark  the program       seconds  of the recording        play     words of `waymark play`
 #   buses    RUN=PLAYER ...    bitrate  bit/s   has_fd 1: FD    cameras  devices
+#   virtual  1: a fault takes virtual buses, where a guest has controllers
 #   where    local guest host  played   1: the program has a recording in the place of the kernel's drivers
 #   url      of LCM            priority of the estimator        faults   1: faults.sh has those that happen to the computer
-#   from_s   of the recording  lead_s   before the first datum
+#   from_s   of the recording  lead_s   before the first datum  plays    0: nothing is left for the player
 # It ends when standard input does: then the desk is gone. Whatever ends it, interfaces, modules and processes are as before.
 set -u
 cd "$(dirname "$(readlink -f "$0")")/.." || exit 2
@@ -94,7 +95,7 @@ guest_buses() { # the guest's own controllers, two on each bus: one hears, one p
 interfaces() {
   local pair numbers="" device
   [ "$played" = 0 ] || return 0
-  if [ "$where" = guest ] && [ -n "$buses" ] && ! guest_buses; then
+  if [ "$where" = guest ] && [ -n "$buses" ] && { [ "$virtual" = 1 ] || ! guest_buses; }; then
     for pair in $buses; do bus_up "${pair%=*}" "${pair#*=}"; done
   elif [ "$where" != guest ]; then
     for pair in $buses; do bus_up "${pair%=*}" "${pair#*=}" || return 1; done
@@ -216,9 +217,13 @@ start_run || exit 1
 start_ns=$(($(now_ns) + ${lead_s}000000000))
 echo "$start_ns" >out/start_ns
 if [ "$played" = 1 ]; then
-  echo "$start_ns" >played/begin.new && mv played/begin.new played/begin
+  awk -v start="$start_ns" -v from="$from_s" 'BEGIN {printf "%.0f\n", start - from * 1e9}' >played/begin.new && mv played/begin.new played/begin
 fi
-"$waymark" play recording "${play[@]}" --start-at "$start_ns" --json out/played.json >out/played.txt 2>&1 &
+if [ "$plays" = 1 ]; then
+  "$waymark" play recording "${play[@]}" --start-at "$start_ns" --json out/played.json >out/played.txt 2>&1 &
+else # all of it comes from the place of drivers
+  sleep "$((lead_s + ${seconds%.*} + 1))" &
+fi
 player=$!
 begun "$player"
 sample "$start_ns" 3>&1 >out/samples.txt &
@@ -231,7 +236,7 @@ if [ "$faults" = 1 ]; then
 fi
 wake_ups
 nap $((lead_s - 2))
-chrt -a -f -p 45 "$player" 2>/dev/null # not before: reading the recording at this priority would hold the run up
+[ "$plays" = 0 ] || chrt -a -f -p 45 "$player" >/dev/null 2>&1 # not before: reading the recording at this priority would hold the run up
 step drive
 wait "$player"
 code=$?

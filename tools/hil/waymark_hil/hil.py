@@ -95,6 +95,20 @@ def _quote(values):
     return " ".join(shlex.quote(str(value)) for value in values)
 
 
+# Faults that a virtual interface alone can have.
+_VIRTUAL = ["bus_off"]
+
+
+def _played_world(folder, given, buses, cameras):
+    """What drivers in the place of the kernel's read: tests/faults/played_world.h."""
+    played = folder / "played"
+    played.mkdir()
+    os.symlink("../recording", played / "recording")
+    if given.faults:
+        shutil.copy(given.faults, played / "faults.yaml")
+    (played / "devices").write_text("".join([f"{run} can:{name}\n" for name, run in buses] + [f"{camera['device']} camera:{camera['name']}\n" for camera in cameras]))
+
+
 def _runner_plan(faults, until_s):
     """faults.plan: those that happen to the computer and its processes."""
     lines = []
@@ -115,11 +129,15 @@ def _write_plan(folder, given, target, rec, faults, derived):
     from_s, until_s = _cut(given, rec)
     player = {run: target.player_of(run) for _, run in buses}
     seconds = until_s - from_s
+    virtual = any(fault["fault"] in _VIRTUAL for fault in faults)
+    if virtual and target.where == "guest":
+        player = {run: run for run in player}
     play = ["--lcm", config["publish"]["lcm_url"], "--channel-prefix", config["publish"].get("channel_prefix", "WAYMARK_")]
-    for name, run in buses:
-        play += ["--can", f"{name}={player[run]}"]
-    for camera in cameras:
-        play += ["--camera", f"{camera['name']}={camera['device']},{camera['format']}"]
+    if not target.played:
+        for name, run in buses:
+            play += ["--can", f"{name}={player[run]}"]
+        for camera in cameras:
+            play += ["--camera", f"{camera['name']}={camera['device']},{camera['format']}"]
     if given.faults:
         shutil.copy(given.faults, folder / "faults.yaml")
         play += ["--faults", "faults.yaml"]
@@ -129,16 +147,18 @@ def _write_plan(folder, given, target, rec, faults, derived):
     runner = _runner_plan(faults, until_s)
     (folder / "faults.plan").write_text(runner)
     program = "waymark" if target.where != "local" else str(target.program)
-    lines = {"waymark": program, "seconds": f"{seconds:.2f}", "buses": " ".join(f"{run}={player[run]}" for _, run in buses),
+    plays = not target.played or bool(rec.streams or rec.has_sightings)
+    lines = {"waymark": program, "plays": int(plays), "virtual": int(virtual), "seconds": f"{seconds:.2f}", "buses": " ".join(f"{run}={player[run]}" for _, run in buses),
              "bitrate": 500000 if bits < 400000 else 1000000, "has_fd": int(any(bus.has_fd for bus in rec.buses)),
              "cameras": " ".join(camera["device"] for camera in cameras), "where": target.where, "played": int(bool(target.played)),
              "url": config["publish"]["lcm_url"], "priority": (config.get("realtime") or {}).get("priority", "80"), "from_s": f"{from_s:g}", "faults": int(bool(runner)), "lead_s": targets.LEAD_S}
     (folder / "plan.sh").write_text("".join(f"{key}={shlex.quote(str(value))}\n" for key, value in lines.items()) + f"play=({_quote(play)})\n")
     shutil.copytree(targets.SCRIPTS, folder / "target")
-    played = {f"can:{name}" for name, _ in buses} | {f"camera:{camera['name']}" for camera in cameras} | set(rec.streams)
-    unused = [*rec.not_played, *(bus.name for bus in rec.buses if f"can:{bus.name}" not in played), *(camera.name for camera in rec.cameras if f"camera:{camera.name}" not in played)]
+    played_streams = {f"can:{name}" for name, _ in buses} | {f"camera:{camera['name']}" for camera in cameras} | set(rec.streams)
+    unused = [*rec.not_played, *(bus.name for bus in rec.buses if f"can:{bus.name}" not in played_streams),
+              *(camera.name for camera in rec.cameras if f"camera:{camera.name}" not in played_streams)]
     return {"recording": rec.path.resolve(), "seconds": seconds, "from_s": from_s, "until_s": until_s, "is_cut": until_s < rec.seconds, "where": target.where, "played": bool(target.played), "buses": buses, "faults": faults,
-            "prefix": config["publish"].get("channel_prefix", "WAYMARK_"), "rate_hz": float(config["publish"].get("rate_hz", 50)), "unused": unused,
+            "prefix": config["publish"].get("channel_prefix", "WAYMARK_"), "rate_hz": float(config["publish"].get("rate_hz", 50)), "unused": unused, "plays": plays,
             "map": str((folder / config["map"]).resolve()) if "map" in config else None}
 
 
@@ -171,7 +191,7 @@ def test(given, beside, types):
     derived = scenario.derive(given.config, rec, folder, target.single_core, survives)
     os.symlink(rec.path.resolve(), folder / "recording")
     if target.played:
-        (folder / "played").mkdir()
+        _played_world(folder, given, derived[1], derived[2])
     facts = _write_plan(folder, given, target, rec, faults, derived)
     progress.step(f"{target.name}: {rec.name}, {facts['seconds']:.0f} s")
     is_good = target.run(folder, facts, progress)
@@ -199,8 +219,9 @@ def text_of(folder, result):
     for group in dict.fromkeys(row["group"] for row in rows):
         mine = [row for row in rows if row["group"] == group]
         bad = [row for row in mine if row["status"] == verdict.FAILED]
-        lines.append(f"{'FAILED' if bad else 'good':7} {group}: " + ("; ".join(f"{row['name']}: {row['text']}" for row in bad) if bad else
-                     "; ".join(row["text"] for row in mine if row["status"] == verdict.PASSED) or "not judged"))
+        word = "FAILED" if bad else "good" if any(row["status"] == verdict.PASSED for row in mine) else "-"
+        texts = [f"{row['name']}: {row['text']}" for row in bad] or [row["text"] for row in mine]
+        lines.append(f"{word:7} {group}: " + "; ".join(dict.fromkeys(texts)))
     counts = {status: sum(row["status"] == status for row in rows) for status in (verdict.PASSED, verdict.FAILED, verdict.SKIPPED)}
     lines.append(f"{result['verdict']}: {counts['passed']} checks passed, {counts['failed']} failed, {counts['skipped']} not judged, in {result['took_s']:.0f} s; "
                  f"{folder}/report.html, junit.xml, result.json")

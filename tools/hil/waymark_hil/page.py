@@ -80,11 +80,13 @@ def _tiles(result):
     known = [("position_max_m", 1e3, "mm", "largest distance from the replay"), ("heading_max_deg", 1, "°", "largest turn from it"), ("truth_rmse_m", 1e3, "mm", "RMS from the truth"),
              ("lost_share", 100, "%", "lost of the worst source"), ("wake_p99_us", 1, "µs", "wake-up, p99"), ("send_p99_us", 1e-3, "ms", "made to sent, p99"),
              ("cpu_share", 100, "%", "of one processor"), ("memory_mb", 1, "MB", "resident"), ("play_late_max_ms", 1, "ms", "player's largest lateness")]
-    return html.tiles([(f"{figures[key] * factor:.3g}&nbsp;{unit}", words) for key, factor, unit, words in known if figures.get(key) is not None])
+    def shown(value, factor, unit):
+        return f"{value:.3g}&nbsp;m" if unit == "mm" and value >= 1 else f"{value * factor:.3g}&nbsp;{unit}"
+    return html.tiles([(shown(figures[key], factor, unit), words) for key, factor, unit, words in known if figures.get(key) is not None])
 
 
 def _check_table(rows):
-    return html.table(["check", "verdict", "found", "limit"],
+    return html.table(["check", "verdict", ("words", "found"), "limit"],
                       [[html.escape(row["name"]), (row["status"], "not judged" if row["status"] == verdict.SKIPPED else row["status"]), ("words", html.escape(row["text"])),
                         html.short(row["limit"]) if row["limit"] is not None else "–"] for row in rows])
 
@@ -104,7 +106,7 @@ def _faults(rows, faults):
     if not table:
         return ""
     return html.section("Faults", "What was broken on purpose, and whether health and poses were as the faults file has it.",
-                        html.table(["fault", "what", "when", "verdict", "found"], table) + details)
+                        html.table(["fault", "what", "when", "verdict", ("words", "found")], table) + details)
 
 
 def make(style, result, series, faults):
