@@ -109,7 +109,7 @@ def _played_world(folder, given, buses, cameras):
     (played / "devices").write_text("".join([f"{run} can:{name}\n" for name, run in buses] + [f"{camera['device']} camera:{camera['name']}\n" for camera in cameras]))
 
 
-def _runner_plan(faults, until_s):
+def _runner_plan(faults, end_s):
     """faults.plan: those that happen to the computer and its processes."""
     lines = []
     for number, fault in enumerate(faults):
@@ -119,7 +119,7 @@ def _runner_plan(faults, until_s):
         numbers = [fault.get(key) for key in ("free_kb", "share", "cpus") if key in fault]
         text = next((fault[key] for key in ("path", "process", "interface", "bus") if fault.get(key)), "-")
         values = [*(f"{value:g}" for value in numbers), *["0"] * (2 - len(numbers))]
-        lines.append(f"{number} {fault['from_s']:g} {seconds if until_s is None else max(until_s, fault['from_s']):g} {fault['fault']} {' '.join(values)} {text}\n")
+        lines.append(f"{number} {fault['from_s']:g} {end_s if until_s is None else max(until_s, fault['from_s']):g} {fault['fault']} {' '.join(values)} {text}\n")
     return "".join(lines)
 
 
