@@ -168,7 +168,7 @@ wm_status play_faults_begin(wm_play *self, wm_error *err) {
     if (status != WM_OK) return status;
     const wm_time_ns from_ns = wm_ns_from_seconds(f->from_s);
     const wm_time_ns until_ns = isfinite(f->until_s) ? wm_ns_from_seconds(f->until_s) : INT64_MAX;
-    if (until_ns < self->from_ns) continue;  // over
+    if (until_ns <= self->from_ns && from_ns < self->from_ns) continue;  // over
     self->edge[self->edge_count++] = (play_edge){from_ns > self->from_ns ? from_ns : self->from_ns, i, 1};
     if (until_ns < INT64_MAX && until_ns > from_ns) self->edge[self->edge_count++] = (play_edge){until_ns, i, 0};
   }

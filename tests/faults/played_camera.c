@@ -1,29 +1,46 @@
 // SPDX-License-Identifier: Apache-2.0
-// V4L2's place: one camera of MJPEG pictures, stamped at the end of the exposure. Faults: unplugged, frozen, stalled,
-// dropped PERCENT, damaged PERCENT, camera_clock SECONDS.
+// V4L2's place: cameras of a recording, stamped at the end of the exposure.
 #include <errno.h>
 #include <linux/videodev2.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "camera_io.h"
 #include "played_world.h"
 
-static size_t next;  // one camera, one thread
-static const played_item *shown;
-static wm_time_ns opened_ns;
+typedef struct played_camera {
+  played_cursor cursor;
+} played_camera;
 
 static int open_camera(void *context, camera_identity *wanted, void **camera) {
-  (void)context, (void)wanted;
-  if (played_fault("unplugged", NULL)) return -ENODEV;
-  *camera = &next;
+  (void)context;
+  wm_play_stream about;
+  if (!played_find(wanted->path, WM_PLAY_PICTURE, &about) || played_fault(WM_FAULT_CAMERA_UNPLUGGED, about.of))
+    return -ENODEV;
+  played_camera *self = calloc(1, sizeof *self);
+  if (!self) return -ENOMEM;
+  self->cursor.about = about;
+  *camera = self;
   return 0;
 }
 
+// As wanted, where it is one that a player makes; else as recorded.
 static int set_mode(void *camera, camera_mode *mode) {
-  (void)camera;
-  mode->fourcc = V4L2_PIX_FMT_MJPEG;
-  mode->stride = 0;
-  mode->image_bytes = mode->width * mode->height * 2;
+  static const struct {
+    uint32_t fourcc;
+    const char *name;
+    uint32_t bytes;
+  } kFormats[] = {{V4L2_PIX_FMT_MJPEG, "MJPG", 0}, {V4L2_PIX_FMT_GREY, "GREY", 1}, {V4L2_PIX_FMT_YUYV, "YUYV", 2}};
+  played_camera *self = camera;
+  size_t chosen = strcmp(self->cursor.about.format, "GREY") == 0;
+  for (size_t i = 0; i < 3; i++)
+    if (mode->fourcc == kFormats[i].fourcc) chosen = i;
+  strcpy(self->cursor.format, kFormats[chosen].name);
+  mode->fourcc = kFormats[chosen].fourcc;
+  mode->width = self->cursor.about.width_px;
+  mode->height = self->cursor.about.height_px;
+  mode->stride = mode->width * kFormats[chosen].bytes;
+  mode->image_bytes = mode->width * mode->height * (chosen == 1 ? 1 : 2);
   return 0;
 }
 
@@ -38,32 +55,24 @@ static wm_time_ns exposure_ns(void *camera) {
 }
 
 static int start(void *camera, uint32_t buffers) {
-  (void)camera, (void)buffers;
-  opened_ns = played_now_ns();
+  (void)buffers;
+  played_close(&((played_camera *)camera)->cursor);  // what came before is gone
   return 0;
 }
 
 static int take(void *camera, int wait_ms, camera_buffer *out) {
-  (void)camera;
-  double value = 0;
-  if (played_fault("unplugged", NULL)) return -ENODEV;
-  const played_item *item = played_next('p', opened_ns, &next);
-  int is_stalled = played_fault("stalled", NULL);
-  if (!item || is_stalled || !played_sleep(played_due_ns(item), wait_ms)) {
-    if (!item || is_stalled) (void)played_sleep(INT64_MAX, wait_ms);
-    if (is_stalled) opened_ns = played_now_ns();  // nobody kept what came meanwhile
-    return 0;
-  }
-  next++;
-  if (played_fault("dropped", &value) && played_is_hit(item->number, value)) return 0;
-  if (!shown || !played_fault("frozen", NULL)) shown = item;
+  played_camera *self = camera;
+  wm_time_ns due_ns = 0;
+  if (played_fault(WM_FAULT_CAMERA_UNPLUGGED, self->cursor.about.of)) return -ENODEV;
+  const wm_play_item *item = played_next(&self->cursor, &due_ns);
+  if (!played_sleep(item ? due_ns : INT64_MAX, wait_ms)) return 0;
+  played_taken(&self->cursor);
   *out = (camera_buffer){.index = item->number % CAMERA_BUFFERS_MAX,
-                         .bytes = shown->bytes,
+                         .bytes = item->bytes,
                          .sequence = item->number,
-                         .stamp_ns = played_due_ns(item),
-                         .data = shown->data};
-  if (played_fault("damaged", &value) && played_is_hit(item->number, value)) out->flags |= CAMERA_BUFFER_ERROR;
-  if (played_fault("camera_clock", &value)) out->stamp_ns += wm_ns_from_seconds(value);
+                         .flags = item->is_damaged ? CAMERA_BUFFER_ERROR : 0,
+                         .stamp_ns = due_ns + item->ahead_ns,
+                         .data = item->data};
   return 1;
 }
 
@@ -72,7 +81,10 @@ static int give_back(void *camera, uint32_t index) {
   return 0;
 }
 
-static void close_camera(void *camera) { (void)camera; }
+static void close_camera(void *camera) {
+  played_close(&((played_camera *)camera)->cursor);
+  free(camera);
+}
 
 static void sleep_ms(void *context, int ms) {
   (void)context;

@@ -7,88 +7,38 @@
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
-
-#define FAULTS_MAX 64
-
-typedef struct fault {
-  double from_s, until_s, value;
-  char what[32];
-} fault;
+#include <unistd.h>
 
 static pthread_once_t once = PTHREAD_ONCE_INIT;
-static played_item *items;
-static size_t item_count;
-static wm_time_ns first_ns;
+static char recording[600];
+static wm_faults faults;
+static wm_play_stream streams[WM_PLAY_STREAMS_MAX];
+static size_t stream_count;
 static _Atomic wm_time_ns begin_ns;  // 0: not yet
-static fault faults[FAULTS_MAX];
-static size_t fault_count;
 
-static char *read_file(const char *folder, const char *name, size_t *length) {
-  char path[600];
-  (void)snprintf(path, sizeof path, "%s/%s", folder, name);
-  FILE *f = fopen(path, "rb");
-  if (!f) {
-    perror(path);
-    exit(3);
-  }
-  (void)fseek(f, 0, SEEK_END);
-  *length = (size_t)ftell(f);
-  rewind(f);
-  char *data = calloc(*length + 1, 1);
-  if (!data || fread(data, 1, *length, f) != *length) exit(3);
-  (void)fclose(f);
-  return data;
+static void die(const wm_error *err) {
+  (void)fprintf(stderr, "played world: %s\n", err->text);
+  exit(3);
 }
 
-static int parse(const char *line, const uint8_t *pictures, size_t pictures_length, played_item *out) {
-  long long t_ns;
-  int used = 0;
-  unsigned id = 0;
-  char data[32] = "";
-  size_t offset = 0, bytes = 0;
-  memset(out, 0, sizeof *out);
-  if (sscanf(line, "%lld %c%n", &t_ns, &out->kind, &used) != 2) return 0;
-  out->due_ns = t_ns;
-  if (out->kind == 'p') {
-    if (sscanf(line + used, "%zu %zu", &offset, &bytes) != 2 || offset + bytes > pictures_length) return 0;
-    out->data = pictures + offset;
-    out->bytes = (uint32_t)bytes;
-    return 1;
-  }
-  if (out->kind != 'c' || sscanf(line + used, "%x %16s", &id, data) < 1) return 0;
-  out->frame.id = id;
-  out->frame.length = (uint8_t)(strlen(data) / 2);
-  for (size_t i = 0; i < out->frame.length; i++) {
-    unsigned byte = 0;
-    (void)sscanf(data + 2 * i, "%2x", &byte);
-    out->frame.data[i] = (uint8_t)byte;
-  }
-  return 1;
+static const char *path_of(const char *name, char out[600]) {
+  const char *folder = getenv("WM_PLAYED");
+  if (!folder) exit(3);
+  (void)snprintf(out, 600, "%s/%s", folder, name);
+  return out;
 }
 
 static void read_world(void) {
-  const char *folder = getenv("WM_PLAYED");
-  size_t length, pictures_length;
-  uint32_t numbers[256] = {0};
-  if (!folder) exit(3);
-  char *text = read_file(folder, "timeline", &length);
-  const uint8_t *pictures = (const uint8_t *)read_file(folder, "pictures", &pictures_length);
-  items = calloc(length / 4 + 1, sizeof *items);
-  if (!items) exit(3);
-  for (char *rest = text, *line; (line = strsep(&rest, "\n")) != NULL;) {
-    if (!parse(line, pictures, pictures_length, &items[item_count])) continue;
-    items[item_count].number = numbers[(uint8_t)items[item_count].kind]++;
-    item_count++;
-  }
-  if (item_count > 0) first_ns = items[0].due_ns;
-  for (size_t i = 0; i < item_count; i++) items[i].due_ns -= first_ns;
-  free(text);
-  text = read_file(folder, "faults", &length);
-  for (char *rest = text, *line; (line = strsep(&rest, "\n")) != NULL && fault_count < FAULTS_MAX;) {
-    fault *f = &faults[fault_count];
-    fault_count += sscanf(line, "%lf %lf %31s %lf", &f->from_s, &f->until_s, f->what, &f->value) >= 3;
-  }
-  free(text);
+  char path[600];
+  wm_error err = {0};
+  wm_play *play;
+  const wm_play_options options = {.faults = &faults};
+  (void)path_of("recording", recording);
+  if (access(path_of("faults.yaml", path), F_OK) == 0 && wm_faults_load(path, &faults, &err) != WM_OK) die(&err);
+  if (wm_play_open(recording, &options, &play, &err) != WM_OK) die(&err);
+  const wm_play_stream *all = wm_play_streams(play, &stream_count);
+  memcpy(streams, all, stream_count * sizeof *all);
+  wm_play_close(play);
 }
 
 // 1: the world has begun.
@@ -97,12 +47,37 @@ static int look_for_begin(void) {
   long long ns = 0;
   (void)pthread_once(&once, read_world);
   if (begin_ns) return 1;
-  (void)snprintf(path, sizeof path, "%s/begin", getenv("WM_PLAYED"));
-  FILE *f = fopen(path, "r");
+  FILE *f = fopen(path_of("begin", path), "r");
   if (!f) return 0;
   if (fscanf(f, "%lld", &ns) == 1) begin_ns = ns;
   (void)fclose(f);
   return begin_ns != 0;
+}
+
+// The stream that `devices` names; "": none.
+static void look_up(const char *device, char out[64]) {
+  char path[600], line[256], name[128];
+  FILE *f = fopen(path_of("devices", path), "r");
+  out[0] = '\0';
+  while (f && fgets(line, sizeof line, f)) {
+    char stream[64];
+    if (sscanf(line, "%127s %63s", name, stream) == 2 && strcmp(name, device) == 0) (void)strcpy(out, stream);
+  }
+  if (f) (void)fclose(f);
+}
+
+int played_find(const char *device, wm_play_kind kind, wm_play_stream *out) {
+  char wanted[64];
+  const wm_play_stream *found = NULL;
+  (void)pthread_once(&once, read_world);
+  look_up(device, wanted);
+  for (size_t i = stream_count; i-- > 0;) {
+    const wm_play_stream *s = &streams[i];
+    if (s->kind != kind || (wanted[0] && strcmp(s->name, wanted) != 0)) continue;
+    if (!found || strcmp(found->of, device) != 0) found = s;
+  }
+  if (found) *out = *found;
+  return found != NULL;
 }
 
 wm_time_ns played_now_ns(void) {
@@ -111,32 +86,47 @@ wm_time_ns played_now_ns(void) {
   return (wm_time_ns)now.tv_sec * WM_NS_PER_S + now.tv_nsec;
 }
 
-const played_item *played_next(char kind, wm_time_ns from_ns, size_t *next) {
-  if (!look_for_begin()) return NULL;
-  wm_time_ns since_ns = from_ns - begin_ns;
-  while (*next < item_count && (items[*next].kind != kind || items[*next].due_ns < since_ns)) (*next)++;
-  return *next < item_count ? &items[*next] : NULL;
-}
-
-wm_time_ns played_due_ns(const played_item *item) { return begin_ns + item->due_ns; }
-
-int played_fault(const char *what, double *value) {
-  if (!look_for_begin()) return 0;
-  double now_s = (double)(played_now_ns() - begin_ns) * 1e-9;
-  for (size_t i = 0; i < fault_count; i++) {
-    if (now_s < faults[i].from_s || now_s >= faults[i].until_s || strcmp(faults[i].what, what) != 0) continue;
-    if (value) *value = faults[i].value;
-    return 1;
+static void open_now(played_cursor *self) {
+  wm_error err = {0};
+  const double now_s = wm_seconds_between(begin_ns, played_now_ns());
+  const wm_play_options options = {.from_s = now_s > 0 ? now_s : 0, .faults = &faults};
+  size_t count;
+  if (wm_play_open(recording, &options, &self->play, &err) != WM_OK) die(&err);
+  const wm_play_stream *all = wm_play_streams(self->play, &count);
+  for (size_t i = 0; i < count; i++) {
+    if (strcmp(all[i].name, self->about.name) != 0)
+      wm_play_leave_out(self->play, i);
+    else if (self->format[0] && wm_play_set_format(self->play, i, self->format, &err) != WM_OK)
+      die(&err);
   }
-  return 0;
 }
 
-int played_is_hit(uint32_t number, double percent) {
-  uint32_t x = number * 2654435761u + 12345u;
-  x ^= x >> 15;
-  x *= 2246822519u;
-  x ^= x >> 13;
-  return (double)(x % 10000u) < percent * 100;
+const wm_play_item *played_next(played_cursor *self, wm_time_ns *due_ns) {
+  wm_error err = {0};
+  if (!look_for_begin() || self->has_ended) return NULL;
+  if (!self->play) open_now(self);
+  while (!self->has_item) {
+    wm_status status = wm_play_next(self->play, &self->item, &err);
+    self->has_ended = status == WM_END;
+    if (self->has_ended) return NULL;
+    if (status != WM_OK) die(&err);
+    self->has_item = self->item.kind != WM_PLAY_FAULT;
+  }
+  *due_ns = begin_ns + self->item.due_ns;
+  return &self->item;
+}
+
+void played_taken(played_cursor *self) { self->has_item = 0; }
+
+void played_close(played_cursor *self) {
+  wm_play_close(self->play);
+  self->play = NULL;
+  self->has_item = self->has_ended = 0;
+}
+
+int played_fault(wm_fault_kind kind, const char *of) {
+  if (!look_for_begin()) return 0;
+  return wm_faults_at(&faults, kind, of, wm_seconds_between(begin_ns, played_now_ns())) != NULL;
 }
 
 int played_sleep(wm_time_ns when_ns, int wait_ms) {

@@ -1,33 +1,36 @@
 // SPDX-License-Identifier: Apache-2.0
-// A recording in the place of the kernel: waymark, whole, on drivers that play a drive at its own times, with what
-// breaks and when. The folder that WM_PLAYED names has `timeline` and `pictures` as tests/hil/play.c reads them, and
-// `faults`, lines "FROM UNTIL WHAT [VALUE]" in seconds since WM_PLAYED_BEGIN_NS (monotonic), when the first line is
-// due: a run that was killed finds the world as far on as it is.
+// A recording in the place of the kernel: waymark, whole, on drivers that play it at its own times, with faults, by the
+// engine of `waymark play` (waymark/play.h). The folder that WM_PLAYED names has
+//   recording     the recording
+//   faults.yaml   what breaks; optional
+//   begin         CLOCK_MONOTONIC in ns at which its first datum is due (as `waymark play --start-at`); until it is
+//                 there, nothing comes. A run that was killed finds the world as far on as it is.
+//   devices       lines "DEVICE STREAM": "can0 can:can2", "/dev/video0 camera:front"; without a line an interface has
+//                 the frames recorded by its name, else those of the first; a device has the first camera
 #ifndef WM_PLAYED_WORLD_H
 #define WM_PLAYED_WORLD_H
 
-#include <stddef.h>
-#include <stdint.h>
+#include "waymark/play.h"
 
-#include "waymark/can.h"
-#include "waymark/time.h"
+// A stream's data from a moment on. One thread.
+typedef struct played_cursor {
+  wm_play *play;
+  wm_play_stream about;
+  char format[8];  // of pictures; "": as recorded
+  wm_play_item item;
+  int has_item, has_ended;
+} played_cursor;
 
-typedef struct played_item {
-  wm_time_ns due_ns;    // since the beginning
-  wm_can_frame frame;   // 'c'
-  const uint8_t *data;  // 'p'
-  uint32_t bytes;
-  char kind;
-  uint32_t number;  // of its kind
-} played_item;
+// The stream of a device: `kind` WM_PLAY_CAN or WM_PLAY_PICTURE. 0: the recording has none.
+int played_find(const char *device, wm_play_kind kind, wm_play_stream *out);
+// The next item that is due now or later, at *due_ns (monotonic); NULL: not begun, or none any more. The first call
+// opens the recording at the present time. played_taken moves on.
+const wm_play_item *played_next(played_cursor *self, wm_time_ns *due_ns);
+void played_taken(played_cursor *self);
+void played_close(played_cursor *self);
 
-// The first of this kind that is due at `from_ns` or later, from *next on; NULL: there is none any more.
-const played_item *played_next(char kind, wm_time_ns from_ns, size_t *next);
-wm_time_ns played_due_ns(const played_item *item);  // monotonic
-// Whether this breaks now; *value (may be NULL) as the line says it.
-int played_fault(const char *what, double *value);
-// Whether this one of many is hit, of `percent` per cent; by its number alone.
-int played_is_hit(uint32_t number, double percent);
+// Whether a fault of this kind lasts now for `of` (a camera or an interface of the recording).
+int played_fault(wm_fault_kind kind, const char *of);
 
 wm_time_ns played_now_ns(void);
 // Until `when_ns`, but not longer than `wait_ms`. 1: it is `when_ns`.
