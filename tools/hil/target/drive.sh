@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # On a target, in the test's folder: a recording played into this computer's own interfaces, into `waymark run`, with what it needs to be
 # judged at the desk in out/. Needs Waymark, and what `waymark doctor` asks for. The desk wrote plan.sh:
-#   waymark  the program       seconds  of the recording        play     words of `waymark play`
+#   waymark  the commands      program  of the run           seconds  of the recording        play     words of `waymark play`
 #   buses    RUN=PLAYER ...    bitrate  bit/s   has_fd 1: FD    cameras  devices
 #   virtual  1: a fault takes virtual buses, where a guest has controllers
 #   where    local guest host  played   1: the program has a recording in the place of the kernel's drivers
@@ -176,7 +176,7 @@ start_run() {
     out=out/disk/drive
   fi
   [ "$played" = 0 ] || export WM_PLAYED=$PWD/played
-  "$waymark" run --config robot.yaml --out "$out" >>out/said.txt 2>&1 &
+  "$program" run --config robot.yaml --out "$out" >>out/said.txt 2>&1 &
   run=$!
   begun "$run"
   echo "$run" >state/pid

@@ -19,7 +19,7 @@ fault_process_killed() {
   fi
   local drives=(out/drive*)
   [ -d out/disk ] && drives=(out/disk/drive*)
-  "$waymark" run --config robot.yaml --out "${drives[0]}-$((${#drives[@]} + 1))" >>out/said.txt 2>&1 &
+  "$program" run --config robot.yaml --out "${drives[0]}-$((${#drives[@]} + 1))" >>out/said.txt 2>&1 &
   echo $! >state/pid
   echo $! >>state/pids
   : >state/again

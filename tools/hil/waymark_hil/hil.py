@@ -81,7 +81,7 @@ def _target(given, waymark):
         path = getattr(given, name)
         if path and not os.path.isfile(path):
             raise HilError(f"--{name} {path}: is no file")
-    program = pathlib.Path(given.program or given.played or waymark).resolve()
+    program = pathlib.Path((given.played if given.local else None) or given.program or waymark).resolve()
     if given.host:
         return targets.Host(given.host, shlex.split(given.ssh), pairs, given.package)
     if given.guest:
@@ -123,7 +123,7 @@ def _runner_plan(faults, end_s):
     return "".join(lines)
 
 
-def _write_plan(folder, given, target, rec, faults, derived):
+def _write_plan(folder, given, target, rec, faults, derived, waymark):
     """plan.sh, faults.plan, the scripts of the target; the facts for the judge."""
     config, buses, cameras = derived
     from_s, until_s = _cut(given, rec)
@@ -146,9 +146,9 @@ def _write_plan(folder, given, target, rec, faults, derived):
     bits = max((bus.bits / max(rec.seconds, 1) for bus in rec.buses), default=0)
     runner = _runner_plan(faults, until_s)
     (folder / "faults.plan").write_text(runner)
-    program = "waymark" if target.where != "local" else str(target.program)
+    is_local = target.where == "local"
     plays = not target.played or bool(rec.streams or rec.has_sightings)
-    lines = {"waymark": program, "plays": int(plays), "virtual": int(virtual), "seconds": f"{seconds:.2f}", "buses": " ".join(f"{run}={player[run]}" for _, run in buses),
+    lines = {"waymark": waymark if is_local else "waymark", "program": target.program if is_local else "waymark", "plays": int(plays), "virtual": int(virtual), "seconds": f"{seconds:.2f}", "buses": " ".join(f"{run}={player[run]}" for _, run in buses),
              "bitrate": 500000 if bits < 400000 else 1000000, "has_fd": int(any(bus.has_fd for bus in rec.buses)),
              "cameras": " ".join(camera["device"] for camera in cameras), "where": target.where, "played": int(bool(target.played)),
              "url": config["publish"]["lcm_url"], "priority": (config.get("realtime") or {}).get("priority", "80"), "from_s": f"{from_s:g}", "faults": int(bool(runner)), "lead_s": targets.LEAD_S}
@@ -192,7 +192,7 @@ def test(given, beside, types):
     os.symlink(rec.path.resolve(), folder / "recording")
     if target.played:
         _played_world(folder, given, derived[1], derived[2])
-    facts = _write_plan(folder, given, target, rec, faults, derived)
+    facts = _write_plan(folder, given, target, rec, faults, derived, waymark)
     progress.step(f"{target.name}: {rec.name}, {facts['seconds']:.0f} s")
     is_good = target.run(folder, facts, progress)
     progress.step("judging")
