@@ -4,7 +4,6 @@
 # judged at the desk in out/. Needs Waymark, and what `waymark doctor` asks for. The desk wrote plan.sh:
 #   waymark  the commands      program  of the run           seconds  of the recording        play     words of `waymark play`
 #   buses    RUN=PLAYER ...    bitrate  bit/s   has_fd 1: FD    cameras  devices
-#   virtual  1: a fault takes virtual buses, where a guest has controllers
 #   where    local guest host  played   1: the program has a recording in the place of the kernel's drivers
 #   url      of LCM            priority of the estimator        faults   1: faults.sh has those that happen to the computer
 #   from_s   of the recording  lead_s   before the first datum  plays    0: nothing is left for the player
@@ -95,7 +94,7 @@ guest_buses() { # the guest's own controllers, two on each bus: one hears, one p
 interfaces() {
   local pair numbers="" device
   [ "$played" = 0 ] || return 0
-  if [ "$where" = guest ] && [ -n "$buses" ] && { [ "$virtual" = 1 ] || ! guest_buses; }; then
+  if [ "$where" = guest ] && [ -n "$buses" ] && ! guest_buses; then
     for pair in $buses; do bus_up "${pair%=*}" "${pair#*=}"; done
   elif [ "$where" != guest ]; then
     for pair in $buses; do bus_up "${pair%=*}" "${pair#*=}" || return 1; done

@@ -83,20 +83,20 @@ def _holds(checks, group, name, heard, statement, fault):
     from_s, until_s = _span(fault, heard)
     rows = _states(heard, statement, fault)
     what = f"{statement.get('source') or 'the run'} {statement['what']} {statement['value']}"
-    # Of health, which is sent once a second, the message before the one that states it may be up to a second old.
-    slack_s = _HEALTH_PERIOD_S if statement["what"] in ("device", "cause") else 0.1
     within_s = statement.get("within_s")
+    first_s = next((t for t, good, _ in rows if good), None)
+    when = "never" if first_s is None else f"{first_s - from_s:.2f} s after it begins"
     if within_s is None and statement.get("cleared_within_s") is None:
-        checks.add(group, name, any(good for t, good, _ in rows if t < until_s + slack_s), f"{what}: stated at some time: {_shown([v for *_, v in rows])}")
+        checks.add(group, name, first_s is not None and first_s < until_s + _HEALTH_PERIOD_S, f"{what}: stated {when}; {_shown([v for *_, v in rows])}")
         return
     if within_s is not None:
-        first_s = next((t for t, good, _ in rows if good), None)
-        delay_s = math.inf if first_s is None else first_s - from_s
-        checks.at_most(group, f"{name}, in time", delay_s, within_s + slack_s,
-                       f"{what}: {'never' if first_s is None else f'{delay_s:.2f} s after it begins'}, {within_s:g} s are allowed; health had {_shown([v for *_, v in rows])}")
-        during = [(good, v) for t, good, v in rows if from_s + within_s + slack_s <= t < until_s]
-        if during:
-            checks.add(group, f"{name}, as long as it lasts", all(good for good, _ in during), f"{what}: then {_shown([v for _, v in during])}")
+        # Each message from then on; of a fault that is over before the next one is sent, that one.
+        due = [(t, good, v) for t, good, v in rows if t >= from_s + within_s]
+        judged = [row for row in due if row[0] < until_s] or due[:1]
+        checks.add(group, f"{name}, in time", bool(judged) and judged[0][1],
+                   f"{what}: {when}, {within_s:g} s are allowed; {_shown([v for *_, v in rows])}", None if first_s is None else first_s - from_s, within_s)
+        if judged[1:]:
+            checks.add(group, f"{name}, as long as it lasts", all(good for _, good, _ in judged[1:]), f"{what}: then {_shown([v for *_, v in judged[1:]])}")
     cleared_s = statement.get("cleared_within_s")
     if cleared_s is not None and until_s < heard.end_s:
         after = [(good, v) for t, good, v in rows if t >= until_s + cleared_s]

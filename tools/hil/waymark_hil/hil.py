@@ -95,8 +95,24 @@ def _quote(values):
     return " ".join(shlex.quote(str(value)) for value in values)
 
 
-# Faults that a virtual interface alone can have.
-_VIRTUAL = ["bus_off"]
+# Faults that a real controller cannot be told to have.
+_VIRTUAL_ALONE = ["bus_off"]
+
+
+def _player_faults(path, folder, target, buses):
+    """faults.yaml for the target: without what its interfaces cannot do, and with the run's interface where a bus goes down. Names of
+    those that are left out."""
+    text = recording.read_yaml(path)
+    run_of, left_out, kept = dict(buses), [], []
+    for fault in text["faults"]:
+        if fault["fault"] in _VIRTUAL_ALONE and target.where == "guest":
+            left_out.append(fault["name"])
+            continue
+        if fault["fault"] in ("bus_down", "bus_removed") and not target.played and "interface" not in fault and fault.get("bus") in run_of:
+            fault["interface"] = run_of[fault["bus"]]
+        kept.append(fault)
+    (folder / "faults.yaml").write_text(scenario.dump({**text, "faults": kept}), encoding="utf-8")
+    return left_out
 
 
 def _played_world(folder, given, buses, cameras):
@@ -105,7 +121,7 @@ def _played_world(folder, given, buses, cameras):
     played.mkdir()
     os.symlink("../recording", played / "recording")
     if given.faults:
-        shutil.copy(given.faults, played / "faults.yaml")
+        os.symlink("../faults.yaml", played / "faults.yaml")
     (played / "devices").write_text("".join([f"{run} can:{name}\n" for name, run in buses] + [f"{camera['device']} camera:{camera['name']}\n" for camera in cameras]))
 
 
@@ -129,17 +145,15 @@ def _write_plan(folder, given, target, rec, faults, derived, waymark):
     from_s, until_s = _cut(given, rec)
     player = {run: target.player_of(run) for _, run in buses}
     seconds = until_s - from_s
-    virtual = any(fault["fault"] in _VIRTUAL for fault in faults)
-    if virtual and target.where == "guest":
-        player = {run: run for run in player}
     play = ["--lcm", config["publish"]["lcm_url"], "--channel-prefix", config["publish"].get("channel_prefix", "WAYMARK_")]
     if not target.played:
         for name, run in buses:
             play += ["--can", f"{name}={player[run]}"]
         for camera in cameras:
             play += ["--camera", f"{camera['name']}={camera['device']},{camera['format']}"]
+    left_out = []
     if given.faults:
-        shutil.copy(given.faults, folder / "faults.yaml")
+        left_out = _player_faults(given.faults, folder, target, buses)
         play += ["--faults", "faults.yaml"]
     play += ["--from", f"{from_s:g}"] if from_s else []
     play += ["--until", f"{until_s:g}"] if given.until_s is not None else []
@@ -148,7 +162,7 @@ def _write_plan(folder, given, target, rec, faults, derived, waymark):
     (folder / "faults.plan").write_text(runner)
     is_local = target.where == "local"
     plays = not target.played or bool(rec.streams or rec.has_sightings)
-    lines = {"waymark": waymark if is_local else "waymark", "program": target.program if is_local else "waymark", "plays": int(plays), "virtual": int(virtual), "seconds": f"{seconds:.2f}", "buses": " ".join(f"{run}={player[run]}" for _, run in buses),
+    lines = {"waymark": waymark if is_local else "waymark", "program": target.program if is_local else "waymark", "plays": int(plays), "seconds": f"{seconds:.2f}", "buses": " ".join(f"{run}={player[run]}" for _, run in buses),
              "bitrate": 500000 if bits < 400000 else 1000000, "has_fd": int(any(bus.has_fd for bus in rec.buses)),
              "cameras": " ".join(camera["device"] for camera in cameras), "where": target.where, "played": int(bool(target.played)),
              "url": config["publish"]["lcm_url"], "priority": (config.get("realtime") or {}).get("priority", "80"), "from_s": f"{from_s:g}", "faults": int(bool(runner)), "lead_s": targets.LEAD_S}
@@ -158,7 +172,7 @@ def _write_plan(folder, given, target, rec, faults, derived, waymark):
     unused = [*rec.not_played, *(bus.name for bus in rec.buses if f"can:{bus.name}" not in played_streams),
               *(camera.name for camera in rec.cameras if f"camera:{camera.name}" not in played_streams)]
     return {"recording": rec.path.resolve(), "seconds": seconds, "from_s": from_s, "until_s": until_s, "is_cut": until_s < rec.seconds, "where": target.where, "played": bool(target.played), "buses": buses, "faults": faults,
-            "prefix": config["publish"].get("channel_prefix", "WAYMARK_"), "rate_hz": float(config["publish"].get("rate_hz", 50)), "unused": unused, "plays": plays,
+            "prefix": config["publish"].get("channel_prefix", "WAYMARK_"), "rate_hz": float(config["publish"].get("rate_hz", 50)), "unused": unused, "left_out": left_out, "plays": plays,
             "map": str((folder / config["map"]).resolve()) if "map" in config else None}
 
 

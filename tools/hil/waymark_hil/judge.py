@@ -270,7 +270,9 @@ class Judge:
             elif event == "begin":
                 done[int(number)] = {"done": True}
         for number, fault in enumerate(self.faults):
-            if self.facts["played"] and fault.get("by_played_driver"):
+            if fault["name"] in self.facts["left_out"]:
+                done[number] = {"done": False, "absent": True, "why": "not on this target: its controllers cannot be told to do it"}
+            elif self.facts["played"] and fault.get("by_played_driver"):
                 done[number] = {"done": True}
             elif fault["by"] == "played driver":
                 done.setdefault(number, {"done": False, "absent": True, "why": "not on this target: a real driver cannot be made to do it"})
