@@ -17,14 +17,13 @@ import struct
 import subprocess
 import sys
 import tempfile
-import threading
 import time
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
+HERE = pathlib.Path(__file__).resolve().parent
+ROOT = HERE.parent.parent
 sys.path.insert(0, str(ROOT / "tests/hil"))
 import drives  # noqa: E402
 import edges  # noqa: E402
-import landmarks  # noqa: E402
 import messages  # noqa: E402
 from published import ABSENT, BUS_OFF, DOWN, FROZEN, IS_BUSY, MOTION_STALE, STALLED, WORKS, Published  # noqa: E402
 
@@ -59,30 +58,26 @@ def prepare(work, worlds):
         (work / name).mkdir()
         recording = work / name / "recording"
         subprocess.run([BUILD / "bin/waymark-simulate", scenario, "--out", recording, "--duration", str(seconds)], check=True)
-        items, blob = list(drives.can_items(recording)), bytearray()
-        if name != "crossing":
-            with open(recording / "video/front.csv", newline="") as f:
-                for row, picture in zip(csv.DictReader(f), edges.pictures(recording / "video/front.avi")):
-                    items.append((int(row["t_ns"]), f"p {len(blob)} {len(picture)}"))
-                    blob += picture
-        (work / name / "timeline").write_text("".join(f"{t} {what}\n" for t, what in sorted(items)))
-        (work / name / "pictures").write_bytes(blob)
-        (work / name / "first").write_text(str(min(items)[0]))
+        streams = subprocess.run([BUILD / "bin/waymark-play", recording, "--print-streams"], check=True, capture_output=True, text=True)
+        (work / name / "first").write_text(str(json.loads(streams.stdout)["first_ns"]))
 
 
 class Drive:
-    """A folder with the world and its faults, a configuration, and a logger that hears what is said."""
+    """A folder with the world and its faults (a file beside this one), a configuration, and a logger that hears what is said."""
 
-    def __init__(self, work, world, name, faults):
+    def __init__(self, work, world, name, faults=None):
         self.world, self.folder = work / world, work / name
         self.folder.mkdir()
         recording = self.world / "recording"
         for file in ("vehicle.dbc", "can-signals.yaml", "calibration.yaml", "map", "landmarks.csv"):
             if (recording / file).exists():
                 (self.folder / file).symlink_to(recording / file)
-        for file in ("timeline", "pictures"):
-            (self.folder / file).symlink_to(self.world / file)
-        (self.folder / "faults").write_text("".join(" ".join(map(str, fault)) + "\n" for fault in faults))
+        (self.folder / "recording").symlink_to(recording)
+        self.faults = []
+        if faults:
+            shutil.copy(HERE / faults, self.folder / "faults.yaml")
+            said = subprocess.run([BUILD / "bin/waymark-play", "--faults", HERE / faults, "--print-faults"], check=True, capture_output=True, text=True)
+            self.faults = json.loads(said.stdout)["faults"]
         camera_ = f"devices: {{can: [{{interface: can0}}], cameras: [{{name: front, device: /dev/video0, format: MJPG, rate_hz: {RATE_HZ}}}]}}\n"
         own, devices = {
             "corridor": ("corridor.yaml", camera_ + "map: map/map.yaml\n"),
@@ -100,19 +95,13 @@ class Drive:
         self.begin_ns = None
         self.first_ns = int((self.world / "first").read_text())
         self.environment = dict(os.environ, WM_PLAYED=str(self.folder))
-        self.eyes = threading.Thread(target=self.send_sightings, daemon=True) if world == "crossing" else None
+        self.has_eyes, self.eyes = world == "crossing", None
 
     def send_sightings(self):
-        """The program that sees landmarks: LCM's datagrams, each when it arrived in the recording."""
-        out = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        sent = sorted(landmarks.sightings(self.folder, self.world / "recording"), key=lambda s: s[0])
-        for number, (arrival_ns, t_ns, message) in enumerate(sent):
-            self.sleep_until((arrival_ns - self.first_ns) * 1e-9)
-            stamp = struct.pack(">q", t_ns - self.first_ns + self.begin_ns)
-            try:
-                out.sendto(packet(b"WAYMARK_SIGHTINGS", message[:8] + stamp + message[16:], number), LCM_GROUP)
-            except OSError:
-                pass  # no route: that is one of the faults
+        """The program that sees landmarks: the player, over LCM, each message when it arrived in the recording."""
+        with open(self.folder / "played.txt", "w") as said:
+            self.eyes = subprocess.Popen([BUILD / "bin/waymark-play", self.folder / "recording", "--lcm", drives.URL, "--start-at", str(self.begin_ns),
+                                          "--json", "played.json"], cwd=self.folder, stdout=said, stderr=said)
 
     def start(self, *words):
         with open(self.folder / "said.txt", "a") as said:
@@ -131,13 +120,21 @@ class Drive:
         self.begin_ns = time.monotonic_ns() + 10**9
         (self.folder / "begin.new").write_text(str(self.begin_ns))
         (self.folder / "begin.new").rename(self.folder / "begin")
-        if self.eyes:
-            self.eyes.start()
+        if self.has_eyes:
+            self.send_sightings()
 
     def end(self, run, at_s):
         self.sleep_until(at_s)
         run.send_signal(signal.SIGTERM)
         run.wait(timeout=60)
+        if self.eyes:
+            self.eyes.send_signal(signal.SIGINT)
+            self.eyes.wait(timeout=10)
+
+    def fault(self, name):
+        """(name, from_s, until_s) of a fault."""
+        fault = next(f for f in self.faults if f["name"] == name)
+        return name, fault["from_s"], fault["until_s"]
 
     def sleep_until(self, at_s):
         time.sleep(max(0.0, (self.begin_ns - time.monotonic_ns()) * 1e-9 + at_s))
@@ -158,12 +155,14 @@ class Drive:
 
 def camera(work):
     """The camera breaks in five ways, one after the other."""
-    drive = Drive(work, "corridor", "camera", [(10, 15, "unplugged"), (22, 26, "frozen"), (32, 38, "stalled"), (45, 53, "dropped", 20), (56, 61, "damaged", 30)])
+    drive = Drive(work, "corridor", "camera", "camera.yaml")
     run = drive.run()
     drive.end(run, 63)
     heard = drive.hear()
     heard.check(run.returncode == 0, f"exit code {run.returncode}")
-    for what, from_s, until_s, state, delay_s in (("unplugged", 10, 15, ABSENT, 1.2), ("frozen", 22, 26, FROZEN, 2.3), ("stalled", 32, 36, STALLED, 2.4)):
+    for name, state, delay_s in (("unplugged", ABSENT, 1.2), ("frozen", FROZEN, 2.3), ("stalled", STALLED, 2.4)):
+        what, from_s, until_s = drive.fault(name)
+        until_s = min(until_s, 36)  # from 36 s on the stalled camera is started again now and then
         usual_m = 3 * heard.sigma_at(from_s)
         heard.goes_on(what, from_s, until_s)
         heard.grows(what, from_s, until_s)
@@ -185,7 +184,7 @@ def camera(work):
 
 def clock(work):
     """A camera whose clock is 29 s ahead all the time."""
-    drive = Drive(work, "corridor", "clock", [(0, 1000, "camera_clock", 29)])
+    drive = Drive(work, "corridor", "clock", "clock.yaml")
     run = drive.run()
     drive.end(run, 13)
     heard = drive.hear()
@@ -198,12 +197,13 @@ def clock(work):
 
 def can(work):
     """The bus breaks in four ways."""
-    drive = Drive(work, "crossing", "can", [(8, 11, "can_down"), (15.5, 18.5, "can_removed"), (21, 27, "can_lost", 2), (31, 33.8, "bus_off")])
+    drive = Drive(work, "crossing", "can", "can.yaml")
     run = drive.run()
     drive.end(run, 38)
     heard = drive.hear()
     heard.check(run.returncode == 0, f"exit code {run.returncode}")
-    for what, from_s, until_s, state in (("interface down", 8, 11, DOWN), ("adapter removed", 15.5, 18.5, ABSENT), ("bus-off", 31, 33.8, BUS_OFF)):
+    for name, state in (("interface down", DOWN), ("adapter removed", ABSENT), ("bus-off", BUS_OFF)):
+        what, from_s, until_s = drive.fault(name)
         usual_m = 3 * heard.sigma_at(from_s)
         poses = heard.goes_on(what, from_s, until_s)
         heard.check(all(p.status_flags & MOTION_STALE for t, p in poses if t > from_s + 1), f"{what}: poses say that motion is stale")
@@ -220,7 +220,7 @@ def can(work):
 
 def process(work):
     """Killed and started again; a disk that is full; another configuration with an error; a network without a route."""
-    drive = Drive(work, "crossing", "process", [])
+    drive = Drive(work, "crossing", "process")
     small = drive.folder / "small"
     small.mkdir()
     subprocess.run(["mount", "-t", "tmpfs", "-o", "size=300k", "tmpfs", small], check=True)
@@ -269,7 +269,7 @@ def process(work):
 
 def recorder(work):
     """A recording that is ended by SIGTERM in its middle, and one that is killed: both replay."""
-    drive = Drive(work, "corridor", "recorder", [])
+    drive = Drive(work, "corridor", "recorder")
     failures = []
     for name, number in (("term", signal.SIGTERM), ("kill", signal.SIGKILL)):
         record = drive.start("record", "--config", "robot.yaml", "--out", name, "--free-mb", "0")
@@ -306,7 +306,7 @@ def say_it_is_elsewhere(drive, at_s):
 def box(work):
     """The black box of a run that is killed, and of one that loses its way: the last seconds with CAN and pictures, which replay."""
     keep_s, pictures_hz, killed_s, elsewhere_s = 8, 2, 20, 34
-    drive = Drive(work, "corridor", "box", [])
+    drive = Drive(work, "corridor", "box")
     (drive.folder / "robot.yaml").write_text(drive.config + f"black_box: {{folder: box, keep_s: {keep_s}, pictures_hz: {pictures_hz}}}\n")
     run = drive.run()
     drive.sleep_until(killed_s)
@@ -350,7 +350,7 @@ def box(work):
 def readers(work):
     """One camera, four readers: two detectors (config/datasets/office-walls.yaml), the black box and a recording, whose replay gives the
     poses of the run. Two CAN interfaces: the wheels on one, the gyro on the other."""
-    drive, until_s = Drive(work, "walls", "readers", []), WALLS_S - 3
+    drive, until_s = Drive(work, "walls", "readers"), WALLS_S - 3
     signals = re.split(r"(?m)^(?=- )", (drive.folder / "can-signals.yaml").read_text())
     for name, on_it in (("gyro", True), ("wheels", False)):
         (drive.folder / f"{name}.yaml").write_text("".join(one for one in signals if one.startswith("- ") and ("yaw_rate" in one) == on_it))

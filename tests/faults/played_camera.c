@@ -10,6 +10,8 @@
 
 typedef struct played_camera {
   played_cursor cursor;
+  uint8_t *buffer[CAMERA_BUFFERS_MAX];  // the reader's until it is given back
+  uint32_t room[CAMERA_BUFFERS_MAX];
 } played_camera;
 
 static int open_camera(void *context, camera_identity *wanted, void **camera) {
@@ -60,6 +62,17 @@ static int start(void *camera, uint32_t buffers) {
   return 0;
 }
 
+static const uint8_t *keep(played_camera *self, uint32_t index, const wm_play_item *item) {
+  if (self->room[index] < item->bytes) {
+    uint8_t *larger = realloc(self->buffer[index], item->bytes);
+    if (!larger) return NULL;
+    self->buffer[index] = larger;
+    self->room[index] = item->bytes;
+  }
+  memcpy(self->buffer[index], item->data, item->bytes);
+  return self->buffer[index];
+}
+
 static int take(void *camera, int wait_ms, camera_buffer *out) {
   played_camera *self = camera;
   wm_time_ns due_ns = 0;
@@ -67,12 +80,15 @@ static int take(void *camera, int wait_ms, camera_buffer *out) {
   const wm_play_item *item = played_next(&self->cursor, &due_ns);
   if (!played_sleep(item ? due_ns : INT64_MAX, wait_ms)) return 0;
   played_taken(&self->cursor);
-  *out = (camera_buffer){.index = item->number % CAMERA_BUFFERS_MAX,
+  const uint32_t index = item->number % CAMERA_BUFFERS_MAX;
+  const uint8_t *data = keep(self, index, item);
+  if (!data) return -ENOMEM;
+  *out = (camera_buffer){.index = index,
                          .bytes = item->bytes,
                          .sequence = item->number,
                          .flags = item->is_damaged ? CAMERA_BUFFER_ERROR : 0,
                          .stamp_ns = due_ns + item->ahead_ns,
-                         .data = item->data};
+                         .data = data};
   return 1;
 }
 
@@ -82,8 +98,10 @@ static int give_back(void *camera, uint32_t index) {
 }
 
 static void close_camera(void *camera) {
-  played_close(&((played_camera *)camera)->cursor);
-  free(camera);
+  played_camera *self = camera;
+  played_close(&self->cursor);
+  for (int i = 0; i < CAMERA_BUFFERS_MAX; i++) free(self->buffer[i]);
+  free(self);
 }
 
 static void sleep_ms(void *context, int ms) {

@@ -13,9 +13,10 @@
 static const char kHelp[] =
     "usage: waymark play RECORDING [options]\n"
     "\n"
-    "Plays a recording into real interfaces, each datum at its own time by one clock: CAN frames into SocketCAN,\n"
-    "pictures into V4L2 output devices (v4l2loopback), all other streams over LCM, stamped on this computer's\n"
-    "monotonic clock. States at the end how late each stream was, and what has no place. Ctrl-C ends it.\n"
+    "Plays a recording into CAN, cameras and LCM, each datum at its own time by one clock.\n"
+    "CAN frames go into SocketCAN, pictures into V4L2 output devices (v4l2loopback), all other streams over LCM with\n"
+    "stamps of this computer's monotonic clock. At the end it states how late each stream was, and what has no place.\n"
+    "Ctrl-C ends it with this summary.\n"
     "\n"
     "  --config FILE    a run's configuration: its `devices:` are where the data go\n"
     "  --can RECORDED=INTERFACE\n"
@@ -33,6 +34,7 @@ static const char kHelp[] =
     "  --start-at N     CLOCK_MONOTONIC in nanoseconds at which --from is due (default: in half a second)\n"
     "  --json FILE      the summary, at the start and again at the end\n"
     "  --print-faults   print --faults FILE as JSON, with defaults, and end\n"
+    "  --print-streams  print the recording's streams as JSON, and end\n"
     "  --print-kinds    print all kinds of faults, and end\n"
     "\n"
     "examples:\n"
@@ -58,7 +60,7 @@ typedef struct arguments {
   option_texts can, cameras;
   double speed, from_s, until_s;
   uint64_t passes, start_at_ns;
-  int print_faults, print_kinds, help;
+  int print_faults, print_kinds, print_streams, help;
 } arguments;
 
 static int complain(const wm_error *err) {
@@ -86,6 +88,7 @@ static wm_status parse(int argc, char *const *argv, arguments *a, wm_error *err)
                             {"--json", OPTION_TEXT, &a->json},
                             {"--print-faults", OPTION_FLAG, &a->print_faults},
                             {"--print-kinds", OPTION_FLAG, &a->print_kinds},
+                            {"--print-streams", OPTION_FLAG, &a->print_streams},
                             {"--help", OPTION_FLAG, &a->help},
                             {"-h", OPTION_FLAG, &a->help}};
   const char *words[1] = {NULL};
@@ -194,6 +197,11 @@ static wm_status play_recording(const arguments *a, const wm_config *config, con
   wm_status status = wm_play_open(a->recording, &options, &self.play, err);
   if (status != WM_OK) return status;
   const places_wanted wanted = {config, &a->can, &a->cameras, a->lcm, a->prefix};
+  if (a->print_streams) {
+    report_streams(self.play, a->recording, stdout);
+    wm_play_close(self.play);
+    return WM_OK;
+  }
   status = places_open(&wanted, &self, &places, err);
   if (status == WM_OK) status = play_into(a, &self, &places, err);
   places_close(&self, &places);

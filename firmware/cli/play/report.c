@@ -171,3 +171,30 @@ wm_status report_write_json(const play_report *self, const char *path, wm_error 
     return wm_fail(err, WM_IO, "--json: %s: can't be written: %s", path, strerror(errno));
   return WM_OK;
 }
+
+void report_streams(const wm_play *play, const char *recording, FILE *to) {
+  static const char *const kKinds[] = {
+      [WM_PLAY_CAN] = "can", [WM_PLAY_PICTURE] = "picture", [WM_PLAY_MESSAGE] = "message"};
+  size_t count;
+  const wm_play_stream *streams = wm_play_streams(play, &count);
+  const double duration_s = wm_play_duration_s(play);
+  (void)fputs("{\"format\": \"waymark-play-streams/1\", \"recording\": ", to);
+  wm_json_text(recording, to);
+  (void)fprintf(to, ", \"first_ns\": %" PRId64 ", \"duration_s\": ", wm_play_first_ns(play));
+  if (isfinite(duration_s))
+    (void)fprintf(to, "%.12g", duration_s);
+  else
+    (void)fputs("null", to);
+  (void)fputs(", \"streams\": [", to);
+  for (size_t i = 0; i < count; i++) {
+    const wm_play_stream *s = &streams[i];
+    (void)fprintf(to, "%s\n  {\"name\": ", i ? "," : "");
+    wm_json_text(s->name, to);
+    (void)fprintf(to, ", \"kind\": \"%s\", \"of\": ", kKinds[s->kind]);
+    wm_json_text(s->of, to);
+    if (s->kind == WM_PLAY_PICTURE)
+      (void)fprintf(to, ", \"format\": \"%s\", \"size\": [%u, %u]", s->format, s->width_px, s->height_px);
+    (void)fprintf(to, ", \"can_be_played\": %s}", s->lacking ? "false" : "true");
+  }
+  (void)fputs("\n]}\n", to);
+}

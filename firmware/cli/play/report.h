@@ -17,7 +17,9 @@ typedef struct play_report {
 void report_left_out(const play_report *self, FILE *to);
 // Per stream: sent, not sent, how late; what has no place; faults.
 void report_print(const play_report *self, FILE *to);
-// The same in JSON, over the file that is there. `waymark-play/1`.
+// The recording's streams in JSON, `waymark-play-streams/1`: a stream's kind is can, picture or message.
+void report_streams(const wm_play *play, const char *recording, FILE *to);
+// What was played in JSON, over the file that is there. `waymark-play/1`.
 wm_status report_write_json(const play_report *self, const char *path, wm_error *err);
 
 #endif

@@ -4,7 +4,7 @@ _waymark() {
   local word=${COMP_WORDS[COMP_CWORD]} command=${COMP_WORDS[1]:-} words= more=
   COMPREPLY=()
   if [ "$COMP_CWORD" -eq 1 ]; then
-    mapfile -t COMPREPLY < <(compgen -W 'run replay record watch check doctor stamps batch calibrate compare detect diff eval import init map mine reference report simulate suggest web --help --version' -- "$word")
+    mapfile -t COMPREPLY < <(compgen -W 'run replay record watch check doctor stamps batch calibrate compare detect diff eval import init map mine play reference report simulate suggest web --help --version' -- "$word")
     return
   fi
   case $command in
@@ -41,6 +41,7 @@ _waymark() {
     "init") words='--help --motion --dbc --can-log --can --imu --gnss --sender-clock --wheel-radius --ticks --track --wheelbase --steering-ratio --sees --camera --calibration --sensor --urdf --frame --mounting --tag-layout --tag-family --tag-size --landmarks --map --stream --yes --force' ;;
     "map") words='--help --resolution --origin --inside --walls-below --negate --fine --speck --clearance --out --recording --draw --poses --json --id --picture --at --sigma --size --yaw --from --corners --calibration --camera --pose --sigma-deg --mounting-deg --family --ids --paper --rows --margin --size-min --stages --pictures --seed' ;;
     "mine") words='--help --out --within --all --jobs --json' ;;
+    "play") words='--config --can --camera --lcm --channel-prefix --speed --loop --from --until --faults --start-at --json --print-faults --print-streams --print-kinds' ;;
     "reference") words='--help --map --range --particles --passes --seed' ;;
     "report") words='--help --out --svg --style' ;;
     "simulate") words='--help --out --seed --landmarks --laps --duration --no-video --frame --png --camera --contact-sheet --perfect' ;;
