@@ -6,6 +6,7 @@
 #   buses    RUN=PLAYER ...    bitrate  bit/s   has_fd 1: FD    cameras  devices
 #   where    local guest host  played   1: the program has a recording in the place of the kernel's drivers
 #   url      of LCM            priority of the estimator        faults   1: faults.sh has those that happen to the computer
+#   record   1: beside the run
 #   from_s   of the recording  lead_s   before the first datum  plays    0: nothing is left for the player
 # It ends when standard input does: then the desk is gone. Whatever ends it, interfaces, modules and processes are as before.
 set -u
@@ -175,7 +176,9 @@ start_run() {
     out=out/disk/drive
   fi
   [ "$played" = 0 ] || export WM_PLAYED=$PWD/played
-  "$program" run --config robot.yaml --out "$out" >>out/said.txt 2>&1 &
+  local more=()
+  [ "$record" = 0 ] || more=(--record out/recorded)
+  "$program" run --config robot.yaml --out "$out" "${more[@]}" >>out/said.txt 2>&1 &
   run=$!
   begun "$run"
   echo "$run" >state/pid

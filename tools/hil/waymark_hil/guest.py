@@ -14,8 +14,9 @@ SCRIPTS = pathlib.Path(__file__).resolve().parent.parent / "guest"
 # Two controllers a bus: one hears, one plays. SJA1000 on PCI is what Debian's kernel and qemu both have.
 _BUS = ["-object", "can-bus,id=cb{0}", "-device", "kvaser_pci,canbus=cb{0}", "-device", "kvaser_pci,canbus=cb{0}"]
 # Instruction clocks: 250 million a second, idle time is the host's; 500 million, idle time is skipped, so that who sleeps
-# wakes in time whatever else the host does; as that, but idle time is the host's, as a disk is waited for.
-SLOW, FAST, SYSTEM = "shift=2,sleep=on", "shift=1,sleep=off", "shift=1,sleep=on"
+# wakes in time whatever else the host does; as that, but idle time is the host's, as a disk is waited for; 1000 million, about what a
+# core of a board does (docs/boards.md), idle time is skipped.
+SLOW, FAST, SYSTEM, BOARD = "shift=2,sleep=on", "shift=1,sleep=off", "shift=1,sleep=on", "shift=0,sleep=off"
 GUEST_S = 1800  # on this computer's clock
 _ARM = {"qemu": ["qemu-system-aarch64", "-machine", "virt", "-cpu", "cortex-a57"], "console": "ttyAMA0"}
 # What a guest is made of, by Debian's name of its architecture; `cc` makes helpers for it.

@@ -44,6 +44,7 @@ def parser():
     out.add_argument("--until", dest="until_s", metavar="S", type=float, help="end there")
     out.add_argument("--can", metavar="RUN=PLAYER", action="append", default=[], help="--host: what the run hears on RUN is sent on PLAYER, wired to it")
     out.add_argument("--ssh", metavar="OPTIONS", default="", help="--host: more options of ssh, as '-p 2222'")
+    out.add_argument("--record", action="store_true", help="the target records beside the run, and its stamps are judged datum by datum")
     out.add_argument("--program", metavar="FILE", help="the waymark of --guest amd64 and --local; this one by default")
     out.add_argument("--package", metavar="FILE", help="the package that a guest installs; needed for arm64 and armhf")
     out.add_argument("--played", metavar="FILE", help="--local: a waymark with a recording in the place of the kernel's drivers (build/tests/waymark-played)")
@@ -165,14 +166,15 @@ def _write_plan(folder, given, target, rec, faults, derived, waymark):
     lines = {"waymark": waymark if is_local else "waymark", "program": target.program if is_local else "waymark", "plays": int(plays), "seconds": f"{seconds:.2f}", "buses": " ".join(f"{run}={player[run]}" for _, run in buses),
              "bitrate": 500000 if bits < 400000 else 1000000, "has_fd": int(any(bus.has_fd for bus in rec.buses)),
              "cameras": " ".join(camera["device"] for camera in cameras), "where": target.where, "played": int(bool(target.played)),
-             "url": config["publish"]["lcm_url"], "priority": (config.get("realtime") or {}).get("priority", "80"), "from_s": f"{from_s:g}", "faults": int(bool(runner)), "lead_s": targets.LEAD_S}
+             "url": config["publish"]["lcm_url"], "priority": (config.get("realtime") or {}).get("priority", "80"), "from_s": f"{from_s:g}", "faults": int(bool(runner)), "lead_s": targets.LEAD_S,
+             "record": int(given.record)}
     (folder / "plan.sh").write_text("".join(f"{key}={shlex.quote(str(value))}\n" for key, value in lines.items()) + f"play=({_quote(play)})\n")
     shutil.copytree(targets.SCRIPTS, folder / "target")
     played_streams = {f"can:{name}" for name, _ in buses} | {f"camera:{camera['name']}" for camera in cameras} | set(rec.streams)
     unused = [*rec.not_played, *(bus.name for bus in rec.buses if f"can:{bus.name}" not in played_streams),
               *(camera.name for camera in rec.cameras if f"camera:{camera.name}" not in played_streams)]
     return {"recording": rec.path.resolve(), "seconds": seconds, "from_s": from_s, "until_s": until_s, "is_cut": until_s < rec.seconds, "where": target.where, "played": bool(target.played), "buses": buses, "faults": faults,
-            "prefix": config["publish"].get("channel_prefix", "WAYMARK_"), "rate_hz": float(config["publish"].get("rate_hz", 50)), "unused": unused, "left_out": left_out, "plays": plays,
+            "prefix": config["publish"].get("channel_prefix", "WAYMARK_"), "rate_hz": float(config["publish"].get("rate_hz", 50)), "unused": unused, "record": given.record, "cameras": [camera["name"] for camera in cameras], "left_out": left_out, "plays": plays,
             "map": str((folder / config["map"]).resolve()) if "map" in config else None}
 
 

@@ -4,7 +4,7 @@ import json
 import re
 import subprocess
 
-from . import HilError, fault_judge, lcm_log, poses, samples
+from . import HilError, fault_judge, lcm_log, poses, samples, stamps
 
 _WAKE_MS = 0.2  # a wake-up that is late by less than this is in order, whatever cyclictest measures
 _SETTLED_S = 3.0  # devices that are looked for twice a second are found, and the first buffers are thrown away
@@ -317,6 +317,8 @@ class Judge:
         self.logs()
         self.poses()
         self.losses()
+        if self.facts["record"] and self.start_ns is not None and "offset_ns" in self.played:
+            stamps.judge(self, self.facts["buses"], self.facts["cameras"], _SETTLED_S)
         self.timing()
         self.computer()
         self.health()

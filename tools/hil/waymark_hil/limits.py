@@ -11,6 +11,7 @@ RUN = {
     "truth_ratio": (1.5, "error from the truth, over that of the replay at the desk"),
     "lost_share": (0.0, "share of a stream's data that were lost, dropped or late"),
     "play_late_ms": (5.0, "ms, lateness of the player, 99 of 100 data; later ones are not the run's fault"),
+    "skew_ms": (1.0, "ms between the stamps of pictures and of CAN frames, 99 of 100; with --record"),
     "deadlines_missed_share": (0.001, "share of the estimator's loops"),
     "wake_over_cyclictest": (3.0, "wake-up of the estimator's thread, 99 of 100, over that of cyclictest beside it; below 0.2 ms it is in order"),
     "memory_mb": (None, "MB resident at most"),
@@ -20,7 +21,7 @@ RUN = {
     "clock_share": (None, "lowest clock rate over the highest seen"),
 }
 # On a desk that does much else, whose kernel is none of a robot's, these are no faults of the run.
-BUSY = {"play_late_ms": 50.0, "deadlines_missed_share": None, "wake_over_cyclictest": None, "lost_share": 0.02}
+BUSY = {"play_late_ms": 50.0, "skew_ms": None, "deadlines_missed_share": None, "wake_over_cyclictest": None, "lost_share": 0.02}
 # figure: (larger change that counts, as a share; smallest difference that counts, in its unit)
 COMPARE = {
     "position_rmse_m": (0.05, 0.002), "heading_rmse_deg": (0.05, 0.02), "truth_rmse_m": (0.05, 0.002),

@@ -130,7 +130,7 @@ class Guest(Target):
                     tar.add(path, path.name)
         megabytes = (share / "test.tar").stat().st_size >> 20
         machine = guest.MACHINES[self.arch]
-        command = guest.command_of(self.image, machine, share, "hil.sh", guest.buses(len(facts["buses"])), guest.FAST, memory_mb=1024 + 4 * megabytes)
+        command = guest.command_of(self.image, machine, share, "hil.sh", guest.buses(len(facts["buses"])), guest.BOARD, memory_mb=1024 + 4 * megabytes)
         limit_s = 300 + 20 * facts["seconds"]
         is_good = guest.boot(command, folder / "target.log", limit_s, progress.line)
         for path in (share / "out").iterdir():
