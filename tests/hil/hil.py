@@ -6,7 +6,7 @@ real (emulated) CAN controller, under qemu's instruction clock, fed from a recor
 usage: hil.py [--arch arm64|armhf] [--package DEB] WORK WAYMARK WAYMARK_SIMULATE [PART ...]
 
 WORK keeps the guest's image from run to run; WAYMARK is this computer's; parts: can, camera, libcamera, landmarks, edges, walls,
-service, power; all of them but power where none is named. Without --arch the guest runs WAYMARK itself, under systemd the package; else the package in all parts.
+service, board, power; all of them but power where none is named. Without --arch the guest runs WAYMARK itself, under systemd the package; else the package in all parts.
 The service and power parts run the package under systemd; without one they are left out. armhf is arm64's kernel with armhf's programs.
 
 Judged on the host: the guest's own checks; the log of its run gives its poses bit by bit; its poses are those of a replay
@@ -23,6 +23,7 @@ import time
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 sys.path.insert(0, str(ROOT / "tools/hil"))
+import board  # noqa: E402
 import drives  # noqa: E402
 import edges  # noqa: E402
 import landmarks  # noqa: E402
@@ -38,10 +39,10 @@ POSITION_M, HEADING_DEG = 0.02, 0.2
 PLAYER_M, PLAYER_DEG, PLAYER_MS = 0.1, 0.5, 100
 
 
-def boot(work, machine, script, *devices, clock=SLOW, init=""):
+def boot(work, machine, script, *devices, clock=SLOW, init="", watch=None):
     """Runs guest/SCRIPT by this clock; everything that it prints is shown and kept."""
     log = work / f"{script}.log"
-    is_good = guest.boot(guest.command_of(work / "image", machine, work / "share", script, devices, clock, init), log)
+    is_good = guest.boot(guest.command_of(work / "image", machine, work / "share", script, devices, clock, init), log, watch=watch)
     print(log.read_text(errors="replace"))
     return is_good
 
@@ -223,6 +224,7 @@ PARTS = {
     "edges": [("edges", OF_ROOT(edges.prepare), AT_ROOT(edges.judge), CAN, FAST, "")],
     "walls": [("walls", OF_ROOT(walls.prepare), AT_ROOT(walls.judge), CAN, FAST, "")],
     "service": [("service", OF_ROOT(service.prepare_service), service.judge_service, CAN, FAST, "systemd")],
+    "board": [("board", OF_ROOT(board.prepare), AT_ROOT(board.judge), [], SYSTEM, "")],
     "power": [("kills", OF_ROOT(service.prepare_kills), service.judge_kills, CAN, SYSTEM, "systemd")],
 }
 UNDER_SYSTEMD = ("service", "power")
@@ -235,7 +237,8 @@ def run_part(work, machine, waymark, simulate, steps):
         more = prepare(work, simulate) or []
         begun_s = time.monotonic()
         devices = [word.format(work=work) for word in devices] + more
-        if not boot(work, machine, f"{name}.sh", *devices, clock=clock, init=init):
+        watch = board.watch(work, waymark) if name == "board" else None
+        if not boot(work, machine, f"{name}.sh", *devices, clock=clock, init=init, watch=watch):
             return failures + [f"the guest's own checks failed ({name}.sh)"]
         print(f"{name}: {time.monotonic() - begun_s:.0f} s in the guest")
         failures += judge(work, waymark)
@@ -272,6 +275,7 @@ def main():
         shutil.copy(waymark, work / "share/waymark")
         if camera.exists():
             shutil.copy(camera, work / "share/waymark-camera")
+        shutil.copy(waymark.parent / "waymark-play", work / "share/waymark-play")
     drives.COMPILER = machine["cc"]
     failures = []
     for name in args.parts or [part for part in PARTS if part != "power"]:
