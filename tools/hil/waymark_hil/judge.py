@@ -179,13 +179,22 @@ class Judge:
 
     # ── the target's figures ────────────────────────────────────────────────────────────────────────────────────────
 
+    def _at_first(self, name, key):
+        """A counter when the devices had settled: the first buffers of a video device are old ones, and are thrown away."""
+        if self.start_ns is None:
+            return 0
+        settled_ns = self.start_ns + int((self.facts["from_s"] + _SETTLED_S) * 1e9)
+        health = next((h for h in getattr(self, "healths", []) if h.t_ns >= settled_ns), None)
+        source = lcm_log.source(health, name) if health else None
+        return getattr(source, key, 0) if source else 0
+
     def losses(self):
-        """What each source lost. Where faults are, their own lines of health judge it."""
+        """What each source lost since the devices had settled. Where faults are, their own lines of health judge it."""
         health = load(self.drives[0] / "health.json", {}) if self.drives else {}
         worst = 0.0
         for name, source in (health.get("sources") or {}).items():
             received = source.get("received") or 0
-            counted = {key: source[key] for key in _LOST if source.get(key)}
+            counted = {key: n for key in _LOST if (n := (source.get(key) or 0) - self._at_first(name, key)) > 0}
             share = sum(counted.values()) / max(received + source.get("lost", 0), 1)
             worst = max(worst, share)
             text = f"{received} received, " + (", ".join(f"{n} {key}" for key, n in counted.items()) or "none lost, dropped or late")
