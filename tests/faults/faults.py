@@ -25,6 +25,7 @@ sys.path.insert(0, str(ROOT / "tests/hil"))
 import drives  # noqa: E402
 import edges  # noqa: E402
 import messages  # noqa: E402
+import player  # noqa: E402
 from published import ABSENT, BUS_OFF, DOWN, FROZEN, IS_BUSY, MOTION_STALE, STALLED, WORKS, Published  # noqa: E402
 
 BUILD = pathlib.Path(sys.argv[1]).resolve()
@@ -389,8 +390,31 @@ def readers(work):
     return heard.failures
 
 
+def load(work):
+    """2000 CAN frames a second on two buses and two cameras at 30 Hz: the drivers give all of it, as it was."""
+    folder, devices = work / "load", {"vcan0": "can:can0", "vcan1": "can:can1", "/dev/video10": "camera:left", "/dev/video11": "camera:right"}
+    player.write_recording(folder / "recording")
+    (folder / "devices").write_text("".join(f"{device} {stream}\n" for device, stream in devices.items()))
+    (folder / "begin").write_text(str(time.monotonic_ns() + 2 * 10**9))
+    read = subprocess.run([BUILD / "tests/played_rates", str(player.SECONDS + 6), *devices], env=dict(os.environ, WM_PLAYED=str(folder)),
+                          capture_output=True, text=True)
+    (folder / "heard.log").write_text(read.stdout)
+    print(read.stderr)
+    failures = [] if read.returncode == 0 else [f"exit code {read.returncode}"]
+    for name, to in (("can0", "vcan0"), ("can1", "vcan1")):
+        sent = [frame for _, interface, frame in sorted(player.frames()) if interface == name]
+        heard = [frame for _, frame in player.read_can(folder / "heard.log", to)]
+        if sent != heard:
+            failures.append(f"{to}: {len(heard)} frames of {len(sent)}, or others")
+    for device in ("/dev/video10", "/dev/video11"):
+        if f"{device} {player.PICTURES_HZ * player.SECONDS} came 0 missing" not in read.stderr:
+            failures.append(f"{device}: not all pictures came")
+    print("\n".join(f"  BAD   load: {failure}" for failure in failures) or "  good  load: all frames and pictures came, as they were")
+    return failures
+
+
 DRIVES = {"camera": (camera, "corridor"), "clock": (clock, "corridor"), "can": (can, "crossing"), "process": (process, "crossing"),
-          "recorder": (recorder, "corridor"), "box": (box, "corridor"), "readers": (readers, "walls")}
+          "recorder": (recorder, "corridor"), "box": (box, "corridor"), "readers": (readers, "walls"), "load": (load, None)}
 
 
 def main():

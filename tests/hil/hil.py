@@ -5,7 +5,7 @@ real (emulated) CAN controller, under qemu's instruction clock, fed from a recor
 
 usage: hil.py [--arch arm64|armhf] [--package DEB] WORK WAYMARK WAYMARK_SIMULATE [PART ...]
 
-WORK keeps the guest's image from run to run; WAYMARK is this computer's; parts: can, camera, libcamera, landmarks, edges, walls,
+WORK keeps the guest's image from run to run; WAYMARK is this computer's; parts: can, camera, libcamera, play, landmarks, edges, walls,
 service, board, power; all of them but power where none is named. Without --arch the guest runs WAYMARK itself, under systemd the package; else the package in all parts.
 The service and power parts run the package under systemd; without one they are left out. armhf is arm64's kernel with armhf's programs.
 
@@ -27,6 +27,7 @@ import board  # noqa: E402
 import drives  # noqa: E402
 import edges  # noqa: E402
 import landmarks  # noqa: E402
+import player  # noqa: E402
 import service  # noqa: E402
 import vimc  # noqa: E402
 import walls  # noqa: E402
@@ -220,6 +221,7 @@ PARTS = {
     "can": [("can", scenario_can, judge_can, CAN, SLOW, "")],
     "camera": [("camera", scenario_camera, judge_camera, DISK, SLOW, "")],
     "libcamera": [("libcamera", lambda work, _: vimc.prepare(work), lambda work, _: vimc.judge(work), [], SLOW, "")],
+    "play": [("play", OF_ROOT(player.prepare), AT_ROOT(player.judge), [], FAST, "")],
     "landmarks": [("landmarks", OF_ROOT(landmarks.prepare), AT_ROOT(landmarks.judge), CAN, FAST, "")],
     "edges": [("edges", OF_ROOT(edges.prepare), AT_ROOT(edges.judge), CAN, FAST, "")],
     "walls": [("walls", OF_ROOT(walls.prepare), AT_ROOT(walls.judge), CAN, FAST, "")],

@@ -46,6 +46,7 @@ static int is_virtual(int fd, const char *interface) {
 static int write_frame(can_sink *self, const struct canfd_frame *raw, size_t bytes) {
   for (int tries = 0;; tries++) {
     if (write(self->fd, raw, bytes) == (ssize_t)bytes) return 0;
+    if (errno == ENETDOWN && tries == 0) continue;  // of the past: a socket keeps it until it is reported once
     if ((errno != ENOBUFS && errno != EAGAIN && errno != EINTR) || tries == FULL_TRIES_MAX) return -errno;
     const struct timespec a_while = {.tv_nsec = FULL_WAIT_NS};  // its queue is full: the bus is slower
     (void)nanosleep(&a_while, NULL);

@@ -117,6 +117,8 @@ static void statements_and_bounds_are_checked(void) {
          "f.yaml:7: faults[0].health[0]: at_least and at_most are of a counter or a text");
   refuse(WITH("{source: can, counter: lost}"),
          "f.yaml:7: faults[0].health[0]: at_least or at_most is needed: by how much the counter grows");
+  refuse(WITH("{source: can, counter: lost, at_least: 5, at_most: 4}"),
+         "f.yaml:7: faults[0].health[0]: at_least is above at_most");
   refuse(WITH("{flag: jumped, source: can}"), "f.yaml:7: faults[0].health[0]: source: a flag is of the whole run");
   refuse(HEAD "- {name: a, fault: bus_off, from_s: 5, pose: {postion_m: 1}}\n",
          "f.yaml:3: faults[0].pose.postion_m: unknown key; did you mean 'position_m'?");

@@ -208,6 +208,7 @@ static uint64_t hash_of(double open_s, double from_s, int *count) {
   *count = 0;
   open_at(open_s, 0, 1);
   while (next()) {
+    TEST_ASSERT_TRUE(at_s() >= open_s);
     if (at_s() < from_s || item.kind == WM_PLAY_FAULT) continue;
     hash = mix(hash, &item.due_ns, sizeof item.due_ns);
     hash = mix(hash, &item.t_ns, sizeof item.t_ns);
@@ -347,6 +348,20 @@ static void a_bus_breaks_in_its_ways(void) {
   TEST_ASSERT_EQUAL(1000 + 20, count_of("can:can0", 3, 4));
 }
 
+static void a_stream_breaks_in_its_ways(void) {
+  int ahead = 0;
+  break_it(
+      "- {name: a, fault: stream_silent, stream: imu, from_s: 0, until_s: 1}\n"
+      "- {name: b, fault: stream_dropped, stream: imu, share: 0.5, from_s: 1, until_s: 2}\n"
+      "- {name: c, fault: stream_clock_ahead, stream: imu, ahead_s: -7, from_s: 2, until_s: 3}\n");
+  TEST_ASSERT_EQUAL(0, count_of("imu", 0, 1));
+  const int left = count_of("imu", 1, 2);
+  TEST_ASSERT_TRUE(left > 4 && left < 21);
+  open_at(2, 3.5, 1);
+  while (next()) ahead += is("imu") && item.t_ns == item.due_ns - 5000000 - 7 * WM_NS_PER_S;
+  TEST_ASSERT_EQUAL(25, ahead);
+}
+
 static void bytes_of_words_are_reversed(void) {
   break_it("- {name: a, fault: bus_wrong_byte_order, bus: can0, word_bytes: 4, from_s: 0, until_s: 2}\n");
   open_at(0, 0, 1);
@@ -396,6 +411,7 @@ int main(void) {
   RUN_TEST(a_dark_camera_keeps_its_share_of_light);
   RUN_TEST(pictures_have_the_format_that_is_asked_for);
   RUN_TEST(a_bus_breaks_in_its_ways);
+  RUN_TEST(a_stream_breaks_in_its_ways);
   RUN_TEST(bytes_of_words_are_reversed);
   RUN_TEST(a_fault_of_what_is_not_there_is_refused);
   RUN_TEST(a_folder_that_is_no_recording_is_refused);

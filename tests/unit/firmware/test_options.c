@@ -9,18 +9,18 @@ void tearDown(void) {}
 
 static const char *out_dir;
 static uint64_t seed;
-static double speed;
+static double speed, from_s;
+static option_texts cameras;
 static int help;
 static const char *words[2];
 static size_t word_count;
 static wm_error err;
 
 static wm_status parse(int argc, char **argv) {
-  static const option kOptions[] = {{"--out", OPTION_TEXT, &out_dir},
-                                    {"--seed", OPTION_U64, &seed},
-                                    {"--speed", OPTION_F64, &speed},
-                                    {"--help", OPTION_FLAG, &help}};
-  return options_parse(argc, argv, kOptions, 4, words, 2, &word_count, &err);
+  static const option kOptions[] = {{"--out", OPTION_TEXT, &out_dir},     {"--seed", OPTION_U64, &seed},
+                                    {"--speed", OPTION_F64, &speed},      {"--from", OPTION_F64_FROM_0, &from_s},
+                                    {"--camera", OPTION_TEXTS, &cameras}, {"--help", OPTION_FLAG, &help}};
+  return options_parse(argc, argv, kOptions, 6, words, 2, &word_count, &err);
 }
 #define PARSE(...) parse((int)(sizeof((char *[]){__VA_ARGS__}) / sizeof(char *)), (char *[]){__VA_ARGS__})
 
@@ -32,6 +32,15 @@ static void values_stand_behind_a_blank_or_an_equals_sign(void) {
   TEST_ASSERT_EQUAL(1, help);
   TEST_ASSERT_EQUAL(2, word_count);
   TEST_ASSERT_EQUAL_STRING("--strange", words[1]);
+}
+
+static void an_option_may_be_given_several_times(void) {
+  from_s = 1;
+  TEST_ASSERT_EQUAL(WM_OK, PARSE("--camera", "left=/dev/video0", "--from", "0", "--camera=right=/dev/video1"));
+  TEST_ASSERT_EQUAL(2, cameras.count);
+  TEST_ASSERT_EQUAL_STRING("left=/dev/video0", cameras.text[0]);
+  TEST_ASSERT_EQUAL_STRING("right=/dev/video1", cameras.text[1]);
+  TEST_ASSERT_EQUAL_DOUBLE(0, from_s);
 }
 
 static void refuse(const char *message, wm_status status) {
@@ -52,12 +61,15 @@ static void mistakes_are_told(void) {
   refuse("--speed: '0' is not a number above 0", PARSE("--speed", "0"));
   refuse("--speed: 'fast' is not a number above 0", PARSE("--speed", "fast"));
   refuse("--speed: 'nan' is not a number above 0", PARSE("--speed", "nan"));
+  refuse("--from: '-1' is not a number from 0 on", PARSE("--from", "-1"));
+  refuse("--camera: is empty", PARSE("--camera="));
   refuse("unexpected argument 'c'", PARSE("a", "b", "c"));
 }
 
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(values_stand_behind_a_blank_or_an_equals_sign);
+  RUN_TEST(an_option_may_be_given_several_times);
   RUN_TEST(mistakes_are_told);
   return UNITY_END();
 }

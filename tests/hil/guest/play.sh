@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: Apache-2.0
+# In the guest: `waymark play` into virtual CAN interfaces and v4l2loopback devices, recorded beside it.
+set -u
+cp -r /host/play /run/
+cd /run/play || exit 1
+command -v waymark-play >/dev/null || cp waymark-play /usr/bin/
+modprobe -a vcan can-raw || exit 1
+modprobe v4l2loopback devices=2 video_nr=10,11 exclusive_caps=0 max_buffers=8 || exit 1
+for can in vcan0 vcan1; do
+  ip link add $can type vcan
+  ip link set $can up
+done
+for tool in "chrt -h" "waymark check robot.yaml" "waymark play --help" "waymark record --help"; do $tool >/dev/null 2>&1; done
+cat recording/can.log recording/video/*.avi >/dev/null
+fails=0
+fail() { echo "FAIL: $*"; fails=$((fails + 1)); }
+
+# played NAME JSON OPTIONS: plays, and records what the kernel gives.
+played() {
+  local name=$1 json=$2
+  shift 2
+  # The player has the devices first: a camera's format is that of its writer.
+  chrt -f 45 waymark play recording --can can0=vcan0 --can can1=vcan1 --camera left=/dev/video10,MJPG --camera right=/dev/video11,GREY --lcm off \
+    --start-at $(($(cut -d. -f1 /proc/uptime) * 1000000000 + 6000000000)) --json "$json" "$@" >"$name.txt" 2>&1 &
+  local player=$!
+  sleep 1
+  waymark record --config robot.yaml --out "$name" --duration 16 --free-mb 50 >"$name-record.txt" 2>&1 || fail "waymark record: exit code $?"
+  wait $player || fail "waymark play: exit code $?"
+  cat "$name.txt" "$name-record.txt"
+}
+played rec played.json
+played broken broken.json --faults faults.yaml
+waymark play recording --can can0=vcan7 --lcm off 2>&1 | grep -F "vcan7: there is no such interface" || fail "no message about vcan7"
+waymark play recording --camera left=/dev/video77 --lcm off 2>&1 | grep -F "/dev/video77: can't be opened" || fail "no message about video77"
+mkdir -p /host/out/play
+rm -f rec/video/*.avi broken/video/*.avi
+cp -r rec broken played.json broken.json /host/out/play
+exit $((fails > 0))
