@@ -252,7 +252,7 @@ def _two(given, beside, types):
         if not os.path.isfile(path):
             raise HilError(f"--compare {path}: is no file; with REC it takes programs, packages (.deb) or configurations (.yaml)")
         words = argparse.Namespace(**vars(given))
-        key = "config" if path.endswith((".yaml", ".yml")) else "package" if path.endswith(".deb") else "program"
+        key = "config" if path.endswith((".yaml", ".yml")) else "package" if path.endswith(".deb") else "played" if given.played else "program"
         setattr(words, key, path)
         words.out, words.compare = str(out / side), None
         folder, result = test(words, beside, types)
