@@ -77,11 +77,11 @@ set(CPACK_DEBIAN_FLEET_PACKAGE_NAME waymark-fleet)
 set(CPACK_DEBIAN_FLEET_PACKAGE_ARCHITECTURE all)
 set(CPACK_DEBIAN_FLEET_PACKAGE_SECTION misc)
 set(CPACK_DEBIAN_FLEET_PACKAGE_DEPENDS "waymark-tools (= ${PROJECT_VERSION}-1), python3 (>= 3.11), python3-yaml")
-set(CPACK_DEBIAN_FLEET_PACKAGE_SUGGESTS "snakemake")
+set(CPACK_DEBIAN_FLEET_PACKAGE_SUGGESTS "snakemake, qemu-system-x86, qemu-system-arm, mmdebstrap, cpio, e2fsprogs, gcc-12, make, openssh-client")
 set(CPACK_DEBIAN_FLEET_DESCRIPTION "many drives of robots at once
 Replays and judges all recordings of a fleet on every core or on a cluster,
-compares what a change did to them, and lists what black boxes hold: waymark
-batch, compare, mine.")
+compares what a change did to them, lists what black boxes hold, and plays
+recordings into boards and guests: waymark batch, compare, mine, hil.")
 
 set(CPACK_DEBIAN_DEV_PACKAGE_NAME libwaymark-dev)
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)

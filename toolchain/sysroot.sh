@@ -31,52 +31,10 @@ flock -n 9 || { say "another ./dev sysroot $arch is at work: waiting for it"; fl
 [ "$(cat "$stamp" 2>/dev/null)" = "${packages[*]}" ] && exit 0
 
 # ── an apt of its own ───────────────────────────────────────────────────────────────────────────────────────────────
-mkdir -p "$work"/{lists,archives}/partial
-: >"$work/status"
-# The machine's settings (proxies, retries), without hooks, with other folders.
-{
-  apt-config dump | grep -vE '^(APT::Architectures?|APT::Update::(Pre|Post)-Invoke|DPkg::(Pre|Post)-|Dir::)'
-  cat <<EOT
-APT::Architecture "$arch";
-APT::Architectures { "$arch"; };
-Dir::State "$work";
-Dir::State::status "$work/status";
-Dir::State::lists "$work/lists";
-Dir::Cache "$work";
-Dir::Cache::archives "$work/archives";
-Dir::Etc "$work";
-Dir::Etc::sourcelist "$work/sources.list";
-Dir::Etc::sourceparts "-";
-Dir::Etc::main "-";
-Dir::Etc::parts "-";
-Dir::Etc::netrc "/etc/apt/auth.conf";
-Dir::Etc::netrcparts "/etc/apt/auth.conf.d";
-Dir::Etc::trustedparts "/etc/apt/trusted.gpg.d";
-EOT
-} >"$work/apt.conf"
-apt() { env APT_CONFIG="$work/apt.conf" apt-get -q "$@"; } # which is read first: no other configuration is
-
-codename=$(. /etc/os-release && echo "${VERSION_CODENAME:-}")
-keyring=/usr/share/keyrings/debian-archive-keyring.gpg
-option=$([ -e "$keyring" ] && echo "[signed-by=$keyring]" || true)
-# Debian's own suites are named after the release; other vendors' are not for other architectures.
-apt-get indextargets --format '$(REPO_URI) $(RELEASE) $(COMPONENT)' 'Created-By: Packages' |
-  awk -v c="$codename" -v o="$option" '$2 == c || index($2, c "-") == 1 {print "deb", o, $1, $2, $3}' | sort -u >"$work/all.list"
-[ -s "$work/all.list" ] || fail "no Debian source of '$codename' among this machine's (apt-get indextargets). Debian 12 is what this was made for."
-
-update() { # its own words, which are many, are shown if it fails
-  apt update --error-on=any >"$work/update.log" 2>&1
-}
-say "sysroot $arch: package lists from $(awk '{print $(NF-2)}' "$work/all.list" | sort -u | tr '\n' ' ')"
-cp "$work/all.list" "$work/sources.list"
-if ! update; then
-  # A mirror's security index is sometimes in the middle of a change. Headers and libraries to compile against may be
-  # a point release older: the board installs its own.
-  grep -v -- '-security ' "$work/all.list" >"$work/sources.list" || true
-  grep -E '^(E|W):' "$work/update.log" >&2 || true
-  echo "trying again without the security suite" >&2
-  update || { cat "$work/update.log" >&2; fail "the package lists of $arch could not be fetched (above). Is the mirror reachable? Run this again: it goes on where it stopped."; }
-fi
+apt() { env APT_CONFIG="$work/apt.conf" apt-get -q "$@"; }
+say "sysroot $arch: package lists"
+bash toolchain/foreign-apt.sh "$arch" "$work" ||
+  fail "the package lists of $arch could not be fetched (above). Is the mirror reachable? Run this again: it goes on where it stopped."
 
 # ── fetch, unpack ───────────────────────────────────────────────────────────────────────────────────────────────────
 apt --no-install-recommends -y --print-uris install "${packages[@]}" >"$work/uris" 2>"$work/install.log" ||

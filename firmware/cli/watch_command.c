@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <lcm/eventlog.h>
 #include <signal.h>
 #include <stdatomic.h>
 #include <stdio.h>
@@ -20,6 +21,7 @@ static const char kHelp[] =
     "  --url URL      LCM's (default: LCM_DEFAULT_URL, else this computer's)\n"
     "  --prefix TEXT  of the channels (default WAYMARK_)\n"
     "  --duration S   seconds, then stop\n"
+    "  --log FILE     instead of the view, all messages into a log, as LCM's own logger writes it\n"
     "  --foxglove [ADDRESS:]PORT\n"
     "                 for Foxglove instead of a terminal, by the Python package (--foxglove --help: its options)\n"
     "\n"
@@ -30,6 +32,7 @@ static const char kHelp[] =
     "For a browser, with the map and live pictures: `waymark web CONFIG`.\n";
 
 #define SHOW_EVERY_NS (500 * WM_NS_PER_MS)  // refresh of the terminal
+#define LOG_QUEUE 1000                      // messages that wait for a disk: 15 s of poses and health
 
 static atomic_int stop;
 
@@ -51,6 +54,17 @@ static void on_health(const lcm_recv_buf_t *message, const char *channel, void *
 static void on_innovation(const lcm_recv_buf_t *message, const char *channel, void *context) {
   (void)channel;
   watch_innovation(context, message->data, message->data_size);
+}
+
+static void on_any(const lcm_recv_buf_t *message, const char *channel, void *context) {
+  static int64_t number;
+  lcm_eventlog_event_t event = {.eventnum = number++,
+                                .timestamp = message->recv_utime,
+                                .channellen = (int32_t)strlen(channel),
+                                .datalen = (int32_t)message->data_size,
+                                .channel = (char *)channel,
+                                .data = message->data};
+  if (lcm_eventlog_write_event(context, &event) != 0) atomic_store(&stop, 2);
 }
 
 static watch seen;
@@ -85,14 +99,35 @@ static void run_foxglove(int argc, char *const *argv, wm_error *err) {
       "(docs/stack.md)");
 }
 
+// All messages with this prefix into the log, until the end of `duration_s` (0: none) or a signal.
+static int write_log(lcm_t *lcm, const char *prefix, const char *path, double duration_s) {
+  char channels[96];
+  wm_error err = {0};
+  lcm_eventlog_t *log = lcm_eventlog_create(path, "w");
+  if (!log) {
+    (void)wm_fail(&err, WM_IO, "%s: cannot be written", path);
+    return complain(&err);
+  }
+  (void)snprintf(channels, sizeof channels, "%.80s.*", prefix);
+  (void)lcm_subscription_set_queue_capacity(lcm_subscribe(lcm, channels, on_any, log), LOG_QUEUE);
+  wm_time_ns end_ns = duration_s > 0 ? wm_monotonic_ns() + wm_ns_from_seconds(duration_s) : INT64_MAX;
+  while (!atomic_load(&stop) && wm_monotonic_ns() < end_ns)
+    if (lcm_handle_timeout(lcm, 100) < 0) break;
+  lcm_eventlog_destroy(log);
+  if (atomic_load(&stop) != 2) return EXIT_DONE;
+  (void)wm_fail(&err, WM_IO, "%s: cannot be written: is the disk full?", path);
+  return complain(&err);
+}
+
 int command_watch(int argc, char *const *argv) {
-  const char *url = "", *prefix = "WAYMARK_", *why;
+  const char *url = "", *prefix = "WAYMARK_", *log_path = NULL, *why;
   double duration_s = 0;
   int help = 0;
   const char *web = NULL;
   const option options[] = {
-      {"--url", OPTION_TEXT, &url}, {"--prefix", OPTION_TEXT, &prefix}, {"--duration", OPTION_F64, &duration_s},
-      {"--web", OPTION_TEXT, &web}, {"--help", OPTION_FLAG, &help},     {"-h", OPTION_FLAG, &help}};
+      {"--url", OPTION_TEXT, &url},      {"--prefix", OPTION_TEXT, &prefix}, {"--duration", OPTION_F64, &duration_s},
+      {"--log", OPTION_TEXT, &log_path}, {"--web", OPTION_TEXT, &web},       {"--help", OPTION_FLAG, &help},
+      {"-h", OPTION_FLAG, &help}};
   wm_error err = {0};
   size_t words;
   char channel[96];
@@ -116,15 +151,20 @@ int command_watch(int argc, char *const *argv) {
                   lcm_connect_url(url), why);
     return complain(&err);
   }
+  struct sigaction action = {.sa_handler = on_signal};
+  (void)sigaction(SIGINT, &action, NULL);
+  (void)sigaction(SIGTERM, &action, NULL);
+  if (log_path) {
+    int code = write_log(lcm, prefix, log_path, duration_s);
+    lcm_destroy(lcm);
+    return code;
+  }
   (void)snprintf(channel, sizeof channel, "%.80sPOSE", prefix);
   (void)lcm_subscribe(lcm, channel, on_pose, &seen);
   (void)snprintf(channel, sizeof channel, "%.80sHEALTH", prefix);
   (void)lcm_subscribe(lcm, channel, on_health, &seen);
   (void)snprintf(channel, sizeof channel, "%.80sINNOVATION", prefix);
   (void)lcm_subscribe(lcm, channel, on_innovation, &seen);
-  struct sigaction action = {.sa_handler = on_signal};
-  (void)sigaction(SIGINT, &action, NULL);
-  (void)sigaction(SIGTERM, &action, NULL);
   show(lcm, duration_s);
   lcm_destroy(lcm);
   return EXIT_DONE;

@@ -295,7 +295,7 @@ def recorder(work):
 def say_it_is_elsewhere(drive, at_s):
     """SET_POSE: 3 m ahead of where it is, turned by a quarter, and sure of it."""
     truth = [(t - drive.first_ns, *rest) for t, *rest in drives.table(drive.world / "recording/truth.csv")]
-    x_m, y_m, heading_rad = drives.at(truth, [row[0] for row in truth], at_s * 1e9)
+    x_m, y_m, heading_rad, _ = drives.at(truth, [row[0] for row in truth], at_s * 1e9)
     said = messages.types(drive.folder).set_pose_t()
     turned = heading_rad + math.pi / 2
     said.position_m = [x_m + 3 * math.cos(heading_rad), y_m + 3 * math.sin(heading_rad), 0]
@@ -379,7 +379,7 @@ def readers(work):
     if replay.returncode == 0:
         poses = [p for p in messages.rows([p for _, p in heard.poses]) if p[0] > drive.begin_ns + 2e9]
         apart = list(drives.apart_of(poses, drives.table(drive.folder / "again/published.csv"), 0))
-        worst_m, worst_deg = max((m for m, _ in apart), default=math.inf), max((d for _, d in apart), default=math.inf)
+        worst_m, worst_deg = max((m for _, m, _ in apart), default=math.inf), max((d for *_, d in apart), default=math.inf)
         heard.check(len(apart) > 40 * (until_s - 4) and worst_m < 0.02 and worst_deg < 0.2,
                     f"{len(apart)} poses at most {worst_m:.4f} m and {worst_deg:.3f} degrees from the replay of its recording")
     stamps = sum(len((drive.folder / f"box/pictures-front-{part}.csv").read_text().splitlines()) - 1 for part in "ab"

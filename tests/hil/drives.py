@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """A recording through the guest's drivers into `waymark run`: its timeline for guest/play, and the judgement of what the run
 said over LCM, against a replay of the recording with the data that the guest saw, and against the truth."""
-import bisect
-import csv
-import math
+import pathlib
 import re
 import shutil
 import subprocess
+import sys
 
-import messages
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "tools/hil"))
+import messages  # noqa: E402
+from waymark_hil.poses import BEGIN_NS, HEADING_DEG, POSITION_M, apart_of, at, differences, rms, table  # noqa: E402
 
-POSITION_M, HEADING_DEG, TRUTH_RATIO = 0.02, 0.2, 1.5
-BEGIN_NS = 200_000_000  # of the first pose: sent before or after the first observation was fused, as it happens
+TRUTH_RATIO = 1.5
 COMPILER = "cc"  # of what runs in the guest
 URL = "udpm://239.255.76.67:7667?ttl=0"
 
@@ -50,58 +50,6 @@ def write(scenario, here, items, blob, seconds):
     compile_helper(here / "play.c", scenario / "play")
 
 
-def table(path):
-    with open(path, newline="") as f:
-        return [(int(r["t_ns"]), float(r["x_m"]), float(r["y_m"]), 2 * math.atan2(float(r["qz"]), float(r["qw"])))
-                for r in csv.DictReader(f)]
-
-
-def between(a, b, t_ns):
-    """On the line through two rows."""
-    part = (t_ns - a[0]) / (b[0] - a[0])
-    return a[1] + part * (b[1] - a[1]), a[2] + part * (b[2] - a[2]), a[3] + part * math.remainder(b[3] - a[3], 2 * math.pi)
-
-
-def at(rows, times, t_ns):
-    """Between the two rows around t_ns; None outside."""
-    i = bisect.bisect_right(times, t_ns)
-    return None if i == 0 or i == len(rows) else between(rows[i - 1], rows[i], t_ns)
-
-
-def around(rows, times, t_ns):
-    """Between the rows around t_ns, and on from pairs of rows up to two before and after: a correction that takes the processor a while
-    falls between two messages of the one run, and one or two later or earlier in the other."""
-    i = bisect.bisect_right(times, t_ns)
-    if i < 3 or i + 2 >= len(rows):
-        return []
-    return [between(rows[k - 1], rows[k], t_ns) for k in (i, i - 1, i + 1, i - 2, i + 2)]
-
-
-def away(pose, other):
-    return math.hypot(pose[1] - other[0], pose[2] - other[1]), abs(math.degrees(math.remainder(pose[3] - other[2], 2 * math.pi)))
-
-
-def differences(poses, rows, offset_ns):
-    times = [r[0] for r in rows]
-    for p in poses:
-        q = at(rows, times, p[0] - offset_ns)
-        if q:
-            yield away(p, q)
-
-
-def apart_of(poses, rows, offset_ns):
-    """As differences, from the nearest of what is around."""
-    times = [r[0] for r in rows]
-    for p in poses:
-        near = around(rows, times, p[0] - offset_ns)
-        if near:
-            yield min((away(p, q) for q in near), key=lambda d: d[0] / POSITION_M + d[1] / HEADING_DEG)
-
-
-def rms(values):
-    return math.sqrt(sum(v * v for v in values) / len(values))
-
-
 def judge(name, work, waymark, recording, config, seconds, *logged_options):
     out, failures = work / f"share/out/{name}", []
 
@@ -120,11 +68,11 @@ def judge(name, work, waymark, recording, config, seconds, *logged_options):
     poses = [p for p in poses if p[0] > begun_ns]
     apart = list(apart_of(poses, table(work / f"{name}-same/published.csv"), offset_ns))
     truth = table(recording / "truth.csv")
-    live = [m for m, _ in differences(poses, truth, offset_ns)]
-    desk = [m for m, _ in differences(table(work / f"{name}-desk/published.csv"), truth, 0)]
+    live = [m for _, m, _ in differences(poses, truth, offset_ns)]
+    desk = [m for _, m, _ in differences(table(work / f"{name}-desk/published.csv"), truth, 0)]
     if len(apart) < 30 * seconds:
         return failures + [f"{name}: only {len(apart)} of {len(poses)} poses over LCM can be compared"]
-    worst_m, worst_deg = max(m for m, _ in apart), max(d for _, d in apart)
+    worst_m, worst_deg = max(m for _, m, _ in apart), max(d for *_, d in apart)
     print(f"{name}: {len(poses)} poses over LCM; {len(apart)} of them at most {worst_m:.4f} m and {worst_deg:.3f} degrees from the "
           f"replay with the guest's data; from the truth {rms(live):.4f} m RMS, at the desk {rms(desk):.4f} m")
     if worst_m > POSITION_M or worst_deg > HEADING_DEG:

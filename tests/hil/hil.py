@@ -6,7 +6,7 @@ real (emulated) CAN controller, under qemu's instruction clock, fed from a recor
 usage: hil.py [--arch arm64|armhf] [--package DEB] WORK WAYMARK WAYMARK_SIMULATE [PART ...]
 
 WORK keeps the guest's image from run to run; WAYMARK is this computer's; parts: can, camera, libcamera, play, landmarks, motion, edges, walls,
-service, power; all of them but power where none is named. Without --arch the guest runs WAYMARK itself, under systemd the package; else the package in all parts.
+service, board, power; all of them but power where none is named. Without --arch the guest runs WAYMARK itself, under systemd the package; else the package in all parts.
 The service and power parts run the package under systemd; without one they are left out. armhf is arm64's kernel with armhf's programs.
 
 Judged on the host: the guest's own checks; the log of its run gives its poses bit by bit; its poses are those of a replay
@@ -15,72 +15,38 @@ import argparse
 import csv
 import math
 import pathlib
-import random
 import shutil
 import subprocess
 import sys
 import time
 
-import drives
-import edges
-import landmarks
-import motion
-import player
-import service
-import vimc
-import walls
-from published import ABSENT, DOWN, MOTION_STALE, STALLED, WORKS, Published
-
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
-CAN = ["-object", "can-bus,id=cb0", "-device", "kvaser_pci,canbus=cb0", "-device", "kvaser_pci,canbus=cb0"]
-# Instruction clocks: 250 million a second, idle time is the host's; 500 million, idle time is skipped, so that who sleeps
-# wakes in time whatever else the host does; as that, but idle time is the host's, as a disk is waited for.
-SLOW, FAST, SYSTEM = "shift=2,sleep=on", "shift=1,sleep=off", "shift=1,sleep=on"
+sys.path.insert(0, str(ROOT / "tools/hil"))
+import board  # noqa: E402
+import drives  # noqa: E402
+import edges  # noqa: E402
+import landmarks  # noqa: E402
+import motion  # noqa: E402
+import player  # noqa: E402
+import service  # noqa: E402
+import vimc  # noqa: E402
+import walls  # noqa: E402
+from published import ABSENT, DOWN, MOTION_STALE, STALLED, WORKS, Published  # noqa: E402
+from waymark_hil import guest  # noqa: E402
+from waymark_hil.guest import FAST, MACHINES, SLOW, SYSTEM  # noqa: E402
+
+CAN = guest.buses(1)
 POSITION_M, HEADING_DEG = 0.02, 0.2
-GUEST_S = 1800  # on this computer's clock
 PLAYER_M, PLAYER_DEG, PLAYER_MS = 0.1, 0.5, 100
 
 
-# What a guest is made of, by Debian's name of its architecture; `cc` makes its helpers.
-ARM = {"qemu": ["qemu-system-aarch64", "-machine", "virt", "-cpu", "cortex-a57"], "console": "ttyAMA0"}
-MACHINES = {
-    "amd64": {"qemu": ["qemu-system-x86_64", "-machine", "q35", "-cpu", "max"], "console": "ttyS0", "cc": "cc"},
-    "arm64": {**ARM, "cc": "aarch64-linux-gnu-gcc"},
-    "armhf": {**ARM, "cc": "arm-linux-gnueabihf-gcc"},
-}
-
-
-def command_of(work, machine, script, devices, clock, init):
-    image = work / "image"
-    return [str(word) for word in (
-        *machine["qemu"], "-accel", "tcg,thread=single", "-smp", "1",
-        "-icount", clock, "-m", "1024", "-no-reboot",
-        "-kernel", image / "vmlinuz", "-initrd", image / "init.cpio.gz",
-        "-append", f"console={machine['console']} quiet panic=-1 hil={script} {init}",
-        "-drive", f"file={image}/root.ext4,if=virtio,format=raw,readonly=on",
-        "-virtfs", f"local,path={work}/share,mount_tag=host,security_model=none,id=host",
-        "-display", "none", "-monitor", "none", "-serial", "stdio", "-nic", "none", *devices)]
-
-
-def boot(work, machine, script, *devices, clock=SLOW, init=""):
-    """Runs guest/SCRIPT by this clock; everything that it prints is shown and kept. Judged by its last word, not by qemu's. After the
-    word NO MORE POWER the guest is killed at a random moment, as a cut of the power would: what it has given to its disk is there."""
+def boot(work, machine, script, *devices, clock=SLOW, init="", watch=None):
+    """Runs guest/SCRIPT by this clock; everything that it prints is shown and kept."""
     log = work / f"{script}.log"
-    with open(log, "w") as out:
-        guest = subprocess.Popen(command_of(work, machine, script, devices, clock, init), stdin=subprocess.DEVNULL, stdout=out, stderr=subprocess.STDOUT)
-    end_s, has_power = time.monotonic() + GUEST_S, True
-    while guest.poll() is None:
-        has_power = "NO MORE POWER" not in log.read_text(errors="replace")
-        if not has_power:
-            time.sleep(random.uniform(0, 3))
-        if not has_power or time.monotonic() > end_s:
-            guest.kill()
-            guest.wait()
-        time.sleep(0.5)
-    text = log.read_text(errors="replace")
-    print(text)
-    return "GUEST-RC 0" in text or not has_power
+    is_good = guest.boot(guest.command_of(work / "image", machine, work / "share", script, devices, clock, init), log, watch=watch)
+    print(log.read_text(errors="replace"))
+    return is_good
 
 
 def poses(path):
@@ -262,6 +228,7 @@ PARTS = {
     "edges": [("edges", OF_ROOT(edges.prepare), AT_ROOT(edges.judge), CAN, FAST, "")],
     "walls": [("walls", OF_ROOT(walls.prepare), AT_ROOT(walls.judge), CAN, FAST, "")],
     "service": [("service", OF_ROOT(service.prepare_service), service.judge_service, CAN, FAST, "systemd")],
+    "board": [("board", OF_ROOT(board.prepare), AT_ROOT(board.judge), [], SYSTEM, "")],
     "power": [("kills", OF_ROOT(service.prepare_kills), service.judge_kills, CAN, SYSTEM, "systemd")],
 }
 UNDER_SYSTEMD = ("service", "power")
@@ -274,7 +241,8 @@ def run_part(work, machine, waymark, simulate, steps):
         more = prepare(work, simulate) or []
         begun_s = time.monotonic()
         devices = [word.format(work=work) for word in devices] + more
-        if not boot(work, machine, f"{name}.sh", *devices, clock=clock, init=init):
+        watch = board.watch(work, waymark) if name == "board" else None
+        if not boot(work, machine, f"{name}.sh", *devices, clock=clock, init=init, watch=watch):
             return failures + [f"the guest's own checks failed ({name}.sh)"]
         print(f"{name}: {time.monotonic() - begun_s:.0f} s in the guest")
         failures += judge(work, waymark)
@@ -300,16 +268,18 @@ def main():
         if shutil.which(program) is None:
             print(f"{program} is not there: skipped")
             return 77
-    subprocess.run(["bash", HERE / "prepare.sh", work / "image", args.arch], check=True)
+    guest.prepare(args.arch, work)
     shutil.rmtree(work / "share", ignore_errors=True)
     (work / "share/out").mkdir(parents=True)
     shutil.copytree(HERE / "guest", work / "share/guest")
+    shutil.copytree(guest.SCRIPTS, work / "share/guest", dirs_exist_ok=True)
     if args.package:
         shutil.copy(args.package, work / "share/waymark.deb")
     if args.arch == "amd64":
         shutil.copy(waymark, work / "share/waymark")
         if camera.exists():
             shutil.copy(camera, work / "share/waymark-camera")
+        shutil.copy(waymark.parent / "waymark-play", work / "share/waymark-play")
     drives.COMPILER = machine["cc"]
     failures = []
     for name in args.parts or [part for part in PARTS if part != "power"]:

@@ -40,7 +40,7 @@ def judge(work, waymark, root):
     rows = drives.table(work / "walls-again/published.csv")
     poses = [p for p in poses if p[0] > rows[0][0] + BEGIN_S * 10**9]
     apart = list(drives.apart_of(poses, rows, 0))
-    worst_m, worst_deg = max(m for m, _ in apart), max(d for _, d in apart)
+    worst_m, worst_deg = max(m for _, m, _ in apart), max(d for *_, d in apart)
     with open(out / "rec/video/front.csv", newline="") as f:
         recorded = sum(1 for _ in csv.DictReader(f))
     boxed = sum(len(path.read_text().splitlines()) - 1 for path in (out / "keep/box").glob("pictures-front-*.csv"))

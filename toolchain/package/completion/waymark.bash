@@ -4,7 +4,7 @@ _waymark() {
   local word=${COMP_WORDS[COMP_CWORD]} command=${COMP_WORDS[1]:-} words= more=
   COMPREPLY=()
   if [ "$COMP_CWORD" -eq 1 ]; then
-    mapfile -t COMPREPLY < <(compgen -W 'run replay record watch check doctor stamps batch calibrate compare detect diff eval import init map mine play reference report simulate suggest web --help --version' -- "$word")
+    mapfile -t COMPREPLY < <(compgen -W 'run replay record watch check doctor stamps batch calibrate compare detect diff eval hil import init map mine play reference report simulate suggest web --help --version' -- "$word")
     return
   fi
   case $command in
@@ -27,7 +27,7 @@ _waymark() {
     "run") words='--config --recording --out --record --force --out-max-mb --duration --speed --seed --resume --landmarks --map --calibration' ;;
     "replay") words='--config --out --seed --landmarks --calibration --map --frames-of --timing-of --from --until --lost --force --reference' ;;
     "record") words='--config --out --duration --max-mb --free-mb' ;;
-    "watch") words='--url --prefix --duration --foxglove' ;;
+    "watch") words='--url --prefix --duration --log --foxglove' ;;
     "check") words='--landmarks --calibration --map --json --quick --apply' ;;
     "doctor") words='--json --seconds' ;;
     "stamps") words='' ;;
@@ -37,6 +37,7 @@ _waymark() {
     "detect") words='--help --detector --config --set --out --draw --rate --camera --calibration --landmarks --poses --every' ;;
     "diff") words='--help' ;;
     "eval") words='--help --json --published --reference --align --against --take-out-delay --from --to --detector --camera --sizes --size-min --view' ;;
+    "hil") words='--help --config --guest --host --local --out --faults --limits --from --until --can --ssh --record --program --package --played --compare --json' ;;
     "import") words='--help --out --camera --stamps --begin-ns --quality' ;;
     "init") words='--help --motion --dbc --can-log --can --imu --gnss --sender-clock --wheel-radius --ticks --track --wheelbase --steering-ratio --sees --camera --calibration --sensor --urdf --frame --mounting --tag-layout --tag-family --tag-size --landmarks --map --stream --yes --force' ;;
     "map") words='--help --resolution --origin --inside --walls-below --negate --fine --speck --clearance --out --recording --draw --poses --json --id --picture --at --sigma --size --yaw --from --corners --calibration --camera --pose --sigma-deg --mounting-deg --family --ids --paper --rows --margin --size-min --stages --pictures --seed' ;;

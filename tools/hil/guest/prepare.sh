@@ -4,23 +4,29 @@
 # modules, v4l2loopback (and for amd64 vimc) built for it, a small root file system, an initramfs. Packages come from Debian
 # alone. An armhf guest has arm64's kernel, which runs its programs.
 # usage: prepare.sh FOLDER [amd64|arm64|armhf]   (4 minutes, 3 GB; needs the packages that docs/dependencies.md lists for hil)
+# Two that are begun at once wait for each other; the second finds the image ready.
 set -euo pipefail
 arch=${2:-amd64}
 here=$(dirname "$(readlink -f "$0")")
 mkdir -p "$1"
 folder=$(readlink -f "$1")
-top=$here/../..
+# Beside this script where it is installed, else in the sources.
+toolchain=$here
+[ -e "$toolchain/foreign-apt.sh" ] || toolchain=$here/../../../toolchain
 case "$arch" in
   amd64) machine=amd64 build=() ;;
   arm64 | armhf) machine=arm64 build=(ARCH=arm64 CROSS_COMPILE=aarch64-linux-gnu-) ;;
   *) echo "prepare.sh: '$arch': amd64, arm64 and armhf are known" >&2; exit 2 ;;
 esac
 
-# The kernel's packages, by an apt with its own state where they are another architecture's (toolchain/sysroot.sh made it).
-cd "$top"
-[ "$machine" = amd64 ] || bash toolchain/sysroot.sh "$machine"
-apt_conf=$(readlink -f .cache)/sysroot/$machine.apt/apt.conf
-its_apt() { if [ "$machine" = amd64 ]; then "$@"; else env APT_CONFIG="$apt_conf" "$@"; fi; }
+exec 9>"$folder/.lock"
+flock 9
+
+# The kernel's packages, by an apt with its own state where they are another architecture's. With an image that is there, lists
+# that were fetched before are new enough.
+apt_folder=$folder/$machine.apt
+if [ "$machine" != amd64 ] && [ ! -e "$apt_folder/update.log" ]; then bash "$toolchain/foreign-apt.sh" "$machine" "$apt_folder"; fi
+its_apt() { if [ "$machine" = amd64 ]; then "$@"; else env APT_CONFIG="$apt_folder/apt.conf" "$@"; fi; }
 
 kernel=$(its_apt apt-cache depends "linux-image-rt-$machine" | awk '/Depends: linux-image-/{sub("linux-image-", "", $2); print $2; exit}')
 [ -n "$kernel" ] || { echo "apt knows no linux-image-rt-$machine (apt-get update?)"; exit 1; }
@@ -43,6 +49,8 @@ for deb in debs/*.deb; do dpkg -x "$deb" files; done
 cp "files/boot/vmlinuz-$kernel" vmlinuz
 
 include=iproute2,kmod,can-utils,v4l-utils,liblcm1,procps,udev,liblcm-bin,libyaml-0-2,libturbojpeg0,libpng16-16,libapriltag3,busybox-static
+# cyclictest, and a board that is reached over ssh.
+include=$include,rt-tests,openssh-server
 # What the package's service runs under, and its dynamic user.
 include=$include,systemd,libnss-systemd,init-system-helpers
 if [ "$arch" = amd64 ]; then
@@ -50,7 +58,7 @@ if [ "$arch" = amd64 ]; then
 else
   # A mirror's security index of another architecture is sometimes in the middle of a change: the guest does without.
   mirror=$(apt-get indextargets --format '$(REPO_URI)' 'Created-By: Packages' | grep -v security | head -1)
-  bash "$top/toolchain/foreign.sh" "$arch" mmdebstrap --quiet --mode=root --variant=minbase --architectures="$arch" --include="$include" \
+  bash "$toolchain/foreign.sh" "$arch" mmdebstrap --quiet --mode=root --variant=minbase --architectures="$arch" --include="$include" \
     bookworm root.tar "deb $mirror bookworm main" "deb $mirror bookworm-updates main"
   mkdir root
   tar -C root -xf root.tar --exclude='./dev/*'

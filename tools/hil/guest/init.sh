@@ -20,6 +20,7 @@ fi
 mkdir -p /dev/pts /dev/shm
 for d in tmp run dev/shm; do mount -t tmpfs tmpfs /$d; done
 mount -t devpts devpts /dev/pts
+ln -sf /proc/self/fd /dev/fd
 if grep -qw systemd /proc/cmdline; then
   echo 0123456789abcdef0123456789abcdef >/etc/machine-id # a computer that was started before: nothing is enabled by itself
   cat >/etc/systemd/system/hil.service <<'UNIT'
@@ -41,6 +42,7 @@ ip route add 224.0.0.0/4 dev lo
 # The program alone, or the package as on a robot; into memory, as all that is written here.
 if [ -e /host/waymark ]; then
   cp /host/waymark /usr/bin/
+  [ ! -e /host/waymark-play ] || cp /host/waymark-play /usr/bin/
   [ ! -e /host/waymark-camera ] || install -D /host/waymark-camera /usr/lib/waymark/waymark-camera
 else
   dpkg -i /host/waymark.deb

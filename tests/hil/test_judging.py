@@ -1,0 +1,287 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What `waymark hil` judges by: faults against what was heard, JUnit XML, limits, samples, derived configurations, comparisons.
+
+    test_judging.py TYPES      the folder with LCM's types for Python"""
+import json
+import math
+import pathlib
+import sys
+import tempfile
+import unittest
+
+import yaml
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT / "tools/hil"), str(ROOT / "tools/fleet")]
+from waymark_hil import HilError, compare, fault_judge, lcm_log, limits, poses, recording, samples, scenario, verdict  # noqa: E402
+
+TYPES = lcm_log.types(sys.argv.pop(1))
+END_S, RATE_HZ = 30.0, 50
+ABSENT, WORKS, FROZEN = 2, 1, 7
+
+
+def pose(t_s, x_m, sigma_m=0.02, flags=0, state=1):
+    out = TYPES.pose_t()
+    out.t_ns, out.state, out.status_flags = round(t_s * 1e9), state, flags
+    out.position_m, out.orientation_xyzw = [x_m, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]
+    out.covariance = [[0.0] * 6 for _ in range(6)]
+    out.covariance[0][0] = sigma_m ** 2
+    return out
+
+
+def health(t_s, device, lost=0, cause=0):
+    out, source = TYPES.health_t(), TYPES.source_health_t()
+    name = b"edges:front"
+    source.name, source.device, source.lost = list(name.ljust(48, b"\0")), device, lost
+    out.t_ns, out.source_count, out.sources, out.cause = round(t_s * 1e9), 1, [source], cause
+    return out
+
+
+class Drive:
+    """30 s at 1 m/s; a camera is unplugged from 10 to 15 s, and all is as it should be. Each test makes one thing wrong."""
+
+    def __init__(self):
+        self.poses = []
+        for k in range(int(END_S * RATE_HZ)):
+            t = k / RATE_HZ
+            without_s = t - 10 if 10 <= t < 15 else 0.0
+            self.poses.append((t, pose(t, t + 0.01 * without_s, 0.02 + 0.02 * without_s)))
+        self.healths = [(t + 0.4, health(t + 0.4, ABSENT if 10 <= t < 15 else WORKS, lost=3 if t >= 15 else 0)) for t in range(int(END_S))]
+        self.fault = {"name": "unplugged", "fault": "camera_unplugged", "from_s": 10.0, "until_s": 15.0, "by": "player", "health": [
+            {"what": "device", "source": "edges:front", "value": "absent", "within_s": 1.0, "cleared_within_s": 2.0}], "pose": None}
+        self.said, self.done = "", {"done": True}
+
+    def failures(self):
+        checks = verdict.Checks()
+        reference = [(k * 0.1, k * 0.1, 0.0, 0.0, 0.0) for k in range(int(10 * END_S))]
+        heard = fault_judge.Heard(self.poses, self.healths, reference, self.said, END_S)
+        fault_judge.judge(checks, self.fault, heard, self.done, "by the truth")
+        return [check.name for check in checks.failed()]
+
+
+class Faults(unittest.TestCase):
+    def setUp(self):
+        self.drive = Drive()
+
+    def test_all_as_it_should_be(self):
+        self.drive.fault["pose"] = {"position_m": 0.1, "error_sigmas": 3, "sigma_m": 0.2, "sigma_grows": 2, "rate_hz": 45, "gap_max_s": 0.1, "within_s": 1.0}
+        self.assertEqual(self.drive.failures(), [])
+
+    def test_a_bound_that_is_too_tight(self):
+        for name, value in (("position_m", 0.04), ("error_sigmas", 0.3), ("sigma_m", 0.1), ("sigma_grows", 20), ("rate_hz", 60), ("gap_max_s", 0.01)):
+            self.drive.fault["pose"] = {name: value}
+            self.assertEqual(self.drive.failures(), [f"pose {name}"], name)
+
+    def test_wrong_health(self):
+        for i in (12, 13):
+            self.drive.healths[i] = (i + 0.4, health(i + 0.4, FROZEN))
+        self.assertEqual(self.drive.failures(), ["health 1: edges:front absent, as long as it lasts"])
+
+    def test_health_that_is_never_stated(self):
+        self.drive.healths = [(t, health(t, WORKS)) for t, _ in self.drive.healths]
+        self.assertIn("health 1: edges:front absent, in time", self.drive.failures())
+
+    def test_health_that_is_too_late(self):
+        for i in (10, 11, 12):
+            self.drive.healths[i] = (i + 0.4, health(i + 0.4, WORKS))
+        self.assertIn("health 1: edges:front absent, in time", self.drive.failures())
+
+    def test_health_that_is_not_taken_back(self):
+        for i in range(15, 29):
+            self.drive.healths[i] = (i + 0.4, health(i + 0.4, ABSENT))
+        self.assertEqual(self.drive.failures(), ["health 1: edges:front absent, taken back"])
+
+    def test_a_pose_that_does_not_recover(self):
+        self.drive.fault["pose"] = {"within_s": 2.0}
+        self.drive.poses = [(t, p if t < 15 else pose(t, t, 0.4)) for t, p in self.drive.poses]
+        self.assertEqual(self.drive.failures(), ["pose within_s"])
+
+    def test_poses_that_stop(self):
+        self.drive.fault["pose"] = {"gap_max_s": 0.5, "rate_hz": 40}
+        self.drive.poses = [(t, p) for t, p in self.drive.poses if not 11 < t < 13]
+        self.assertEqual(self.drive.failures(), ["pose gap_max_s", "pose rate_hz"])
+
+    def test_counters(self):
+        for least, most, failed in ((1, 5, 0), (4, None, 1), (None, 2, 1)):
+            self.drive.fault["health"] = [{"what": "counter", "source": "edges:front", "value": "lost", "at_least": least, "at_most": most}]
+            self.assertEqual(len(self.drive.failures()), failed, (least, most))
+
+    def test_flags_causes_and_texts(self):
+        self.drive.fault["health"] = [{"what": "flag", "value": "motion_stale", "within_s": 0.5}]
+        self.assertEqual(len(self.drive.failures()), 2)
+        self.drive.poses = [(t, pose(t, t, flags=1) if 10.2 < t < 15.1 else p) for t, p in self.drive.poses]
+        self.assertEqual(self.drive.failures(), [])
+        self.drive.fault["health"] = [{"what": "cause", "value": "refused", "within_s": 2}]
+        self.assertEqual(len(self.drive.failures()), 2)
+        self.drive.fault["health"] = [{"what": "text", "value": "front is gone", "at_most": 1}]
+        self.assertEqual(len(self.drive.failures()), 1)
+        self.drive.said = "front is gone\n"
+        self.assertEqual(self.drive.failures(), [])
+        self.drive.said *= 2
+        self.assertEqual(len(self.drive.failures()), 1)
+
+    def test_a_fault_that_did_not_happen(self):
+        self.drive.done = {"done": False, "why": "EPERM"}
+        self.assertEqual(self.drive.failures(), ["it happened"])
+
+
+class Written(unittest.TestCase):
+    def checks(self):
+        out = verdict.Checks()
+        out.add("log", "bits", True, "the same")
+        out.at_most("poses", "distance <m> & \"turn\"", 0.03, 0.02, "too far\x00\x1b[0m")
+        out.add("computer", "temperature", None, "no thermometer")
+        return out
+
+    def test_junit_is_read_by_a_parser(self):
+        import junitparser
+        text = verdict.junit(self.checks(), "waymark hil drive", 12.5, "said\x01")
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder) / "junit.xml"
+            path.write_bytes(text)
+            read = junitparser.JUnitXml.fromfile(str(path))
+        cases = [case for suite in read for case in suite]
+        self.assertEqual((read.tests, read.failures, [suite.name for suite in read]), (3, 1, ["log", "poses", "computer"]))
+        self.assertEqual([type(case.result[0]).__name__ if case.result else "passed" for case in cases], ["passed", "Failure", "Skipped"])
+        self.assertEqual(cases[1].name, 'distance <m> & "turn"')
+        self.assertIn("too far", cases[1].result[0].message)
+
+    def test_json_has_no_nan(self):
+        checks = verdict.Checks()
+        checks.at_most("poses", "never", math.inf, 1.0, "never")
+        with tempfile.TemporaryDirectory() as folder:
+            result = verdict.write(pathlib.Path(folder), {"name": "x"}, checks)
+            self.assertEqual(json.loads((pathlib.Path(folder) / "result.json").read_text())["verdict"], "failed")
+        self.assertEqual(result["checks"][0]["value"], None)
+
+
+class Files(unittest.TestCase):
+    def setUp(self):
+        self.temporary = tempfile.TemporaryDirectory()
+        self.folder = pathlib.Path(self.temporary.name)
+        self.addCleanup(self.temporary.cleanup)
+
+    def write(self, name, text):
+        path = self.folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+        return path
+
+    def robot(self):
+        self.write("rec/recording.yaml", "format: waymark-recording/1\nname: r\nvehicle: {initial_pose: {t_ns: 5, x_m: 1, y_m: 2, heading_rad: 1e-3}}\n")
+        self.write("rec/can.log", "(10.000000) can0 101#00\n(10.500000) can1 102##100112233445566778899\n(11.000000) can0 101#01\n")
+        self.write("rec/vehicle.dbc", "")
+        self.write("rec/calibration.yaml", "")
+        self.write("rec/video/front.csv", "frame,t_ns\n0,10000000000\n1,10100000000\n2,10200000000\n")
+        self.write("rec/video/front.avi", "RIFF....AVI MJPG")
+        self.write("rec/imu.csv", "t_ns,wx\n12000000000,1\n")
+        return recording.read(self.folder / "rec")
+
+    def test_a_recording(self):
+        found = self.robot()
+        self.assertEqual([(bus.name, bus.frames, bus.has_fd) for bus in found.buses], [("can0", 2, False), ("can1", 1, True)])
+        self.assertEqual((found.first_ns, found.last_ns, found.streams), (10 * 10**9, 12 * 10**9, ["imu"]))
+        self.assertAlmostEqual(found.cameras[0].rate_hz, 10)
+
+    def test_bad_recordings(self):
+        for text in ("", "rubbish\n", "(1.0) can0\n"):
+            self.write("bad/can.log", text)
+            with self.assertRaises(HilError):
+                recording.read(self.folder / "bad")
+        with self.assertRaises(HilError):
+            recording.read(self.folder / "none")
+
+    def test_a_derived_configuration(self):
+        rec, out = self.robot(), self.folder / "test"
+        out.mkdir()
+        config = self.write("robot/robot.yaml", "format: waymark-config/1\nestimator: slam\ndbc: own.dbc\nvision: {apriltag: {}}\nmotion: {noise: {speed_mps: 1e-3}}\n"
+                            "devices: {can: [{interface: can1, dbc: own.dbc}], cameras: [{name: front, device: /dev/video0, format: YUYV}], iio: {device: bmi160}}\n"
+                            "start: {saved_pose: /var/lib/waymark/pose.yaml}\ncommands: {socket: /run/x}\n")
+        self.write("robot/own.dbc", "mine")
+        _, buses, cameras = scenario.derive(config, rec, out, True, False)
+        derived = yaml.safe_load((out / "robot.yaml").read_text())
+        self.assertEqual(buses, [("can1", "can1")])
+        self.assertEqual((cameras[0]["format"], cameras[0]["device"]), ("YUYV", "/dev/video40"))
+        self.assertEqual((out / derived["dbc"]).read_text(), "mine")
+        self.assertEqual(derived["calibration"], "recording/calibration.yaml")
+        self.assertEqual(derived["devices"]["lcm"], [{"stream": "imu"}])
+        self.assertNotIn("iio", derived["devices"])
+        self.assertNotIn("commands", derived)
+        self.assertFalse(derived["start"]["saved_pose"].startswith("/"))
+        self.assertEqual(derived["initial_pose"].keys(), {"x_m", "y_m", "heading_rad"})
+        self.assertIn("speed_mps: 1e-3", (out / "robot.yaml").read_text())
+
+    def test_bad_configurations(self):
+        rec = self.robot()
+        for text in ("a: [", "just text", "dbc: missing.dbc\n", "devices: 5\n"):
+            with self.assertRaises(HilError):
+                scenario.derive(self.write("bad.yaml", text), rec, self.folder, False, False)
+
+    def test_limits(self):
+        run, figures = limits.read(self.write("l.yaml", "format: waymark-hil-limits/1\nrun: {position_m: 0.5, memory_mb: off}\ncompare: {memory_mb: {share: 0.2}, cpu_share: 0.5}\n"), False)
+        self.assertEqual((run["position_m"], run["memory_mb"], figures["memory_mb"], figures["cpu_share"]), (0.5, None, (0.2, 1.0), (0.5, 0.01)))
+        for text in ("run: {}\n", "format: waymark-hil-limits/1\nrun: {positon_m: 1}\n", "format: waymark-hil-limits/1\nrun: {position_m: -1}\n",
+                     "format: waymark-hil-limits/1\nrun: {position_m: wide}\n", "format: waymark-hil-limits/1\nother: 1\n"):
+            with self.assertRaises(HilError):
+                limits.read(self.write("l.yaml", text), False)
+
+    def test_samples(self):
+        self.write("out/samples.txt", "# ...; ticks a second: 100\n0.5 cpu wm-source-0:7 10\n0.5 cpu wm-source-0:8 0\n10.5 cpu wm-source-0:7 210\n10.5 cpu wm-source-0:8 100\n"
+                   "1.0 temperature 0 41000\n1.0 temperature 1 52500\n1.0 clock 0 1200000\n1.0 clock 1 900000\n1.0 memory VmRSS 20480\n1.0 memory VmHWM 30720\nrubbish\n2.0 cpu\n")
+        found = samples.read(self.folder / "out")
+        self.assertEqual([(name, round(share, 9)) for name, share in found.threads], [("wm-source-0", 0.3)])
+        self.assertEqual((found.temperature, found.clock, found.memory_peak_mb), ([(1.0, 52.5)], [(1.0, 900.0)], 30.0))
+
+    def test_wake_ups(self):
+        self.assertIsNone(samples.wake_us(self.folder))
+        self.write("cyclictest.json", json.dumps({"thread": {"0": {"histogram": {"10": 990, "40": 9, "900": 1}}}}))
+        self.assertEqual(samples.wake_us(self.folder), {"what": "cyclictest", "p99_us": 10.0, "max_us": 900.0})
+
+
+class Compared(unittest.TestCase):
+    def side(self, **figures):
+        seconds = [[i, figures.get("truth_rmse_m", 0.02) + 0.001 * (i % 3)] for i in range(40)]
+        return {"recording": "r", "target": "t", "figures": figures, "per_second": {"truth_m": seconds}, "checks": []}
+
+    def verdicts(self, before, after):
+        result, _ = compare.compare(before, after, limits.COMPARE)
+        return {row["figure"]: row["verdict"] for row in result["figures"]}, result["is_worse"]
+
+    def test_the_same(self):
+        one = self.side(truth_rmse_m=0.02, cpu_share=0.2)
+        self.assertEqual(self.verdicts(one, one), ({"truth_rmse_m": "no difference found", "cpu_share": "no difference found"}, False))
+
+    def test_worse_and_better(self):
+        self.assertEqual(self.verdicts(self.side(truth_rmse_m=0.02, cpu_share=0.2), self.side(truth_rmse_m=0.03, cpu_share=0.1)),
+                         ({"truth_rmse_m": "worse", "cpu_share": "better"}, True))
+
+    def test_within_its_limit(self):
+        self.assertEqual(self.verdicts(self.side(correct_p99_us=100.0), self.side(correct_p99_us=114.0)), ({"correct_p99_us": "no difference found"}, False))
+
+    def test_a_check_that_fails_now(self):
+        one, two = self.side(memory_mb=20.0), self.side(memory_mb=20.0)
+        one["checks"], two["checks"] = [[{"group": "log", "name": "bits", "status": status, "text": "x"}] for status in ("passed", "failed")]
+        self.assertTrue(self.verdicts(one, two)[1])
+        self.assertFalse(self.verdicts(two, two)[1])
+
+    def test_different_targets(self):
+        with self.assertRaises(HilError):
+            compare.compare(self.side(memory_mb=1.0), self.side(memory_mb=1.0) | {"target": "other"}, limits.COMPARE)
+
+
+class Poses(unittest.TestCase):
+    def test_between_and_around(self):
+        rows = [(k * 10**9, float(k), 0.0, 3.1 if k % 2 else -3.1, 0.0) for k in range(8)]
+        times = [row[0] for row in rows]
+        x, _, heading, _ = poses.at(rows, times, 2_500_000_000)
+        self.assertAlmostEqual(x, 2.5)
+        self.assertAlmostEqual(abs(math.remainder(heading, 2 * math.pi)), math.pi, places=6)
+        self.assertIsNone(poses.at(rows, times, -1))
+        live = [(3_500_000_000, 3.5, 0.3, math.pi, 0.0)]
+        (_, metres, degrees), = poses.apart_of(live, rows, 0)
+        self.assertAlmostEqual(metres, 0.3)
+        self.assertLess(degrees, 3)
+
+
+if __name__ == "__main__":
+    unittest.main()

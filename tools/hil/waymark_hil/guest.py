@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Guests: Debian's PREEMPT_RT kernel under qemu's instruction clock, from images that are made once and kept. What a guest runs and what it
+gives back is a folder that both share."""
+import os
+import pathlib
+import random
+import shutil
+import subprocess
+import time
+
+from . import HilError
+
+SCRIPTS = pathlib.Path(__file__).resolve().parent.parent / "guest"
+# Two controllers a bus: one hears, one plays. SJA1000 on PCI is what Debian's kernel and qemu both have.
+_BUS = ["-object", "can-bus,id=cb{0}", "-device", "kvaser_pci,canbus=cb{0}", "-device", "kvaser_pci,canbus=cb{0}"]
+# Instruction clocks: 250 million a second, idle time is the host's; 500 million, idle time is skipped, so that who sleeps
+# wakes in time whatever else the host does; as that, but idle time is the host's, as a disk is waited for; 1000 million, about what a
+# core of a board does (docs/boards.md), idle time is skipped.
+SLOW, FAST, SYSTEM, BOARD = "shift=2,sleep=on", "shift=1,sleep=off", "shift=1,sleep=on", "shift=0,sleep=off"
+GUEST_S = 1800  # on this computer's clock
+_ARM = {"qemu": ["qemu-system-aarch64", "-machine", "virt", "-cpu", "cortex-a57"], "console": "ttyAMA0"}
+# What a guest is made of, by Debian's name of its architecture; `cc` makes helpers for it.
+MACHINES = {
+    "amd64": {"qemu": ["qemu-system-x86_64", "-machine", "q35", "-cpu", "max"], "console": "ttyS0", "cc": "cc"},
+    "arm64": {**_ARM, "cc": "aarch64-linux-gnu-gcc"},
+    "armhf": {**_ARM, "cc": "arm-linux-gnueabihf-gcc"},
+}
+# Debian's packages of the programs that making and booting a guest needs.
+_NEEDS = {"qemu-system-x86_64": "qemu-system-x86", "qemu-system-aarch64": "qemu-system-arm", "mmdebstrap": "mmdebstrap", "cpio": "cpio",
+          "mke2fs": "e2fsprogs", "gcc-12": "gcc-12", "make": "make", "aarch64-linux-gnu-gcc": "gcc-aarch64-linux-gnu",
+          "qemu-arm-static": "qemu-user-static", "qemu-aarch64-static": "qemu-user-static"}
+
+
+def buses(count):
+    """Options for so many buses."""
+    return [word.format(number) for number in range(count) for word in _BUS]
+
+
+def cache():
+    """Where images are kept."""
+    if given := os.environ.get("WAYMARK_HIL_CACHE"):
+        return pathlib.Path(given)
+    return pathlib.Path(os.environ.get("XDG_CACHE_HOME") or pathlib.Path.home() / ".cache") / "waymark/hil"
+
+
+def missing(arch, has_image=False):
+    """Debian packages that are missing for a guest of this architecture."""
+    programs = [MACHINES[arch]["qemu"][0]]
+    if not has_image:
+        programs += ["mmdebstrap", "cpio", "mke2fs", "make"] + (["gcc-12"] if arch == "amd64" else ["aarch64-linux-gnu-gcc"])
+        programs += {"arm64": ["qemu-aarch64-static"], "armhf": ["qemu-arm-static"]}.get(arch, [])
+    path = os.environ.get("PATH", "") + ":/usr/sbin:/sbin"
+    return sorted({_NEEDS[program] for program in programs if not shutil.which(program, path=path)})
+
+
+def prepare(arch, folder, out=None):
+    """Makes the image of an architecture in a folder, where it is not there yet: minutes the first time."""
+    image = folder / "image"
+    if packages := missing(arch, (image / "made_of").is_file()):
+        raise HilError(f"a guest needs Debian packages that are missing: sudo apt-get install {' '.join(packages)}")
+    done = subprocess.run(["bash", SCRIPTS / "prepare.sh", image, arch], stdout=out, stderr=subprocess.STDOUT if out else None, check=False)
+    if done.returncode:
+        raise HilError(f"the guest's image was not made (exit code {done.returncode}){f': {out.name}' if out else ''}")
+    return image
+
+
+def command_of(image, machine, share, script, devices=(), clock=SLOW, init="", memory_mb=1024):
+    """qemu's command line: guest/SCRIPT is run in the guest; `share` is its folder /host."""
+    return [str(word) for word in (
+        *machine["qemu"], "-accel", "tcg,thread=single", "-smp", "1",
+        "-icount", clock, "-m", memory_mb, "-no-reboot",
+        "-kernel", image / "vmlinuz", "-initrd", image / "init.cpio.gz",
+        "-append", f"console={machine['console']} quiet panic=-1 hil={script} {init}",
+        "-drive", f"file={image}/root.ext4,if=virtio,format=raw,readonly=on",
+        "-virtfs", f"local,path={share},mount_tag=host,security_model=none,id=host",
+        "-display", "none", "-monitor", "none", "-serial", "stdio", *(() if "-nic" in devices else ("-nic", "none")), *devices)]
+
+
+def boot(command, log, limit_s=GUEST_S, watch=None):
+    """Runs a guest; what it prints is kept in `log`, and new lines go to `watch`. Judged by its last word, not by qemu's. After the word
+    NO MORE POWER it is killed at a random moment, as a cut of the power would: what it has given to its disk is there."""
+    with open(log, "w", encoding="utf-8") as out:
+        guest = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=out, stderr=subprocess.STDOUT)
+    end_s, has_power, seen = time.monotonic() + limit_s, True, 0
+    try:
+        while guest.poll() is None:
+            text = log.read_text(errors="replace")
+            if watch:
+                lines = text.splitlines(keepends=True)
+                lines = lines if not lines or lines[-1].endswith("\n") else lines[:-1]
+                for line in lines[seen:]:
+                    watch(line.strip())
+                seen = len(lines)
+            has_power = "NO MORE POWER" not in text
+            if not has_power:
+                time.sleep(random.uniform(0, 3))
+            if not has_power or time.monotonic() > end_s:
+                guest.kill()
+                guest.wait()
+            time.sleep(0.5)
+    finally:
+        if guest.poll() is None:
+            guest.kill()
+            guest.wait()
+    return "GUEST-RC 0" in log.read_text(errors="replace") or not has_power

@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tables of poses, and how far one is from another: rows (t_ns, x_m, y_m, heading_rad, z_m)."""
+import bisect
+import csv
+import math
+
+POSITION_M, HEADING_DEG = 0.02, 0.2  # a run beside the replay of what it saw
+# Sent before or after the first observation was fused, as it happens.
+BEGIN_NS = 200_000_000
+
+
+def heading_of(x, y, z, w):
+    """Heading of a quaternion, rad."""
+    return math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+
+
+def table(path):
+    """Rows of trajectory.csv, published.csv or truth.csv; a row without an orientation has none."""
+    def row(r):
+        q = [r.get(name) for name in ("qx", "qy", "qz", "qw")]
+        heading = heading_of(*map(float, q)) if all(q) else math.nan
+        return int(r["t_ns"]), float(r["x_m"]), float(r["y_m"]), heading, float(r.get("z_m") or 0)
+    with open(path, newline="", encoding="utf-8") as f:
+        return [row(r) for r in csv.DictReader(f)]
+
+
+def between(a, b, t_ns):
+    """On the line through two rows: (x, y, heading, z)."""
+    part = (t_ns - a[0]) / (b[0] - a[0])
+    turn = 0.0 if math.isnan(a[3] + b[3]) else part * math.remainder(b[3] - a[3], 2 * math.pi)
+    return a[1] + part * (b[1] - a[1]), a[2] + part * (b[2] - a[2]), a[3] + turn, a[4] + part * (b[4] - a[4])
+
+
+def at(rows, times, t_ns):
+    """Between the two rows around t_ns; None outside."""
+    i = bisect.bisect_right(times, t_ns)
+    return None if i == 0 or i == len(rows) else between(rows[i - 1], rows[i], t_ns)
+
+
+def around(rows, times, t_ns):
+    """Between the rows around t_ns, and on from pairs of rows up to two before and after: a correction that takes the processor a while
+    falls between two messages of the one run, and one or two later or earlier in the other."""
+    i = bisect.bisect_right(times, t_ns)
+    if i < 3 or i + 2 >= len(rows):
+        return []
+    return [between(rows[k - 1], rows[k], t_ns) for k in (i, i - 1, i + 1, i - 2, i + 2)]
+
+
+def away(pose, other):
+    """(m, degrees) from one pose to another; of six degrees of freedom the height counts, too. Without a heading: 0 degrees."""
+    degrees = abs(math.degrees(math.remainder(pose[3] - other[2], 2 * math.pi))) if math.isfinite(pose[3] + other[2]) else 0.0
+    return math.hypot(pose[1] - other[0], pose[2] - other[1], pose[4] - other[3]), degrees
+
+
+def differences(poses, rows, offset_ns):
+    """(t_ns, m, degrees) of each pose from the rows, whose clock is offset_ns behind."""
+    times = [r[0] for r in rows]
+    for p in poses:
+        q = at(rows, times, p[0] - offset_ns)
+        if q:
+            yield p[0], *away(p, q)
+
+
+def apart_of(poses, rows, offset_ns):
+    """As differences, from the nearest of what is around."""
+    times = [r[0] for r in rows]
+    for p in poses:
+        near = around(rows, times, p[0] - offset_ns)
+        if near:
+            yield p[0], *min((away(p, q) for q in near), key=lambda d: d[0] / POSITION_M + d[1] / HEADING_DEG)
+
+
+def rms(values):
+    """Root mean square; None of nothing."""
+    values = list(values)
+    return math.sqrt(sum(v * v for v in values) / len(values)) if values else None
+
+
+def quantile(values, share):
+    """The value that this share is below; None of nothing."""
+    values = sorted(values)
+    return values[min(len(values) - 1, int(share * len(values)))] if values else None
