@@ -108,7 +108,7 @@ static void lines_that_find_no_room_are_counted_in_health(void) {
   wm_ring_init(&run.publish.lines, lines, SLOTS, 400);
   for (int i = 0; i < 10; i++) live_say_later(&run, "camera: silent");
   wm_histogram_add(&run.publish.send_ns, 3 * WM_NS_PER_MS);
-  live_publish_health(&run.publish, &health);
+  live_publish_health(&run, &health);
   TEST_ASSERT_EQUAL_UINT64(10 - SLOTS, health.lines_lost);
   TEST_ASSERT_INT64_WITHIN(WM_NS_PER_MS, 3 * WM_NS_PER_MS, health.send_p99_ns);
   free(lines);
