@@ -48,8 +48,8 @@ wm_odom_point interpolate(const wm_odom_point &a, const wm_odom_point &b, wm_tim
   return out;
 }
 
-// Where the motion is unknown, at `fused` and since, its noise begins at `fused`, whose variance it makes larger. By the
-// difference of two points it would begin with the silence.
+// Where the motion is unknown, at `fused` and since, its noise begins at `fused`, whose variance it makes larger. By
+// the difference of two points it would begin with the silence.
 void begin_unknown_at(const wm_odometry *self, const wm_estimate &fused, const wm_odom_point &from, wm_time_ns t_ns,
                       wm_odom_point *to) {
   const double position_m2 = fused.covariance[wm_cov_index(0, 0)] + fused.covariance[wm_cov_index(1, 1)];

@@ -61,8 +61,8 @@ static size_t list_needs(live *self, wm_arena_need needs[NEEDS_MAX]) {
       (wm_arena_need){"publish ring", wm_ring_bytes(PUBLISH_RING_SLOTS, PUBLISH_RECORD_BYTES), &e->to_publish_memory};
   needs[n++] =
       (wm_arena_need){"health ring", wm_ring_bytes(HEALTH_RING_SLOTS, sizeof(health_record)), &e->healths_memory};
-  needs[n++] =
-      (wm_arena_need){"line rings", lines_bytes() + self->assembly.source_count * source_lines_bytes(), &self->lines_memory};
+  needs[n++] = (wm_arena_need){"line rings", lines_bytes() + self->assembly.source_count * source_lines_bytes(),
+                               &self->lines_memory};
   if (self->disk.keeps_map)
     needs[n++] = (wm_arena_need){"map ring", wm_ring_bytes(1, map_slot_bytes(self)), &e->maps_memory};
   n += views_needs(&e->views, self->config->estimator, self->config->runtime.publish_lcm, needs + n);

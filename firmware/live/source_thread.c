@@ -61,8 +61,7 @@ static void say_device(live_source *self) {
   if (counts->device == self->said_device && counts->news == self->said_news) return;
   self->said_device = counts->device;
   self->said_news = counts->news;
-  if (counts->device_note[0])
-    live_queue_line(&self->lines, "%s: %s", self->reader->source->name, counts->device_note);
+  if (counts->device_note[0]) live_queue_line(&self->lines, "%s: %s", self->reader->source->name, counts->device_note);
 }
 
 static void listen_to_device(live_source *self) {

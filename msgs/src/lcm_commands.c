@@ -19,7 +19,8 @@ const char *wm_lcm_read_set_pose(const void *message, size_t length, wm_event *o
   if (waymark_set_pose_t_decode(message, 0, room(length), &m) < 0) return "is no set_pose_t of this version";
   double norm = 0, farthest_m = 0;
   for (int i = 0; i < 4; i++) norm += m.orientation_xyzw[i] * m.orientation_xyzw[i];
-  for (int i = 0; i < 3; i++) farthest_m = fmax(farthest_m, isfinite(m.position_m[i]) ? fabs(m.position_m[i]) : INFINITY);
+  for (int i = 0; i < 3; i++)
+    farthest_m = fmax(farthest_m, isfinite(m.position_m[i]) ? fabs(m.position_m[i]) : HUGE_VAL);
   const char *why = NULL;
   norm = sqrt(norm);
   if (farthest_m > 1e9)

@@ -141,8 +141,8 @@ void test_carry_moves_mean_and_covariance(void) {
     }
 }
 
-// A bus that is silent for a minute: what the robot may have driven since the fused pose, 0.25 s ago, is added to it; not
-// what it may have driven in a quarter of a second more of the whole silence, 11.6 m.
+// A bus that is silent for a minute: what the robot may have driven since the fused pose, 0.25 s ago, is added to it;
+// not what it may have driven in a quarter of a second more of the whole silence, 11.6 m.
 void test_unknown_motion_begins_at_the_fused_pose(void) {
   start(make::no_wheels());
   for (int i = 0; i <= 100; i++) feed(make::twist(0.01 * i, 1.5, 0.0));
