@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // This computer's membership in LCM's multicast group. The kernel drops a socket's membership with the network
-// interface (a USB adapter that is plugged in again, a default route that moves to another interface), and liblcm joins
+// interface (a USB adapter), multicast may move to another one with the default route, and liblcm joins
 // once. As liblcm's sockets take what any socket of the computer has joined, one that joins anew keeps all
 // subscriptions alive.
 #ifndef WAYMARK_LIVE_LCM_GROUP_H

@@ -12,6 +12,7 @@
 #include "waymark_landmarks_t.h"
 #include "waymark_observations_t.h"
 #include "waymark_pose_t.h"
+#include "waymark_set_pose_t.h"
 
 void setUp(void) {}
 void tearDown(void) {}
