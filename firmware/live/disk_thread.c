@@ -15,7 +15,7 @@
 static void keep_pose(live *run, const wm_published *published) {
   live_disk *self = &run->disk;
   black_box_pose(&self->box, &published->now, wm_monotonic_ns());
-  if (!self->keeps_pose || !wm_saved_pose_is_worth_it(&published->now)) return;
+  if (!self->keeps_pose || !wm_saved_pose_is_one(&published->now)) return;
   self->last_pose = published->now;
   self->has_last_pose = 1;
 }

@@ -113,6 +113,10 @@ static int start_where_it_was(live *self) {
     live_say(self, "start: no saved pose is used: %s", err.text);
     return 0;
   }
+  if (saved.is_lost) {
+    live_say(self, "start: the run before had lost its pose; the saved one is not used");
+    return 0;
+  }
   double now_s = live_utc_s(), age_s = now_s - saved.utc_s;
   if (!wm_saved_pose_start(&saved, now_s, params->start_max_age_s, params->start_moved_m,
                            params->start_moved_deg * M_PI / 180, start)) {
