@@ -36,7 +36,7 @@ CAN = ["-object", "can-bus,id=cb0", "-device", "kvaser_pci,canbus=cb0", "-device
 # wakes in time whatever else the host does; as that, but idle time is the host's, as a disk is waited for.
 SLOW, FAST, SYSTEM = "shift=2,sleep=on", "shift=1,sleep=off", "shift=1,sleep=on"
 POSITION_M, HEADING_DEG = 0.02, 0.2
-GUEST_S = 1800  # on this computer's clock
+GUEST_S = 3600  # on this computer's clock, which may do much else
 PLAYER_M, PLAYER_DEG, PLAYER_MS = 0.1, 0.5, 100
 
 
