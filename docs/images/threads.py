@@ -86,7 +86,7 @@ def drawing():
     for y, name in ((275, "run folder"), (296, "event log"), (317, "black box"), (338, "saved pose")):
         parts.append(text(1004, y, name, "soft", "start"))
     parts += [text(1004, 356, "saved map", "soft", "start")]
-    parts += [way("M943 152V168"), ring(905, 196, f"lines ({size('LINE_RING_SLOTS')})"), way("M943 205V251")]
+    parts += [way("M943 152V168"), ring(905, 196, f"lines ({size('LINE_RING_SLOTS')}; of each source {size('SOURCE_LINE_RING_SLOTS')})"), way("M943 205V251")]
     # What is shared besides rings.
     parts += [way("M694 362V398H425V364", "shared"), text(560, 392, "newest pose (sequence lock), for detectors", "soft")]
     parts += [way("M425 43V22H943V46", "shared"), text(684, 16, "counts of each source (atomics)", "soft")]

@@ -116,6 +116,7 @@ static wm_status end_nodes(reader *r) {
     if (!is_whole(n[2], 0, ITEMS_MAX)) return fail(r, "internalNodes: a feature's number is needed in the third place");
     node->feature = (uint32_t)n[2];
     node->threshold = (float)n[3];
+    if (!isfinite(node->threshold)) return fail(r, "internalNodes: a number is too large");
     for (size_t k = 3; k < each && r->out->is_lbp; k++) {
       if (!is_whole(n[k], -2147483648.0, 4294967295.0)) return fail(r, "internalNodes: a set of codes is 8 integers");
       node->codes[k - 3] = (uint32_t)(int64_t)n[k];

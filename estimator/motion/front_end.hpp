@@ -51,6 +51,13 @@ class motion_front_end {
   // The same for any interval, past or future; the state stays.
   template <class Visit>
   void walk(wm_time_ns from_ns, wm_time_ns to_ns, const wm_motion_calibration &calibration, Visit visit) const {
+    walk(from_ns, to_ns, calibration, position_m2_, visit);
+  }
+
+  // The same where the position's variance at from_ns is not the present one.
+  template <class Visit>
+  void walk(wm_time_ns from_ns, wm_time_ns to_ns, const wm_motion_calibration &calibration, double position_m2,
+            Visit visit) const {
     const wm_time_ns lag_ns = lag_of(calibration);
     history_.walk(from_ns - lag_ns, to_ns - lag_ns, hold_max_ns_, [&](motion_segment &segment) {
       if (segment.input.command) respond(*params_, calibration, wheels_, &segment);
@@ -58,7 +65,7 @@ class motion_front_end {
       if (segment.input.model == WM_MOTION_CONSTANT_VELOCITY) static_cast<planar_twist &>(twist) = velocity_;
       motion_noise noise = noise_of(segment.input, twist, segment.dt_s, *params_, wheels_, calibration,
                                     stated_noise_now(), noise_factors_);
-      add_overdue_noise(segment, *params_, ticks_drive() && segment.has_next && !segment.input.uncounted, position_m2_,
+      add_overdue_noise(segment, *params_, ticks_drive() && segment.has_next && !segment.input.uncounted, position_m2,
                         &noise);
       add_refused_noise(segment, *params_, &noise);
       if (segment.input.command) add_change_noise(segment, *params_, &noise);

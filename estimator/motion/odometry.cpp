@@ -49,6 +49,23 @@ wm_odom_point interpolate(const wm_odom_point &a, const wm_odom_point &b, wm_tim
   return out;
 }
 
+// Where the motion is unknown, at `fused` and since, its noise begins at `fused`, whose variance it makes larger. By
+// the difference of two points it would begin with the silence.
+void begin_unknown_at(const wm_odometry *self, const wm_estimate &fused, const wm_odom_point &from, wm_time_ns t_ns,
+                      wm_odom_point *to) {
+  const double position_m2 = fused.covariance[wm_cov_index(0, 0)] + fused.covariance[wm_cov_index(1, 1)];
+  wm_odom_point point = from;
+  bool unknown = fused.t_ns >= self->head.t_ns;
+  self->front.walk(fused.t_ns, t_ns, self->calibration, position_m2,
+                   [&](const wm::motion_segment &piece, const wm::motion_twist &twist, const wm::motion_noise &noise) {
+                     unknown = unknown && piece.input.stale;
+                     carry_point(point, piece.dt_s, twist, noise);
+                   });
+  if (!unknown) return;
+  to->along_var_m2 = point.along_var_m2;
+  to->across_var_m2 = point.across_var_m2;
+}
+
 double growth(double from, double to) { return to > from ? to - from : 0.0; }
 
 // Heading of the body's x axis seen from above.
@@ -267,6 +284,7 @@ wm_status wm_odometry_carry(const wm_odometry *self, const wm_estimate *fused, w
   wm_status status = wm_odometry_at(self, fused->t_ns, &from);
   if (status == WM_OK) status = wm_odometry_at(self, t_ns, &to);
   if (status != WM_OK) return status;
+  if (self->front.is_overdue(fused->t_ns)) begin_unknown_at(self, *fused, from, t_ns, &to);
   *out = *fused;
   out->t_ns = t_ns;
   if (odom) *odom = to;

@@ -167,6 +167,14 @@ static wm_status read_start(const wm_yaml_node *root, wm_config *out, wm_error *
   return status == WM_OK ? wm_start_read(&pose, &out->initial_pose, err) : status;
 }
 
+// LCM's subscriptions take regular expressions: a name with other characters would match other channels, or none.
+static wm_status read_prefix(const wm_yaml_node *node, wm_config *out, wm_error *err) {
+  static const char kAllowed[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_-/";
+  wm_status status = wm_yaml_string(node, out->channel_prefix, sizeof out->channel_prefix, err);
+  if (status != WM_OK || out->channel_prefix[strspn(out->channel_prefix, kAllowed)] == '\0') return status;
+  return wm_yaml_fail(node, err, "'%s': letters, digits, '_', '-' and '/' are possible", out->channel_prefix);
+}
+
 static wm_status read_texts(const wm_yaml_node *root, wm_config *out, wm_error *err) {
   snprintf(out->channel_prefix, sizeof out->channel_prefix, "WAYMARK_");
   wm_yaml_node url = wm_yaml_get(root, "publish.lcm_url"), prefix = wm_yaml_get(root, "publish.channel_prefix");
@@ -182,8 +190,7 @@ static wm_status read_texts(const wm_yaml_node *root, wm_config *out, wm_error *
   wm_yaml_node commands = wm_yaml_get(root, "commands.socket");
   if (status == WM_OK && wm_yaml_there(&commands)) status = config_path(&commands, out->path, out->commands, err);
   if (status == WM_OK && wm_yaml_there(&url)) status = wm_yaml_string(&url, out->lcm_url, sizeof out->lcm_url, err);
-  if (status == WM_OK && wm_yaml_there(&prefix))
-    status = wm_yaml_string(&prefix, out->channel_prefix, sizeof out->channel_prefix, err);
+  if (status == WM_OK && wm_yaml_there(&prefix)) status = read_prefix(&prefix, out, err);
   return status;
 }
 

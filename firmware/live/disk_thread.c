@@ -15,7 +15,7 @@
 static void keep_pose(live *run, const wm_published *published) {
   live_disk *self = &run->disk;
   black_box_pose(&self->box, &published->now, wm_monotonic_ns());
-  if (!self->keeps_pose || !wm_saved_pose_is_worth_it(&published->now)) return;
+  if (!self->keeps_pose || !wm_saved_pose_is_one(&published->now)) return;
   self->last_pose = published->now;
   self->has_last_pose = 1;
 }
@@ -39,13 +39,17 @@ static void take_outputs(live *run) {
     take_output(run, record);
 }
 
+static void take_lines_of(live *run, wm_ring *lines) {
+  for (const char *line; (line = wm_ring_front(lines)) != NULL; wm_ring_pop(lines)) live_say(run, "%s", line);
+}
+
 static void take_lines(live *run) {
-  for (const char *line; (line = wm_ring_front(&run->publish.lines)) != NULL; wm_ring_pop(&run->publish.lines))
-    live_say(run, "%s", line);
+  for (size_t i = 0; i < run->assembly.source_count; i++) take_lines_of(run, &run->sources[i].lines);
+  take_lines_of(run, &run->publish.lines);
 }
 
 static void say_lost_lines(live *run) {
-  const uint64_t lost = wm_ring_dropped(&run->publish.lines), fresh = lost - run->disk.said_lines_lost;
+  const uint64_t lost = live_lines_lost(run), fresh = lost - run->disk.said_lines_lost;
   run->disk.said_lines_lost = lost;
   if (fresh > 0)
     live_say(run, "%llu lines are missing here: the disk or the terminal was blocked (lines_lost in health)",

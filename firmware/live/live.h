@@ -3,7 +3,8 @@
 // Everything else belongs to one thread at a time.
 //
 //   source threads ── events ──► estimator ──┬─ to_publish, healths ──► publish thread: LCM, watchdog
-//                                            └─ to_disk, maps ───────► disk thread: files ◄── lines ── publish thread
+//                                            └─ to_disk, maps ───────► disk thread: files, standard error
+//   source threads, publish thread ── lines of text ──────────────────────────┘
 #ifndef WAYMARK_LIVE_LIVE_H
 #define WAYMARK_LIVE_LIVE_H
 
@@ -11,6 +12,7 @@
 
 #include "fusion/pipeline.h"
 #include "fusion/source_reader.h"
+#include "live/lcm_group.h"
 #include "live/lcm_sink.h"
 #include "live/notify.h"
 #include "live/other_runs.h"
@@ -32,6 +34,7 @@ typedef struct live_source {
   wm_source_reader *reader;  // of the source's thread while it runs
   wm_ring ring;
   void *ring_memory;
+  wm_ring lines;  // of text, to the disk thread
   atomic_int done;
   wm_status status;  // of the thread, after its end
   wm_error error;
@@ -77,8 +80,8 @@ typedef struct live_publish {
   lcm_sink lcm;
   notify notify;
   other_runs others;
+  lcm_group group;
   wm_ring lines;  // of text, to the disk thread, which writes them to standard error
-  void *lines_memory;
   wm_time_ns next_landmarks_ns;
   int has_published;
   wm_estimate last_published;
@@ -119,6 +122,7 @@ struct live {
   live_disk disk;
   picture_server *pictures;  // NULL: none is wanted
   wm_saved_map map;          // of an earlier run; no image: none
+  void *lines_memory;        // rings of text: of the publish thread, then of the sources' threads
   atomic_int stop;           // ends the sources' threads
   atomic_int restarting;     // a reload: STOPPING=1 is not sent
 };
@@ -148,7 +152,7 @@ wm_output estimator_output(live_estimator *self);
 // Records dropped by either ring.
 uint64_t outputs_lost(const live_estimator *self);
 // The publish thread's part of a health record.
-void live_publish_health(const live_publish *self, wm_health *health);
+void live_publish_health(const live *run, wm_health *health);
 
 // Writes a map to the disk; errors are reported once. On the disk thread, and on the main thread after its end.
 void live_save_map(live *self, const void *image, size_t bytes);
@@ -160,9 +164,13 @@ void *estimator_thread(void *live_pointer);
 void *publish_thread(void *live_pointer);
 void *disk_thread(void *live_pointer);
 
-// A line for standard error or the service's log. May block: not on the estimator's or the publish thread.
+// A line for standard error or the service's log. It blocks where their reader does: on main and the disk thread alone.
 void live_say(live *self, const char *format, ...) __attribute__((format(printf, 2, 3)));
-// The same from the publish thread; the disk thread prints it. `line` as wm_line_fn, `context` is the run.
+// The same by a thread's ring of lines; the disk thread prints it.
+void live_queue_line(wm_ring *lines, const char *format, ...) __attribute__((format(printf, 2, 3)));
+// By that of the publish thread. `line` as wm_line_fn, `context` is the run.
 void live_say_later(void *context, const char *line);
+// Lines that found no room. Any thread.
+uint64_t live_lines_lost(const live *run);
 
 #endif

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Poses, observations, innovations and health over LCM, and the watchdog. The thread touches no file and does not write
 // to standard error, so that a slow disk delays no message.
+#include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 #include <time.h>
@@ -11,12 +12,25 @@
 
 #define LANDMARKS_EVERY_NS (5 * WM_NS_PER_S)  // for viewers that join later
 
+void live_queue_line(wm_ring *lines, const char *format, ...) {
+  char *slot = wm_ring_reserve(lines, LINE_BYTES);
+  if (!slot) return;  // full, because standard error is blocked; the ring counts the dropped ones
+  va_list arguments;
+  va_start(arguments, format);
+  (void)vsnprintf(slot, LINE_BYTES, format, arguments);
+  va_end(arguments);
+  wm_ring_commit(lines);
+}
+
 void live_say_later(void *context, const char *line) {
   live *run = context;
-  char *slot = wm_ring_reserve(&run->publish.lines, LINE_BYTES);
-  if (!slot) return;  // 16 lines wait for a blocked disk; the ring counts the dropped ones
-  (void)snprintf(slot, LINE_BYTES, "%s", line);
-  wm_ring_commit(&run->publish.lines);
+  live_queue_line(&run->publish.lines, "%s", line);
+}
+
+uint64_t live_lines_lost(const live *run) {
+  uint64_t lost = wm_ring_dropped(&run->publish.lines);
+  for (size_t i = 0; i < run->assembly.source_count; i++) lost += wm_ring_dropped(&run->sources[i].lines);
+  return lost;
 }
 
 // UTC minus the run's clock, between two readings of the monotonic clock. Not available at other speeds than real time.
@@ -81,10 +95,10 @@ static void add_source_counts(live *run, wm_health *health) {
   }
 }
 
-void live_publish_health(const live_publish *self, wm_health *health) {
-  health->send_p99_ns = wm_histogram_quantile(&self->send_ns, 0.99);
-  health->lines_lost = wm_ring_dropped(&self->lines);
-  other_runs_health(&self->others, health);
+void live_publish_health(const live *run, wm_health *health) {
+  health->send_p99_ns = wm_histogram_quantile(&run->publish.send_ns, 0.99);
+  health->lines_lost = live_lines_lost(run);
+  other_runs_health(&run->publish.others, health);
 }
 
 // Sources that fall silent, motion sensors that fail, and their return: once each.
@@ -147,7 +161,7 @@ static void take_healths(live *run) {
        wm_ring_pop(&run->estimator.healths)) {
     wm_health health = record->health;
     add_source_counts(run, &health);
-    live_publish_health(self, &health);
+    live_publish_health(run, &health);
     lcm_sink_health(&self->lcm, &health);
     char status[NOTIFY_STATUS_BYTES];
     describe(&health, status);
@@ -171,6 +185,7 @@ void *publish_thread(void *argument) {
     wm_time_ns now_ns = wm_monotonic_ns();
     lcm_sink_tick(&self->lcm, now_ns);
     other_runs_tick(&self->others, now_ns);
+    lcm_group_tick(&self->group, now_ns);
     notify_tick(&self->notify, now_ns);
     if (now_ns >= self->next_landmarks_ns) {
       lcm_sink_landmarks(&self->lcm, run_from_monotonic(&run->clock, now_ns));
@@ -179,6 +194,7 @@ void *publish_thread(void *argument) {
   }
   lcm_sink_close(&self->lcm);
   other_runs_close(&self->others);
+  lcm_group_close(&self->group);
   if (!atomic_load(&run->restarting)) notify_stopping(&self->notify);
   atomic_store_explicit(&self->done, 1, memory_order_release);
   return NULL;

@@ -47,6 +47,9 @@ static size_t map_slot_bytes(const live *self) {
   return sizeof(kept_map) + wm_keeper_of(config->estimator)->bytes_max(config->estimator_params, &self->assembly.setup);
 }
 
+static size_t lines_bytes(void) { return wm_ring_bytes(LINE_RING_SLOTS, LINE_BYTES); }
+static size_t source_lines_bytes(void) { return wm_ring_bytes(SOURCE_LINE_RING_SLOTS, LINE_BYTES); }
+
 static size_t list_needs(live *self, wm_arena_need needs[NEEDS_MAX]) {
   live_estimator *e = &self->estimator;
   size_t n = WM_PIPELINE_NEEDS, slots = (size_t)self->config->runtime.realtime_ring_events;
@@ -58,7 +61,8 @@ static size_t list_needs(live *self, wm_arena_need needs[NEEDS_MAX]) {
       (wm_arena_need){"publish ring", wm_ring_bytes(PUBLISH_RING_SLOTS, PUBLISH_RECORD_BYTES), &e->to_publish_memory};
   needs[n++] =
       (wm_arena_need){"health ring", wm_ring_bytes(HEALTH_RING_SLOTS, sizeof(health_record)), &e->healths_memory};
-  needs[n++] = (wm_arena_need){"lines ring", wm_ring_bytes(LINE_RING_SLOTS, LINE_BYTES), &self->publish.lines_memory};
+  needs[n++] = (wm_arena_need){"line rings", lines_bytes() + self->assembly.source_count * source_lines_bytes(),
+                               &self->lines_memory};
   if (self->disk.keeps_map)
     needs[n++] = (wm_arena_need){"map ring", wm_ring_bytes(1, map_slot_bytes(self)), &e->maps_memory};
   n += views_needs(&e->views, self->config->estimator, self->config->runtime.publish_lcm, needs + n);
@@ -82,11 +86,15 @@ static wm_status take_memory(live *self, wm_error *err) {
   wm_ring_init(&e->healths, e->healths_memory, HEALTH_RING_SLOTS, sizeof(health_record));
   if (e->maps_memory) wm_ring_init(&e->maps, e->maps_memory, 1, map_slot_bytes(self));
   views_init(&e->views);
-  wm_ring_init(&self->publish.lines, self->publish.lines_memory, LINE_RING_SLOTS, LINE_BYTES);
-  for (size_t i = 0; i < self->assembly.source_count; i++)
-    wm_ring_init(&self->sources[i].ring, self->sources[i].ring_memory,
-                 (size_t)self->config->runtime.realtime_ring_events,
+  uint8_t *lines = self->lines_memory;
+  wm_ring_init(&self->publish.lines, lines, LINE_RING_SLOTS, LINE_BYTES);
+  lines += lines_bytes();
+  for (size_t i = 0; i < self->assembly.source_count; i++) {
+    live_source *source = &self->sources[i];
+    wm_ring_init(&source->ring, source->ring_memory, (size_t)self->config->runtime.realtime_ring_events,
                  wm_merge_slot_bytes(self->assembly.sources[i].kinds));
+    wm_ring_init(&source->lines, lines + i * source_lines_bytes(), SOURCE_LINE_RING_SLOTS, LINE_BYTES);
+  }
   return WM_OK;
 }
 
@@ -103,6 +111,10 @@ static int start_where_it_was(live *self) {
   wm_status status = wm_saved_pose_read(path, &saved, &err);
   if (status != WM_OK) {
     live_say(self, "start: no saved pose is used: %s", err.text);
+    return 0;
+  }
+  if (saved.is_lost) {
+    live_say(self, "start: the run before had lost its pose; the saved one is not used");
     return 0;
   }
   double now_s = live_utc_s(), age_s = now_s - saved.utc_s;
@@ -226,6 +238,7 @@ static wm_status prepare(live *self, wm_recording *recording, wm_error *err) {
                 &self->assembly, live_say_later, self, NULL);
   other_runs_open(&self->publish.others, params->publish_lcm, self->config->lcm_url, self->config->channel_prefix,
                   live_say_later, self);
+  lcm_group_open(&self->publish.group, self->config->lcm_url);
   black_box_open(&self->disk.box, self->config->black_box, params->black_box_keep_s, params->black_box_pictures_hz,
                  &self->assembly, self->options->say, self->options->say_context);
   wm_pictures *pictures = wm_recording_pictures(recording);
@@ -371,7 +384,7 @@ static void fill_report(live *self, wm_live_report *report) {
   run->health.loops = e->loops;
   run->health.deadlines_missed = e->deadlines_missed;
   run->health.outputs_lost = outputs_lost(e);
-  live_publish_health(&self->publish, &run->health);
+  live_publish_health(self, &run->health);
   run->poses = e->pipeline.fuser.poses;
   run->events = e->pipeline.fuser.events;
   run->recorded_s = wm_seconds_between(self->clock.run_ns, end_ns);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Puts a source's events into its ring: a recording's when due, a device's on arrival.
+// Puts a source's events into its ring: a recording's when due, a device's on arrival. Text goes to the disk thread:
+// a blocked standard error must not stop a source.
 #include <string.h>
 
 #include "live/live.h"
@@ -60,7 +61,7 @@ static void say_device(live_source *self) {
   if (counts->device == self->said_device && counts->news == self->said_news) return;
   self->said_device = counts->device;
   self->said_news = counts->news;
-  if (counts->device_note[0]) live_say(self->run, "%s: %s", self->reader->source->name, counts->device_note);
+  if (counts->device_note[0]) live_queue_line(&self->lines, "%s: %s", self->reader->source->name, counts->device_note);
 }
 
 static void listen_to_device(live_source *self) {
@@ -85,7 +86,8 @@ void *source_thread(void *argument) {
   } else {
     play_recording(self);
   }
-  if (self->status != WM_OK) live_say(self->run, "%s: ended: %s", self->reader->source->name, self->error.text);
+  if (self->status != WM_OK)
+    live_queue_line(&self->lines, "%s: ended: %s", self->reader->source->name, self->error.text);
   atomic_store_explicit(&self->done, 1, memory_order_release);
   return NULL;
 }

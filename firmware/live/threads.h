@@ -42,8 +42,9 @@ void threads_of_libraries(void);
 // Slots for LCM: a second at 1 kHz. Health records are large and rare and have their own ring.
 #define PUBLISH_RING_SLOTS 1024
 #define HEALTH_RING_SLOTS 4
-// Lines of text from the publish thread to the disk thread.
+// Lines of text to the disk thread, from the publish thread and from each source's.
 #define LINE_RING_SLOTS 16
+#define SOURCE_LINE_RING_SLOTS 8
 #define LINE_BYTES 400
 
 // Starts a thread of that role with all signals blocked; the starting thread handles them. `number` makes a source's or

@@ -10,11 +10,13 @@
 #include "waymark/recording.h"
 #include "waymark/yaml.h"
 
-// A doubtful pose is saved with its covariance; an older one would be as wrong with a smaller covariance.
-#define SIGMA_XY_MAX_M 50.0        // a less certain pose is worse than a search
-#define SIGMA_HEADING_MAX_RAD 1.5  // likewise
-#define GOES_ON_S 2.0              // motion at the last speed that is assumed after the save
-#define DRIVES_S 10.0              // age up to which the robot may still drive
+// A doubtful pose is saved with its covariance; an older one would be as wrong with a smaller covariance. The same
+// holds for one that is lost: it replaces the older one, and the next run searches.
+#define SIGMA_XY_MAX_M 50.0         // a less certain pose is worse than a search
+#define SIGMA_HEADING_MAX_RAD M_PI  // likewise
+#define SIGMA_ANY_HEADING_RAD 1.81  // pi / sqrt(3): all headings are as likely
+#define GOES_ON_S 2.0               // motion at the last speed that is assumed after the save
+#define DRIVES_S 10.0               // age up to which the robot may still drive
 
 // ── writing ─────────────────────────────────────────────────────────────────────────────────────────────────────────
 
@@ -27,13 +29,19 @@ static double sigma_xy(const double *p) {
 
 static double sigma_heading(const double *p) { return sqrt(fmax(p[wm_cov_index(5, 5)], 0)); }
 
-int wm_saved_pose_is_worth_it(const wm_estimate *e) {
-  if (e->state != WM_STATE_TRACKING && e->state != WM_STATE_DEAD_RECKONING) return 0;
+int wm_saved_pose_is_one(const wm_estimate *e) {
+  if (e->state == WM_STATE_SEARCHING) return 0;
   for (int i = 0; i < 3; i++)
     if (!isfinite(e->pose_map_base.p_m[i])) return 0;
-  return isfinite(e->heading_rad) && sigma_xy(e->covariance) < SIGMA_XY_MAX_M &&
-         sigma_heading(e->covariance) < SIGMA_HEADING_MAX_RAD;
+  return isfinite(e->heading_rad);
 }
+
+int wm_saved_pose_is_worth_it(const wm_estimate *e) {
+  if (e->state == WM_STATE_LOST || !wm_saved_pose_is_one(e)) return 0;
+  return sigma_xy(e->covariance) < SIGMA_XY_MAX_M && sigma_heading(e->covariance) < SIGMA_HEADING_MAX_RAD;
+}
+
+static const char kLost[] = "lost";
 
 static double finite_or_0(double value) { return isfinite(value) ? value : 0; }
 
@@ -46,9 +54,10 @@ wm_status wm_saved_pose_write(const char *path, const wm_estimate *e, double utc
                "format: waymark-pose/1\nutc_s: %.3f\n"
                "pose: {x_m: %.6f, y_m: %.6f, z_m: %.6f, heading_rad: %.9f, qx: %.12f, qy: %.12f, qz: %.12f, "
                "qw: %.12f, sigma_xy_m: %.6f, sigma_heading_rad: %.6f}\n"
-               "speed_mps: %.4f\nrate_radps: %.5f\n",
+               "state: %s\nspeed_mps: %.4f\nrate_radps: %.5f\n",
                utc_s, p[0], p[1], p[2], e->heading_rad, q[0], q[1], q[2], q[3], fmax(sigma_xy(e->covariance), 1e-6),
-               fmax(sigma_heading(e->covariance), 1e-6), finite_or_0(e->v_mps[0]), finite_or_0(e->w_radps[2]));
+               fmax(sigma_heading(e->covariance), 1e-6), wm_saved_pose_is_worth_it(e) ? "known" : kLost,
+               finite_or_0(e->v_mps[0]), finite_or_0(e->w_radps[2]));
   const file_part part = {text, (size_t)length < sizeof text ? (size_t)length : sizeof text - 1};
   return replace_file(path, &part, 1, err);
 }
@@ -56,10 +65,10 @@ wm_status wm_saved_pose_write(const char *path, const wm_estimate *e, double utc
 // ── reading ─────────────────────────────────────────────────────────────────────────────────────────────────────────
 
 static wm_status read_root(const wm_yaml_node *root, wm_saved_pose *out, wm_error *err) {
-  char format[64];
+  char format[64], state[16] = "";
   wm_yaml_node version = wm_yaml_get(root, "format"), utc = wm_yaml_get(root, "utc_s"),
                pose = wm_yaml_get(root, "pose"), speed = wm_yaml_get(root, "speed_mps"),
-               rate = wm_yaml_get(root, "rate_radps");
+               rate = wm_yaml_get(root, "rate_radps"), known = wm_yaml_get(root, "state");
   if (!wm_yaml_is_map(root) || !wm_yaml_there(&version) || !wm_yaml_there(&utc) || !wm_yaml_there(&pose))
     return wm_yaml_fail(root, err, "is no saved pose (format, utc_s, pose)");
   wm_status status = wm_yaml_string(&version, format, sizeof format, err);
@@ -69,6 +78,8 @@ static wm_status read_root(const wm_yaml_node *root, wm_saved_pose *out, wm_erro
   if (status == WM_OK) status = wm_start_read(&pose, &out->start, err);
   if (status == WM_OK && wm_yaml_there(&speed)) status = wm_yaml_f64(&speed, -1000, 1000, &out->speed_mps, err);
   if (status == WM_OK && wm_yaml_there(&rate)) status = wm_yaml_f64(&rate, -1000, 1000, &out->rate_radps, err);
+  if (status == WM_OK && wm_yaml_there(&known)) status = wm_yaml_string(&known, state, sizeof state, err);
+  out->is_lost = strcmp(state, kLost) == 0;
   out->start.t_ns = WM_TIME_NONE;
   if (status == WM_OK && !isfinite(out->start.p_m[0] + out->start.p_m[1] + out->start.heading_rad))
     return wm_yaml_fail(&pose, err, "x_m, y_m or heading_rad is missing");
@@ -107,13 +118,14 @@ static double together(double a, double b, double c) { return sqrt(a * a + b * b
 int wm_saved_pose_start(const wm_saved_pose *saved, double utc_s, double max_age_s, double moved_m, double moved_rad,
                         wm_start *out) {
   double age_s = utc_s - saved->utc_s;
-  if (age_s > max_age_s) return 0;
+  if (age_s > max_age_s || saved->is_lost) return 0;
   *out = saved->start;
   int drives = age_s >= 0 && age_s <= DRIVES_S;
   double on_s = drives ? fmin(age_s, GOES_ON_S) : 0, blind_s = drives ? age_s : GOES_ON_S;
   go_on(out, saved->speed_mps * on_s, saved->rate_radps * on_s);
   out->sigma_xy_m = together(out->sigma_xy_m, moved_m, saved->speed_mps * blind_s);
-  out->sigma_heading_rad = together(out->sigma_heading_rad, moved_rad, saved->rate_radps * blind_s);
+  out->sigma_heading_rad =
+      fmin(together(out->sigma_heading_rad, moved_rad, saved->rate_radps * blind_s), SIGMA_ANY_HEADING_RAD);
   return 1;
 }
 

@@ -11,21 +11,24 @@ typedef struct wm_saved_pose {
   wm_start start;                // t_ns is WM_TIME_NONE: the first motion
   double utc_s;                  // when it was saved, by this computer's clock at that time
   double speed_mps, rate_radps;  // of base_link at that time, along its x axis and about z
+  int is_lost;                   // the pose was lost, or too vague for a start
 } wm_saved_pose;
 
-// Replaces the file atomically (output/replace_file.h). A few ms, on a memory card up to seconds: not on the real-time
-// thread. WM_IO with the reason.
+// Replaces the file atomically (output/replace_file.h), marked as lost where the pose is not worth it. A few ms, on a
+// memory card up to seconds: not on the real-time thread. WM_IO with the reason.
 wm_status wm_saved_pose_write(const char *path, const wm_estimate *pose, double utc_s, wm_error *err);
 // WM_NOT_FOUND: no file. WM_BAD_CONFIG: it can't be read. Allocates.
 wm_status wm_saved_pose_read(const char *path, wm_saved_pose *out, wm_error *err);
-// Whether a pose can be a start: finite, not searching, not lost, sigma below 50 m and 1.5 rad.
+// Whether there is a pose: finite, not searching.
+int wm_saved_pose_is_one(const wm_estimate *pose);
+// Whether it can be a start: not lost, sigma below 50 m and pi.
 int wm_saved_pose_is_worth_it(const wm_estimate *pose);
 // The estimate as a start in this process: `blind_s` of motion at its speed is added to its sigma.
 void wm_start_from_estimate(const wm_estimate *pose, double blind_s, wm_start *out);
-// The saved pose as a start; 0 where it is older than max_age_s (`utc_s` is now). Sigmas grow by moved_m and moved_rad
-// for a motion while the robot was off. A robot that drove at the save is carried on at its speed for its age, two
-// seconds at most. For ten seconds its speed is taken as anything between zero and twice that; after that it is taken
-// to have stopped within two seconds of driving.
+// The saved pose as a start; 0 where it is lost or older than max_age_s (`utc_s` is now). Sigmas grow by moved_m and
+// moved_rad for a motion while the robot was off. A robot that drove at the save is carried on at its speed for its
+// age, two seconds at most. For ten seconds its speed is taken as anything between zero and twice that; after that it
+// is taken to have stopped within two seconds of driving.
 int wm_saved_pose_start(const wm_saved_pose *saved, double utc_s, double max_age_s, double moved_m, double moved_rad,
                         wm_start *out);
 

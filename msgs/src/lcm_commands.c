@@ -17,13 +17,14 @@ static void begin(wm_event *out, unsigned kind, wm_time_ns t_ns) {
 const char *wm_lcm_read_set_pose(const void *message, size_t length, wm_event *out) {
   waymark_set_pose_t m;
   if (waymark_set_pose_t_decode(message, 0, room(length), &m) < 0) return "is no set_pose_t of this version";
-  double norm = 0, sum = 0;
+  double norm = 0, farthest_m = 0;
   for (int i = 0; i < 4; i++) norm += m.orientation_xyzw[i] * m.orientation_xyzw[i];
-  for (int i = 0; i < 3; i++) sum += m.position_m[i];
+  for (int i = 0; i < 3; i++)
+    farthest_m = fmax(farthest_m, isfinite(m.position_m[i]) ? fabs(m.position_m[i]) : HUGE_VAL);
   const char *why = NULL;
   norm = sqrt(norm);
-  if (!isfinite(sum) || fabs(sum) > 1e9)
-    why = "position_m is not finite";
+  if (farthest_m > 1e9)
+    why = "position_m is not finite, or farther than 1e9 m";
   else if (!(fabs(norm - 1) < 0.01))
     why = "orientation_xyzw is no unit quaternion";
   else if (!(m.sigma_xy_m > 0 && m.sigma_xy_m < 1e6 && m.sigma_heading_rad > 0 && m.sigma_heading_rad < 10))

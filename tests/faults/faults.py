@@ -5,11 +5,13 @@ drivers (played_world.h), heard by LCM's own logger. Each drive has a network of
 
     faults.py BUILD [DRIVE ...]          needs the right to network and mount namespaces, and liblcm-bin; skipped (77) without"""
 import csv
+import fcntl
 import json
 import math
 import os
 import pathlib
 import re
+import select
 import shutil
 import signal
 import socket
@@ -104,13 +106,13 @@ class Drive:
             self.eyes = subprocess.Popen([BUILD / "bin/waymark-play", self.folder / "recording", "--lcm", drives.URL, "--start-at", str(self.begin_ns),
                                           "--json", "played.json"], cwd=self.folder, stdout=said, stderr=said)
 
-    def start(self, *words):
+    def start(self, *words, stderr=None):
         with open(self.folder / "said.txt", "a") as said:
-            return subprocess.Popen([WAYMARK, *words], cwd=self.folder, env=self.environment, stderr=said, stdout=said)
+            return subprocess.Popen([WAYMARK, *words], cwd=self.folder, env=self.environment, stderr=stderr or said, stdout=said)
 
-    def run(self, *words):
+    def run(self, *words, stderr=None):
         """`waymark run`; with the first one, once it listens, the world begins."""
-        run = self.start("run", "--config", "robot.yaml", *words)
+        run = self.start("run", "--config", "robot.yaml", *words, stderr=stderr)
         while self.begin_ns is None and run.poll() is None:
             time.sleep(0.05)
             if "can0 is up" in self.said():
@@ -268,6 +270,55 @@ def process(work):
     return heard.failures
 
 
+class Reader(threading.Thread):
+    """Of a run's standard error by a small pipe, which it can leave full."""
+
+    def __init__(self, to):
+        super().__init__(daemon=True)
+        self.end, self.write_end = os.pipe()
+        fcntl.fcntl(self.write_end, fcntl.F_SETPIPE_SZ, 4096)
+        self.to, self.reads = to, threading.Event()
+        self.reads.set()
+        self.start()
+
+    def run(self):
+        while True:
+            self.reads.wait()
+            if select.select([self.end], [], [], 0.1)[0] and self.reads.is_set():
+                with open(self.to, "ab") as out:
+                    out.write(os.read(self.end, 4096))
+
+    def leave_full(self):
+        self.reads.clear()
+        time.sleep(0.2)
+        os.set_blocking(self.write_end, False)
+        try:
+            while True:
+                os.write(self.write_end, b"x" * 63 + b"\n")
+        except BlockingIOError:
+            os.set_blocking(self.write_end, True)
+
+
+def terminal(work):
+    """Nobody reads standard error any more (a terminal that was stopped, a log's program that hangs) while the bus goes down and up."""
+    drive = Drive(work, "crossing", "terminal", "terminal.yaml")
+    reader = Reader(drive.folder / "said.txt")
+    run = drive.run(stderr=reader.write_end)
+    drive.sleep_until(6)
+    reader.leave_full()
+    drive.sleep_until(16)
+    reader.reads.set()
+    drive.end(run, 18)
+    heard = drive.hear()
+    heard.check(run.returncode == 0, f"exit code {run.returncode}")
+    usual_m = 3 * heard.sigma_at(8)
+    heard.goes_on("standard error blocked, interface down", 8, 11)
+    heard.device("standard error blocked, interface down", CAN, DOWN, 9.2, 11)
+    heard.is_back("standard error blocked, interface down", CAN, 11, 13, usual_m)
+    heard.is_said("can0 went down", or_else="can0 is down (")
+    return heard.failures
+
+
 def recorder(work):
     """A recording that is ended by SIGTERM in its middle, and one that is killed: both replay."""
     drive = Drive(work, "corridor", "recorder")
@@ -414,6 +465,7 @@ def load(work):
 
 
 DRIVES = {"camera": (camera, "corridor"), "clock": (clock, "corridor"), "can": (can, "crossing"), "process": (process, "crossing"),
+          "terminal": (terminal, "crossing"),
           "recorder": (recorder, "corridor"), "box": (box, "corridor"), "readers": (readers, "walls"), "load": (load, None)}
 
 

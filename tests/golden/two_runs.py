@@ -5,7 +5,8 @@
   1. two runs with one publish.channel_prefix: each names the other's process and computer, once, and that it is gone at its
      end; health counts it. Two runs with different prefixes do not notice each other;
   2. `commands: {socket: FILE}` takes set_pose_t from a program that may write the file, and not over LCM; the file is for
-     owner and group alone, gone at the end; another run on it is refused, one that a killed run left is replaced.
+     owner and group alone, gone at the end; another run on it is refused, one that a killed run left is replaced;
+  3. `commands: {lcm: true}` after the default route moved to another network's interface: a command is heard.
 
 Needs lcm-gen, and the right to a network namespace (else 77)."""
 import csv
@@ -115,6 +116,34 @@ def check_commands(work):
     print("told by the local socket to stand at x = 100 m: ends at", last_x_m(work, "local"))
 
 
+def plug_in(name, address):
+    for command in (f"link add {name} type veth peer name {name}-peer", f"link set {name}-peer up", f"addr add {address}/24 dev {name}", f"link set {name} up"):
+        subprocess.run(["ip", *command.split()], check=True)
+
+
+def check_other_network(work):
+    """The default route, by which LCM's multicast goes, moves from Wi-Fi to a cable: sending never fails, and the group was joined on Wi-Fi."""
+    subprocess.run(["ip", "route", "del", "224.0.0.0/4", "dev", "lo"], check=True)
+    plug_in("wifi", "192.0.2.2")
+    subprocess.run(["ip", "route", "add", "default", "dev", "wifi"], check=True)
+    configure(work, "network", "WAYMARK_", "commands: {lcm: true}\n")
+    write_recording(work / "long", 90)
+    process = start(work, "network", "long")
+    time.sleep(3)
+    plug_in("cable", "198.51.100.2")
+    subprocess.run(["ip", "route", "replace", "default", "dev", "cable"], check=True)
+    time.sleep(3)
+    packet = b"LC02" + (1).to_bytes(4, "big") + b"WAYMARK_SET_POSE\0" + set_pose(work, 100.0)
+    socket.socket(socket.AF_INET, socket.SOCK_DGRAM).sendto(packet, ("239.255.76.67", 7667))
+    time.sleep(2)
+    assert process.poll() is None
+    process.send_signal(signal.SIGTERM)
+    end(process)
+    counts = health(work, "network")["sources"]["commands"]
+    assert counts["fused"] == 1, f"a command after the route moved to another interface: {counts}"
+    print("told over the other network to stand at x = 100 m: ends at", last_x_m(work, "network"))
+
+
 def inside():
     work = pathlib.Path(tempfile.mkdtemp(prefix="waymark-two-runs-"))
     try:
@@ -123,6 +152,7 @@ def inside():
         write_recording(work / "recording", 12)
         check_other_runs(work)
         check_commands(work)
+        check_other_network(work)
     finally:
         shutil.rmtree(work)
 

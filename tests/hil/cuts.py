@@ -23,7 +23,7 @@ from published import IS_BUSY
 from write_log import WriteLog
 
 CUTS, DISK_BYTES, FILES_BYTES = 20, 64 << 20, 60 << 20
-MAPPED_S = 11            # of the drive: there is a map from here on
+MAPPED_S = 53            # of the drive: the map has all markers of the lap from here on
 OFF_S, PLAYED_S = 0.5, 6  # without power; then the robot goes on
 POSE_S, RIGHT_S, RIGHT_M = (3.0 if IS_BUSY else 0.5), 5.0, 0.15
 RANDOM = random.Random(12)

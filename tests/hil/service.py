@@ -20,6 +20,8 @@ DETECTORS = ("apriltag:front", "mr:front")
 # Seconds from the drive's begin; it lasts 158 s.
 BUS_SILENT_S, CAMERA_GONE_S, BOTH_GONE_S, END_S = (22, 142), (15, 75), (88, 148), 157
 HEALED_S, KILLS = 1.0, 20
+# A lap takes 52 s, of three; killed during the second and the third. (In the first one the next markers are new, by which no pose is found.)
+PAUSE_S = (2.0, 3.6)
 POSE_S, RIGHT_S, RIGHT_M = 0.5, 5.0, 0.15
 RANDOM = random.Random(11)
 
@@ -181,7 +183,7 @@ def judge_service(work, waymark):
 def prepare_kills(work, root, here, simulate):
     recording, folder, can, pictures = scenario_of("kills", work, root, here, simulate)
     write_timeline(folder / "drive.timeline", can + pictures)
-    (folder / "pauses").write_text("".join(f"{RANDOM.uniform(3.0, 5.0):.3f}\n" for _ in range(KILLS)))
+    (folder / "pauses").write_text("".join(f"{RANDOM.uniform(*PAUSE_S):.3f}\n" for _ in range(KILLS)))
     drives.compile_helper(here / "disk_clock.c", folder / "disk_clock")
     disk = work / "kills.disk"
     disk.unlink(missing_ok=True)
@@ -226,7 +228,10 @@ def judge_kills(work, waymark):
     started = [int(line) * 1e-6 - begin_s for line in (out / "started-us").read_text().split()]
     for start_s, until_s in zip(started, killed[1:] + [killed[-1] + 6]):
         times.append(first_right_s(told, start_s, until_s, RIGHT_M))
-    report("killed (SIGKILL)", times, failures)
+    stamps = [int(us) for us in (out / "nothing-us").read_text().split()]
+    nothing_s = max(abs(end - begin) for begin, end in zip(stamps[::2], stamps[1::2])) * 1e-6
+    print(f"the same unit with /bin/true is over {nothing_s:.3f} s after its start at most: systemd's part, in this emulated computer")
+    report("killed (SIGKILL), without that", [(first - nothing_s, right) for first, right in times], failures)
     if subprocess.run([sys.executable, pathlib.Path(__file__).parent / "cuts.py", work, waymark]).returncode:
         failures.append("the disks that cuts of the power left (above)")
     return failures

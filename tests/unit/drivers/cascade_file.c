@@ -89,6 +89,7 @@ static void mistakes(void) {
   refused(GOOD, "0 -1 0 1", "0 -1 1", "has 11 numbers");
   refused(GOOD, "-1. 0.5", "-1.", "one leaf more");
   refused(GOOD, "-1. 0.5", "-1. 1e300", "too large");
+  refused(HAAR, "1 0 0 0.5", "1 0 0 1e300", "internalNodes: a number is too large");
   refused(GOOD, "<stageThreshold>0.25</stageThreshold>", "", "stage");
   refused(GOOD, "<featureType>LBP</featureType>", "", "featureType must stand before");
   refused(GOOD, "opencv-cascade-classifier", "opencv-haar-classifier", "OpenCV 1");

@@ -141,6 +141,23 @@ void test_carry_moves_mean_and_covariance(void) {
     }
 }
 
+// A bus that is silent for a minute: what the robot may have driven since the fused pose, 0.25 s ago, is added to it;
+// not what it may have driven in a quarter of a second more of the whole silence, 11.6 m.
+void test_unknown_motion_begins_at_the_fused_pose(void) {
+  start(make::no_wheels());
+  for (int i = 0; i <= 100; i++) feed(make::twist(0.01 * i, 1.5, 0.0));
+  for (double sigma_m : {0.01, 2.0}) {
+    wm_estimate fused{}, now;
+    fused.t_ns = make::at(61.0);
+    for (int axis = 0; axis < 2; axis++) fused.covariance[wm_cov_index(axis, axis)] = sigma_m * sigma_m;
+    TEST_ASSERT_EQUAL(WM_OK, wm_odometry_carry(odom, &fused, make::at(61.25), &now, nullptr));
+    const double position_m = sqrt(2.0) * sigma_m;
+    const double gone_m2 = (position_m + 1.5 * 0.25) * (position_m + 1.5 * 0.25) - position_m * position_m;
+    for (int axis = 0; axis < 2; axis++)
+      TEST_ASSERT_DOUBLE_WITHIN(0.01 * gone_m2, gone_m2, now.covariance[wm_cov_index(axis, axis)] - sigma_m * sigma_m);
+  }
+}
+
 void test_a_copy_continues_identically(void) {
   start(make::two_wheels());
   for (int i = 0; i <= 50; i++)
@@ -275,6 +292,7 @@ int main(void) {
   RUN_TEST(test_calibration_holds_from_now_on_and_nothing_jumps);
   RUN_TEST(test_twists_are_commands_as_long_as_the_estimator_takes_them_so);
   RUN_TEST(test_carry_moves_mean_and_covariance);
+  RUN_TEST(test_unknown_motion_begins_at_the_fused_pose);
   RUN_TEST(test_a_copy_continues_identically);
   RUN_TEST(test_a_pose_in_space_is_carried_in_space);
   RUN_TEST(test_a_twist_in_space_does_not_hold_for_ever);

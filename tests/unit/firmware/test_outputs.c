@@ -100,18 +100,24 @@ static void a_blocked_disk_holds_no_message_up(void) {
   TEST_ASSERT_EQUAL_UINT64(10 - SLOTS, estimator->events_lost);
 }
 
-// Lines of text of the publish thread wait for the same disk.
+// Lines of text of the publish thread and of the sources' threads wait for the same disk.
 static void lines_that_find_no_room_are_counted_in_health(void) {
   static live run;
   static wm_health health;
   void *lines = malloc(wm_ring_bytes(SLOTS, 400));
   wm_ring_init(&run.publish.lines, lines, SLOTS, 400);
   for (int i = 0; i < 10; i++) live_say_later(&run, "camera: silent");
+  void *of_source = malloc(wm_ring_bytes(SLOTS, 400));
+  run.assembly.source_count = 1;
+  wm_ring_init(&run.sources[0].lines, of_source, SLOTS, 400);
+  for (int i = 0; i < SLOTS + 2; i++) live_queue_line(&run.sources[0].lines, "camera: picture %d is late", i);
+  TEST_ASSERT_EQUAL_STRING("camera: picture 0 is late", wm_ring_front(&run.sources[0].lines));
   wm_histogram_add(&run.publish.send_ns, 3 * WM_NS_PER_MS);
-  live_publish_health(&run.publish, &health);
-  TEST_ASSERT_EQUAL_UINT64(10 - SLOTS, health.lines_lost);
+  live_publish_health(&run, &health);
+  TEST_ASSERT_EQUAL_UINT64(10 - SLOTS + 2, health.lines_lost);
   TEST_ASSERT_INT64_WITHIN(WM_NS_PER_MS, 3 * WM_NS_PER_MS, health.send_p99_ns);
   free(lines);
+  free(of_source);
 }
 
 int main(void) {

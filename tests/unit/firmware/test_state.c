@@ -78,6 +78,31 @@ static void a_pose_that_was_moving_goes_on(void) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-3, sqrt(0.09 + 16), start.sigma_xy_m);
 }
 
+// A run that lost its pose does not leave the one from before, with a sigma of then: the next run searches.
+static void a_lost_pose_replaces_the_one_before(void) {
+  wm_estimate e = tracking(12.25, 0.3);
+  wm_saved_pose saved;
+  wm_start start;
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_saved_pose_write(path, &e, 1000, &err), err.text);
+  for (int vague = 0; vague < 2; vague++) {
+    e = tracking(13, vague ? 60 : 8);
+    if (!vague) e.state = WM_STATE_LOST;
+    TEST_ASSERT_TRUE(wm_saved_pose_is_one(&e));
+    TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_saved_pose_write(path, &e, 1001, &err), err.text);
+    TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_saved_pose_read(path, &saved, &err), err.text);
+    TEST_ASSERT_TRUE(saved.is_lost);
+    TEST_ASSERT_FALSE(wm_saved_pose_start(&saved, 1002, 600, 0, 0, &start));
+  }
+  e = tracking(14, 8);
+  e.covariance[wm_cov_index(5, 5)] = 1.6 * 1.6;
+  e.w_radps[2] = 1.0;
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_saved_pose_write(path, &e, 1002, &err), err.text);
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_saved_pose_read(path, &saved, &err), err.text);
+  TEST_ASSERT_TRUE(wm_saved_pose_start(&saved, 1004, 600, 0, 0, &start));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-5, 8, start.sigma_xy_m);
+  TEST_ASSERT_DOUBLE_WITHIN(0.01, M_PI / sqrt(3), start.sigma_heading_rad);  // any heading
+}
+
 static void a_pose_that_is_worth_nothing_is_not_kept(void) {
   wm_estimate good = tracking(1, 0.3), e = good;
   TEST_ASSERT_TRUE(wm_saved_pose_is_worth_it(&good));
@@ -311,6 +336,7 @@ int main(void) {
   RUN_TEST(a_pose_is_there_again);
   RUN_TEST(a_pose_that_was_moving_goes_on);
   RUN_TEST(a_pose_that_is_worth_nothing_is_not_kept);
+  RUN_TEST(a_lost_pose_replaces_the_one_before);
   RUN_TEST(a_file_that_is_none_is_refused_with_its_line);
   RUN_TEST(where_it_cant_be_written_the_old_one_stays);
   RUN_TEST(the_way_left_is_where_the_variance_reaches_the_limit);

@@ -13,6 +13,7 @@
 #include "waymark_landmarks_t.h"
 #include "waymark_observations_t.h"
 #include "waymark_pose_t.h"
+#include "waymark_set_pose_t.h"
 
 void setUp(void) {}
 void tearDown(void) {}
@@ -172,6 +173,20 @@ static void every_value_of_an_enum_has_its_constant(void) {
   TEST_ASSERT_EQUAL_STRING("?", wm_cause_name(WM_CAUSE_COUNT));
 }
 
+static void a_pose_beyond_all_bounds_is_no_command(void) {
+  static const double kFar[][3] = {{1e300, -1e300, 0}, {0, NAN, 0}, {-2e9, 2e9, 0}, {INFINITY, -INFINITY, 0}};
+  wm_event out;
+  waymark_set_pose_t m = {.orientation_xyzw = {0, 0, 0, 1}, .sigma_xy_m = 1, .sigma_heading_rad = 1};
+  for (int i = 0; i < 5; i++) {
+    if (i < 4) memcpy(m.position_m, kFar[i], sizeof m.position_m);
+    if (i == 4) memset(m.position_m, 0, sizeof m.position_m);
+    int length = waymark_set_pose_t_encode(bytes, 0, sizeof bytes, &m);
+    const char *why = wm_lcm_read_set_pose(bytes, (size_t)length, &out);
+    if (i < 4) TEST_ASSERT_EQUAL_STRING("position_m is not finite, or farther than 1e9 m", why);
+    if (i == 4) TEST_ASSERT_NULL(why);
+  }
+}
+
 static void an_innovation_arrives(void) {
   wm_innovation i = {.t_ns = 3,
                      .landmark_id = -1,
@@ -227,6 +242,7 @@ int main(void) {
   RUN_TEST(each_number_of_a_sighting_arrives);
   RUN_TEST(a_sighting_with_an_elevation_sigma_of_zero_has_no_elevation);
   RUN_TEST(every_value_of_an_enum_has_its_constant);
+  RUN_TEST(a_pose_beyond_all_bounds_is_no_command);
   RUN_TEST(an_innovation_arrives);
   RUN_TEST(more_sightings_than_fit_are_counted);
   RUN_TEST(a_large_map_goes_in_pieces);

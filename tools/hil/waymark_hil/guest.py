@@ -17,7 +17,7 @@ _BUS = ["-object", "can-bus,id=cb{0}", "-device", "kvaser_pci,canbus=cb{0}", "-d
 # wakes in time whatever else the host does; as that, but idle time is the host's, as a disk is waited for; 1000 million, about what a
 # core of a board does (docs/boards.md), idle time is skipped.
 SLOW, FAST, SYSTEM, BOARD = "shift=2,sleep=on", "shift=1,sleep=off", "shift=1,sleep=on", "shift=0,sleep=off"
-GUEST_S = 1800  # on this computer's clock
+GUEST_S = 3600  # on this computer's clock, which may do much else
 _ARM = {"qemu": ["qemu-system-aarch64", "-machine", "virt", "-cpu", "cortex-a57"], "console": "ttyAMA0"}
 # What a guest is made of, by Debian's name of its architecture; `cc` makes helpers for it.
 MACHINES = {

@@ -38,6 +38,8 @@ const error_case kErrorCases[] = {
     {CONFIG, "Choice misspelt", FILE_, "motion: {model: twits}\n",
      "config/robot.yaml:3: motion.model: 'twits' is unknown; did you mean 'twist'? (one of: auto, ticks, "
      "speed_yaw_rate, ackermann, twist, increments, constant_velocity)"},
+    {CONFIG, "Channels that LCM takes for an expression", FILE_, "publish: {channel_prefix: 'R[1'}\n",
+     "config/robot.yaml:3: publish.channel_prefix: 'R[1': letters, digits, '_', '-' and '/' are possible"},
     {CONFIG, "Key without a value", FILE_, "publish:\n  rate_hz:\n",
      "config/robot.yaml:4: publish.rate_hz: has no value; a number from 0.1 to 1000 is needed"},
     {CONFIG, "Value where a section is needed", FILE_, "merge: 300\n",
