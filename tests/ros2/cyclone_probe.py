@@ -5,6 +5,7 @@
     cyclone_probe.py listen DOMAIN OUT TOPIC TYPE QUALITY [TOPIC TYPE QUALITY ...]
         until its standard input ends; OUT: pickled (arrival on the monotonic clock in ns, topic, message as dict)
     cyclone_probe.py send DOMAIN TOPIC TYPE RATE_HZ < pickled messages as dicts
+        prints "matched" once a reader is there
     cyclone_probe.py endpoints DOMAIN
         {topic: [type in DDS, user data]} of the writers and readers that are there after 2 s, as JSON"""
 
@@ -104,11 +105,12 @@ def listen(participant, out, names):
 
 def send(participant, topic, kind, rate_hz):
     writer = DataWriter(participant, Topic(participant, "rt" + topic, struct(kind)), quality_of("stream"))
-    until = time.monotonic() + 10
+    until = time.monotonic() + 30
     while not writer.get_matched_subscriptions():
         if time.monotonic() > until:
             sys.exit("no reader came")
         time.sleep(0.02)
+    print("matched", flush=True)
     while True:
         try:
             writer.write(filled(kind, pickle.load(sys.stdin.buffer)))
