@@ -84,9 +84,9 @@ bool takes(unsigned kind) {
   return ((estimator->takes | WM_MOTION_EVENTS) & WM_EVENT_BIT(kind & 31)) != 0 && kind < 32;
 }
 
-wm_sighting sighting(uint16_t sensor, int32_t id, double bearing_rad, double range_m) {
+wm_sighting sighting(uint16_t index, int32_t id, double bearing_rad, double range_m) {
   wm_sighting s = wm_sighting_without_numbers();
-  s.sensor = sensor;
+  s.sensor = index;
   s.landmark_id = id;
   s.bearing_rad = bearing_rad;
   s.range_m = range_m;
