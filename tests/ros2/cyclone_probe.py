@@ -84,10 +84,11 @@ def filled(name, values):
 
 
 def quality_of(text):
-    """The same as an RViz display (reliable), nav2's reader of a localizer's pose (latched), a sensor's reader."""
+    """The same as an RViz display (reliable), nav2's reader of a localizer's pose (latched), a sensor's reader. The history is
+    the reader's own matter, and long: Python may stand still for seconds on a loaded computer."""
     return Qos(Policy.Reliability.BestEffort if text == "sensor" else Policy.Reliability.Reliable(duration(milliseconds=100)),
                Policy.Durability.TransientLocal if text == "latched" else Policy.Durability.Volatile,
-               Policy.History.KeepLast(100))
+               Policy.History.KeepLast(5000))
 
 
 def listen(participant, out, names):
