@@ -276,6 +276,7 @@ wm_status wm_odometry_at(const wm_odometry *self, wm_time_ns t_ns, wm_odom_point
 
 wm_status wm_odometry_carry(const wm_odometry *self, const wm_estimate *fused, wm_time_ns t_ns, wm_estimate *out,
                             wm_odom_point *odom) {
+  if (fused->t_ns == WM_TIME_NONE) return WM_NOT_FOUND;  // nothing was fused yet
   if (self->front.model() == WM_MOTION_CONSTANT_VELOCITY) {
     carry_by_own_velocity(self->front.params(), fused, t_ns, out, odom);
     return WM_OK;

@@ -77,14 +77,10 @@ class landmark_drive {
     const wm_landmark &l = landmarks_[i % 4];
     const double dx = l.p_m[0] - x, dy = l.p_m[1] - y;
     seen.kind = WM_EVENT_SIGHTING;
-    seen.as.sighting = {0,
-                        l.id,
-                        std::remainder(std::atan2(dy, dx) - turn, 6.283185307179586),
-                        range_ ? std::hypot(dx, dy) : kAbsent,
-                        kAbsent,
-                        kAbsent,
-                        kAbsent,
-                        kAbsent};
+    seen.as.sighting = wm_sighting_without_numbers();
+    seen.as.sighting.landmark_id = l.id;
+    seen.as.sighting.bearing_rad = std::remainder(std::atan2(dy, dx) - turn, 6.283185307179586);
+    if (range_) seen.as.sighting.range_m = std::hypot(dx, dy);
     return {twist, seen};
   }
   void predict(const step &now) { ekf_->predict(state_, &now.twist); }

@@ -84,6 +84,15 @@ bool takes(unsigned kind) {
   return ((estimator->takes | WM_MOTION_EVENTS) & WM_EVENT_BIT(kind & 31)) != 0 && kind < 32;
 }
 
+wm_sighting sighting(uint16_t index, int32_t id, double bearing_rad, double range_m) {
+  wm_sighting s = wm_sighting_without_numbers();
+  s.sensor = index;
+  s.landmark_id = id;
+  s.bearing_rad = bearing_rad;
+  s.range_m = range_m;
+  return s;
+}
+
 // A drive of events of every kind, some of them nonsense for the pose: any order of kinds that time allows.
 wm_event event_at(uint64_t i, double t_s) {
   const double u = wm_random_uniform(1, 1, i), a = wm_random_normal(1, 2, i), b = wm_random_normal(1, 3, i);
@@ -105,7 +114,7 @@ wm_event event_at(uint64_t i, double t_s) {
   } else if (u < 0.85) {
     e.kind = WM_EVENT_SIGHTING;
     const wm_landmark &l = landmarks[i % 4];
-    e.as.sighting = {0, l.id, 0.3 * a, u < 0.7 ? 4 + std::fabs(b) : kAbsent, kAbsent, kAbsent, kAbsent, kAbsent};
+    e.as.sighting = sighting(0, l.id, 0.3 * a, u < 0.7 ? 4 + std::fabs(b) : kAbsent);
   } else if (u < 0.93) {
     e.kind = WM_EVENT_POSITION;
     e.as.position = {{2 * a, 2 * b, NAN}, 3.0, NAN};
@@ -256,21 +265,22 @@ void test_nonsense_is_refused_with_a_status_and_changes_nothing(void) {
     assert_refused(a, e, want);
     if (std::isnan(x)) continue;
     e.kind = WM_EVENT_SIGHTING;
-    e.as.sighting = {0, landmarks[0].id, x, 1, NAN, NAN, NAN, NAN};
+    e.as.sighting = sighting(0, landmarks[0].id, x, 1);
     assert_refused(a, e, want);
-    e.as.sighting = {0, landmarks[0].id, 0, x, NAN, NAN, NAN, NAN};
+    e.as.sighting = sighting(0, landmarks[0].id, 0, x);
     assert_refused(a, e, want);
   }
   wm_event e{};
   e.t_ns = t;
   e.kind = WM_EVENT_SIGHTING;
-  e.as.sighting = {0, landmarks[0].id, NAN, NAN, NAN, NAN, NAN, NAN};
+  e.as.sighting = sighting(0, landmarks[0].id, NAN, NAN);
   assert_refused(a, e, WM_NOT_FINITE);
-  e.as.sighting = {77, landmarks[0].id, 0, 1, NAN, NAN, NAN, NAN};
+  e.as.sighting = sighting(77, landmarks[0].id, 0, 1);
   assert_refused(a, e, WM_OUT_OF_RANGE);
-  e.as.sighting = {0, landmarks[0].id, 0, -1, NAN, NAN, NAN, NAN};
+  e.as.sighting = sighting(0, landmarks[0].id, 0, -1);
   assert_refused(a, e, WM_OUT_OF_RANGE);
-  e.as.sighting = {0, landmarks[0].id, 0, 1, -0.1, NAN, NAN, NAN};
+  e.as.sighting = sighting(0, landmarks[0].id, 0, 1);
+  e.as.sighting.bearing_sigma_rad = -0.1;
   assert_refused(a, e, WM_OUT_OF_RANGE);
   e.kind = WM_EVENT_SET_POSE;
   e.as.set_pose = {{{0, 0, 0}, {0, 0, 0, 0}}, 1, 1};

@@ -5,6 +5,7 @@
     cyclone_probe.py listen DOMAIN OUT TOPIC TYPE QUALITY [TOPIC TYPE QUALITY ...]
         until its standard input ends; OUT: pickled (arrival on the monotonic clock in ns, topic, message as dict)
     cyclone_probe.py send DOMAIN TOPIC TYPE RATE_HZ < pickled messages as dicts
+        prints "matched" once a reader is there
     cyclone_probe.py endpoints DOMAIN
         {topic: [type in DDS, user data]} of the writers and readers that are there after 2 s, as JSON"""
 
@@ -83,10 +84,11 @@ def filled(name, values):
 
 
 def quality_of(text):
-    """The same as an RViz display (reliable), nav2's reader of a localizer's pose (latched), a sensor's reader."""
+    """The same as an RViz display (reliable), nav2's reader of a localizer's pose (latched), a sensor's reader. The history is
+    the reader's own matter, and long: Python may stand still for seconds on a loaded computer."""
     return Qos(Policy.Reliability.BestEffort if text == "sensor" else Policy.Reliability.Reliable(duration(milliseconds=100)),
                Policy.Durability.TransientLocal if text == "latched" else Policy.Durability.Volatile,
-               Policy.History.KeepLast(100))
+               Policy.History.KeepLast(5000))
 
 
 def listen(participant, out, names):
@@ -104,11 +106,12 @@ def listen(participant, out, names):
 
 def send(participant, topic, kind, rate_hz):
     writer = DataWriter(participant, Topic(participant, "rt" + topic, struct(kind)), quality_of("stream"))
-    until = time.monotonic() + 10
+    until = time.monotonic() + 30
     while not writer.get_matched_subscriptions():
         if time.monotonic() > until:
             sys.exit("no reader came")
         time.sleep(0.02)
+    print("matched", flush=True)
     while True:
         try:
             writer.write(filled(kind, pickle.load(sys.stdin.buffer)))

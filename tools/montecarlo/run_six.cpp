@@ -71,8 +71,13 @@ std::vector<wm_event> events_of(const sim::Recording &recording) {
     std::copy(row.w_radps, row.w_radps + 3, q.value);
     std::copy(row.a_mps2, row.a_mps2 + 3, q.value + 3);
   }
-  for (const sim::Sighting &s : recording.sightings)
-    add(s, WM_EVENT_SIGHTING, 1).as.sighting = {s.sensor, s.id, s.bearing_rad, s.range_m, NAN, NAN, NAN, NAN};
+  for (const sim::Sighting &s : recording.sightings) {
+    wm_sighting &seen = add(s, WM_EVENT_SIGHTING, 1).as.sighting = wm_sighting_without_numbers();
+    seen.sensor = s.sensor;
+    seen.landmark_id = s.id;
+    seen.bearing_rad = s.bearing_rad;
+    seen.range_m = s.range_m;
+  }
   for (const sim::StereoSeen &s : recording.stereo)
     add(s, WM_EVENT_STEREO, 2).as.stereo = {s.id, {s.left_px[0], s.left_px[1]}, {s.right_px[0], s.right_px[1]}};
   for (const sim::Fix &f : recording.fixes)

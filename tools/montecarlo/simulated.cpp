@@ -78,7 +78,13 @@ wm_status make_events(const sim::Recording &recording, std::vector<SmallEvent> &
   };
   for (const sim::Sighting &s : recording.sightings) {
     wm_event e = event(s, WM_EVENT_SIGHTING);
-    e.as.sighting = {s.sensor, s.id, s.bearing_rad, s.range_m, NAN, NAN, s.elevation_rad, s.elevation_sigma_rad};
+    e.as.sighting = wm_sighting_without_numbers();
+    e.as.sighting.sensor = s.sensor;
+    e.as.sighting.landmark_id = s.id;
+    e.as.sighting.bearing_rad = s.bearing_rad;
+    e.as.sighting.range_m = s.range_m;
+    e.as.sighting.elevation_rad = s.elevation_rad;
+    e.as.sighting.elevation_sigma_rad = s.elevation_sigma_rad;
     out.emplace_back(e);
   }
   for (const sim::MarkerSeen &m : recording.markers) {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A sighting, from the event to the rows of its update: validation, association, expectation, Jacobian, noise.
 // Constants were chosen on drawn crossings (waymark-montecarlo-landmarks) and not swept.
-#include <limits>
 
 #include "filters/landmark_ekf/landmark_ekf.hpp"
 #include "math/arc.hpp"
@@ -67,13 +66,17 @@ double landmark_ekf::map_sigma(int landmark) const {
 // floor, as expect() has it. A second pose that the corners fit is turned about the same place.
 wm_status landmark_ekf::fuse_marker(const wm_event &event, record_list records) {
   const wm_marker &m = event.as.marker;
-  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   double v[3] = {m.p_m[0], m.p_m[1], m.p_m[2]};
   if (m.sensor < setup_->sensor_count && sensor_[m.sensor].is_steep) to_level(sensor_[m.sensor], m.p_m, v);
   const int landmark = index_.find(setup_->landmarks, m.id);
   const bool has_height = landmark >= 0 && finite(setup_->landmarks[landmark].p_m[2]);
   const double range_m = std::sqrt(square(v[0]) + square(v[1]) + (has_height ? square(v[2]) : 0.0));
-  const wm_sighting s = {m.sensor, m.id, atan2(v[1], v[0]), range_m, kNone, m.along_sigma_m, kNone, kNone};
+  wm_sighting s = wm_sighting_without_numbers();
+  s.sensor = m.sensor;
+  s.landmark_id = m.id;
+  s.bearing_rad = atan2(v[1], v[0]);
+  s.range_m = range_m;
+  s.range_sigma_m = m.along_sigma_m;
   return fuse_sighting(event, s, records);
 }
 

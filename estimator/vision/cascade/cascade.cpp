@@ -153,14 +153,13 @@ bool emit(const cascade_state &self, const wm_frame &frame, const window_hit &se
   const auto sigma = [&](double size) {
     return std::sqrt(square(kSigma_px * self.pixel_rad) + square(kSigmaOfSize * size));
   };
-  out->as.sighting = {.sensor = 0,
-                      .landmark_id = -1,
-                      .bearing_rad = sensor_bearing(self.camera, self.is_steep, ray),
-                      .range_m = range_m,
-                      .bearing_sigma_rad = sigma(seen.width),
-                      .range_sigma_m = self.params.sigma_range * range_m,
-                      .elevation_rad = sensor_elevation(self.camera, self.is_steep, ray),
-                      .elevation_sigma_rad = sigma(seen.height)};
+  wm_sighting &s = out->as.sighting = wm_sighting_without_numbers();
+  s.bearing_rad = sensor_bearing(self.camera, self.is_steep, ray);
+  s.range_m = range_m;
+  s.bearing_sigma_rad = sigma(seen.width);
+  s.range_sigma_m = self.params.sigma_range * range_m;
+  s.elevation_rad = sensor_elevation(self.camera, self.is_steep, ray);
+  s.elevation_sigma_rad = sigma(seen.height);
   return true;
 }
 

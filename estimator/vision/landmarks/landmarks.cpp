@@ -168,14 +168,12 @@ bool emit(const landmarks_state &self, const wm_frame &frame, const camera_guess
   std::memset(static_cast<void *>(out), 0, WM_EVENT_SMALL_BYTES);
   out->t_ns = time_of_row(frame.t_ns, seen.at.v, frame.height_px, self.readout_ns);
   out->kind = WM_EVENT_SIGHTING;
-  out->as.sighting = {.sensor = 0,
-                      .landmark_id = one.what->id,
-                      .bearing_rad = bearing_of(self, ray),
-                      .range_m = kNan,
-                      .bearing_sigma_rad = std::sqrt(variance),
-                      .range_sigma_m = kNan,
-                      .elevation_rad = elevation_of(self, ray),
-                      .elevation_sigma_rad = std::sqrt(up_variance)};
+  wm_sighting &s = out->as.sighting = wm_sighting_without_numbers();
+  s.landmark_id = one.what->id;
+  s.bearing_rad = bearing_of(self, ray);
+  s.bearing_sigma_rad = std::sqrt(variance);
+  s.elevation_rad = elevation_of(self, ray);
+  s.elevation_sigma_rad = std::sqrt(up_variance);
   return true;
 }
 

@@ -57,7 +57,11 @@ inline wm_event quantities(double t_s, std::initializer_list<std::pair<wm_quanti
 
 inline wm_event sighting(double t_s, int32_t id, double bearing, double range, uint16_t sensor = 0) {
   wm_event e = empty(t_s, WM_EVENT_SIGHTING);
-  e.as.sighting = {sensor, id, bearing, range, NAN, NAN, NAN, NAN};
+  e.as.sighting = wm_sighting_without_numbers();
+  e.as.sighting.sensor = sensor;
+  e.as.sighting.landmark_id = id;
+  e.as.sighting.bearing_rad = bearing;
+  e.as.sighting.range_m = range;
   return e;
 }
 

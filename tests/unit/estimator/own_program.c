@@ -85,8 +85,11 @@ static void a_drive(void) {
     if (i % 5) continue;
     const wm_landmark *l = &landmarks[i / 5 % 2];
     event.kind = WM_EVENT_SIGHTING;
-    const double dx = l->p_m[0] - 0.02 * i, dy = l->p_m[1] - 0.3, none = (double)NAN;
-    event.as.sighting = (wm_sighting){0, l->id, atan2(dy, dx), sqrt(dx * dx + dy * dy), none, none, none, none};
+    const double dx = l->p_m[0] - 0.02 * i, dy = l->p_m[1] - 0.3;
+    event.as.sighting = wm_sighting_without_numbers();
+    event.as.sighting.landmark_id = l->id;
+    event.as.sighting.bearing_rad = atan2(dy, dx);
+    event.as.sighting.range_m = sqrt(dx * dx + dy * dy);
     TEST_ASSERT_EQUAL(WM_OK, ekf->correct(state, &event, rows, WM_INNOVATIONS_PER_EVENT_MAX, &count));
   }
   wm_estimate now;

@@ -54,6 +54,17 @@ void test_extrapolates_with_the_held_twist_but_not_for_ever(void) {
   assert_pose(1.0 + params.hold_max_s, 0, 0, pose_at(60));
 }
 
+void test_an_estimate_without_a_time_is_carried_nowhere(void) {
+  wm_estimate fused{}, out;
+  fused.t_ns = WM_TIME_NONE;
+  fused.dof = 3;
+  start(make::no_wheels());
+  TEST_ASSERT_EQUAL(WM_NOT_FOUND, wm_odometry_carry(odom, &fused, make::at(1), &out, nullptr));
+  params.model = WM_MOTION_CONSTANT_VELOCITY;
+  TEST_ASSERT_EQUAL(WM_OK, wm_odometry_init(odom, &params, &wheels));
+  TEST_ASSERT_EQUAL(WM_NOT_FOUND, wm_odometry_carry(odom, &fused, make::at(1), &out, nullptr));
+}
+
 void test_a_time_too_old_or_before_any_motion_is_not_found(void) {
   start(make::no_wheels());
   wm_odom_point p;
@@ -288,6 +299,7 @@ int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_half_a_circle_by_twists);
   RUN_TEST(test_extrapolates_with_the_held_twist_but_not_for_ever);
+  RUN_TEST(test_an_estimate_without_a_time_is_carried_nowhere);
   RUN_TEST(test_a_time_too_old_or_before_any_motion_is_not_found);
   RUN_TEST(test_calibration_holds_from_now_on_and_nothing_jumps);
   RUN_TEST(test_twists_are_commands_as_long_as_the_estimator_takes_them_so);

@@ -340,10 +340,8 @@ void test_ranges_depth_and_heading_are_rows_too(void) {
   s.begin();
   for (int i = 0; i < 100; i++) {
     s.swim(0.1, {0.3, 0, 0}, {0, 0, 0.3});
-    wm_event e = make::empty(s.t_s, WM_EVENT_SIGHTING);
     const wm_landmark &l = s.map[static_cast<size_t>(i % 3)];
-    e.as.sighting = {0,       l.id,    kAbsent, length(vec_of(l.p_m) - s.truth.p) + 0.05 * s.noise(),
-                     kAbsent, kAbsent, kAbsent, kAbsent};
+    wm_event e = make::sighting(s.t_s, l.id, kAbsent, length(vec_of(l.p_m) - s.truth.p) + 0.05 * s.noise());
     TEST_ASSERT_EQUAL(WM_OK, s.take(e));
     e = make::empty(s.t_s, WM_EVENT_POSITION);
     e.as.position = {{kAbsent, kAbsent, s.truth.p.z + 0.02 * s.noise()}, kAbsent, 0.02};

@@ -94,8 +94,8 @@ void test_each_refused_datum_leaves_a_record(void) {
   stereo(1, HUGE_VAL);
   stereo(1, kAbsent);
   const auto sighting = [&](double bearing, double range, double sigma) {
-    wm_event e = make::empty(s.t_s, WM_EVENT_SIGHTING);
-    e.as.sighting = {0, 1, bearing, range, sigma, sigma, kAbsent, kAbsent};
+    wm_event e = make::sighting(s.t_s, 1, bearing, range);
+    e.as.sighting.bearing_sigma_rad = e.as.sighting.range_sigma_m = sigma;
     bad.push_back(e);
   };
   sighting(200, kAbsent, 0.1);
@@ -104,9 +104,7 @@ void test_each_refused_datum_leaves_a_record(void) {
   sighting(kAbsent, 3, -1);
   sighting(kAbsent, HUGE_VAL, 0.1);
   sighting(kAbsent, kAbsent, 0.1);
-  wm_event sensor = make::empty(s.t_s, WM_EVENT_SIGHTING);
-  sensor.as.sighting = {9, 1, 0.1, 3, kAbsent, kAbsent, kAbsent, kAbsent};
-  bad.push_back(sensor);
+  bad.push_back(make::sighting(s.t_s, 1, 0.1, 3, 9));
   const auto position = [&](double x, double sigma) {
     wm_event e = make::empty(s.t_s, WM_EVENT_POSITION);
     e.as.position = {{x, 0, 0}, sigma, 1};

@@ -154,7 +154,9 @@ void a_sighting_is_a_line_to_its_landmark() {
   wm_event event{};
   event.kind = WM_EVENT_SIGHTING;
   event.t_ns = kSecond;
-  event.as.sighting = {0, 7, 0.0, kNone, kNone, kNone, kNone, kNone};
+  event.as.sighting = wm_sighting_without_numbers();
+  event.as.sighting.landmark_id = 7;
+  event.as.sighting.bearing_rad = 0;
   out.resize(WM_LCM_MESSAGE_MAX);
   out.resize(wm_lcm_observations("eye", &event, 1, out.data(), out.size()));
   take(&live, "OBSERVATIONS", out);

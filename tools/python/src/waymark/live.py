@@ -25,6 +25,9 @@ class Message(NamedTuple):
     arrival_ns: int
 
 
+_QUEUED = 1000  # messages of a kind that wait while the caller is busy, 20 s of poses; LCM's own 30 are 0.6 s
+
+
 class Live:
     """Subscribes to a run on this computer or the network. One thread. ConnectionError where LCM has no way in.
 
@@ -43,7 +46,7 @@ class Live:
         try:
             self._lcm = lcm.LCM(url)
             for kind in kinds:
-                self._lcm.subscribe(re.escape(prefix) + kind, self._take)
+                self._lcm.subscribe(re.escape(prefix) + kind, self._take).set_queue_capacity(_QUEUED)
         except RuntimeError as error:
             raise ConnectionError(f"LCM: no connection on {url}: {error} "
                                   "(`ip route add 224.0.0.0/4 dev lo` makes a route on this computer)") from None
