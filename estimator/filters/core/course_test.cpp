@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The dead reckoning of a window is laid over the positions by the best turn and shift [Umeyama1991], as it is, and with
+// The dead reckoning of a window is laid over the positions by the best turn and shift [Horn1987], as it is, and with
 // the turn's sign changed. With an unknown variance the log likelihood ratio of both is half the number of coordinates
 // times the logarithm of the ratio of the sums of squares. The stated variances are added to both sums: below them a
 // difference has no meaning. Neither the pose nor its heading are needed, so that a start that is wrong does not matter.
