@@ -10,6 +10,7 @@
 
 #include "filters/core/course_test.hpp"
 #include "filters/core/noise_adaption.hpp"
+#include "filters/core/scale_test.hpp"
 #include "filters/core/turn_check.hpp"
 #include "math/elementary.hpp"
 
@@ -290,10 +291,12 @@ int32_t silent_source(const wm_monitor &self, wm_time_ns t_ns) {
 
 // Sources in disagreement raise the noise of the motion, or of one of them, as far as it may grow. In 25 good drives,
 // real and simulated, the largest factor is 15.5 (plaza-1).
-bool test_noises(wm_monitor *self, const wm_calibration_value *values, size_t count) {
+// Or they bend a scale far from what the configuration states.
+bool test_calibration(wm_monitor *self, const wm_calibration_value *values, size_t count) {
   self->is_noise_at_limit = 0;
   for (size_t i = 0; i < count; i++)
-    if (noise_adaption::is_at_limit(values[i])) self->is_noise_at_limit = 1;
+    if (noise_adaption::is_at_limit(values[i]) || scale_contradicts(self->scale_sigma, values[i]))
+      self->is_noise_at_limit = 1;
   if (!self->is_noise_at_limit) return false;
   self->cause = WM_CAUSE_INCONSISTENT;
   self->source = -1;
@@ -388,6 +391,7 @@ void wm_monitor_init(wm_monitor *self, const wm_setup *setup, uint64_t observers
     self->is_map_known = setup->landmark_count > 0;
   }
   wm::course_begin(&self->course);
+  wm::scales_begin(*setup, self->scale_sigma);
   wm::clear(self);
 }
 
@@ -424,7 +428,7 @@ void wm_monitor_step(wm_monitor *self, const wm_estimate *e, const wm_calibratio
   self->was_lost = e->state == WM_STATE_LOST;
   if (!self->is_map_known) wm::widen_box(self, e->pose_map_base.p_m[0], e->pose_map_base.p_m[1]);
   bool fits;
-  const bool is_noisy = wm::test_noises(self, calibration, count);
+  const bool is_noisy = wm::test_calibration(self, calibration, count);
   const bool is_turned = wm::test_turn(self, calibration, count);
   const bool contradicts = wm::test_sources(self, e->t_ns, &fits) || is_noisy || is_turned;
   wm::count_contradicted(self, contradicts, fits && !self->was_lost, dt_s);
