@@ -38,7 +38,8 @@ constexpr double kStated = 1.5;        // innovations' variance over the stated 
 constexpr double kLostAfter_s = 10.0, kFitRate = 1.0 / 3.0, kMostDoubt_s = 30.0;
 // A run that was contradicted for long has a fault that no search finds, such as a mirrored map, and fits by chance now
 // and then. Beyond kExcused_s each further kSuspect_s of contradiction count as much as all fitting ones: they weigh
-// less by that. Half of the time is doubt of a pose that is found then. Ten times as long without doubt makes up for it.
+// less by that. Half of the time is doubt of a pose that is found then. Ten times as long without doubt makes up for
+// it.
 constexpr double kExcused_s = 10.0, kSuspect_s = 10.0, kMostContradicted_s = 600.0, kForgiveRate = 0.1;
 constexpr double kFresh_s = 1.0;      // observations within this time are present ones
 constexpr double kSilent_s = 2.0;     // an observing source without data for so long is silent

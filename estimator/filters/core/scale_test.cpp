@@ -16,9 +16,12 @@ constexpr double kMost = 1.2, kSigmas = 5.0;
 constexpr struct {
   const char *name;
   int term;
-} kScales[WM_MONITOR_SCALES] = {{"motion.speed_scale", WM_SPEED_SCALE}, {"motion.yaw_rate_scale", WM_YAW_RATE_SCALE},
-                                {"motion.left_scale", WM_LEFT_SCALE},   {"motion.right_scale", WM_RIGHT_SCALE},
-                                {"motion.track_scale", WM_TRACK_SCALE}, {"motion.side_scale", WM_SIDE_SCALE},
+} kScales[WM_MONITOR_SCALES] = {{"motion.speed_scale", WM_SPEED_SCALE},
+                                {"motion.yaw_rate_scale", WM_YAW_RATE_SCALE},
+                                {"motion.left_scale", WM_LEFT_SCALE},
+                                {"motion.right_scale", WM_RIGHT_SCALE},
+                                {"motion.track_scale", WM_TRACK_SCALE},
+                                {"motion.side_scale", WM_SIDE_SCALE},
                                 {"range_scale", -1}};
 
 // WM_MONITOR_SCALES: none of them.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Scales of wheels, gyro and ranges against the sigmas that the configuration states for them, for the monitor: the same
-// limits as those of `waymark check` at the end of a drive.
+// Scales of wheels, gyro and ranges against the sigmas that the configuration states for them, for the monitor: the
+// same limits as those of `waymark check` at the end of a drive.
 #ifndef WAYMARK_ESTIMATOR_CORE_SCALE_TEST_HPP
 #define WAYMARK_ESTIMATOR_CORE_SCALE_TEST_HPP
 
