@@ -22,8 +22,7 @@ _Static_assert(sizeof(((waymark_health_t *)0)->counters) / sizeof(waymark_counte
                "a place each");
 _Static_assert(WAYMARK_POSE_T_STATUS_JUMPED == WM_PUB_JUMPED &&
                    WAYMARK_POSE_T_STATUS_CAUSE_SHIFT == WM_PUB_CAUSE_SHIFT &&
-                   WAYMARK_POSE_T_STATE_DEGRADED == WM_STATE_DEGRADED &&
-                   WAYMARK_POSE_T_CAUSE_TURN == WM_CAUSE_TURN,
+                   WAYMARK_POSE_T_STATE_DEGRADED == WM_STATE_DEGRADED && WAYMARK_POSE_T_CAUSE_TURN == WM_CAUSE_TURN,
                "the messages' numbers are the structs' numbers");
 
 size_t wm_lcm_pose(const wm_published *p, wm_time_ns sent_ns, void *out, size_t capacity) {

@@ -244,6 +244,26 @@ void a_turn_that_no_vehicle_can_drive_is_degraded(void) {
   TEST_ASSERT_EQUAL(WM_CAUSE_TURN, out.cause);
 }
 
+// Markers that are measured with their frame bend the scales of both wheels.
+void a_scale_far_from_what_is_stated_is_degraded(void) {
+  const parameters::values motion(wm_motion_params_table, {{"states.left_scale_sigma", 0.02}});
+  wm_setup setup{};
+  setup.motion = static_cast<const wm_motion_params *>(static_cast<const void *>(motion.data()));
+  wm_monitor monitor;
+  for (const double scale : {1.05, 1.25}) {
+    wm_monitor_init(&monitor, &setup, 1);
+    const wm_calibration_value value = {"motion.left_scale", scale, 0.003};
+    wm_estimate out{};
+    out.state = WM_STATE_TRACKING;
+    for (int i = 1; i < 5; i++) {
+      out.t_ns = i * WM_NS_PER_S;
+      wm_monitor_step(&monitor, &out, &value, 1);
+    }
+    wm_monitor_judge(&monitor, &out);
+    TEST_ASSERT_EQUAL(scale > 1.2 ? WM_STATE_DEGRADED : WM_STATE_TRACKING, out.state);
+  }
+}
+
 // A map with a fault fits by chance now and then: after a minute of contradiction it does not count like a found pose.
 void a_run_that_was_contradicted_for_long_has_to_fit_for_longer(void) {
   lone once(true), again(true);
@@ -312,6 +332,7 @@ int main(void) {
   RUN_TEST(a_turn_with_the_wrong_sign_is_named);
   RUN_TEST(positions_that_turn_to_the_other_side_are_degraded);
   RUN_TEST(a_turn_that_no_vehicle_can_drive_is_degraded);
+  RUN_TEST(a_scale_far_from_what_is_stated_is_degraded);
   RUN_TEST(a_run_that_was_contradicted_for_long_has_to_fit_for_longer);
   RUN_TEST(a_pose_off_the_map_is_degraded);
   RUN_TEST(identities_that_the_map_lacks_are_doubt);

@@ -304,8 +304,9 @@ Score Drive::score(bool with_halves) const {
       const double due = counts_[channel][event][r];
       if (due == 0) continue;
       of.count += due;
-      of.log_sum += count[r] > due ? log_sum[r] * due / count[r]
-                                   : log_sum[r] + (due - count[r]) * (std::log(kOutlier) + wm_outlier_log_density(r, 0.0));
+      of.log_sum += count[r] > due
+                        ? log_sum[r] * due / count[r]
+                        : log_sum[r] + (due - count[r]) * (std::log(kOutlier) + wm_outlier_log_density(r, 0.0));
     }
   });
   out.states = std::min(out.states, pass.calibration(out.end));

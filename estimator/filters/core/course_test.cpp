@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// The dead reckoning of a window is laid over the positions by the best turn and shift [Umeyama1991], as it is, and with
+// The dead reckoning of a window is laid over the positions by the best turn and shift [Horn1987], as it is, and with
 // the turn's sign changed. With an unknown variance the log likelihood ratio of both is half the number of coordinates
 // times the logarithm of the ratio of the sums of squares. The stated variances are added to both sums: below them a
-// difference has no meaning. Neither the pose nor its heading are needed, so that a start that is wrong does not matter.
+// difference has no meaning. Neither the pose nor its heading are needed, so that a start that is wrong does not
+// matter.
 #include "filters/core/course_test.hpp"
 
 #include <cmath>
@@ -125,7 +126,8 @@ void course_move(course *self, const wm_estimate &e) {
 void course_take(course *self, wm_time_ns t_ns, const wm_position &position) {
   const double ahead_s = self->until_ns == WM_TIME_NONE ? kGap_s : wm_seconds_between(self->until_ns, t_ns);
   const double sigma_m = position.sigma_xy_m;
-  if (!(std::fabs(ahead_s) < kGap_s) || !finite(position.p_m[0]) || !finite(position.p_m[1]) || !finite(sigma_m)) return;
+  if (!(std::fabs(ahead_s) < kGap_s) || !finite(position.p_m[0]) || !finite(position.p_m[1]) || !finite(sigma_m))
+    return;
   if (self->opened == 0 || wm_seconds_between(slot_at(*self, 0).begin_ns, t_ns) >= kSlot_s) {
     if (self->opened > 0) self->is_mirrored = is_mirrored(*self);
     slot *next = &self->slots[self->opened++ % WM_MONITOR_COURSE_SLOTS];

@@ -10,6 +10,7 @@
 
 #include "filters/core/course_test.hpp"
 #include "filters/core/noise_adaption.hpp"
+#include "filters/core/scale_test.hpp"
 #include "filters/core/turn_check.hpp"
 #include "math/elementary.hpp"
 
@@ -37,7 +38,8 @@ constexpr double kStated = 1.5;        // innovations' variance over the stated 
 constexpr double kLostAfter_s = 10.0, kFitRate = 1.0 / 3.0, kMostDoubt_s = 30.0;
 // A run that was contradicted for long has a fault that no search finds, such as a mirrored map, and fits by chance now
 // and then. Beyond kExcused_s each further kSuspect_s of contradiction count as much as all fitting ones: they weigh
-// less by that. Half of the time is doubt of a pose that is found then. Ten times as long without doubt makes up for it.
+// less by that. Half of the time is doubt of a pose that is found then. Ten times as long without doubt makes up for
+// it.
 constexpr double kExcused_s = 10.0, kSuspect_s = 10.0, kMostContradicted_s = 600.0, kForgiveRate = 0.1;
 constexpr double kFresh_s = 1.0;      // observations within this time are present ones
 constexpr double kSilent_s = 2.0;     // an observing source without data for so long is silent
@@ -290,10 +292,12 @@ int32_t silent_source(const wm_monitor &self, wm_time_ns t_ns) {
 
 // Sources in disagreement raise the noise of the motion, or of one of them, as far as it may grow. In 25 good drives,
 // real and simulated, the largest factor is 15.5 (plaza-1).
-bool test_noises(wm_monitor *self, const wm_calibration_value *values, size_t count) {
+// Or they bend a scale far from what the configuration states.
+bool test_calibration(wm_monitor *self, const wm_calibration_value *values, size_t count) {
   self->is_noise_at_limit = 0;
   for (size_t i = 0; i < count; i++)
-    if (noise_adaption::is_at_limit(values[i])) self->is_noise_at_limit = 1;
+    if (noise_adaption::is_at_limit(values[i]) || scale_contradicts(self->scale_sigma, values[i]))
+      self->is_noise_at_limit = 1;
   if (!self->is_noise_at_limit) return false;
   self->cause = WM_CAUSE_INCONSISTENT;
   self->source = -1;
@@ -388,6 +392,7 @@ void wm_monitor_init(wm_monitor *self, const wm_setup *setup, uint64_t observers
     self->is_map_known = setup->landmark_count > 0;
   }
   wm::course_begin(&self->course);
+  wm::scales_begin(*setup, self->scale_sigma);
   wm::clear(self);
 }
 
@@ -424,7 +429,7 @@ void wm_monitor_step(wm_monitor *self, const wm_estimate *e, const wm_calibratio
   self->was_lost = e->state == WM_STATE_LOST;
   if (!self->is_map_known) wm::widen_box(self, e->pose_map_base.p_m[0], e->pose_map_base.p_m[1]);
   bool fits;
-  const bool is_noisy = wm::test_noises(self, calibration, count);
+  const bool is_noisy = wm::test_calibration(self, calibration, count);
   const bool is_turned = wm::test_turn(self, calibration, count);
   const bool contradicts = wm::test_sources(self, e->t_ns, &fits) || is_noisy || is_turned;
   wm::count_contradicted(self, contradicts, fits && !self->was_lost, dt_s);

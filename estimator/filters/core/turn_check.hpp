@@ -27,7 +27,7 @@ class turn_check {
 
  private:
   static constexpr int kBlock = noise_adaption::kBlock, kAlternatives = 2;
-  double by_[kBlock];            // derivative of the mean by the factor
+  double by_[kBlock];           // derivative of the mean by the factor
   double nats_[kAlternatives];  // sum for each alternative, at least 0
 };
 

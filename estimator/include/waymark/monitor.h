@@ -43,6 +43,7 @@ typedef struct wm_monitor_source {
 } wm_monitor_source;
 
 #define WM_MONITOR_COURSE_SLOTS 33
+#define WM_MONITOR_SCALES 7
 
 // Positions near in time, and the mean of the dead reckoning at their stamps.
 typedef struct wm_monitor_course_slot {
@@ -65,14 +66,15 @@ typedef struct wm_monitor_course {
 
 typedef struct wm_monitor {
   wm_monitor_source sources[WM_MONITOR_SOURCES];
-  uint64_t observers;          // bit for each source that may give observations
+  uint64_t observers;  // bit for each source that may give observations
   wm_monitor_course course;
-  double spread_m2;            // variance of a place anywhere on the map, each axis
-  double low_m[2], high_m[2];  // the map, else the way so far
-  double doubt_s;              // time of contradiction that fitting observations have not made up for
-  double fitted_s;             // time of fitting observations since the pose was set or found
-  double since_found_s;        // since a search found a pose
-  double contradicted_s;       // lost or contradicted, less a share of the time without doubt
+  double scale_sigma[WM_MONITOR_SCALES];  // stated; 0: no state
+  double spread_m2;                       // variance of a place anywhere on the map, each axis
+  double low_m[2], high_m[2];             // the map, else the way so far
+  double doubt_s;                         // time of contradiction that fitting observations have not made up for
+  double fitted_s;                        // time of fitting observations since the pose was set or found
+  double since_found_s;                   // since a search found a pose
+  double contradicted_s;                  // lost or contradicted, less a share of the time without doubt
   wm_time_ns begun_ns, stepped_ns, next_ns;
   uint32_t resets;
   int32_t cause, source;        // of the present doubt; source -1: none

@@ -140,12 +140,11 @@ static trial_message drive(const trials_plan *plan, const char *folder, double u
   const wm_status status = wm_replay_recording(config, recording, &options, &report, &err);
   wm_recording_close(recording);
   if (status != WM_OK || self.evidence.updates == 0) return none;
-  done.result =
-      (trial_result){.is_valid = 1,
-                     .updates = self.evidence.updates,
-                     .score = evidence_score(&self.evidence) - calibration_cost(plan->assembly, &report.health) -
-                              doubt_cost(&self.evidence),
-                     .explained = (double)self.evidence.fused / (double)self.evidence.updates};
+  done.result = (trial_result){.is_valid = 1,
+                               .updates = self.evidence.updates,
+                               .score = evidence_score(&self.evidence) -
+                                        calibration_cost(plan->assembly, &report.health) - doubt_cost(&self.evidence),
+                               .explained = (double)self.evidence.fused / (double)self.evidence.updates};
   if (self.votes.given) id_votes_table(&self.votes, &done.table);
   return done;
 }

@@ -304,6 +304,20 @@ static void every_kind_has_its_words(void) {
   }
 }
 
+// A receiver's sigma of 30 m: the density of a position that fits is below that of an outlier over 50 m.
+static double score_of(double off_m) {
+  static drive_evidence evidence;
+  memset(&evidence, 0, sizeof evidence);
+  const wm_innovation in = {
+      .residual = WM_RESIDUAL_X, .verdict = WM_FUSED, .landmark_id = -1, .observed = off_m, .variance = 900};
+  evidence_put(&evidence, WM_OUTPUT_INNOVATION, &in);
+  return evidence_score(&evidence);
+}
+static void positions_with_a_large_sigma_tell_good_poses_from_wrong_ones(void) {
+  TEST_ASSERT_TRUE(score_of(0) > score_of(30) + 0.4);
+  TEST_ASSERT_TRUE(score_of(30) > score_of(60) + 1);
+}
+
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(a_health_in_order_makes_no_finding);
@@ -319,5 +333,6 @@ int main(void) {
   RUN_TEST(a_log_has_each_finding_once_in_ten_minutes);
   RUN_TEST(a_full_list_counts_what_it_drops);
   RUN_TEST(every_kind_has_its_words);
+  RUN_TEST(positions_with_a_large_sigma_tell_good_poses_from_wrong_ones);
   return UNITY_END();
 }

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "filters/core/scale_test.hpp"
+
+#include <cmath>
+#include <cstring>
+
+#include "math/elementary.hpp"
+#include "motion/motion_params.h"
+#include "sensors/sighting_params.h"
+
+namespace wm {
+namespace {
+
+constexpr double kMost = 1.2, kSigmas = 5.0;
+// Names of calibration values, and whose sigma it is. The last one is of any sensor.
+constexpr struct {
+  const char *name;
+  int term;
+} kScales[WM_MONITOR_SCALES] = {{"motion.speed_scale", WM_SPEED_SCALE},
+                                {"motion.yaw_rate_scale", WM_YAW_RATE_SCALE},
+                                {"motion.left_scale", WM_LEFT_SCALE},
+                                {"motion.right_scale", WM_RIGHT_SCALE},
+                                {"motion.track_scale", WM_TRACK_SCALE},
+                                {"motion.side_scale", WM_SIDE_SCALE},
+                                {"range_scale", -1}};
+
+// WM_MONITOR_SCALES: none of them.
+int scale_of(const wm_calibration_value &value) {
+  const char *dot = std::strrchr(value.name, '.');
+  for (int i = 0; i < WM_MONITOR_SCALES; i++)
+    if (std::strcmp(kScales[i].term < 0 && dot ? dot + 1 : value.name, kScales[i].name) == 0) return i;
+  return WM_MONITOR_SCALES;
+}
+
+}  // namespace
+
+void scales_begin(const wm_setup &setup, double sigma[WM_MONITOR_SCALES]) {
+  for (int i = 0; i < WM_MONITOR_SCALES; i++) {
+    sigma[i] = 0.0;
+    if (kScales[i].term >= 0 && setup.motion) sigma[i] = std::fabs(setup.motion->states.sigma[kScales[i].term]);
+    if (kScales[i].term < 0 && setup.sightings)
+      sigma[i] = std::fabs(setup.sightings->states.sigma[WM_SENSOR_ROW_kRangeScale]);
+  }
+}
+
+bool scale_contradicts(const double sigma[WM_MONITOR_SCALES], const wm_calibration_value &value) {
+  const int i = scale_of(value);
+  if (i == WM_MONITOR_SCALES || !(sigma[i] > 0.0)) return false;
+  const double off = std::fabs(value.value - 1.0);
+  return (value.value > kMost || value.value < 1.0 / kMost) && off > kSigmas * larger(sigma[i], value.sigma);
+}
+
+}  // namespace wm
