@@ -51,9 +51,9 @@ set(CPACK_DEBIAN_RUNTIME_PACKAGE_NAME waymark)
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_SECTION misc)
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_DEPENDS "${base}, ${pictures}, liblcm1 (>= 1.3.1)${cameras}${page}")
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_SUGGESTS "waymark-tools, can-utils, v4l-utils, liblcm-bin")
-set(CPACK_DEBIAN_RUNTIME_DESCRIPTION "tells a robot where it is
-A runtime that localizes a robot from cameras and CAN, on the robot's own
-computer, and publishes poses over LCM from a real-time thread. The service
+set(CPACK_DEBIAN_RUNTIME_DESCRIPTION "localization of a robot on its own computer
+Estimates the pose of a robot from cameras, CAN and other sensors on its
+computer, and publishes it over LCM from a real-time thread. The service
 is installed, not started: its configuration in /etc/waymark has to be the
 robot's first.")
 set(conffiles "")
@@ -68,7 +68,7 @@ set(CPACK_DEBIAN_RUNTIME_PACKAGE_CONTROL_EXTRA ${CMAKE_BINARY_DIR}/debian/conffi
 set(CPACK_DEBIAN_TOOLS_PACKAGE_NAME waymark-tools)
 set(CPACK_DEBIAN_TOOLS_PACKAGE_SECTION misc)
 set(CPACK_DEBIAN_TOOLS_PACKAGE_DEPENDS "waymark (= ${PROJECT_VERSION}-1), ${base}, ${pictures}${simulator}${videos}${urdf}")
-set(CPACK_DEBIAN_TOOLS_DESCRIPTION "desk tools for a robot that knows where it is
+set(CPACK_DEBIAN_TOOLS_DESCRIPTION "desk tools for the localization of a robot
 Simulates drives, judges runs against truth, draws reports, calibrates
 cameras, makes maps, writes the configuration of a new robot: waymark eval,
 report, simulate, diff, calibrate, map, init.")

@@ -22,20 +22,20 @@ apt-get -qq install -y --no-install-recommends /out/*.deb gcc libc6-dev pkg-conf
 echo "== $((SECONDS - begin)) s: apt install of $(ls /out/*.deb | wc -l) packages"
 mkdir /work && tar -C /work -xzf /out/waymark-*.tar.gz && cd /work/waymark-*
 waymark --version
-for command in init check simulate replay eval report diff map calibrate detect suggest web batch compare mine export import ros2; do
+for command in init check simulate replay eval report diff map calibrate detect suggest web batch compare mine import ros2; do
   waymark "$command" --help >/dev/null || { echo "waymark $command --help failed"; exit 1; }
 done
 waymark simulate config/worlds/crossing.yaml --no-video --out /tmp/drive >/dev/null
 waymark replay /tmp/drive --config /usr/share/doc/waymark/examples/datasets/crossing-points.yaml --out /tmp/run >/dev/null
 waymark replay /tmp/run/events.wmlog --out /tmp/again >/dev/null
 cmp /tmp/run/trajectory.csv /tmp/again/trajectory.csv
-waymark eval /tmp/run /tmp/drive | grep "^position"
+waymark eval /tmp/run /tmp/drive | grep "position m"
 for example in $(cd /usr/share/doc/libwaymark-dev/examples && ls *.c); do
   libraries=$(grep -l waymark_open "/usr/share/doc/libwaymark-dev/examples/$example" >/dev/null && echo waymark-session || echo waymark)
   gcc -Wall -o "/tmp/${example%.c}" "/usr/share/doc/libwaymark-dev/examples/$example" $(pkg-config --cflags --libs $libraries) && echo "compiled: $example"
 done
 failed=0
-for page in landmarks floor-plan tags board hil; do
+for page in landmarks board hil floor-plan tags; do
   begin=$SECONDS
   python3 tests/docs/tutorial.py docs/tutorials/$page.md /usr/bin && echo "== $((SECONDS - begin)) s: tutorial $page" || { echo "failed: tutorial $page"; failed=1; }
 done

@@ -121,7 +121,7 @@ def main_page(top, commands):
                ".Bd -literal -offset indent", "waymark check /etc/waymark/robot.yaml",
                "waymark doctor /etc/waymark/robot.yaml", r"systemctl enable \-\-now waymark", ".Ed"]
     also = [", ".join(f".Xr waymark\\-{tool} 1" for tool in sorted(TOOLS + OPTIONAL)).replace(", .Xr", " ,\n.Xr")]
-    return page("waymark", "tells a robot where it is",
+    return page("waymark", "localization of a robot on its own computer",
                 [("SYNOPSIS", [".Nm", ".Ar command", ".Op Ar options"]), ("DESCRIPTION", description), ("COMMANDS", parts),
                  ("SERVICE", service), ("FILES", files),
                  ("EXIT STATUS", ["0: done; 1: the work failed; 2: usage or configuration."]), ("SEE ALSO", also)])
