@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# What `cmake --install` puts where, in the components that become packages: runtime, tools, fleet, dev, ros2.
+# What `cmake --install` puts where, in the components that become packages: runtime, tools, calibrate, fleet, dev, ros2.
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 # Libraries of several architectures side by side, also under /usr/local.
@@ -42,12 +42,15 @@ if(TARGET waymark-web) # a robot's page comes from the robot
 endif()
 
 # ── the desk's ───────────────────────────────────────────────────────────────────────────────────────────────────────
-foreach(tool calibrate detect diff eval import init map reference report simulate suggest)
+foreach(tool detect diff eval import init map reference report simulate suggest)
   if(TARGET waymark-${tool}) # not everything is there for every architecture
     install(TARGETS waymark-${tool} DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT tools)
     wm_install_compressed(${WM_PACKAGE_DIR}/man/waymark-${tool}.1 waymark-${tool}.1 man/man1 tools)
   endif()
 endforeach()
+# A package of its own: OpenCV and Ceres bring many libraries.
+install(TARGETS waymark-calibrate DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT calibrate)
+wm_install_compressed(${WM_PACKAGE_DIR}/man/waymark-calibrate.1 waymark-calibrate.1 man/man1 calibrate)
 # Scripts: what they need is Python and the programs above.
 foreach(command batch compare mine)
   install(PROGRAMS ${CMAKE_BINARY_DIR}/fleet/waymark-${command} DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT fleet)
@@ -98,7 +101,7 @@ foreach(name waymark waymark-estimator waymark-session)
 endforeach()
 
 # ── what each package says of itself ─────────────────────────────────────────────────────────────────────────────────
-set(packages runtime:waymark tools:waymark-tools fleet:waymark-fleet dev:libwaymark-dev)
+set(packages runtime:waymark tools:waymark-tools calibrate:waymark-calibrate fleet:waymark-fleet dev:libwaymark-dev)
 if(TARGET wm_shared)
   list(APPEND packages library:libwaymark0)
 endif()

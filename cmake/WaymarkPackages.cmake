@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# Debian packages by CPack: waymark (the robot's), waymark-tools (the desk's), waymark-fleet, libwaymark0, libwaymark-dev, waymark-ros2. docs/boards.md.
+# Debian packages by CPack: waymark (the robot's), waymark-tools (the desk's), waymark-calibrate, waymark-fleet, libwaymark0, libwaymark-dev, waymark-ros2. docs/boards.md.
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME waymark)
 set(CPACK_PACKAGE_VENDOR Waymark)
@@ -7,7 +7,7 @@ set(CPACK_PACKAGE_CONTACT "Waymark maintainers <maintainers@waymark.example>" CA
 # CPack 3.25 puts one summary before each package's own description, unless it is this one.
 set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "${PROJECT_NAME} built using CMake")
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
-set(CPACK_COMPONENTS_ALL runtime tools fleet dev)
+set(CPACK_COMPONENTS_ALL runtime tools calibrate fleet dev)
 if(TARGET waymark-ros2)
   list(APPEND CPACK_COMPONENTS_ALL ros2)
 endif()
@@ -69,9 +69,22 @@ set(CPACK_DEBIAN_TOOLS_PACKAGE_NAME waymark-tools)
 set(CPACK_DEBIAN_TOOLS_PACKAGE_SECTION misc)
 set(CPACK_DEBIAN_TOOLS_PACKAGE_DEPENDS "waymark (= ${PROJECT_VERSION}-1), ${base}, ${pictures}${simulator}${videos}${urdf}")
 set(CPACK_DEBIAN_TOOLS_DESCRIPTION "desk tools for the localization of a robot
-Simulates drives, judges runs against truth, draws reports, calibrates
-cameras, makes maps, writes the configuration of a new robot: waymark eval,
-report, simulate, diff, calibrate, map, init.")
+Simulates drives, judges runs against truth, draws reports, makes maps,
+writes the configuration of a new robot: waymark eval, report, simulate, diff,
+map, init.")
+set(CPACK_DEBIAN_TOOLS_PACKAGE_RECOMMENDS waymark-calibrate)
+
+set(boards "")
+if(TARGET wm_calibrate)
+  set(boards ", libceres3 (>= 2.1.0), libgoogle-glog0v6 (>= 0.6.0), libopencv-calib3d406 (>= 4.6.0), libopencv-contrib406 (>= 4.6.0), libopencv-core406 (>= 4.6.0), libopencv-imgproc406 (>= 4.6.0)")
+endif()
+set(CPACK_DEBIAN_CALIBRATE_PACKAGE_NAME waymark-calibrate)
+set(CPACK_DEBIAN_CALIBRATE_PACKAGE_SECTION misc)
+set(CPACK_DEBIAN_CALIBRATE_PACKAGE_DEPENDS "waymark (= ${PROJECT_VERSION}-1), ${base}, ${pictures}${boards}")
+set(CPACK_DEBIAN_CALIBRATE_DESCRIPTION "calibration of a robot's cameras
+Finds the model of a camera, of a pair, and their mountings on the robot, from
+pictures of boards or from drives; reads calibrations of OpenCV, Kalibr, ROS
+and OCamCalib: waymark calibrate.")
 
 set(CPACK_DEBIAN_FLEET_PACKAGE_NAME waymark-fleet)
 set(CPACK_DEBIAN_FLEET_PACKAGE_ARCHITECTURE all)

@@ -36,7 +36,7 @@ static const struct {
   const char *name, *about, *package;
 } kDesk[] = {
     {"batch", "replay and judge many recordings on all cores", "waymark-fleet"},
-    {"calibrate", "find a camera's lens and mounting; read calibrations of other programs", "waymark-tools"},
+    {"calibrate", "find a camera's lens and mounting; read calibrations of other programs", "waymark-calibrate"},
     {"compare", "what a change did to all drives of a batch", "waymark-fleet"},
     {"detect", "run a detector on pictures: what it finds, drawn and as a table", "waymark-tools"},
     {"diff", "compare two runs: what differs, and where the difference begins", "waymark-tools"},

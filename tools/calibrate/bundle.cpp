@@ -176,13 +176,17 @@ std::optional<Calibration> with_model(const Calibration &from, Model model) {
   const auto rays = [&](const Vec2 &pixel, Vec3 &d) {
     return render::unproject(known, pixel, d) && std::acos(std::clamp(d.z(), -1.0, 1.0)) <= widest;
   };
-  Calibration out = from;
   const size_t n = known.intrinsics.size();
-  out.camera =
-      fit_model(model, rays, known.width, known.height, {known.intrinsics[n - 2], known.intrinsics[n - 1]}).camera;
-  if (out.camera.intrinsics.empty()) return {};
-  finish(out);
-  return out.views.size() < 3 ? std::nullopt : std::optional<Calibration>(out);
+  std::optional<Calibration> out;
+  // Minima that fit the rays nearly alike are told apart by the corners.
+  for (const Camera &start :
+       fit_minima(model, rays, known.width, known.height, {known.intrinsics[n - 2], known.intrinsics[n - 1]})) {
+    Calibration next = from;
+    next.camera = start;
+    finish(next);
+    if (next.views.size() >= 3 && (!out || next.rms_px < out->rms_px)) out = next;
+  }
+  return out;
 }
 
 double find_board(const Camera &camera, const std::vector<BoardCorner> &corners, Pose &T_camera_board) {

@@ -110,7 +110,7 @@ Calibration calibrate(const Arguments &a, const std::string &name, const BoardPi
     throw tools::Failure(
         "no camera model fits these boards; check that --chessboard counts inner corners and that the board is flat");
   for (const std::string &left_out : first->dropped_views) std::fprintf(stderr, "  left out: %s\n", left_out.c_str());
-  const Calibration out = best(a, *first);
+  Calibration out = best(a, *first);
   say_parameters(out);
   const Coverage coverage = coverage_of(out);
   constexpr double kDeg = 180 / render::kPi;

@@ -169,18 +169,29 @@ double widest_angle(const std::vector<Ray> &rays) {
   return widest;
 }
 
-Fit fit_model(Model model, const std::function<bool(const Vec2 &, Vec3 &)> &unproject, int width, int height,
-              const Vec2 &centre) {
+std::vector<Camera> fit_minima(Model model, const std::function<bool(const Vec2 &, Vec3 &)> &unproject, int width,
+                               int height, const Vec2 &centre) {
   const std::vector<Ray> rays = sample_rays(unproject, width, height, 33, 25);
-  Fit out;
-  double best = std::numeric_limits<double>::infinity();
+  std::vector<std::pair<double, Camera>> found;
   for (Camera start : starts(model, width, height, centre, focal_near(unproject, centre))) {
     refine(start, rays);
-    const double reached = cost(start, rays);
-    if (!(reached < best)) continue;
-    best = reached;
-    out.camera = start;
+    found.emplace_back(cost(start, rays), start);
   }
+  std::stable_sort(found.begin(), found.end(), [](const auto &a, const auto &b) { return a.first < b.first; });
+  constexpr double kAnother = 0.1;  // of the first parameter, a shape where there are several starts
+  std::vector<Camera> out;
+  for (const auto &[left, camera] : found)
+    if (std::none_of(out.begin(), out.end(), [&, &camera = camera](const Camera &other) {
+          return std::fabs(other.intrinsics[0] - camera.intrinsics[0]) < kAnother;
+        }))
+      out.push_back(camera);
+  return out;
+}
+
+Fit fit_model(Model model, const std::function<bool(const Vec2 &, Vec3 &)> &unproject, int width, int height,
+              const Vec2 &centre) {
+  Fit out;
+  out.camera = fit_minima(model, unproject, width, height, centre).front();
   double sum = 0;
   for (const Ray &ray : sample_rays(unproject, width, height, width / 8 + 2, height / 8 + 2)) {
     out.rays++;

@@ -40,6 +40,10 @@ struct Fit {
 Fit fit_model(render::Model model, const std::function<bool(const Vec2 &, Vec3 &)> &unproject, int width, int height,
               const Vec2 &centre);
 
+// The cameras of all minima that its starts lead to, the best first: shapes of a double sphere may fit nearly alike.
+std::vector<render::Camera> fit_minima(render::Model model, const std::function<bool(const Vec2 &, Vec3 &)> &unproject,
+                                       int width, int height, const Vec2 &centre);
+
 // The largest angle from the optical axis among the rays, in rad.
 double widest_angle(const std::vector<Ray> &rays);
 

@@ -15,7 +15,7 @@ using render::Model;
 constexpr int lens_parameters(Model model) {
   switch (model) {
     case Model::equidistant: return 8;
-    case Model::pinhole_radtan: return 9;
+    case Model::pinhole_radtan:
     case Model::omni: return 9;
     case Model::double_sphere: return 6;
   }

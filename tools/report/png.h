@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Small PNG files of few colours, made without a compressor: stored blocks (RFC 1951, 3.2.4) are small enough.
+// Small PNG files of few colours, in memory, by libpng; and base64 for pages.
 #pragma once
 
 #include <cstdint>

@@ -179,10 +179,10 @@ void test_too_little_is_said() {
 
 void test_no_board() {
   GreyPicture blank{640, 480, std::vector<uint8_t>(640UL * 480UL, 128)};
-  TEST_ASSERT_EQUAL(0, find_chessboard(blank, 0, 0).size());
+  TEST_ASSERT_EQUAL(0, grow_chessboard(blank, 0, 0).size());
   for (size_t i = 0; i < blank.pixels.size(); i++) blank.pixels[i] = static_cast<uint8_t>((i * 2654435761U) >> 9);
-  TEST_ASSERT_EQUAL(0, find_chessboard(blank, 0, 0).size());
-  TEST_ASSERT_EQUAL(0, find_chessboard({3, 2, std::vector<uint8_t>(6, 0)}, 0, 0).size());
+  TEST_ASSERT_EQUAL(0, grow_chessboard(blank, 0, 0).size());
+  TEST_ASSERT_EQUAL(0, grow_chessboard({3, 2, std::vector<uint8_t>(6, 0)}, 0, 0).size());
   TEST_ASSERT_EQUAL(0, find_aprilgrid(blank, 6, 6, 0.088, 0.03).size());
 }
 
