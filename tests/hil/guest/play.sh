@@ -15,19 +15,34 @@ cat recording/can.log recording/video/*.avi >/dev/null
 fails=0
 fail() { echo "FAIL: $*"; fails=$((fails + 1)); }
 
+interfaces="--can can0=vcan0 --can can1=vcan1 --camera left=/dev/video10,MJPG --camera right=/dev/video11,GREY --lcm off"
+# From the moment on at which the device lets a reader in.
+listen() {
+  until timeout -s INT "$3" stdbuf -oL -eL v4l2-ctl -d "/dev/video$1" --stream-mmap=8 --stream-count="$2" --verbose 2>&1 | grep --line-buffered dqbuf; do
+    sleep 0.05
+  done
+}
+
+# Once before: what is read from the disk later would stop the guest's clock for the time of the disk.
+chrt -f 45 waymark play recording $interfaces --until 1 >warm.txt 2>&1 &
+warm=$!
+sleep 1
+waymark record --config robot.yaml --out warm --duration 2 --free-mb 50 >/dev/null 2>&1
+timeout 2 stdbuf -oL v4l2-ctl -d /dev/video10 --stream-mmap=8 --stream-count=5 --verbose 2>&1 | grep dqbuf >/dev/null
+wait $warm
+
 # played NAME JSON OPTIONS: plays, and records what the kernel gives.
 played() {
   local name=$1 json=$2
   shift 2
-  chrt -f 45 waymark play recording --can can0=vcan0 --can can1=vcan1 --camera left=/dev/video10,MJPG --camera right=/dev/video11,GREY --lcm off \
-    --start-at $(($(cut -d. -f1 /proc/uptime) * 1000000000 + 6000000000)) --json "$json" "$@" >"$name.txt" 2>&1 &
+  chrt -f 45 waymark play recording $interfaces --start-at $(($(cut -d. -f1 /proc/uptime) * 1000000000 + 8000000000)) --json "$json" "$@" >"$name.txt" 2>&1 &
   local player=$!
-  sleep 2
-  timeout 18 v4l2-ctl -d /dev/video10 --stream-mmap=8 --stream-count=240 --verbose >"$name-left.txt" 2>&1 &
+  until grep -sq "begins at" "$name.txt"; do sleep 0.1; done # its devices are open
+  listen 10 240 18 >"$name-left.txt" 2>/dev/null &
   local left=$!
-  timeout 18 v4l2-ctl -d /dev/video11 --stream-mmap=8 --stream-count=240 --verbose >"$name-right.txt" 2>&1 &
+  listen 11 240 18 >"$name-right.txt" 2>/dev/null &
   local right=$!
-  waymark record --config robot.yaml --out "$name" --duration 16 --free-mb 50 >"$name-record.txt" 2>&1 || fail "waymark record: exit code $?"
+  waymark record --config robot.yaml --out "$name" --duration 17 --free-mb 50 >"$name-record.txt" 2>&1 || fail "waymark record: exit code $?"
   wait $player || fail "waymark play: exit code $?"
   wait $left $right
   cat "$name.txt" "$name-record.txt"
