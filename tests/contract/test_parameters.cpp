@@ -390,6 +390,7 @@ std::vector<dive_scenario> dive_scenarios() {
       {"carried off", kCarriedOff, 10, {}},
       {"samples that no vehicle can follow", kGlitches, 10, {}},
       {"no start", kNoStart, 8, {}},
+      {"an IMU", kImu, 10, {{"states.accelerometer_bias_sigma_mps2", 0.2}}},
   };
 }
 
