@@ -74,14 +74,14 @@ void test_skid_steer(void) { is_near_the_bound(drives(world("yard-skid"), "yard-
 
 void test_a_gyro_that_drifts_beside_a_twist(void) { is_near_the_bound(drives(world("yard-imu"), "yard-imu")); }
 
-// Within seconds its turn rate is the twist's.
+// Its turn rate is the twist's within the first turn; what the filter learnt meanwhile takes some landmarks to forget.
 void test_a_gyro_that_sticks_beside_a_twist(void) {
   sim::Scenario scenario = world("yard-imu");
   scenario.faults.gyro_stuck = {20, 50};
   const Statistics s = drives(scenario, "yard-imu");
   TEST_ASSERT_EQUAL(0, s.lost);
   TEST_ASSERT_LESS_THAN_DOUBLE(0.15, s.position_m(28, 50));
-  TEST_ASSERT_LESS_THAN_DOUBLE(1.3, s.position_m(70, 90) / s.bound_position_m(70, 90));
+  TEST_ASSERT_LESS_THAN_DOUBLE(1.3, s.position_m(60, 73) / s.bound_position_m(60, 73));
 }
 
 Statistics6 dives(const sim::Scenario &scenario, const Options6 &options) {
