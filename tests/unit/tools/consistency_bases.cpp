@@ -52,8 +52,8 @@ Statistics drives(const sim::Scenario &scenario, const char *config_name) {
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, montecarlo::run(scenario, config, 8, 1, seeds, nullptr, s, &err), err.text);
   wm_config_free(&config);
   std::printf("%s: RMS %.4f m (bound %.4f), %.3f deg (%.3f); NEES %.3f, %.1f %%; %llu of %llu lost\n",
-              scenario.name.c_str(), s.position_rms_m(), s.bound_position_rms_m(),
-              s.heading_rms_rad() * 180 / sim::kPi, s.bound_heading_rms_rad() * 180 / sim::kPi, s.nees_mean(),
+              scenario.name.c_str(), s.position_rms_m(), s.bound_position_rms_m(), s.heading_rms_rad() * 180 / sim::kPi,
+              s.bound_heading_rms_rad() * 180 / sim::kPi, s.nees_mean(),
               100 * s.nees_inside(montecarlo::band_of(seeds)), static_cast<unsigned long long>(s.lost),
               static_cast<unsigned long long>(s.runs));
   return s;
