@@ -74,7 +74,7 @@ void test_skid_steer(void) { is_near_the_bound(drives(world("yard-skid"), "yard-
 
 void test_a_gyro_that_drifts_beside_a_twist(void) { is_near_the_bound(drives(world("yard-imu"), "yard-imu")); }
 
-// Its turn rate is the twist's within the first turn; what the filter learnt meanwhile takes some landmarks to forget.
+// Its turn rate is the twist's within the first turn. Errors fused until then stay in the map's states for a while.
 void test_a_gyro_that_sticks_beside_a_twist(void) {
   sim::Scenario scenario = world("yard-imu");
   scenario.faults.gyro_stuck = {20, 50};
