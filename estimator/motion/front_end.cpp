@@ -512,7 +512,7 @@ void motion_front_end::watch_yaw_rate(wm_time_ns t_ns, double speed_mps, bool fr
   const bool alone = same_s > kYawStuckAlone_s && w.way_m > kYawStuckAlone_m;
   const bool against = same_s > kYawStuckAgainst_s && std::fabs(w.apart_rad) > kYawStuckTurn_rad + w.allowed_rad;
   if (!alone && !against) return;
-  // Until it was found, the heading has missed the turn that the other sensor measured.
+  // Until now the heading lacks the turn that the other sensor measured.
   if (!(health_ & WM_MOTION_HEALTH_YAW_RATE_STUCK)) missed_turn_rad2_ = square(w.apart_rad);
   health_ |= WM_MOTION_HEALTH_YAW_RATE_STUCK;
 }

@@ -341,6 +341,22 @@ int evidence_scale_contradicts(const wm_assembly *assembly, const wm_calibration
   return sigma > 0 && off > 5 * fmax(sigma, c->sigma) && (c->value > 1.2 || c->value < 1 / 1.2);
 }
 
+// The effective track of skid steer is wider than the distance of its wheels: its state begins at 1.5, with a sigma of
+// a quarter (motion.drive).
+#define SKID_TRACK 1.5
+
+static int is_skid_track(const wm_assembly *assembly, const wm_calibration_value *c) {
+  const wm_param_table *table = &wm_motion_params_table;
+  if (strcmp(c->name, "motion.track_scale") != 0) return 0;
+  for (size_t i = 0; i < table->count; i++) {
+    int32_t drive = 0;
+    if (strcmp(table->params[i].key, "drive") != 0) continue;
+    memcpy(&drive, (const char *)assembly->setup.motion + table->params[i].offset, sizeof drive);
+    return strcmp(table->params[i].names[drive], "skid_steer") == 0;
+  }
+  return 0;
+}
+
 // A state of calibration that ended where no tape measure and no data sheet would put it.
 static void calibration(const wm_assembly *assembly, const wm_health *health, wm_findings *out) {
   static const struct {
@@ -361,14 +377,18 @@ static void calibration(const wm_assembly *assembly, const wm_health *health, wm
   };
   for (uint32_t i = 0; i < health->calibration_count; i++) {
     const wm_calibration_value *c = &health->calibration[i];
+    const int skids = is_skid_track(assembly, c);
     for (size_t k = 0; k < sizeof kLimits / sizeof kLimits[0]; k++) {
       if (!strstr(c->name, kLimits[k].ending) || (c->value >= kLimits[k].least && c->value <= kLimits[k].most))
         continue;
       if (fabs(c->value - kLimits[k].expected) < 3 * c->sigma) continue;
-      const int is_bad =
-          c->value < kLimits[k].bad_least || c->value > kLimits[k].bad_most || evidence_scale_contradicts(assembly, c);
+      // Of skid steer 1 to 2 is its base's, two sigmas; beyond, `track_m` is wrong.
+      if (skids && fabs(c->value - SKID_TRACK) <= 0.5) continue;
+      const int is_bad = !skids && (c->value < kLimits[k].bad_least || c->value > kLimits[k].bad_most ||
+                                    evidence_scale_contradicts(assembly, c));
       wm_find(out, WM_FOUND_CALIBRATION_OFF, is_bad ? WM_SEVERITY_BAD : WM_SEVERITY_NOTE, "calibration", kLimits[k].fix,
-              "%s is %.4g +- %.2g at the end; %g was expected", c->name, c->value, c->sigma, kLimits[k].expected)
+              "%s is %.4g +- %.2g at the end; %g was expected", c->name, c->value, c->sigma,
+              skids ? SKID_TRACK : kLimits[k].expected)
           ->size = c->value;
       break;
     }

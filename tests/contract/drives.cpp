@@ -366,6 +366,19 @@ void dive::add_beacons(const placed &vehicle, double t_s) {
   }
 }
 
+// At rest but for the slow turns, with a constant error and the noise of a shaken accelerometer.
+void dive::add_imu(double t_s) {
+  const placed vehicle = swim(t_s, false);
+  wm_quantities &q = add(WM_EVENT_QUANTITIES, t_s)->as.quantities;
+  const double w[3] = {0.035 * std::cos(0.7 * t_s) + 0.004, 0.02 * std::cos(0.5 * t_s), 0.14};
+  static constexpr wm_quantity kOf[6] = {WM_Q_ROLL_RATE,      WM_Q_PITCH_RATE,     WM_Q_YAW_RATE,
+                                         WM_Q_ACCELERATION_X, WM_Q_ACCELERATION_Y, WM_Q_ACCELERATION_Z};
+  for (int i = 0; i < 6; i++) {
+    q.id[q.count] = static_cast<uint8_t>(kOf[i]);
+    q.value[q.count++] = i < 3 ? w[i] + 0.003 * normal() : 9.80665 * vehicle.R[2][i - 3] + 0.1 + 0.3 * normal();
+  }
+}
+
 dive::dive(unsigned happens, double seconds) {
   path_.push_back({0, 0, 0, 0, 0, 0, 0, 0, 0});
   make_place(kNoMap);
@@ -421,6 +434,7 @@ dive::dive(unsigned happens, double seconds) {
           0.03};
     if (i % 30 == 9)
       add(WM_EVENT_HEADING, t + 0.01)->as.heading = {std::atan2(vehicle.R[1][0], vehicle.R[0][0]) + 0.04, 0.05};
+    for (int k = 1; (happens & kImu) && k < 5; k++) add_imu(t + 0.02 * k);
   }
 }
 

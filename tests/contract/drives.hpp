@@ -38,6 +38,7 @@ enum happens : unsigned {
   kFewBeacons = 1u << 9,   // only two landmarks are seen
   kWrongStart = 1u << 10,  // the start pose is metres off
   kGlitches = 1u << 11,    // single samples of the motion that no robot can follow
+  kImu = 1u << 12,         // dives: rates and specific force besides the twists
 };
 
 // A robot, its place and what its sensors gave. Not to be copied: the setup points into it.
@@ -95,6 +96,7 @@ class dive : public scene {
   placed swim(double t_s, bool carried) const;
   void add_picture(const placed &vehicle, double t_s, unsigned happens);
   void add_beacons(const placed &vehicle, double t_s);
+  void add_imu(double t_s);
 };
 
 }  // namespace drives

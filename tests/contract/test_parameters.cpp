@@ -172,7 +172,8 @@ std::vector<setting> all(std::initializer_list<std::vector<setting>> lists) {
 using drives::kBearings, drives::kRanges, drives::kElevations, drives::kNameless, drives::kPositions, drives::kHeadings,
     drives::kMarkers, drives::kPoints, drives::kRenamed;
 using drives::kCarriedOff, drives::kNoStart, drives::kSilence, drives::kOutliers, drives::kOneMoved, drives::kDepth,
-    drives::kNoMap, drives::kBlind, drives::kReflections, drives::kFewBeacons, drives::kWrongStart, drives::kGlitches;
+    drives::kNoMap, drives::kBlind, drives::kReflections, drives::kFewBeacons, drives::kWrongStart, drives::kGlitches,
+    drives::kImu;
 
 std::vector<scenario> scenarios() {
   const unsigned kAll = kBearings | kRanges | kPositions | kHeadings;
@@ -390,6 +391,7 @@ std::vector<dive_scenario> dive_scenarios() {
       {"carried off", kCarriedOff, 10, {}},
       {"samples that no vehicle can follow", kGlitches, 10, {}},
       {"no start", kNoStart, 8, {}},
+      {"an IMU", kImu, 10, {{"states.accelerometer_bias_sigma_mps2", 0.2}}},
   };
 }
 

@@ -5,7 +5,7 @@ lcm_tools.py needs.
 
 The robot drives sideways on a circle. Its wheels' turn rate is wrong by a fifth, its gyro is right; the gyro's process has a
 clock of its own. Checked: the pose, health, the log's replay with the same bits, the recording's replay, and its live play.
-Then another one with counts of its wheels, a compass and positions, for landmark_ekf.
+Then another one with counts of its wheels, a compass and positions, for landmark_ekf; and a vehicle in space with an IMU.
 """
 import csv
 import json
@@ -107,6 +107,55 @@ def check_wheels(work):
         assert len(rows(work / f"wheels-rec/{name}.csv")) >= SECONDS * 4, name
 
 
+ROLL = 0.05
+SPACE = (
+    "format: waymark-config/1\nestimator: stereo_ekf\npublish: {lcm_url: '" + lcm_tools.URL + "'}\n"
+    "initial_pose: {x_m: 0, y_m: 0, z_m: -3, heading_rad: 0, sigma_heading_rad: 0.1}\ncalibration: calibration.yaml\n"
+    "realtime: {lock_memory: false}\nstereo_ekf: {states: {accelerometer_bias_sigma_mps2: 0.01}}\n"
+    "devices: {lcm: [{stream: motion6}, {stream: imu}, {stream: depth}]}\n")
+
+
+def publish_space():
+    """A vehicle under water that turns and heels: a velocity log without gyros ten times a second, an IMU, a depth."""
+    import lcm
+    import waymark
+
+    node = lcm.LCM(lcm_tools.URL)
+    begin = time.monotonic()
+    for k in range(SECONDS * 100):
+        noise = 1e-5 if k % 2 else -1e-5
+        rates = [noise, W * math.sin(ROLL) + noise, W * math.cos(ROLL) + noise]
+        force = [0, 9.80665 * math.sin(ROLL), 9.80665 * math.cos(ROLL)]
+        imu = waymark.imu_t()
+        imu.t_ns = time.clock_gettime_ns(time.CLOCK_MONOTONIC)
+        imu.w_radps, imu.a_mps2, imu.temperature_c = rates, force, math.nan
+        node.publish("WAYMARK_IMU", imu.encode())
+        if k % 10 == 0:
+            log, depth = waymark.motion6_t(), waymark.depth_t()
+            log.t_ns = depth.t_ns = imu.t_ns
+            depth.depth_m, depth.sigma_m = 3, 0.05
+            node.publish("WAYMARK_MOTION6", log.encode())
+            node.publish("WAYMARK_DEPTH", depth.encode())
+        time.sleep(max(0, begin + (k + 1) * 0.01 - time.monotonic()))
+
+
+def check_space(work):
+    (work / "calibration.yaml").write_text("{}\n")
+    (work / "space.yaml").write_text(SPACE)
+    run = start(work, "space", SECONDS + 2)
+    subprocess.run([sys.executable, __file__, "publish_space"], env={"PYTHONPATH": str(work)}, check=True)
+    lcm_tools.finish(run)
+    replay_both(work, "space")
+    for what in ("space", "space-replayed"):
+        trajectory = rows(work / what / "trajectory.csv")
+        row, seconds = trajectory[-1], (int(trajectory[-1]["t_ns"]) - int(trajectory[0]["t_ns"])) * 1e-9
+        x, y, z, w = (float(row[name]) for name in ("qx", "qy", "qz", "qw"))
+        roll, yaw = math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)), math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+        print(f"{what}: roll {roll:.4f} rad, {yaw:.3f} rad turned in {seconds:.2f} s, depth {-float(row['z_m']):.2f} m")
+        assert abs(roll - ROLL) < 0.015 and abs(yaw - W * seconds) < 0.05 and abs(float(row["z_m"]) + 3) < 0.1, row
+    assert len(rows(work / "space-rec/imu.csv")) > SECONDS * 80
+
+
 def start(work, name, seconds):
     """A run on the devices, which also records them."""
     run = subprocess.Popen([lcm_tools.WAYMARK, "run", "--config", work / f"{name}.yaml", "--out", work / name, "--record",
@@ -179,13 +228,14 @@ def inside():
         subprocess.run(["lcm-gen", "-p", "--ppath", work, *sorted((lcm_tools.ROOT / "msgs/lcm").glob("*.lcm"))], check=True)
         check_twist(work)
         check_wheels(work)
+        check_space(work)
     finally:
         shutil.rmtree(work)
 
 
 def main():
     if len(sys.argv) > 1:
-        return {"inside": inside, "publish": publish, "publish_wheels": publish_wheels}[sys.argv[1]]()
+        return {"inside": inside, "publish": publish, "publish_wheels": publish_wheels, "publish_space": publish_space}[sys.argv[1]]()
     return subprocess.run(["unshare", "-n", lcm_tools.need_network(), __file__, "inside"]).returncode
 
 

@@ -14,6 +14,10 @@ wm_script_test(run_lcm_tools COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/lcm_too
 wm_script_test(run_lcm_examples COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/lcm_examples.py LABELS release-only)
 wm_script_test(run_lcm_streams COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/lcm_streams.py LABELS release-only)
 wm_script_test(run_play COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/play.py LABELS release-only)
+# Real recordings played live and over LCM give the replay's poses: a quarter of an hour and more, where the recordings are.
+wm_script_test(run_played COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/played.py ${CMAKE_BINARY_DIR}/bin ${CMAKE_SOURCE_DIR}/../shared/data
+    --all --lcm 60
+  LABELS slow release-only TIMEOUT 1800)
 wm_script_test(run_kernel_sources COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/kernel_sources.py LABELS release-only)
 wm_script_test(run_two_runs COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/two_runs.py LABELS release-only)
 wm_script_test(run_realtime_calls COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/realtime_calls.py ${CMAKE_BINARY_DIR} ${CMAKE_OBJDUMP}

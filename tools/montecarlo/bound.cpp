@@ -36,8 +36,8 @@ class Recursion {
     const sim::Motion &m = sc_.motion;
     const bool twist = m.twist_hz > 0;
     sigma.head<kMap>() << e.start_xy_m, e.start_xy_m, e.start_heading_rad, e.yaw_rate_bias_radps, e.wheel_radius,
-        e.wheel_radius, e.track, m.base == sim::Motion::Base::skid_steer ? e.rotation_center_m : 0,
-        twist ? e.speed : 0, m.base == sim::Motion::Base::holonomic ? e.side : 0, twist ? e.turn : 0;
+        e.wheel_radius, e.track, m.base == sim::Motion::Base::skid_steer ? e.rotation_center_m : 0, twist ? e.speed : 0,
+        m.base == sim::Motion::Base::holonomic ? e.side : 0, twist ? e.turn : 0;
     for (size_t i = 0; i < cameras_; i++) {
       const Eigen::Index at = camera_state(i);
       sigma[at + kCameraYaw] = e.camera_mounting_rad;

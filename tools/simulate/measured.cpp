@@ -12,8 +12,8 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kSample_s = 0.005;    // of the truth
-constexpr double kVibration_hz = 23;   // of a motor or a propeller
+constexpr double kSample_s = 0.005;   // of the truth
+constexpr double kVibration_hz = 23;  // of a motor or a propeller
 constexpr double kVibrationHz[3] = {kVibration_hz, 1.3 * kVibration_hz, 1.7 * kVibration_hz};
 constexpr double kBumpLasts_s = 0.05;  // half a sine
 
@@ -151,8 +151,8 @@ void measure_imu(const Scenario &sc, const Random &random, Recording &out) {
   const Shaking shaking(m, random, out.duration_s);
   double bias[3], offset[3];
   for (uint64_t i = 0; i < 3; i++) {
-    bias[i] = !six && i == 2 ? out.drawn.yaw_rate_bias_radps
-                             : e.yaw_rate_bias_radps * random.normal(Stream::rate_bias, i);
+    bias[i] =
+        !six && i == 2 ? out.drawn.yaw_rate_bias_radps : e.yaw_rate_bias_radps * random.normal(Stream::rate_bias, i);
     offset[i] = m.accelerometer_bias_mps2 * random.normal(Stream::accelerometer_bias, i);
   }
   for (uint64_t k = 0; static_cast<double>(k) * step_s <= out.duration_s; k++) {

@@ -470,8 +470,8 @@ void read_faults(Reader &r, const wm_yaml_node &map, Faults &out) {
 }
 
 void read_scenario(Reader &r, const wm_yaml_node &root, Scenario &out) {
-  static const char *const known[] = {"format", "name",     "about",   "seed", "clock_start_s", "world",
-                                      "robot",  "cameras",  "route",   "path", "bus",           "errors",
+  static const char *const known[] = {"format", "name",     "about",   "seed",   "clock_start_s", "world",
+                                      "robot",  "cameras",  "route",   "path",   "bus",           "errors",
                                       "faults", "pictures", "sensors", "motion", nullptr};
   r.keys(root, known);
   std::string format;

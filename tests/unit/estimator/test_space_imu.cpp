@@ -73,7 +73,12 @@ vec3 at_rest(int) { return {0, 0, kG}; }
 
 void test_the_rates_are_the_imus_and_the_velocity_the_logs(void) {
   vehicle v(0);
-  v.go(2, {0.5, 0, 0}, {0, 0, 0}, [](int i) { return vec3{jitter(i), jitter(i), 0.2}; }, at_rest);
+  v.go(
+      2, {0.5, 0, 0}, {0, 0, 0},
+      [](int i) {
+        return vec3{jitter(i), jitter(i), 0.2};
+      },
+      at_rest);
   const wm_estimate e = v.now();
   TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.2 * 1.99, e.heading_rad);
   TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.5 / 0.2 * std::sin(0.398), e.pose_map_base.p_m[0]);
@@ -82,9 +87,19 @@ void test_the_rates_are_the_imus_and_the_velocity_the_logs(void) {
 
 void test_a_silent_imu_yields_to_the_logs_rates(void) {
   vehicle v(0);
-  v.go(1, {0, 0, 0}, {0, 0, 0.1}, [](int i) { return vec3{jitter(i), jitter(i), 0.3}; }, at_rest);
+  v.go(
+      1, {0, 0, 0}, {0, 0, 0.1},
+      [](int i) {
+        return vec3{jitter(i), jitter(i), 0.3};
+      },
+      at_rest);
   const double before = v.now().heading_rad;
-  v.go(3, {0, 0, 0}, {0, 0, 0.1}, [](int) { return vec3{NAN, 0, 0}; }, at_rest);
+  v.go(
+      3, {0, 0, 0}, {0, 0, 0.1},
+      [](int) {
+        return vec3{NAN, 0, 0};
+      },
+      at_rest);
   TEST_ASSERT_DOUBLE_WITHIN(0.07, before + 0.3, v.now().heading_rad);  // a quarter of a second until it is noticed
 }
 
@@ -123,7 +138,12 @@ void test_a_stuck_axis_is_found(void) {
 
 void test_the_filter_reports_a_stuck_axis(void) {
   vehicle v(0);
-  v.go(12, {0, 0, 0}, {0, 0, 0}, [](int i) { return vec3{0.05, jitter(i), jitter(i)}; }, at_rest);
+  v.go(
+      12, {0, 0, 0}, {0, 0, 0},
+      [](int i) {
+        return vec3{0.05, jitter(i), jitter(i)};
+      },
+      at_rest);
   TEST_ASSERT_TRUE(v.ekf->motion_health(v.state) & WM_MOTION_HEALTH_YAW_RATE_STUCK);
 }
 

@@ -7,6 +7,7 @@
 #include "motion/front_end.hpp"
 #include "motion/motion_params.h"
 #include "unity.h"
+#include "waymark/random.h"
 
 namespace {
 
@@ -14,12 +15,14 @@ wm_motion_params params;
 wm::motion_front_end front;
 wm_motion_calibration calibration;
 wm_pose2 pose;
+wm::motion_noise noise_sum;  // of all that was integrated
 
 void begin(int twist = WM_TWIST_MEASURED) {
   wm_params_defaults(&wm_motion_params_table, &params);
   params.twist = twist;
   calibration = wm::kNeutralCalibration;
   pose = {};
+  noise_sum = {};
   const wm_wheels none = make::no_wheels();
   front.init(&params, &none);
 }
@@ -28,7 +31,10 @@ void feed(const wm_event &e) {
   TEST_ASSERT_EQUAL(WM_OK, front.check(e));
   front.feed(e);
   front.advance(e.t_ns, calibration,
-                [](const wm::motion_segment &s, const wm::motion_twist &t, const wm::motion_noise &) {
+                [](const wm::motion_segment &s, const wm::motion_twist &t, const wm::motion_noise &n) {
+                  noise_sum.distance_m2 += n.distance_m2;
+                  noise_sum.lateral_m2 += n.lateral_m2;
+                  noise_sum.rotation_rad2 += n.rotation_rad2;
                   const wm::arc a = wm::make_arc(t.v * s.dt_s, t.u * s.dt_s, t.w * s.dt_s);
                   pose = wm::compose(pose, {a.x_m, a.y_m, a.turn_rad});
                 });
@@ -93,6 +99,43 @@ void test_a_stuck_gyro_is_replaced(void) {
   TEST_ASSERT_EQUAL(WM_MOTION_SPEED_YAW_RATE, front.model());
 }
 
+// The same bits after a stop are still those of a stuck gyro.
+void test_a_stop_does_not_mend_a_stuck_gyro(void) {
+  begin();
+  drive(0, 1, 0.3, 0.0, 0.0, [](int i) { return noise(i); });
+  drive(1, 5, 0.3, 0.0, 0.2, [](int) { return 0.01; });
+  drive(5, 8, 0.0, 0.0, 0.0, [](int) { return 0.01; });
+  drive(8, 8.5, 0.3, 0.0, 0.2, [](int) { return 0.01; });
+  TEST_ASSERT_TRUE(front.health() & WM_MOTION_HEALTH_YAW_RATE_STUCK);
+  TEST_ASSERT_EQUAL(WM_MOTION_TWIST, front.model());
+}
+
+// The twist turned by 0.3 rad more than the gyro until that was found.
+void test_what_a_stuck_gyro_missed_is_uncertain(void) {
+  begin();
+  drive(0, 1, 0.3, 0.0, 0.0, [](int i) { return noise(i); });
+  const double before = noise_sum.rotation_rad2;
+  drive(1, 5, 0.3, 0.0, 0.2, [](int) { return 0.01; });
+  TEST_ASSERT_DOUBLE_WITHIN(0.15, 0.45, std::sqrt(noise_sum.rotation_rad2 - before));
+}
+
+// Samples with the noise that the parameters state: what is integrated has that noise and hardly more.
+void test_noise_of_a_holonomic_twist_is_counted_once(void) {
+  begin();
+  params.states.drive = WM_DRIVE_HOLONOMIC;
+  params.noise_speed_rel = params.noise_sideways_rel = params.noise_side_rel = params.noise_yaw_rate_rel = 0;
+  constexpr double kRate_hz = 50, kSeconds = 40;
+  const double each = std::sqrt(kRate_hz);
+  for (int i = 0; i < kRate_hz * kSeconds; i++) {
+    const auto draw = [i](uint64_t axis) { return wm_random_normal(5, axis, static_cast<uint64_t>(i)); };
+    feed(make::twist6(i / kRate_hz, 0.3 + 0.02 * each * draw(0), 0.3 + 0.02 * each * draw(1), 0.01 * each * draw(2)));
+  }
+  // Speeds of 0.02 m/s per sqrt(s) on both axes and 0.01 rad/s per sqrt(s), by the defaults.
+  TEST_ASSERT_DOUBLE_WITHIN(0.08, 1.04, noise_sum.distance_m2 / (0.02 * 0.02 * kSeconds));
+  TEST_ASSERT_DOUBLE_WITHIN(0.08, 1.04, noise_sum.lateral_m2 / (0.02 * 0.02 * kSeconds));
+  TEST_ASSERT_DOUBLE_WITHIN(0.08, 1.04, noise_sum.rotation_rad2 / (0.01 * 0.01 * kSeconds));
+}
+
 void test_a_turn_on_the_spot_is_no_standstill(void) {
   double rate = 0;
   begin();
@@ -122,6 +165,9 @@ int main(void) {
   RUN_TEST(test_a_twist_alone_is_as_ever);
   RUN_TEST(test_a_silent_gyro_is_replaced_and_taken_up_again);
   RUN_TEST(test_a_stuck_gyro_is_replaced);
+  RUN_TEST(test_a_stop_does_not_mend_a_stuck_gyro);
+  RUN_TEST(test_what_a_stuck_gyro_missed_is_uncertain);
+  RUN_TEST(test_noise_of_a_holonomic_twist_is_counted_once);
   RUN_TEST(test_a_turn_on_the_spot_is_no_standstill);
   RUN_TEST(test_commands_keep_their_own_turn_rate);
   return UNITY_END();

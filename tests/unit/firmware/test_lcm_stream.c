@@ -84,10 +84,22 @@ static void a_gyro_is_a_turn_rate_by_its_mounting(void) {
   send("imu", "T_GYRO", row);
   TEST_ASSERT_EQUAL(WM_OK, next());
   TEST_ASSERT_EQUAL(WM_EVENT_QUANTITIES, event.kind);
-  TEST_ASSERT_EQUAL(1, event.as.quantities.count);
-  TEST_ASSERT_EQUAL(WM_Q_YAW_RATE, event.as.quantities.id[0]);
-  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.125, event.as.quantities.value[0]);
+  const wm_quantities *q = &event.as.quantities;
+  TEST_ASSERT_EQUAL(6, q->count);
+  TEST_ASSERT_EQUAL(WM_Q_YAW_RATE, q->id[0]);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.125, q->value[0]);
+  TEST_ASSERT_EQUAL(WM_Q_ACCELERATION_Z, q->id[5]);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 9.8, q->value[5]);
+  // Rates of a turn are the same length in any axes.
+  const double turn2 = q->value[0] * q->value[0] + q->value[1] * q->value[1] + q->value[2] * q->value[2];
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.5 * 0.5 + 0.25 * 0.25 + 0.125 * 0.125, turn2);
   TEST_ASSERT_TRUE(isnan(row_source_row(source)->number[6]));  // a sigma of 0 is not given
+  row.t_ns = wm_monotonic_ns();
+  row.number[4] = (double)NAN;  // no force: the rates alone
+  send("imu", "T_GYRO", row);
+  TEST_ASSERT_EQUAL(WM_OK, next());
+  TEST_ASSERT_EQUAL(3, event.as.quantities.count);
+  row.number[4] = 0;
   row.t_ns = wm_monotonic_ns();
   row.number[6] = -1;
   send("imu", "T_GYRO", row);

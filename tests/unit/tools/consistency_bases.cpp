@@ -52,8 +52,8 @@ Statistics drives(const sim::Scenario &scenario, const char *config_name) {
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, montecarlo::run(scenario, config, 8, 1, seeds, nullptr, s, &err), err.text);
   wm_config_free(&config);
   std::printf("%s: RMS %.4f m (bound %.4f), %.3f deg (%.3f); NEES %.3f, %.1f %%; %llu of %llu lost\n",
-              scenario.name.c_str(), s.position_rms_m(), s.bound_position_rms_m(),
-              s.heading_rms_rad() * 180 / sim::kPi, s.bound_heading_rms_rad() * 180 / sim::kPi, s.nees_mean(),
+              scenario.name.c_str(), s.position_rms_m(), s.bound_position_rms_m(), s.heading_rms_rad() * 180 / sim::kPi,
+              s.bound_heading_rms_rad() * 180 / sim::kPi, s.nees_mean(),
               100 * s.nees_inside(montecarlo::band_of(seeds)), static_cast<unsigned long long>(s.lost),
               static_cast<unsigned long long>(s.runs));
   return s;
@@ -74,14 +74,14 @@ void test_skid_steer(void) { is_near_the_bound(drives(world("yard-skid"), "yard-
 
 void test_a_gyro_that_drifts_beside_a_twist(void) { is_near_the_bound(drives(world("yard-imu"), "yard-imu")); }
 
-// Within seconds its turn rate is the twist's.
+// Its turn rate is the twist's within the first turn. Errors fused until then stay in the map's states for a while.
 void test_a_gyro_that_sticks_beside_a_twist(void) {
   sim::Scenario scenario = world("yard-imu");
   scenario.faults.gyro_stuck = {20, 50};
   const Statistics s = drives(scenario, "yard-imu");
   TEST_ASSERT_EQUAL(0, s.lost);
   TEST_ASSERT_LESS_THAN_DOUBLE(0.15, s.position_m(28, 50));
-  TEST_ASSERT_LESS_THAN_DOUBLE(1.3, s.position_m(70, 90) / s.bound_position_m(70, 90));
+  TEST_ASSERT_LESS_THAN_DOUBLE(1.3, s.position_m(60, 73) / s.bound_position_m(60, 73));
 }
 
 Statistics6 dives(const sim::Scenario &scenario, const Options6 &options) {
