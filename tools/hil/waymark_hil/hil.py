@@ -84,7 +84,7 @@ def _target(given, waymark):
             raise HilError(f"--{name} {path}: is no file")
     program = pathlib.Path((given.played if given.local else None) or given.program or waymark).resolve()
     if given.host:
-        return targets.Host(given.host, shlex.split(given.ssh), pairs, given.package)
+        return targets.Host(given.host, shlex.split(given.ssh), pairs)
     if given.guest:
         return targets.Guest(given.guest, program, given.package)
     if given.local:
