@@ -49,6 +49,10 @@ def check(f):
     return ["waymark", "check", f / "robot.yaml", f / "rec", "--quick"]
 
 
+def play(f):
+    return ["waymark-play", f / "rec", "--speed", "1000", "--until", "10", "--json", f / "played.json"]
+
+
 def streams(*names):
     return [f"rec/{name}.csv" for name in names] + ["rec/recording.yaml", "robot.yaml"]
 
@@ -68,6 +72,9 @@ CASES = {
     "replay-pictures": Case("signs", ["rec/video/left.avi", "rec/video/left.csv", "rec/landmarks/appearance.csv", "rec/landmarks/1.png"],
                             replay, 1, True),
     "replay-floor": Case("floor", ["rec/video/front.avi", "rec/video/front.csv", "rec/calibration.yaml"], replay, 1, True),
+    "play": Case("crossing", ["rec/recording.yaml", "rec/can.log", "rec/sightings.csv"], play),
+    "play-streams": Case("streams", [f"rec/{name}.csv" for name in ("motion", "imu", "gnss", "heading")], play, 1),
+    "play-faults": Case("robot", ["faults.yaml"], lambda f: ["waymark-play", "--faults", f / "faults.yaml", "--print-faults"], 1),
     "run-resumed": Case("robot", ["pose.yaml", "robot.yaml"],
                         lambda f: ["waymark", "run", "--config", f / "robot.yaml", "--recording", f / "rec", "--out", f / "out",
                                    "--resume", "--speed", "20", "--duration", "1"], 1),

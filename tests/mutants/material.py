@@ -147,6 +147,7 @@ def make(binaries, folder, rendered):
                                       "start: {saved_pose: pose.yaml}\n")
     (place / "pose.yaml").write_text("format: waymark-pose/1\nutc_s: 1700000000.0\npose: {x_m: 0, y_m: 0, heading_rad: 0, "
                                      "sigma_xy_m: 0.1, sigma_heading_rad: 0.1}\nspeed_mps: 0.5\nrate_radps: 0.1\n")
+    shutil.copy(ROOT / "config/faults/indoor.yaml", place / "faults.yaml")
     for name, streams in (("streams", ("motion", "imu", "gnss", "heading")), ("wheels", ("ticks", "imu")),
                           ("sides", ("speeds", "imu", "gnss")), ("steered", ("steering", "imu", "heading", "depth"))):
         (folder / name).mkdir()

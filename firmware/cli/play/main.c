@@ -47,6 +47,7 @@ static const char kHelp[] =
 #define EXIT_USAGE 2
 #define BEGIN_AFTER_NS (500 * WM_NS_PER_MS)  // the queue is filled before
 #define SHOW_EVERY_MS 200
+#define GAP_NOTED_NS (60 * WM_NS_PER_S)  // a wrong stamp, or two recordings in one file: who waits is told
 
 static volatile sig_atomic_t is_asked_to_stop;
 
@@ -136,13 +137,27 @@ static void show_progress(const player *self, double duration_s) {
     (void)fprintf(stderr, "\r\033[K%.1f s, at most %.2f ms late", at_s, late_ms);
 }
 
+// Once for each gap.
+static void note_gap(const player *self, wm_time_ns *noted_ns) {
+  const wm_time_ns next_ns = atomic_load(&self->next_ns), wait_ns = next_ns - wm_monotonic_ns();
+  if (wait_ns < GAP_NOTED_NS || next_ns == *noted_ns) return;
+  *noted_ns = next_ns;
+  (void)fprintf(
+      stderr,
+      "note: after %.1f s of the recording nothing is due for %.0f s; --until leaves out what is later, --from "
+      "what is earlier\n",
+      (double)atomic_load(&self->at_ns) * 1e-9, (double)wait_ns * 1e-9);
+}
+
 static wm_status play(player *self, wm_error *err) {
+  wm_time_ns noted_ns = 0;
   const double duration_s = wm_play_duration_s(self->play);
   wm_status status = player_start(self, err);
   if (status != WM_OK) return status;
   while (!atomic_load(&self->ended) && !is_asked_to_stop) {
     (void)usleep(SHOW_EVERY_MS * 1000);
     show_progress(self, duration_s);
+    note_gap(self, &noted_ns);
   }
   if (is_asked_to_stop) atomic_store(&self->stop, 1);
   if (isatty(STDERR_FILENO)) (void)fputs("\r\033[K", stderr);

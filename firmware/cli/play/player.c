@@ -57,9 +57,19 @@ static void put(player *self, const wm_play_item *item, uint8_t *copy) {
   (void)pthread_mutex_unlock(&t->lock);
 }
 
+// Under a real-time policy (chrt) decoding and encoding must not keep the sending thread waiting.
+static void step_back(void) {
+  int policy;
+  struct sched_param param;
+  if (pthread_getschedparam(pthread_self(), &policy, &param) != 0 || policy == SCHED_OTHER) return;
+  if (param.sched_priority > 1) param.sched_priority--;
+  (void)pthread_setschedparam(pthread_self(), policy, &param);
+}
+
 static void *read_ahead(void *context) {
   player *self = context;
   struct player_threads *t = self->threads;
+  step_back();
   wm_status status = WM_OK;
   while (status == WM_OK && !atomic_load(&self->stop)) {
     wm_play_item item;
@@ -156,6 +166,7 @@ static void *send_in_time(void *context) {
   (void)prctl(PR_SET_TIMERSLACK, 1UL, 0UL, 0UL, 0UL);  // else sleeps end up to 50 us late
   while (take(self, &w)) {
     const wm_time_ns due_ns = player_monotonic_ns(self, w.item.due_ns);
+    atomic_store(&self->next_ns, due_ns);
     if (sleep_until(self, due_ns)) give_out(self, &w.item, due_ns);
     atomic_store(&self->at_ns, w.item.due_ns);
     free(w.data);

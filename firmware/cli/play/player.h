@@ -32,6 +32,7 @@ typedef struct player {
   int fault_failure[WM_FAULTS_MAX];           // errno; 0: none
   atomic_int stop;                            // set by the caller: end soon
   _Atomic wm_time_ns at_ns;                   // due time of the last item, since the recording's first datum
+  _Atomic wm_time_ns next_ns;                 // CLOCK_MONOTONIC at which the next item is due
   _Atomic wm_time_ns late_max_ns;
   atomic_int ended;
   struct player_threads *threads;

@@ -132,7 +132,7 @@ static void nothing_is_lost_and_the_times_are_kept(void) {
                  (double)wm_histogram_quantile(&self.counts[i].late, 0.99) * 1e-3,
                  (double)self.counts[i].late.max_ns * 1e-3);
   // A busy desk wakes threads late; half of them are in time everywhere.
-  TEST_ASSERT_TRUE(wm_histogram_quantile(&self.counts[can].late, 0.5) < 5 * WM_NS_PER_MS);
+  TEST_ASSERT_TRUE(wm_histogram_quantile(&self.counts[can].late, 0.5) < 20 * WM_NS_PER_MS);
 }
 
 static void a_stop_ends_it_soon_and_failures_are_counted(void) {
