@@ -42,8 +42,13 @@ static wm_status set_format(const video_sink *self, wm_error *err) {
   if (self->fourcc == V4L2_PIX_FMT_YUYV) f.fmt.pix.bytesperline = 2 * self->width_px;
   if (ioctl(self->fd, VIDIOC_S_FMT, &f) != 0)
     return wm_fail(err, WM_IO, "%s: does not take pictures of this format: %s", self->device, strerror(errno));
-  if (f.fmt.pix.width == self->width_px && f.fmt.pix.height == self->height_px && f.fmt.pix.pixelformat == self->fourcc)
+  if (f.fmt.pix.width == self->width_px && f.fmt.pix.height == self->height_px &&
+      f.fmt.pix.pixelformat == self->fourcc) {
+    // v4l2loopback lets readers in from here on, not only from the first picture on; other drivers may refuse it.
+    int type = V4L2_BUF_TYPE_VIDEO_OUTPUT;
+    (void)ioctl(self->fd, VIDIOC_STREAMON, &type);
     return WM_OK;
+  }
   return wm_fail(err, WM_IO,
                  "%s: keeps %u x %u and another format, as another program has it open; end that program, or make the "
                  "device anew (`modprobe -r v4l2loopback`)",

@@ -16,14 +16,19 @@ fails=0
 fail() { echo "FAIL: $*"; fails=$((fails + 1)); }
 
 interfaces="--can can0=vcan0 --can can1=vcan1 --camera left=/dev/video10,MJPG --camera right=/dev/video11,GREY --lcm off"
-listen() { timeout "$3" v4l2-ctl -d "/dev/video$1" --stream-mmap=8 --stream-count="$2" --verbose; }
+# Its first pictures may come before the device lets readers in: from then on all are taken.
+listen() {
+  until timeout -s INT "$3" stdbuf -oL -eL v4l2-ctl -d "/dev/video$1" --stream-mmap=8 --stream-count="$2" --verbose 2>&1 | grep --line-buffered dqbuf; do
+    sleep 0.05
+  done
+}
 
 # Once before: what is read from the disk later would stop the guest's clock for the time of the disk.
 chrt -f 45 waymark play recording $interfaces --until 1 >warm.txt 2>&1 &
 warm=$!
 sleep 1
 waymark record --config robot.yaml --out warm --duration 2 --free-mb 50 >/dev/null 2>&1
-listen 10 5 2 >/dev/null 2>&1
+timeout 2 stdbuf -oL v4l2-ctl -d /dev/video10 --stream-mmap=8 --stream-count=5 --verbose 2>&1 | grep dqbuf >/dev/null
 wait $warm
 
 # played NAME JSON OPTIONS: plays, and records what the kernel gives.
@@ -32,10 +37,10 @@ played() {
   shift 2
   chrt -f 45 waymark play recording $interfaces --start-at $(($(cut -d. -f1 /proc/uptime) * 1000000000 + 8000000000)) --json "$json" "$@" >"$name.txt" 2>&1 &
   local player=$!
-  until grep -q "begins at" "$name.txt"; do sleep 0.1; done # its devices are open
-  listen 10 240 18 >"$name-left.txt" 2>&1 &
+  until grep -sq "begins at" "$name.txt"; do sleep 0.1; done # its devices are open
+  listen 10 240 18 >"$name-left.txt" 2>/dev/null &
   local left=$!
-  listen 11 240 18 >"$name-right.txt" 2>&1 &
+  listen 11 240 18 >"$name-right.txt" 2>/dev/null &
   local right=$!
   waymark record --config robot.yaml --out "$name" --duration 17 --free-mb 50 >"$name-record.txt" 2>&1 || fail "waymark record: exit code $?"
   wait $player || fail "waymark play: exit code $?"
