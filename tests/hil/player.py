@@ -12,7 +12,6 @@ import subprocess
 SECONDS, RATE_HZ, PICTURES_HZ, WIDTH, HEIGHT = 8, 1900, 30, 320, 200
 FIRST_NS = 40 * 10**9
 SKEW_MS = 1.0
-FIRST_MISSED_MAX = 6  # pictures before the device lets its reader in
 
 
 def frames():
@@ -119,24 +118,22 @@ def judge_whole(recorded, recording, offset_ns):
     for name in ("left", "right"):
         wanted = read_stamps(recording / f"video/{name}.csv")
         heard = taken(recorded.with_name(f"{recorded.name}-{name}.txt"))
-        # A reader may be let in after the first pictures; from then on it has all.
-        late[name] = [h - w - offset_ns for w, h in zip(wanted[-len(heard):], heard)] if heard else []
-        print(f"play: {name}: {len(heard)} pictures taken of {len(wanted)}, all from its first on")
-        if not FIRST_MISSED_MAX >= len(wanted) - len(heard) >= 0 or max(late[name], default=10**9) - min(late[name], default=0) > 15 * 10**6:
-            failures.append(f"play: {name}: {len(heard)} pictures of {len(wanted)}, or with gaps")
+        late[name] = [h - w - offset_ns for w, h in zip(wanted, heard)]
+        print(f"play: {name}: {len(heard)} pictures taken of {len(wanted)}")
+        if len(heard) != len(wanted):
+            failures.append(f"play: {name}: {len(heard)} pictures of {len(wanted)}")
     if not all(late.values()):
         return failures
     for name, values in late.items():
         print(f"play: stamps of {name} are late by {percentile(values, 0.5) / 1e3:.0f} us (p50), {percentile(values, 0.99) / 1e3:.0f} us (p99), "
               f"{max(values) / 1e3:.0f} us at most")
-    both = min(len(late["left"]), len(late["right"]))
-    pairs = [abs(a - b) / 1e6 for a, b in zip(late["left"][-both:], late["right"][-both:])]
+    pairs = [abs(a - b) / 1e6 for a, b in zip(late["left"], late["right"])]
     # Of each picture against the frame of can0 that was due just before it.
     at = {s[0]: x for s, x in zip(sorted(f for f in frames() if f[1] == "can0"), late["can0"])}
     times = sorted(at)
     wanted = read_stamps(recording / "video/left.csv")
     skews = [abs(x - at[max(t for t in times[max(0, (w - FIRST_NS) * RATE_HZ // 10**9 - 3):(w - FIRST_NS) * RATE_HZ // 10**9 + 3] if t <= w)]) / 1e6
-             for w, x in zip(wanted[-len(late["left"]):], late["left"])]
+             for w, x in zip(wanted, late["left"])]
     print(f"play: skew between CAN and pictures {percentile(skews, 0.99):.3f} ms (p99), between the two cameras {percentile(pairs, 0.99):.3f} ms (p99)")
     if percentile(skews, 0.99) > SKEW_MS or percentile(pairs, 0.99) > SKEW_MS:
         failures.append("play: the skew is too large")

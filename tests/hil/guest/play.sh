@@ -16,7 +16,7 @@ fails=0
 fail() { echo "FAIL: $*"; fails=$((fails + 1)); }
 
 interfaces="--can can0=vcan0 --can can1=vcan1 --camera left=/dev/video10,MJPG --camera right=/dev/video11,GREY --lcm off"
-# Its first pictures may come before the device lets readers in: from then on all are taken.
+# From the moment on at which the device lets a reader in.
 listen() {
   until timeout -s INT "$3" stdbuf -oL -eL v4l2-ctl -d "/dev/video$1" --stream-mmap=8 --stream-count="$2" --verbose 2>&1 | grep --line-buffered dqbuf; do
     sleep 0.05
