@@ -34,7 +34,7 @@ import vimc  # noqa: E402
 import walls  # noqa: E402
 from published import ABSENT, DOWN, MOTION_STALE, STALLED, WORKS, Published  # noqa: E402
 from waymark_hil import guest  # noqa: E402
-from waymark_hil.guest import FAST, MACHINES, SLOW, SYSTEM  # noqa: E402
+from waymark_hil.guest import BOARD, FAST, MACHINES, SLOW, SYSTEM  # noqa: E402
 
 CAN = guest.buses(1)
 POSITION_M, HEADING_DEG = 0.02, 0.2
@@ -228,7 +228,7 @@ PARTS = {
     "edges": [("edges", OF_ROOT(edges.prepare), AT_ROOT(edges.judge), CAN, FAST, "")],
     "walls": [("walls", OF_ROOT(walls.prepare), AT_ROOT(walls.judge), CAN, FAST, "")],
     "service": [("service", OF_ROOT(service.prepare_service), service.judge_service, CAN, FAST, "systemd")],
-    "board": [("board", OF_ROOT(board.prepare), AT_ROOT(board.judge), [], SYSTEM, "")],
+    "board": [("board", OF_ROOT(board.prepare), AT_ROOT(board.judge), [], BOARD, "")],
     "power": [("kills", OF_ROOT(service.prepare_kills), service.judge_kills, CAN, SYSTEM, "systemd")],
 }
 UNDER_SYSTEMD = ("service", "power")

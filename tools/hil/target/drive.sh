@@ -170,10 +170,14 @@ wake_ups() { # cyclictest at the estimator's priority; without it the doctor mea
 # ── the run ─────────────────────────────────────────────────────────────────────────────────────────────────────────
 start_run() {
   local out=out/drive
-  if grep -qs ' disk_full ' faults.plan && mkdir -p out/disk && as_root mount -t tmpfs -o size=512m tmpfs out/disk 2>/dev/null; then
-    later "cp -r out/disk/drive* out/; as_root umount out/disk; rmdir out/disk" # a disk of its own, which a fault fills
-    as_root chown "$(id -u)" out/disk
-    out=out/disk/drive
+  if grep -qs ' disk_full ' faults.plan && mkdir -p out/disk; then # a disk of its own, which a fault fills
+    if as_root mount -t tmpfs -o size=512m tmpfs out/disk 2>/dev/null; then
+      later "cp -r out/disk/drive* out/; as_root umount out/disk; rmdir out/disk"
+      as_root chown "$(id -u)" out/disk
+      out=out/disk/drive
+    else
+      rmdir out/disk
+    fi
   fi
   [ "$played" = 0 ] || export WM_PLAYED=$PWD/played
   local more=()

@@ -25,14 +25,17 @@ fault_process_killed() {
   : >state/again
 }
 fault_disk_full() {
-  [ -d out/disk ] || { echo "the run's folder is on no disk of its own: that takes root"; return 1; }
+  grep -q " $PWD/out/disk tmpfs " /proc/mounts || { echo "the run's folder is on no disk of its own: that takes root"; return 1; }
   if [ "$1" = end ]; then
     rm -f out/disk/full
     return 0
   fi
-  local room
+  # All but a piece at once; what is left to the end, as the run writes beside it.
+  local room free_kb=${2%.*} rest=512
   room=$(df --output=avail -k out/disk | tail -1)
-  fallocate -l $((room - ${2%.*} > 4 ? room - ${2%.*} : 4))K out/disk/full
+  [ "$room" -le $((free_kb + rest)) ] || fallocate -l $((room - free_kb - rest))K out/disk/full
+  if [ "$free_kb" = 0 ]; then cat /dev/zero; else head -c "${rest}K" /dev/zero; fi >>out/disk/full 2>/dev/null
+  return 0
 }
 fault_cpu_hogged() {
   local count=${3%.*} i

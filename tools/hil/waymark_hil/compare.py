@@ -65,6 +65,13 @@ def _new_failures(before, after):
 
 def compare(before, after, allowed):
     """The result as comparison.json has it, and its checks for JUnit."""
+    try:
+        return _compare(before, after, allowed)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise HilError(f"a test's result.json is damaged: {type(error).__name__}: {error}") from None
+
+
+def _compare(before, after, allowed):
     for key in ("recording", "target"):
         if before[key] != after[key]:
             raise HilError(f"the tests are of different {key}s: {before[key]} and {after[key]}; the same is compared with the same")

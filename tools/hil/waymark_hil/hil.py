@@ -84,7 +84,7 @@ def _target(given, waymark):
             raise HilError(f"--{name} {path}: is no file")
     program = pathlib.Path((given.played if given.local else None) or given.program or waymark).resolve()
     if given.host:
-        return targets.Host(given.host, shlex.split(given.ssh), pairs, given.package)
+        return targets.Host(given.host, shlex.split(given.ssh), pairs)
     if given.guest:
         return targets.Guest(given.guest, program, given.package)
     if given.local:
@@ -114,6 +114,22 @@ def _player_faults(path, folder, target, buses):
         kept.append(fault)
     (folder / "faults.yaml").write_text(scenario.dump({**text, "faults": kept}), encoding="utf-8")
     return left_out
+
+
+# A video device without a writer is there and gives nothing: a run states that after two seconds without a picture.
+_STALLED_AFTER_S = 2.5
+
+
+def _as_the_target_has_them(faults, played):
+    """The faults as they are on the target: a player cannot unplug a video device, it leaves it without a writer."""
+    out = []
+    for fault in faults:
+        if fault["fault"] == "camera_unplugged" and not played:
+            kept = [statement for statement in fault["health"] if statement["what"] != "text"]
+            fault = {**fault, "health": [{**statement, "value": "stalled", "within_s": max(statement["within_s"] or 0, _STALLED_AFTER_S)}
+                                         if statement["what"] == "device" and statement["value"] == "absent" else statement for statement in kept]}
+        out.append(fault)
+    return out
 
 
 def _played_world(folder, given, buses, cameras):
@@ -173,7 +189,7 @@ def _write_plan(folder, given, target, rec, faults, derived, waymark):
     played_streams = {f"can:{name}" for name, _ in buses} | {f"camera:{camera['name']}" for camera in cameras} | set(rec.streams)
     unused = [*rec.not_played, *(bus.name for bus in rec.buses if f"can:{bus.name}" not in played_streams),
               *(camera.name for camera in rec.cameras if f"camera:{camera.name}" not in played_streams)]
-    return {"recording": rec.path.resolve(), "seconds": seconds, "from_s": from_s, "until_s": until_s, "is_cut": until_s < rec.seconds, "where": target.where, "played": bool(target.played), "buses": buses, "faults": faults,
+    return {"recording": rec.path.resolve(), "seconds": seconds, "from_s": from_s, "until_s": until_s, "is_cut": until_s < rec.seconds, "where": target.where, "played": bool(target.played), "buses": buses, "faults": _as_the_target_has_them(faults, target.played),
             "prefix": config["publish"].get("channel_prefix", "WAYMARK_"), "rate_hz": float(config["publish"].get("rate_hz", 50)), "unused": unused, "record": given.record, "cameras": [camera["name"] for camera in cameras], "left_out": left_out, "plays": plays,
             "map": str((folder / config["map"]).resolve()) if "map" in config else None}
 

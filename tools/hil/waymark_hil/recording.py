@@ -98,10 +98,10 @@ def _buses(path):
 
 def _stamps(path):
     """Arrivals (else stamps) of a table, in ns. A cell that is no number is left out."""
-    with path.open(newline="", encoding="utf-8") as file:
+    with path.open(newline="", encoding="utf-8", errors="replace") as file:
         for row in csv.DictReader(file):
             text = row.get("arrival_ns") or row.get("t_ns")
-            if text and text.lstrip("-").isdigit():
+            if isinstance(text, str) and re.fullmatch(r"-?[0-9]{1,19}", text):
                 yield int(text)
 
 

@@ -34,7 +34,8 @@ def _ticks_per_s(path):
         first = path.read_text(errors="replace").split("\n", 1)[0]
     except OSError:
         return 100.0
-    return float(first.rsplit(" ", 1)[-1]) if first.rsplit(" ", 1)[-1].isdigit() else 100.0
+    last = first.rsplit(" ", 1)[-1]
+    return float(last) if last.isdecimal() and int(last) > 0 else 100.0  # Linux has 100 everywhere
 
 
 def read(out):

@@ -144,8 +144,8 @@ class Host(Target):
 
     where = "host"
 
-    def __init__(self, address, options, pairs, package):
-        self.address, self.options, self.pairs, self.package = address, options, pairs, package
+    def __init__(self, address, options, pairs):
+        self.address, self.options, self.pairs = address, options, pairs
         self.name = f"host {address}"
 
     def player_of(self, interface):
