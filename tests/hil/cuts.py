@@ -25,6 +25,7 @@ from write_log import WriteLog
 CUTS, DISK_BYTES, FILES_BYTES = 20, 64 << 20, 60 << 20
 MAPPED_S = 53            # of the drive: the map has all markers of the lap from here on
 OFF_S, PLAYED_S = 0.5, 6  # without power; then the robot goes on
+LAST_S = 150             # of the drive, which lasts 158 s
 POSE_S, RIGHT_S, RIGHT_M = (3.0 if IS_BUSY else 0.5), 5.0, 0.15
 RANDOM = random.Random(12)
 
@@ -102,19 +103,20 @@ def main():
     subprocess.run(["ip", "route", "add", "224.0.0.0/4", "dev", "lo"], check=True)
     recording, config = work / "office-recording", (work / "share/kills/robot.yaml").read_text()
     ahead_ns = int(re.search(r"ahead (-?\d+) ns", (work / "share/out/kills/drive.timeline.txt").read_text()).group(1))
-    before, after = (work / "kills.before").read_bytes(), (work / "kills.disk").read_bytes()
+    before = (work / "kills.before").read_bytes()
     log = WriteLog(work / "kills.writes", DISK_BYTES)
     times = [t and t - ahead_ns for t in log.clock_ns()]
     first_ns = next(drives.can_items(recording))[0]
     mapped = next(i for i, t in enumerate(times) if t and t > first_ns + MAPPED_S * 10**9)
+    last = next((i for i, t in enumerate(times) if t and t > first_ns + LAST_S * 10**9), len(times))
     failures, starts = [], []
-    for number, cut in enumerate([*sorted(RANDOM.sample(range(mapped, len(times)), CUTS - 1)), None]):
+    for number, cut in enumerate(sorted(RANDOM.sample(range(mapped, last), CUTS))):
         folder = work / "cuts" / str(number)
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(parents=True)
-        image = bytearray(after if cut is None else before)  # the last one is what qemu left
-        lost = log.disk_after(image, cut, RANDOM) if cut is not None else 0
-        when_ns = times[-1 if cut is None else cut - 1]
+        image = bytearray(before)
+        lost = log.disk_after(image, cut, RANDOM)
+        when_ns = times[cut - 1]
         try:
             state = files_of(image, folder)
             kept = check_files(state)
@@ -129,6 +131,13 @@ def main():
         if kept == 0 or "continues with the map" not in said:
             failures.append(f"cut {number}: starts without its map ({kept} landmarks): {said[:300]}")
         shutil.rmtree(folder)
+    left = work / "cuts/left"  # the disk that the killed qemu left, after the drive
+    shutil.rmtree(left, ignore_errors=True)
+    left.mkdir(parents=True)
+    try:
+        print(f"the disk that the killed computer left has {check_files(files_of((work / 'kills.disk').read_bytes(), left))} landmarks")
+    except (AssertionError, OSError) as e:
+        failures.append(f"the disk that was left: {e}")
     first, right = sorted(s[0] for s in starts), max((s[1] for s in starts), default=math.inf)
     print(f"power cut: {len(starts)} starts: a pose after {first[len(first) // 2]:.2f} s (median), {first[-1]:.2f} s at most; within {RIGHT_M} m for good "
           f"after {right:.2f} s at most; {len(log.entries)} writes in the log")

@@ -31,7 +31,8 @@ while read -r pause; do
   sleep "$pause"
   mark killed
   systemctl kill --signal=KILL waymark
-  sleep 2
+  sleep 1
+  until [ "$(what MainPID)" != 0 ]; do sleep 0.1; done # after RestartSec= and the unit's check
   what ExecMainStartTimestampMonotonic >>"$out/started-us"
 done <pauses
 sleep 6
