@@ -46,7 +46,8 @@ bool write(const uint8_t *pixels, int width, int height, const Format &format, s
 
 std::string png_of(std::vector<uint8_t> pixels, int width, int height, const Format &format) {
   std::string out;
-  if (!write(pixels.data(), width, height, format, &out)) throw Failure("libpng could not make a picture of the report");
+  if (!write(pixels.data(), width, height, format, &out))
+    throw Failure("libpng could not make a picture of the report");
   return out;
 }
 
