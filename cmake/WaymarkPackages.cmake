@@ -76,7 +76,7 @@ set(CPACK_DEBIAN_TOOLS_PACKAGE_RECOMMENDS waymark-calibrate)
 
 set(boards "")
 if(TARGET wm_calibrate)
-  set(boards ", libceres3 (>= 2.1.0), libgoogle-glog0v6 (>= 0.6.0), libopencv-calib3d406 (>= 4.6.0), libopencv-contrib406 (>= 4.6.0), libopencv-core406 (>= 4.6.0), libopencv-imgproc406 (>= 4.6.0)")
+  set(boards ", libceres3 (>= 2.1.0+really2.1.0+dfsg), libgoogle-glog0v6 (>= 0.6.0), libopencv-calib3d406 (>= 4.6.0+dfsg), libopencv-contrib406 (>= 4.6.0+dfsg), libopencv-core406 (>= 4.6.0+dfsg), libopencv-imgproc406 (>= 4.6.0+dfsg)")
 endif()
 set(CPACK_DEBIAN_CALIBRATE_PACKAGE_NAME waymark-calibrate)
 set(CPACK_DEBIAN_CALIBRATE_PACKAGE_SECTION misc)

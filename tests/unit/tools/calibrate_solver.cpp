@@ -23,7 +23,7 @@ void tearDown() {}
 
 namespace {
 
-int trials = 10;
+int trials = 40;
 
 constexpr int kColumns = 9, kRows = 6;
 constexpr double kSquare_m = 0.04, kNoise_px = 0.2;
