@@ -210,7 +210,7 @@ static const wm_fault_kind_row kKinds[] = {
                              NULL,
                              NULL,
                              {{0}},
-                             "The configuration gets an unknown key, and the run is told to read it (SIGHUP)."},
+                             "The configuration gets an unknown key, and the run has to read it (SIGHUP)."},
 };
 _Static_assert(sizeof kKinds / sizeof kKinds[0] == WM_FAULT_KIND_COUNT, "a row for each kind");
 

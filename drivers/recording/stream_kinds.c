@@ -273,7 +273,9 @@ const stream_kind kStreamImu = {
       OPTIONAL("temperature_c", TEMPERATURE)}},
     .fill = fill_imu,
     .quantities = BIT(WM_Q_YAW_RATE) | BIT(WM_Q_ROLL_RATE) | BIT(WM_Q_PITCH_RATE) | BIT(WM_Q_ACCELERATION_X) |
-                  BIT(WM_Q_ACCELERATION_Y) | BIT(WM_Q_ACCELERATION_Z)};
+                  BIT(WM_Q_ACCELERATION_Y) | BIT(WM_Q_ACCELERATION_Z),
+    .quantities_with = BIT(WM_Q_ACCELERATION_X) | BIT(WM_Q_ACCELERATION_Y) | BIT(WM_Q_ACCELERATION_Z),
+    .with = FIRST + 3};
 
 const stream_kind kStreamSightings = {"sightings.csv",
                                       "sightings",

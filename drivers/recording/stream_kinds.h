@@ -30,8 +30,10 @@ typedef struct stream_kind {
   const char *(*fill)(const fill_context *self, const csv_row *row, wm_event *out);
   wm_event_kind also;  // instead of `event`, of rows that have a value in the column `also_with`; 0: none
   int also_with;
-  uint32_t quantities;  // bit per wm_quantity
-  int has_sensors;      // rows of several sensors
+  uint32_t quantities;       // bit per wm_quantity
+  uint32_t quantities_with;  // those of them that a file has with the column `with` alone
+  int with;
+  int has_sensors;  // rows of several sensors
 } stream_kind;
 
 extern const stream_kind kStreamMotion, kStreamMotion6, kStreamIncrements, kStreamImu, kStreamSightings, kStreamMarkers,

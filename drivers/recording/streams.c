@@ -212,6 +212,8 @@ wm_status stream_open(const char *path, const stream_kind *kind, const char *sen
   self->base.kinds = WM_EVENT_BIT(kind->event);
   if (kind->also && self->csv.place[kind->also_with] >= 0) self->base.kinds |= WM_EVENT_BIT(kind->also);
   self->base.in_order = self->csv.place[ARRIVAL] < 0;
+  self->base.quantities = kind->quantities;
+  if (kind->quantities_with && self->csv.place[kind->with] < 0) self->base.quantities &= ~kind->quantities_with;
   snprintf(self->base.name, sizeof self->base.name, "%s%s%s", kind->name, sensor ? ":" : "", sensor ? sensor : "");
   snprintf(self->sensor, sizeof self->sensor, "%s", sensor ? sensor : "");
   self->kind = kind;

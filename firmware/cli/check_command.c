@@ -82,7 +82,7 @@ static void print_driving(const wm_driving *driving) {
 
 static void print_quantities(uint32_t quantities) {
   if (quantities == 0) return;
-  fact("CAN gives   ");
+  fact("measured    ");
   for (unsigned q = 0; q < WM_Q_COUNT; q++)
     if ((quantities >> q) & 1u) fact(" %s", wm_quantity_name(q));
   fact("\n");

@@ -211,7 +211,7 @@ std::function<int()> camera_command(wm::cli::App &app) {
   auto a = std::make_shared<Arguments>();
   app.description(
       "Estimates a camera's model from pictures of a board; lenses over 180 degrees, too. With --second a pair of\n"
-      "cameras, with --floor also where they sit on the robot.");
+      "cameras, with --floor also their mounting on the robot.");
   app.add_option("FROM", a->from, "a folder of pictures (JPEG, PNG, PGM), or a recording's folder")->required();
   app.add_option("--camera", a->camera, "of a recording: this camera; needed where it has several");
   app.add_option("--chessboard", a->chessboard, "COLUMNSxROWS of inner corners: larger lattices are no board");

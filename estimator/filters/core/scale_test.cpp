@@ -24,11 +24,18 @@ constexpr struct {
                                 {"motion.side_scale", WM_SIDE_SCALE},
                                 {"range_scale", -1}};
 
+// What stands behind the last dot of a name.
+const char *last_part(const char *name) {
+  const char *part = name;
+  for (const char *c = name; *c; c++)
+    if (*c == '.') part = c + 1;
+  return part;
+}
+
 // WM_MONITOR_SCALES: none of them.
 int scale_of(const wm_calibration_value &value) {
-  const char *dot = std::strrchr(value.name, '.');
   for (int i = 0; i < WM_MONITOR_SCALES; i++)
-    if (std::strcmp(kScales[i].term < 0 && dot ? dot + 1 : value.name, kScales[i].name) == 0) return i;
+    if (std::strcmp(kScales[i].term < 0 ? last_part(value.name) : value.name, kScales[i].name) == 0) return i;
   return WM_MONITOR_SCALES;
 }
 

@@ -8,13 +8,13 @@ _waymark() {
     return
   fi
   case $command in
-    calibrate) [ "$COMP_CWORD" -eq 2 ] && more='import camera mounting' ;;
+    calibrate) [ "$COMP_CWORD" -eq 2 ] && more='import mounting camera' ;;
     map) [ "$COMP_CWORD" -eq 2 ] && more='make check survey add-landmark look print-markers train-cascade' ;;
   esac
   case "$command ${COMP_WORDS[2]:-}" in
     "calibrate import") words='--help --name --model --size --lens --out' ;;
-    "calibrate camera") words='--help --camera --chessboard --aprilgrid --tag --gap --model --every --most --name --picture --out' ;;
     "calibrate mounting") words='--help --config --run --camera --map' ;;
+    "calibrate camera") words='--help --camera --chessboard --aprilgrid --charuco --dictionary --square --second --second-name --floor --tag --gap --model --every --most --name --picture --out' ;;
     "map make") words='--help --resolution --origin --inside --walls-below --negate --fine --speck --clearance --out' ;;
     "map check") words='--help --recording --draw' ;;
     "map survey") words='--help --poses --out --json' ;;
@@ -32,7 +32,7 @@ _waymark() {
     "doctor") words='--json --seconds' ;;
     "stamps") words='' ;;
     "batch") words='--help --out --jobs --part --list' ;;
-    "calibrate") words='--help --name --model --size --lens --out --camera --chessboard --aprilgrid --tag --gap --every --most --picture --config --run --map' ;;
+    "calibrate") words='--help --name --model --size --lens --out --config --run --camera --map --chessboard --aprilgrid --charuco --dictionary --square --second --second-name --floor --tag --gap --every --most --picture' ;;
     "compare") words='--help --out --json --alpha --tolerate --no-reports' ;;
     "detect") words='--help --detector --config --set --out --draw --rate --camera --calibration --landmarks --poses --every' ;;
     "diff") words='--help' ;;
