@@ -246,7 +246,7 @@ static wm_status read_fault(const wm_yaml_node *item, wm_fault *out, wm_error *e
 
 // ── the file ────────────────────────────────────────────────────────────────────────────────────────────────────────
 
-// Two of one name can't be told apart; two of one kind on one device at one time are no defined state.
+// Names are unique. Faults of one kind on one device must not overlap.
 static wm_status check_others(const wm_yaml_node *item, const wm_faults *self, const wm_fault *f, wm_error *err) {
   for (size_t i = 0; i < self->count; i++) {
     const wm_fault *other = &self->fault[i];

@@ -435,7 +435,7 @@ void motion_front_end::note_samples(motion_input *input) {
 }
 
 // Twists of a holonomic drive: each axis on its own, and of a change only what the samples' own noise does not explain,
-// two of which are in it. The mean of the squares over some samples, since one alone says little.
+// two of which are in it. The mean of the squares over some samples, since one alone is weak evidence.
 void motion_front_end::note_holonomic(motion_input *input) {
   const double dt_s = sampled_ns_[0] == WM_TIME_NONE ? 0.0 : wm_seconds_between(sampled_ns_[0], input->t_ns);
   sampled_ns_[0] = sampled_ns_[1] = input->t_ns;

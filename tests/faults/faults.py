@@ -66,7 +66,7 @@ def prepare(work, worlds):
 
 
 class Drive:
-    """A folder with the world and its faults (a file beside this one), a configuration, and a logger that hears what is said."""
+    """A folder with the world and its faults (a file beside this one), a configuration, and a logger of what is published."""
 
     def __init__(self, work, world, name, faults=None):
         self.world, self.folder = work / world, work / name

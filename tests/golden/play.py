@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""`waymark play` over LCM, heard by LCM's own logger: all messages of a recording, in their order, with their stamps on the monotonic
+"""`waymark play` over LCM, received by LCM's own logger: all messages of a recording, in their order, with their stamps on the monotonic
 clock; with faults; ended by Ctrl-C. And what it refuses. Needs lcm-logger and the right to a network namespace for the first."""
 import csv
 import json
@@ -32,7 +32,7 @@ def stamps(path, channel):
 
 
 class Heard:
-    """What lcm-logger hears while the player plays."""
+    """What lcm-logger receives while the player plays."""
 
     def __init__(self, work, name):
         self.log = work / f"{name}.lcm"
@@ -52,7 +52,7 @@ def rows(recording, name):
 
 
 def check_all(work, recording):
-    """Each row is heard once, in its order, its stamp moved by one offset."""
+    """Each row is received once, in its order, its stamp moved by one offset."""
     heard = Heard(work, "all")
     done = play(recording, "--lcm", lcm_tools.URL, "--json", work / "played.json")
     log = heard.end()

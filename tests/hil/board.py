@@ -16,7 +16,7 @@ SECONDS = 12
 
 
 def free_port():
-    """A port of this computer that nobody has."""
+    """A free port of this computer."""
     with socket.socket() as one:
         one.bind(("127.0.0.1", 0))
         return one.getsockname()[1]
@@ -45,7 +45,7 @@ def command(work, waymark, out):
 
 
 def at_the_desk(work, waymark):
-    """Both tests; what they said is kept for the judge."""
+    """Both tests; their output is kept for the judge."""
     try:
         done = subprocess.run(command(work, waymark, "board-whole"), capture_output=True, text=True, timeout=900)
         (work / "board-whole.txt").write_text(f"{done.returncode}\n{done.stdout}{done.stderr}")

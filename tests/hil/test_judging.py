@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What `waymark hil` judges by: faults against what was heard, JUnit XML, limits, samples, derived configurations, comparisons.
+"""What `waymark hil` judges by: faults against what was received, JUnit XML, limits, samples, derived configurations, comparisons.
 
     test_judging.py TYPES      the folder with LCM's types for Python"""
 import json

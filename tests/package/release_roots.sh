@@ -20,7 +20,7 @@ begin=$SECONDS
 apt-get -qq update >/dev/null
 apt-get -qq install -y --no-install-recommends /out/*.deb gcc libc6-dev pkg-config procps >/tmp/apt.log 2>&1 || { tail -20 /tmp/apt.log; exit 1; }
 echo "== $((SECONDS - begin)) s: apt install of $(ls /out/*.deb | wc -l) packages"
-mkdir /work && tar -C /work -xzf /out/waymark-*.tar.gz && cd /work/waymark-*
+mkdir /src && tar -C /src -xzf /out/waymark-*.tar.gz && cd /src/waymark-*
 waymark --version
 for command in init check simulate replay eval report diff map calibrate detect suggest web batch compare mine import ros2; do
   waymark "$command" --help >/dev/null || { echo "waymark $command --help failed"; exit 1; }
@@ -48,7 +48,7 @@ apt-get -qq update >/dev/null
 apt-get -qq install -y --no-install-recommends python3 python3-venv /out/waymark_*.deb /out/waymark-tools_*.deb >/tmp/apt.log 2>&1 || { tail -20 /tmp/apt.log; exit 1; }
 python3 -m venv /venv
 /venv/bin/pip -q --disable-pip-version-check install /out/waymark-*.whl
-mkdir /work && tar -C /work -xzf /out/waymark-*.tar.gz && cd /work/waymark-*
+mkdir /src && tar -C /src -xzf /out/waymark-*.tar.gz && cd /src/waymark-*
 waymark simulate config/worlds/crossing.yaml --no-video --out /tmp/drive >/dev/null
 waymark replay /tmp/drive --config config/datasets/crossing-points.yaml --out /tmp/run >/dev/null
 cd /tmp
@@ -61,7 +61,7 @@ print(len(run.trajectory[\"t_ns\"]), \"poses, the same bits, by\", waymark.__fil
 
 source='
 set -euo pipefail
-mkdir /work && tar -C /work -xzf /out/waymark-*.tar.gz && cd /work/waymark-*
+mkdir /src && tar -C /src -xzf /out/waymark-*.tar.gz && cd /src/waymark-*
 begin=$SECONDS
 ./dev --yes build >/tmp/build.log 2>&1 || { tail -30 /tmp/build.log; exit 1; }
 echo "== $((SECONDS - begin)) s: ./dev build"

@@ -75,7 +75,7 @@ class Search {
     out_.shots.push_back(shot);
   }
 
-  // The lattice that this picture has, whatever was told.
+  // The lattice of this picture, whatever size was given.
   void sample(const GreyPicture &picture) {
     const LatticeSize size = full_size(find_chessboard(picture, 0, 0));
     sampled_.emplace_back(std::max(size.columns, size.rows), std::min(size.columns, size.rows));

@@ -178,7 +178,7 @@ std::optional<Calibration> with_model(const Calibration &from, Model model) {
   };
   const size_t n = known.intrinsics.size();
   std::optional<Calibration> out;
-  // Minima that fit the rays nearly alike are told apart by the corners.
+  // Minima that fit the rays nearly alike are distinguished by the corners.
   for (const Camera &start :
        fit_minima(model, rays, known.width, known.height, {known.intrinsics[n - 2], known.intrinsics[n - 1]})) {
     Calibration next = from;

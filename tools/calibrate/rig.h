@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Two cameras that are fixed to each other, and where the first sits on the robot: in one problem with the lenses and
-// the poses of the boards.
+// Two cameras that are fixed to each other, and the first one's mounting on the robot: in one problem with the lenses
+// and the poses of the boards.
 #pragma once
 
 #include <optional>

@@ -95,7 +95,7 @@ struct MeasuredCost {
 
   template <typename T>
   bool operator()(const T *base, const T *shot, T *residual) const {
-    // The board's origin and two points a metre from it along its axes tell its pose.
+    // The board's origin and two points a metre from it along its axes give its pose.
     const Vec3 places[3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
     T is[3][3], want[3][3];
     for (int k = 0; k < 3; k++) {
@@ -205,7 +205,7 @@ class Problem {
     if (!bundle_.measured.empty()) blocks.push_back(base_.data());
     Eigen::Index n = 0;
     for (const double *block : blocks) n += problem_.ParameterBlockSize(block);
-    FLAGS_minloglevel = google::GLOG_FATAL;  // what is not determined is told by the result
+    FLAGS_minloglevel = google::GLOG_FATAL;  // the result states what is not determined
     ceres::Covariance::Options o;
     o.num_threads = 1;
     ceres::Covariance of(o);

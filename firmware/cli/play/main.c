@@ -47,7 +47,7 @@ static const char kHelp[] =
 #define EXIT_USAGE 2
 #define BEGIN_AFTER_NS (500 * WM_NS_PER_MS)  // the queue is filled before
 #define SHOW_EVERY_MS 200
-#define GAP_NOTED_NS (60 * WM_NS_PER_S)  // a wrong stamp, or two recordings in one file: who waits is told
+#define GAP_NOTED_NS (60 * WM_NS_PER_S)  // a wrong stamp, or two recordings in one file: a note explains the wait
 
 static volatile sig_atomic_t is_asked_to_stop;
 

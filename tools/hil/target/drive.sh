@@ -68,7 +68,7 @@ bus_up() { # RUN PLAYER
   as_root ip link set "$run" up
 }
 
-guest_buses() { # the guest's own controllers, two on each bus: one hears, one plays
+guest_buses() { # the guest's own controllers, two on each bus: one receives, one plays
   local i=0 pair
   [ "$has_fd" = 0 ] || return 1
   modprobe kvaser_pci && modprobe can-raw || return 1

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Judges one fault of faults.yaml by what a subscriber heard: health against its `health:`, poses against its `pose:`. Times are in
+"""Judges one fault of faults.yaml by what a subscriber received: health against its `health:`, poses against its `pose:`. Times are in
 seconds since the recording's first datum."""
 import bisect
 import math

@@ -11,7 +11,7 @@ import time
 from . import HilError
 
 SCRIPTS = pathlib.Path(__file__).resolve().parent.parent / "guest"
-# Two controllers a bus: one hears, one plays. SJA1000 on PCI is what Debian's kernel and qemu both have.
+# Two controllers a bus: one receives, one plays. SJA1000 on PCI is what Debian's kernel and qemu both have.
 _BUS = ["-object", "can-bus,id=cb{0}", "-device", "kvaser_pci,canbus=cb{0}", "-device", "kvaser_pci,canbus=cb{0}"]
 # Instruction clocks: 250 million a second, idle time is the host's; 500 million, idle time is skipped, so that who sleeps
 # wakes in time whatever else the host does; as that, but idle time is the host's, as a disk is waited for; 1000 million, about what a

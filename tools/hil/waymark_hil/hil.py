@@ -96,7 +96,7 @@ def _quote(values):
     return " ".join(shlex.quote(str(value)) for value in values)
 
 
-# Faults that a real controller cannot be told to have.
+# Faults that a real controller cannot be made to have.
 _VIRTUAL_ALONE = ["bus_off"]
 
 

@@ -21,7 +21,7 @@ def load(path, default=None):
 
 
 class Judge:
-    """One test. `facts` is what the desk knows of it: see hil.py."""
+    """One test. `facts` are the desk's data about it: see hil.py."""
 
     def __init__(self, checks, folder, facts, limits, waymark, types):
         self.checks, self.folder, self.out, self.facts, self.limits, self.waymark = checks, folder, folder / "out", facts, limits, waymark

@@ -23,7 +23,7 @@ def types(folder):
 
 
 def logged(path):
-    """(when it was heard, UTC in microseconds; channel; message) of an LCM log, in its order; a last one that was cut off is left out.
+    """(when it was received, UTC in microseconds; channel; message) of an LCM log, in its order; a last one that was cut off is left out.
     Source: LCM's log format."""
     data, at = pathlib.Path(path).read_bytes(), 0
     while at + 28 <= len(data):

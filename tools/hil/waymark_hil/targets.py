@@ -23,7 +23,7 @@ class Target:
     played = None  # program with a recording in the place of the kernel's drivers
 
     def player_of(self, interface):
-        """The interface on which the player sends what the run hears on `interface`."""
+        """The interface on which the player sends what the run receives on `interface`."""
         return interface
 
     def prepare(self, progress):
