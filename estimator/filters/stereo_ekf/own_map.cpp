@@ -6,9 +6,9 @@
 namespace wm {
 namespace {
 
-// Bits of 256 in which two looks at one point may differ: 31 %. Of two unrelated points fewer than 81 differ with a
-// probability of 1e-9 (binomial, mean 128, sigma 8).
-constexpr int kAlikeMost_bits = 80;
+// Bits of 256 in which two looks at one point may differ: a quarter. Of unrelated random bits so few differ with a
+// probability of 1e-16; but patches of one sea floor are alike, so that places decide, too.
+constexpr int kAlikeMost_bits = 64;
 // The next best point must differ in more bits by this factor: of points that look alike none is taken [Lowe2004].
 constexpr double kRatio = 0.8;
 

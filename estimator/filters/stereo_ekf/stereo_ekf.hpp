@@ -151,6 +151,7 @@ class stereo_ekf {
 
   // find_again.cpp: the own map
   static int32_t corner_id(int frame, int corner) { return -2 - own_map::kCorners * frame - corner; }
+  double corner_variance(double depth_m) const;
   void look(const wm_stereo &seen);
   void bound_reach(double *reach_m) const;
   void note_appearance(int slot, const wm_stereo &seen);
@@ -160,6 +161,7 @@ class stereo_ekf {
   bool map_point_of(int slot, own_point *out) const;
   void leave_point(int slot);
   void find_again();
+  bool take_filtered(const past_pose &past, looked_point *look) const;
   double match(bool everywhere, matched_points *out);
   int keep_agreeing(const matched_points &all, const pose3 &at);
   bool fuse_match(const looked_point &looked, const gates &limits);
@@ -223,7 +225,6 @@ class stereo_ekf {
   int64_t looked_count_;
   pose3 frame_pose_;          // where the newest key frame was made, or the map was found again
   wm_time_ns frame_ns_;       // then; NONE: never
-  wm_time_ns found_ns_;       // when many points agreed; NONE: never
   wm_time_ns everywhere_ns_;  // newest search of the whole map; NONE: never
   wm_time_ns elsewhere_ns_;   // when that search contradicted the pose; NONE: it does not
   double sigma_px_[4];
