@@ -5,6 +5,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include <wm_version.h>
 #include "cli/commands.h"
 #include "waymark/text.h"
 

@@ -68,7 +68,7 @@ render::Mesh boulder(Dice &dice, const Vec3 &middle, double radius, uint32_t mat
     p = middle + p * push;
   }
   // Normals of the pushed surface: mean of the triangles around each corner. Corners that lie on one another (the seam)
-  // differ a little, which nobody sees on a rock.
+  // differ a little, which does not matter on a rock.
   m.normals.assign(m.positions.size(), Vec3(0, 0, 0));
   for (const auto &t : m.triangles) {
     const Vec3 n = (m.positions[t[1]] - m.positions[t[0]]).cross(m.positions[t[2]] - m.positions[t[0]]);
