@@ -33,8 +33,8 @@ typedef struct lcm_subscriber {
 // `lent` may be NULL: then it connects by itself.
 void lcm_subscriber_open(lcm_subscriber *self, const char *url, const char *channel_prefix, lcm_t *lent,
                          void (*subscribe)(lcm_subscriber *self));
-// At most LCM_CHANNELS_MAX channels. LCM drops messages whose queue is full and does not count them: each time that this
-// thread found a queue full is one of the source's overflows.
+// At most LCM_CHANNELS_MAX channels. LCM drops messages whose queue is full and does not count them: each time that
+// this thread found a queue full is one of the source's overflows.
 void lcm_subscriber_add(lcm_subscriber *self, const char *channel, lcm_msg_handler_t handler, void *context);
 // Waits for up to WM_DEVICE_WAIT_MS for one message and calls its handler. Losses and the state of the connection go
 // into *counts.

@@ -134,7 +134,7 @@ slam::marker_reading slam::choose_pose(const context &at, const wm_marker &m, co
   return r;
 }
 
-// The rows of a marker of the map. Where the pose is vague, the second derivatives count as noise [Julier1997]: an
+// The rows of a marker of the map. Where the pose is vague, the second derivatives count as noise [Athans1968]: an
 // error t across the line of sight, by a wrong heading, moves a marker at distance d by -t^2 / 2d along it, and an
 // error r along it by r t / d across. Their mean squares are 3/4 (P_tt / d)^2 and (P_rr P_tt + 2 P_rt^2) / d^2. Below
 // the marker's own noise they change no pose and are left out.

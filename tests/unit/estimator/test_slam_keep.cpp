@@ -103,8 +103,8 @@ void test_a_robot_that_was_moved_while_off_is_found_in_its_map() {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.1, worst_landmark(&found));
 }
 
-// GIVEN a kept map WHEN the robot drove on and turned while it was off, within the start's sigmas THEN no pose is further
-// off than its sigma: at such angles a correction is far from linear.
+// GIVEN a kept map WHEN the robot drove on and turned while it was off, within the start's sigmas THEN no pose is
+// further off than its sigma: at such angles a correction is far from linear.
 void test_a_robot_that_turned_while_off_is_never_surely_wrong() {
   for (const bool with_codes : {false, true}) {
     double worst = 0.0, late_m = 0.0;

@@ -123,7 +123,7 @@ static void a_lost_pose_replaces_the_one_before(void) {
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_saved_pose_write(path, &e, 1002, &err), err.text);
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_saved_pose_read(path, &saved, &err), err.text);
   TEST_ASSERT_TRUE(wm_saved_pose_start(&saved, 1004, 600, 0, 0, motion, &start));
-  TEST_ASSERT_DOUBLE_WITHIN(1e-3, sqrt(64 + 4), start.sigma_xy_m);  // 2 s later
+  TEST_ASSERT_DOUBLE_WITHIN(1e-3, sqrt(64 + 4), start.sigma_xy_m);           // 2 s later
   TEST_ASSERT_DOUBLE_WITHIN(0.01, M_PI / sqrt(3), start.sigma_heading_rad);  // any heading
 }
 
