@@ -47,6 +47,8 @@ def parser():
     out.add_argument("--record", action="store_true", help="the target records beside the run, and its stamps are judged datum by datum")
     out.add_argument("--program", metavar="FILE", help="the waymark of --guest amd64 and --local; this one by default")
     out.add_argument("--package", metavar="FILE", help="the package that a guest installs; needed for arm64 and armhf")
+    out.add_argument("--mips", metavar="N", type=int, default=guest.MIPS,
+                     help=f"million instructions a second of a guest's one processor, {guest.MIPS_LEAST} to {guest.MIPS_MOST} (default {guest.MIPS})")
     out.add_argument("--played", metavar="FILE", help="--local: a waymark with a recording in the place of the kernel's drivers (build/tests/waymark-played)")
     out.add_argument("--compare", metavar=("BEFORE", "AFTER"), nargs=2, help="folders of two tests; or with REC two programs, packages or configurations, which are tested first")
     out.add_argument("--json", action="store_true", help="print result.json")
@@ -86,7 +88,9 @@ def _target(given, waymark):
     if given.host:
         return targets.Host(given.host, shlex.split(given.ssh), pairs)
     if given.guest:
-        return targets.Guest(given.guest, program, given.package)
+        if not guest.MIPS_LEAST <= given.mips <= guest.MIPS_MOST:
+            raise HilError(f"--mips {given.mips}: {guest.MIPS_LEAST} to {guest.MIPS_MOST} million instructions a second are possible")
+        return targets.Guest(given.guest, program, given.package, given.mips)
     if given.local:
         return targets.Local(program, given.played)
     raise HilError("where? --guest amd64, --host USER@BOARD or --local (waymark hil --help)")
@@ -208,6 +212,7 @@ def _folder_of(given, rec, target):
 def test(given, beside, types):
     """Runs and judges one test. Its result, as result.json has it."""
     waymark = desk_program("waymark", beside)[0]
+    sheet = page.sheet(beside)  # a program that is missing is known before the test, not after it
     if not given.config:
         raise HilError("--config FILE is needed: the robot's configuration")
     rec = recording.read(given.recording)
@@ -233,11 +238,11 @@ def test(given, beside, types):
     judge.all(is_good)
     progress.end()
     computer = (folder / "out/computer.txt").read_text(errors="replace").split("\n") if (folder / "out/computer.txt").exists() else []
-    result = {"name": f"waymark hil {rec.name}", "recording": rec.name, "config": str(given.config), "target": target.name, "computer": [line for line in computer if line],
+    result = {"name": f"waymark hil {rec.name}", "recording": rec.name, "config": str(given.config), "target": target.name, "computer": [*(line for line in computer if line), *target.computer],
               "seconds": facts["seconds"], "took_s": round(time.monotonic() - begun_s, 1), "figures": {k: v for k, v in judge.figures.items() if v is not None},
               "threads": getattr(judge, "threads", []), "play": judge.played.get("streams", []), "per_second": page.per_second(judge.series)}
     result = verdict.write(folder, result, checks, judge.said[-20000:])
-    (folder / "report.html").write_text(page.make(page.sheet(beside), result, judge.series, faults), encoding="utf-8")
+    (folder / "report.html").write_text(page.make(sheet, result, judge.series, faults), encoding="utf-8")
     for name in ("same", "desk", "state"):
         shutil.rmtree(folder / name, ignore_errors=True)
     for again in folder.glob("again-*"):
