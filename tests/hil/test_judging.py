@@ -5,6 +5,7 @@
 import json
 import math
 import pathlib
+import re
 import sys
 import tempfile
 import types
@@ -120,6 +121,11 @@ class Faults(unittest.TestCase):
         self.assertEqual(self.drive.failures(), [])
         self.drive.said *= 2
         self.assertEqual(len(self.drive.failures()), 1)
+
+    def test_names_are_those_of_the_run(self):
+        text = (ROOT / "msgs/src/names.c").read_text()
+        for table, names in (("kCauses", ["", *fault_judge.CAUSES[1:]]), ("kStates", lcm_log.STATES), ("kDeviceStates", ["", *lcm_log.DEVICES[1:]])):
+            self.assertEqual(re.findall(r'"([^"]*)"', re.search(rf"{table}\[\] = {{(.*?)}};", text, re.DOTALL)[1]), list(names), table)
 
     def test_a_fault_that_did_not_happen(self):
         self.drive.done = {"done": False, "why": "EPERM"}

@@ -11,7 +11,7 @@ _HEALTH_PERIOD_S = 1.0  # health is sent once a second: a state is seen up to so
 _AS_BEFORE = 3
 _COUNTED_S = 0.2  # a gap is counted when the next datum comes
 FLAGS = {"motion_stale": 1, "fusion_stale": 2, "jumped": 4}
-CAUSES = ["none", "contradicted", "refused", "inconsistent", "biased", "lost_again", "unknown_identities", "silent", "off_map"]
+CAUSES = ["none", "contradicted", "refused", "inconsistent", "biased", "lost_again", "unknown_identities", "silent", "off_map", "turn"]
 
 
 def plain(text):
