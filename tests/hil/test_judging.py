@@ -222,6 +222,15 @@ class Files(InFolder):
         self.assertEqual(derived["initial_pose"].keys(), {"x_m", "y_m", "heading_rad"})
         self.assertIn("speed_mps: 1e-3", (out / "robot.yaml").read_text())
 
+    def test_a_later_start(self):
+        table = self.write("before/published.csv", "t_ns,x_m,y_m,z_m,qx,qy,qz,qw\n100,1,2,0.5,0,0,0,1\n200,3,4,0.6,0,0,1,0\n300,5,6,0.7,0,0,0,1\n")
+        for start, keys in (({"x_m": "9", "y_m": "9", "heading_rad": "1", "sigma_xy_m": "0.5"}, {"x_m", "y_m", "qx", "qy", "qz", "qw", "sigma_xy_m"}),
+                            ({"x_m": "9", "y_m": "9", "z_m": "9"}, {"x_m", "y_m", "z_m", "qx", "qy", "qz", "qw"})):
+            self.assertTrue(scenario.begin_at({"initial_pose": start}, self.folder, table, 299))
+            derived = yaml.safe_load((self.folder / "robot.yaml").read_text())["initial_pose"]
+            self.assertEqual((derived.keys(), derived["x_m"], derived["qz"]), (keys, 3, 1))
+        self.assertFalse(scenario.begin_at({"initial_pose": {}}, self.folder, table, 99))
+
     def test_bad_configurations(self):
         rec = self.robot()
         for text in ("a: [", "just text", "dbc: missing.dbc\n", "devices: 5\n"):

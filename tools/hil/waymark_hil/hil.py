@@ -198,6 +198,18 @@ def _write_plan(folder, given, target, rec, faults, derived, waymark):
             "map": str((folder / config["map"]).resolve()) if "map" in config else None}
 
 
+def _begin_later(config, folder, rec, from_s, waymark):
+    """With --from the start pose is where a replay of what comes before ends: that of the recording is of its first moment."""
+    if from_s <= 0 or "initial_pose" not in config:
+        return
+    before = folder / "before"
+    done = subprocess.run([waymark, "replay", rec.path, "--config", folder / "robot.yaml", "--until", f"{from_s + 0.2:g}", "--out", before],
+                          capture_output=True, text=True, check=False)
+    if done.returncode or not scenario.begin_at(config, folder, before / "published.csv", rec.first_ns + round(from_s * 1e9)):
+        raise HilError(f"--from {from_s:g}: a replay until there gives no start pose: {(done.stderr.strip() or 'no pose').splitlines()[-1]}")
+    shutil.rmtree(before)
+
+
 def _folder_of(given, rec, target):
     """The test's folder, new: one that has another test's files is refused, unless it is one of ours."""
     name = re.sub(r"[^\w.-]+", "-", f"hil-{rec.name}-{target.name}")
@@ -227,6 +239,7 @@ def test(given, beside, types):
     survives = any(fault["fault"] in ("process_killed", "power_cut") for fault in faults)
     derived = scenario.derive(given.config, rec, folder, target.single_core, survives)
     os.symlink(rec.path.resolve(), folder / "recording")
+    _begin_later(derived[0], folder, rec, given.from_s, waymark)
     if target.played:
         _played_world(folder, given, derived[1], derived[2])
     facts = _write_plan(folder, given, target, rec, faults, derived, waymark)

@@ -115,11 +115,16 @@ class Judge:
         heard_poses, healths = lcm_log.heard(self.types, self.out / "heard.lcm", self.facts["prefix"])
         return [p for _, p in heard_poses if p.t_ns > 0], [h for _, h in healths]
 
+    def _part(self):
+        """Words for a replay of the part that was played, and a little more: the poses of its end lie between two."""
+        words = ["--from", f"{self.facts['from_s']:g}"] if self.facts["from_s"] > 0 else []
+        return words + (["--until", f"{self.facts['until_s'] + 1:g}"] if self.facts["is_cut"] else [])
+
     def _reference(self, offset_ns):
-        """Where the robot was, on the target's clock: truth where there is one, else the replay of the whole recording."""
+        """Where the robot was, on the target's clock: truth where there is one, else the replay at the desk."""
         truth = self.facts["recording"] / "truth.csv"
         rows = poses.table(truth) if truth.is_file() else poses.table(self.folder / "desk/published.csv")
-        return [((t + offset_ns - self.start_ns) * 1e-9, x, y, heading, z) for t, x, y, heading, z in rows], "truth" if truth.is_file() else "replay of the whole recording"
+        return [((t + offset_ns - self.start_ns) * 1e-9, x, y, heading, z) for t, x, y, heading, z in rows], "truth" if truth.is_file() else "replay at the desk"
 
     def poses(self):
         """Poses over LCM beside the replay of what the run saw, and beside the truth."""
@@ -131,7 +136,7 @@ class Judge:
             return
         try:
             said = self.replay(recording, "--config", config, "--frames-of", log, "--out", self.folder / "same")
-            self.replay(recording, "--config", config, "--out", self.folder / "desk")
+            self.replay(recording, "--config", config, *self._part(), "--out", self.folder / "desk")
         except HilError as error:
             self.checks.add("poses", "replay at the desk", False, str(error))
             return
