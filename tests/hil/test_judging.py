@@ -127,6 +127,11 @@ class Faults(unittest.TestCase):
         for table, names in (("kCauses", ["", *fault_judge.CAUSES[1:]]), ("kStates", lcm_log.STATES), ("kDeviceStates", ["", *lcm_log.DEVICES[1:]])):
             self.assertEqual(re.findall(r'"([^"]*)"', re.search(rf"{table}\[\] = {{(.*?)}};", text, re.DOTALL)[1]), list(names), table)
 
+    def test_faults_in_a_part(self):
+        for fault, part, is_in in (((10, 15), (0, 30), True), ((10, 15), (15, 30), False), ((10, 15), (14, 30), True), ((10, 15), (0, 10), False),
+                                   ((10, None), (20, 30), True), ((10, 10), (10, 30), True), ((10, 10), (11, 30), False)):
+            self.assertEqual(fault_judge.is_in({"from_s": fault[0], "until_s": fault[1]}, *part), is_in, (fault, part))
+
     def test_a_fault_that_did_not_happen(self):
         self.drive.done = {"done": False, "why": "EPERM"}
         self.assertEqual(self.drive.failures(), ["it happened"])

@@ -19,6 +19,12 @@ def plain(text):
     return str(text).lower().replace("-", "_").replace(" ", "_")
 
 
+def is_in(fault, from_s, until_s):
+    """Whether some of a fault is in a part of the drive."""
+    ends_s = fault.get("until_s")
+    return fault["from_s"] < until_s and (ends_s is None or ends_s > from_s or ends_s == fault["from_s"] >= from_s)
+
+
 class Heard:
     """Poses and healths with their times; `reference` gives where the robot was: [(t_s, x, y, heading, z)]."""
 

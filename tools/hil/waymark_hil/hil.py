@@ -14,7 +14,7 @@ import time
 
 from waymark_fleet.plan import PlanError, desk_program
 
-from . import HilError, compare, guest, limits, page, recording, scenario, targets, verdict
+from . import HilError, compare, fault_judge, guest, limits, page, recording, scenario, targets, verdict
 from .judge import Judge
 from .progress import Progress
 
@@ -146,11 +146,11 @@ def _played_world(folder, given, buses, cameras):
     (played / "devices").write_text("".join([f"{run} can:{name}\n" for name, run in buses] + [f"{camera['device']} camera:{camera['name']}\n" for camera in cameras]))
 
 
-def _runner_plan(faults, end_s, played):
-    """faults.plan: those that happen to the computer and its processes, and to adapters that no played driver takes away."""
+def _runner_plan(faults, from_s, end_s, played):
+    """faults.plan: those that happen to the computer and its processes, and to adapters that no played driver takes away, in the part that is played."""
     lines = []
     for number, fault in enumerate(faults):
-        if fault["by"] != "runner" or (played and fault.get("by_played_driver")):
+        if fault["by"] != "runner" or (played and fault.get("by_played_driver")) or not fault_judge.is_in(fault, from_s, end_s):
             continue
         until_s = fault.get("until_s")
         numbers = [fault.get(key) for key in ("free_kb", "share", "cpus") if key in fault]
@@ -179,7 +179,7 @@ def _write_plan(folder, given, target, rec, faults, derived, waymark):
     play += ["--from", f"{from_s:g}"] if from_s else []
     play += ["--until", f"{until_s:g}"] if given.until_s is not None else []
     bits = max((bus.bits / max(rec.seconds, 1) for bus in rec.buses), default=0)
-    runner = _runner_plan(faults, until_s, target.played)
+    runner = _runner_plan(faults, from_s, until_s, target.played)
     (folder / "faults.plan").write_text(runner)
     is_local = target.where == "local"
     plays = not target.played or bool(rec.streams or rec.has_sightings)

@@ -34,7 +34,7 @@ class Judge:
         # The recording's first datum on the target's clock; --from is due at the stamp of the file.
         self.start_ns = int(start) - round(facts["from_s"] * 1e9) if start.isdigit() else None
         self.faults = facts.get("faults") or []
-        self.before_faults_s = min((fault["from_s"] for fault in self.faults), default=float("inf"))
+        self.before_faults_s = min((fault["from_s"] for fault in self.faults if fault_judge.is_in(fault, facts["from_s"], facts["until_s"])), default=float("inf"))
 
     def replay(self, *words):
         """`waymark replay`; its output. HilError with its last line."""
@@ -284,7 +284,9 @@ class Judge:
             elif event == "begin":
                 done[int(number)] = {"done": True}
         for number, fault in enumerate(self.faults):
-            if fault["name"] in self.facts["left_out"]:
+            if not fault_judge.is_in(fault, self.facts["from_s"], self.facts["until_s"]):
+                done[number] = {"done": False, "absent": True, "why": "not in the part that was played"}
+            elif fault["name"] in self.facts["left_out"]:
                 done[number] = {"done": False, "absent": True, "why": "not on this target: its controllers cannot be told to do it"}
             elif self.facts["played"] and fault.get("by_played_driver"):
                 done[number] = {"done": True}
