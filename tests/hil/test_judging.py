@@ -317,6 +317,16 @@ class Guests(unittest.TestCase):
         for arch in guest.MACHINES:
             self.assertEqual(guest.at_rate(arch, 1000), (guest.MACHINES[arch], ""))
 
+    def test_an_end(self):
+        """A guest that is done, one that works without an end, one that waits on a busy desk."""
+        with tempfile.TemporaryDirectory() as folder:
+            log = pathlib.Path(folder) / "log"
+            self.assertTrue(guest.boot(["sh", "-c", "echo GUEST-RC 0"], log))
+            self.assertFalse(guest.boot(["sh", "-c", "while :; do :; done"], log, 0.3))
+            self.assertIn("was ended by the desk", log.read_text())
+            self.assertTrue(guest.boot(["sh", "-c", "sleep 1.5; echo GUEST-RC 0"], log, 1))
+            self.assertNotIn("was ended", log.read_text())
+
     def test_the_rate_is_stated(self):
         self.assertEqual(targets.Guest("amd64", None, None).name, "guest amd64")
         other = targets.Guest("amd64", None, None, 3000)  # so that the two are not compared

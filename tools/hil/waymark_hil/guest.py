@@ -19,7 +19,8 @@ _BUS = ["-object", "can-bus,id=cb{0}", "-device", "kvaser_pci,canbus=cb{0}", "-d
 SLOW, FAST, SYSTEM, BOARD = "shift=2,sleep=on", "shift=1,sleep=off", "shift=1,sleep=on", "shift=0,sleep=off"
 # Million instructions a second of a guest's processor for `waymark hil`: of those that one core of a board does, 1400 to 4000 (docs/boards.md).
 MIPS, MIPS_LEAST, MIPS_MOST = 2000, 1000, 4000
-GUEST_S = 3600  # on this computer's clock, which may do much else
+GUEST_S = 3600  # of a processor's time: a busy desk gives a guest a tenth of one
+BUSY_DESK = 10
 _ARM = {"qemu": ["qemu-system-aarch64", "-machine", "virt", "-cpu", "cortex-a57"], "console": "ttyAMA0"}
 # What a guest is made of, by Debian's name of its architecture; `cc` makes helpers for it.
 MACHINES = {
@@ -95,12 +96,21 @@ def command_of(image, machine, share, script, devices=(), clock=SLOW, init="", m
         "-display", "none", "-monitor", "none", "-serial", "stdio", *(() if "-nic" in devices else ("-nic", "none")), *devices)]
 
 
+def processor_s(pid):
+    """A process's time on processors until now."""
+    try:
+        words = pathlib.Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()
+    except OSError:
+        return 0.0
+    return (int(words[11]) + int(words[12])) / os.sysconf("SC_CLK_TCK")
+
+
 def boot(command, log, limit_s=GUEST_S, watch=None):
-    """Runs a guest; what it prints is kept in `log`, and new lines go to `watch`. Judged by its last word, not by qemu's. After the word
+    """Runs a guest, for so much of a processor's time; what it prints is kept in `log`, and new lines go to `watch`. Judged by its last word, not by qemu's. After the word
     NO MORE POWER it is killed at a random moment, as a cut of the power would: what it has given to its disk is there."""
     with open(log, "w", encoding="utf-8") as out:
         guest = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=out, stderr=subprocess.STDOUT)
-    end_s, has_power, seen = time.monotonic() + limit_s, True, 0
+    end_s, has_power, is_late, seen = time.monotonic() + BUSY_DESK * limit_s, True, False, 0
     try:
         while guest.poll() is None:
             text = log.read_text(errors="replace")
@@ -113,7 +123,8 @@ def boot(command, log, limit_s=GUEST_S, watch=None):
             has_power = "NO MORE POWER" not in text
             if not has_power:
                 time.sleep(random.uniform(0, 3))
-            if not has_power or time.monotonic() > end_s:
+            is_late = has_power and (processor_s(guest.pid) > limit_s or time.monotonic() > end_s)
+            if not has_power or is_late:
                 guest.kill()
                 guest.wait()
             time.sleep(0.5)
@@ -121,4 +132,7 @@ def boot(command, log, limit_s=GUEST_S, watch=None):
         if guest.poll() is None:
             guest.kill()
             guest.wait()
+    if is_late:
+        with open(log, "a", encoding="utf-8") as out:
+            out.write(f"\nthe guest was ended by the desk: it was not done after {limit_s:.0f} s of a processor, or {BUSY_DESK * limit_s:.0f} s in all\n")
     return "GUEST-RC 0" in log.read_text(errors="replace") or not has_power
