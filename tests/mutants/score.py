@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Mutation score: would the tests notice a wrong sign? Changes one place of a source at a time, builds, and runs the tests of its room.
 
-    score.py WORK [--room ROOM ...] [--sample N] [--seed S] [--jobs J] [--nice N] [--json FILE] [--file SOURCE] [--list]
+    score.py WORK [--room ROOM ...] [--sample N] [--seed S] [--jobs J] [--json FILE] [--file SOURCE] [--list]
 
 WORK gets a copy of the sources and a build of its own; nothing is changed outside of it. A run that was stopped goes on where it
 was: results are kept in WORK/results.jsonl. Remove that file after a change of the tests. Exit code 0 where every room reaches its floor.
@@ -54,7 +54,7 @@ ROOMS = {
 
 
 class Workshop:
-    """A copy of the sources with a build without optimisation beyond -O1, and its tests."""
+    """A copy of the sources with a release build, whose objects the compiler cache has, and its tests."""
 
     def __init__(self, work, jobs):
         self.source, self.build, self.jobs = work / "source", work / "build", jobs
@@ -66,7 +66,7 @@ class Workshop:
         if not (self.source / ".cache").exists():
             (self.source / ".cache").symlink_to(ROOT / ".cache")
         self.environment = {**os.environ, "CCACHE_BASEDIR": str(self.source), "CCACHE_NOHASHDIR": "1"}
-        self.run("cmake", "-G", "Ninja", "-S", self.source, "-B", self.build, "-DCMAKE_BUILD_TYPE=Sanitized", "-DWM_TESTS=ON")
+        self.run("cmake", "-G", "Ninja", "-S", self.source, "-B", self.build, "-DCMAKE_BUILD_TYPE=RelWithDebInfo", "-DWM_TESTS=ON")
 
     def run(self, *command, timeout=None):
         return subprocess.run([str(word) for word in command], env=self.environment, capture_output=True, text=True, timeout=timeout, check=True)
@@ -111,17 +111,19 @@ def usual_times(shop, names):
     return times
 
 
-def judge(shop, mutant, stages, times):
-    """(verdict, test): killed, golden, survived, or refused by the compiler."""
+def judge(shop, mutant, stages, times, killers):
+    """(verdict, test): killed, golden, survived, or refused by the compiler. Tests are linked one by one, those first that killed mutants of
+    this file before (`killers` counts them)."""
     original = (ROOT / mutant.file).read_text()
     shop.put(mutant.file, apply(original, mutant).encode())
     shop.environment["CCACHE_READONLY"] = "1"
     try:
         for verdict, names in stages:
-            if not shop.make(targets_of(names)):
-                return "refused", ""
-            for name in sorted(names, key=times.get):
+            for name in sorted(names, key=lambda n: (-killers[mutant.file, n], times[n])):
+                if not shop.make(targets_of([name])):
+                    return "refused", ""
                 if not shop.test(name, max(HANGS_S, HANGS * times[name])):
+                    killers[mutant.file, name] += 1
                     return verdict, name
         return "survived", ""
     finally:
@@ -187,7 +189,7 @@ def main():
     shop = Workshop(work, options.jobs)
     kept = work / "results.jsonl"
     done = {json.loads(line)["mutant"]: json.loads(line) for line in kept.read_text().splitlines()} if kept.exists() else {}
-    results = []
+    results, killers = [], collections.Counter((r["mutant"].split(":")[0], r["test"]) for r in done.values())
     for room in rooms:
         mutants = chosen(room, options)
         stages = [("killed", ROOMS[room][1]), ("golden", GOLDEN)]
@@ -195,7 +197,7 @@ def main():
         for number, mutant in enumerate(mutants, 1):
             if mutant.name() not in done:
                 begin = time.monotonic()
-                verdict, test = judge(shop, mutant, stages, times)
+                verdict, test = judge(shop, mutant, stages, times, killers)
                 done[mutant.name()] = {"room": room, "mutant": mutant.name(), "kind": mutant.kind, "verdict": verdict, "test": test,
                                        "seconds": round(time.monotonic() - begin, 1)}
                 with open(kept, "a", encoding="utf-8") as out:

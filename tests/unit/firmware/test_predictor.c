@@ -55,7 +55,7 @@ static void it_carries_the_fused_pose_to_now(void) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 5, p.now.pose_map_base.p_m[0]);
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 2.12, p.now.pose_map_base.p_m[1]);
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.22, p.pose_odom_base.x_m);
-  TEST_ASSERT_TRUE(p.now.covariance[wm_cov_index(1, 1)] >= 1e-4);
+  TEST_ASSERT_GREATER_OR_EQUAL_DOUBLE(1e-4, p.now.covariance[wm_cov_index(1, 1)]);
   TEST_ASSERT_EQUAL_UINT32(0, p.status_flags);
 }
 
