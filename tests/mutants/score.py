@@ -48,8 +48,8 @@ ROOMS = {
     "motion": (["estimator/motion"], [*estimator_tests(*MOTION), "test_contract_estimators"]),
     "merge": (["firmware/fusion/merge.c", "firmware/fusion/predictor.c", "firmware/fusion/fuser.c"],
               ["firmware_merge", "firmware_predictor", "firmware_fuser", "run_replay"]),
-    "can": (["drivers/can"], ["can_bits", "can_candump", "can_dbc", "wm_errors_can", "can_decode", "can_queue", "can_device"]),
-    "codec": (["msgs/src"], ["msgs_codec", "msgs_lcm_messages", "msgs_lcm_views", "firmware_eventlog", "firmware_lcm_stream"]),
+    "can": (["drivers/can"], ["can_bits", "can_candump", "can_dbc", "wm_errors_can", "can_decode", "can_gnss", "can_queue", "can_device"]),
+    "codec": (["msgs/src"], ["msgs_text", "msgs_lcm_read", "msgs_codec", "msgs_lcm_messages", "msgs_lcm_views", "firmware_eventlog", "firmware_lcm_stream"]),
 }
 
 
