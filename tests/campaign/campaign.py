@@ -3,7 +3,7 @@
 """A thousand simulated drives over all estimators with random faults: how often a pose is confidently wrong, lost without a word, or
 called lost while it is right.
 
-    campaign.py BIN_DIR SOURCE_DIR OUT [--drives N] [--seed S] [--jobs J] [--part K/N] [--only NUMBER] [--also FILE ...]
+    campaign.py BIN_DIR SOURCE_DIR OUT [--drives N] [--seed S] [--jobs J] [--part K/N] [--only NUMBER] [--fresh] [--also FILE ...]
 
 OUT/results.jsonl has a row a drive; the same command goes on where it was stopped. --part runs a share of the drives, for several
 machines; --also adds their results to the tables. A drive is drawn by its number and the seed alone: --only makes one again and
@@ -171,12 +171,15 @@ def main():
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--part", default="1/1", metavar="K/N")
     parser.add_argument("--only", type=int, metavar="NUMBER")
+    parser.add_argument("--fresh", action="store_true", help="does not go on: forgets the drives that were made")
     parser.add_argument("--also", type=pathlib.Path, action="append", default=[], metavar="FILE")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     if options.only:
         print(json.dumps(one(options, options.only), indent=1))
         return 0
+    if options.fresh:
+        (options.out / "results.jsonl").unlink(missing_ok=True)
     part, parts = (int(n) for n in options.part.split("/"))
     kept = options.out / "results.jsonl"
     run_all(options, kept, range(part, options.drives + 1, parts))
