@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Mutation score: would the tests notice a wrong sign? Changes one place of a source at a time, builds, and runs the tests of its room.
 
-    score.py WORK [--room ROOM ...] [--sample N] [--seed S] [--jobs J] [--json FILE] [--file SOURCE] [--list]
+    score.py WORK [--room ROOM ...] [--sample N] [--seed S] [--jobs J] [--json FILE] [--file SOURCE] [--skip-headers] [--list]
 
 WORK gets a copy of the sources and a build of its own; nothing is changed outside of it. A run that was stopped goes on where it
 was: results are kept in WORK/results.jsonl. Remove that file after a change of the tests. Exit code 0 where every room reaches its floor.
@@ -142,7 +142,7 @@ def chosen(room, options):
     equivalent = {line.split("  #")[0].strip() for line in EQUIVALENT.read_text().splitlines() if line.strip() and not line.startswith("#")}
     places = options.file if options.file else ROOMS[room][0]
     every = [m for path in sources(places) for m in mutants_of(str(path.relative_to(ROOT)), path.read_text())]
-    every = [m for m in every if without_line(m) not in equivalent]
+    every = [m for m in every if without_line(m) not in equivalent and not (options.skip_headers and m.file.endswith((".h", ".hpp")))]
     return every if options.sample <= 0 else random.Random(f"{options.seed} {room}").sample(every, min(options.sample, len(every)))
 
 
@@ -176,6 +176,7 @@ def main():
     parser.add_argument("--room", action="append", choices=list(ROOMS), help="all rooms where none is named")
     parser.add_argument("--file", action="append", help="only mutants of this source, judged by the tests of the one --room")
     parser.add_argument("--sample", type=int, default=20, help="mutants a room; 0: all")
+    parser.add_argument("--skip-headers", action="store_true", help="none of headers: each is compiled into many objects")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--json", type=pathlib.Path, help="results of all mutants")
