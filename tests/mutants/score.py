@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Mutation score: would the tests notice a wrong sign? Changes one place of a source at a time, builds, and runs the tests of its room.
 
-    score.py WORK [--room ROOM ...] [--sample N] [--seed S] [--jobs J] [--json FILE] [--file SOURCE] [--skip-headers] [--list]
+    score.py WORK [--room ROOM ...] [--sample N] [--seed S] [--jobs J] [--json FILE] [--file SOURCE] [--skip-headers] [--without-golden] [--list]
 
 WORK gets a copy of the sources and a build of its own; nothing is changed outside of it. A run that was stopped goes on where it
 was: results are kept in WORK/results.jsonl. Remove that file after a change of the tests. Exit code 0 where every room reaches its floor.
@@ -48,7 +48,7 @@ ROOMS = {
     "motion": (["estimator/motion"], [*estimator_tests(*MOTION), "test_contract_estimators"]),
     "merge": (["firmware/fusion/merge.c", "firmware/fusion/predictor.c", "firmware/fusion/fuser.c"],
               ["firmware_merge", "firmware_predictor", "firmware_fuser", "run_replay"]),
-    "can": (["drivers/can"], ["can_bits", "can_candump", "can_dbc", "wm_errors_can", "can_decode", "can_gnss", "can_queue", "can_device"]),
+    "can": (["drivers/can"], ["can_bits", "can_candump", "can_dbc", "wm_errors_can", "can_decode", "can_gnss", "can_bind", "can_queue", "can_device"]),
     "codec": (["msgs/src"], ["msgs_text", "msgs_lcm_read", "msgs_codec", "msgs_lcm_messages", "msgs_lcm_views", "firmware_eventlog", "firmware_lcm_stream"]),
 }
 
@@ -93,7 +93,7 @@ class Workshop:
 
 
 def targets_of(names):
-    extra = {"golden_outputs": ["waymark", "waymark-simulate"], "run_replay": ["run_replay", "waymark", "waymark-simulate"]}
+    extra = {"golden_outputs": ["waymark", "waymark-simulate"], "run_replay": ["run_replay", "waymark"]}
     return sorted({target for name in names for target in extra.get(name, [name])})
 
 
@@ -176,6 +176,7 @@ def main():
     parser.add_argument("--room", action="append", choices=list(ROOMS), help="all rooms where none is named")
     parser.add_argument("--file", action="append", help="only mutants of this source, judged by the tests of the one --room")
     parser.add_argument("--sample", type=int, default=20, help="mutants a room; 0: all")
+    parser.add_argument("--without-golden", action="store_true", help="stage 1 alone, which takes less time")
     parser.add_argument("--skip-headers", action="store_true", help="none of headers: each is compiled into many objects")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
@@ -193,7 +194,7 @@ def main():
     results, killers = [], collections.Counter((r["mutant"].split(":")[0], r["test"]) for r in done.values())
     for room in rooms:
         mutants = chosen(room, options)
-        stages = [("killed", ROOMS[room][1]), ("golden", GOLDEN)]
+        stages = [("killed", ROOMS[room][1])] + ([] if options.without_golden else [("golden", GOLDEN)])
         times = usual_times(shop, [name for _, names in stages for name in names]) if any(m.name() not in done for m in mutants) else {}
         for number, mutant in enumerate(mutants, 1):
             if mutant.name() not in done:
