@@ -57,7 +57,8 @@ class Workshop:
     """A copy of the sources with a release build, whose objects the compiler cache has, and its tests."""
 
     def __init__(self, work, jobs):
-        self.source, self.build, self.jobs = work / "source", work / "build", jobs
+        # The build is in the sources, as everywhere: the compiler cache counts paths relative to them.
+        self.source, self.build, self.jobs = work / "source", work / "source/build", jobs
         self.source.mkdir(parents=True, exist_ok=True)
         files = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=True).stdout.decode().split("\0")
         for name in filter(None, files):

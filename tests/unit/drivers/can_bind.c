@@ -74,6 +74,27 @@ static void sums_keep_signs_and_units(void) {
   close_it(&f);
 }
 
+#define RANGED(signal) "BO_ 256 M: 8 X\n SG_ A : " signal " \"m/s\" X\n"
+
+// The outermost raw values are no measurement where the range excludes them; others are taken, whatever the range.
+static void outermost_values_are_no_measurement(void) {
+  open_one(&f, RANGED("0|16@1- (1,0) [-32000|32000]"), binding(WM_Q_VEHICLE_SPEED, "M", "A"));
+  TEST_ASSERT_EQUAL(WM_BAD_DATA, feed(&f, "can0 100#0080000000000000"));
+  TEST_ASSERT_EQUAL(WM_BAD_DATA, feed(&f, "can0 100#FF7F000000000000"));
+  TEST_ASSERT_EQUAL_DOUBLE(-32767, value_of(&f, "can0 100#0180000000000000"));
+  TEST_ASSERT_EQUAL_DOUBLE(32766, value_of(&f, "can0 100#FE7F000000000000"));
+  TEST_ASSERT_EQUAL_DOUBLE(1, value_of(&f, "can0 100#0100000000000000"));
+  close_it(&f);
+  open_one(&f, RANGED("0|16@1- (1,0) [-32768|32767]"), binding(WM_Q_VEHICLE_SPEED, "M", "A"));
+  TEST_ASSERT_EQUAL_DOUBLE(-32768, value_of(&f, "can0 100#0080000000000000"));
+  TEST_ASSERT_EQUAL_DOUBLE(32767, value_of(&f, "can0 100#FF7F000000000000"));
+  close_it(&f);
+  open_one(&f, RANGED("0|16@1+ (1,0) [0|60000]"), binding(WM_Q_VEHICLE_SPEED, "M", "A"));
+  TEST_ASSERT_EQUAL(WM_BAD_DATA, feed(&f, "can0 100#FFFF000000000000"));
+  TEST_ASSERT_EQUAL_DOUBLE(65534, value_of(&f, "can0 100#FEFF000000000000"));
+  close_it(&f);
+}
+
 static void a_dbc_from_a_file(void) {
   char path[] = "/tmp/wm-dbc-XXXXXX";
   const int fd = mkstemp(path);
@@ -100,6 +121,7 @@ int main(void) {
   RUN_TEST(one_raw_value_is_one_gear);
   RUN_TEST(messages_that_are_not_there);
   RUN_TEST(sums_keep_signs_and_units);
+  RUN_TEST(outermost_values_are_no_measurement);
   RUN_TEST(a_dbc_from_a_file);
   return UNITY_END();
 }

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Messages of a run, read again by a viewer: each field comes back as it was, and names from strangers are made
 // harmless.
+#include <math.h>
 #include <string.h>
 
 #include "unity.h"
+#include "waymark/event_fields.h"
 #include "waymark/lcm_messages.h"
 
 void setUp(void) {}
@@ -143,6 +145,94 @@ static void innovation(void) {
   for (size_t cut = 0; cut < length; cut++) TEST_ASSERT_NOT_NULL(wm_lcm_read_innovation(bytes, cut, &read));
 }
 
+static void a_pose_that_is_set(void) {
+  const wm_set_pose pose = {
+      .pose_map_base = {.p_m = {1, 2, 3}, .q_xyzw = {0, 0, 0.6, 0.8}}, .sigma_xy_m = 0.5, .sigma_heading_rad = 0.25};
+  const size_t length = wm_lcm_set_pose(&pose, 77, bytes, sizeof bytes);
+  wm_event read;
+  TEST_ASSERT_NULL(wm_lcm_read_set_pose(bytes, length, &read));
+  TEST_ASSERT_EQUAL(WM_EVENT_SET_POSE, read.kind);
+  TEST_ASSERT_EQUAL_INT64(77, read.t_ns);
+  TEST_ASSERT_EQUAL_MEMORY(pose.pose_map_base.p_m, read.as.set_pose.pose_map_base.p_m, sizeof pose.pose_map_base.p_m);
+  for (int i = 0; i < 4; i++)
+    TEST_ASSERT_DOUBLE_WITHIN(1e-15, pose.pose_map_base.q_xyzw[i], read.as.set_pose.pose_map_base.q_xyzw[i]);
+  TEST_ASSERT_EQUAL_DOUBLE(0.5, read.as.set_pose.sigma_xy_m);
+  TEST_ASSERT_EQUAL_DOUBLE(0.25, read.as.set_pose.sigma_heading_rad);
+  TEST_ASSERT_EQUAL(0, wm_lcm_set_pose(&pose, 77, bytes, length - 1));
+  TEST_ASSERT_NOT_NULL(wm_lcm_read_set_pose(bytes, length - 1, &read));
+}
+
+static const char *set_pose_with(double sigma_xy_m, double sigma_heading_rad) {
+  const wm_set_pose pose = {
+      .pose_map_base.q_xyzw = {0, 0, 0, 1}, .sigma_xy_m = sigma_xy_m, .sigma_heading_rad = sigma_heading_rad};
+  wm_event read;
+  return wm_lcm_read_set_pose(bytes, wm_lcm_set_pose(&pose, 1, bytes, sizeof bytes), &read);
+}
+
+static void sigmas_of_a_pose_have_limits(void) {
+  TEST_ASSERT_NULL(set_pose_with(999999, 9.99));
+  TEST_ASSERT_NULL(set_pose_with(1e-6, 1e-6));
+  TEST_ASSERT_NOT_NULL(set_pose_with(1e6, 1));
+  TEST_ASSERT_NOT_NULL(set_pose_with(1, 10));
+  TEST_ASSERT_NOT_NULL(set_pose_with(0, 1));
+  TEST_ASSERT_NOT_NULL(set_pose_with(1, 0));
+  TEST_ASSERT_NOT_NULL(set_pose_with(NAN, 1));
+  TEST_ASSERT_NOT_NULL(set_pose_with(1, NAN));
+}
+
+static const char *read_one(const wm_event *sent) {
+  char sensor[WM_NAME_MAX];
+  wm_time_ns t_ns;
+  wm_sighting read[WM_LCM_OBSERVATIONS_MAX];
+  size_t count;
+  return wm_lcm_read_sightings(bytes, wm_lcm_observations("front", sent, 1, bytes, sizeof bytes), sensor, &t_ns, read,
+                               &count);
+}
+
+// By the table: each number is taken at its limits, and refused one step beyond.
+static void limits_of_a_sighting(void) {
+  wm_event sent = {.t_ns = 1, .kind = WM_EVENT_SIGHTING};
+  wm_sighting *s = &sent.as.sighting;
+#define TRY(member, value, is_good)     \
+  *s = wm_sighting_without_numbers();   \
+  s->bearing_rad = 0.5, s->range_m = 1; \
+  s->member = value;                    \
+  TEST_ASSERT_EQUAL_MESSAGE(is_good, read_one(&sent) == NULL, #member " " #value);
+#define IN_MESSAGE(member, least, most)       \
+  TRY(member, least, 1)                       \
+  TRY(member, most, 1)                        \
+  TRY(member, nextafter(least, -INFINITY), 0) \
+  TRY(member, nextafter(most, INFINITY), 0)
+#define NOT_IN_MESSAGE(member, least, most)
+#define BOTH(member, need, least, most, limits, since, zero_until, message) message(member, least, most)
+  WM_SIGHTING_NUMBERS(BOTH)
+}
+
+// -1: a landmark without identity; anything below is a fault.
+static void identities_of_sightings(void) {
+  wm_event sent = {.t_ns = 9, .kind = WM_EVENT_SIGHTING};
+  sent.as.sighting = wm_sighting_without_numbers();
+  sent.as.sighting.bearing_rad = 0.5;
+  char sensor[WM_NAME_MAX];
+  wm_time_ns t_ns = 0;
+  wm_sighting read[WM_LCM_OBSERVATIONS_MAX];
+  size_t count = 0;
+  for (int id = -2; id < 2; id++) {
+    sent.as.sighting.landmark_id = id;
+    const size_t length = wm_lcm_observations("laser", &sent, 1, bytes, sizeof bytes);
+    const char *why = wm_lcm_read_sightings(bytes, length, sensor, &t_ns, read, &count);
+    if (id == -2) {
+      TEST_ASSERT_EQUAL_STRING("landmark_id is below -1", why);
+      continue;
+    }
+    TEST_ASSERT_NULL(why);
+    TEST_ASSERT_EQUAL(1, count);
+    TEST_ASSERT_EQUAL(id, read[0].landmark_id);
+    TEST_ASSERT_EQUAL_INT64(9, t_ns);
+    TEST_ASSERT_EQUAL_STRING("laser", sensor);
+  }
+}
+
 // A terminal obeys control characters: C0, DEL, and C1 in UTF-8.
 static void control_characters_of_names(void) {
   static wm_health h, read;
@@ -161,6 +251,10 @@ int main(void) {
   RUN_TEST(pose);
   RUN_TEST(health);
   RUN_TEST(innovation);
+  RUN_TEST(a_pose_that_is_set);
+  RUN_TEST(sigmas_of_a_pose_have_limits);
+  RUN_TEST(limits_of_a_sighting);
+  RUN_TEST(identities_of_sightings);
   RUN_TEST(control_characters_of_names);
   return UNITY_END();
 }
