@@ -150,8 +150,12 @@ static void a_pose_that_is_set(void) {
       .pose_map_base = {.p_m = {1, 2, 3}, .q_xyzw = {0, 0, 0.6, 0.8}}, .sigma_xy_m = 0.5, .sigma_heading_rad = 0.25};
   const size_t length = wm_lcm_set_pose(&pose, 77, bytes, sizeof bytes);
   wm_event read;
+  memset(&read, 0x55, sizeof read);
   TEST_ASSERT_NULL(wm_lcm_read_set_pose(bytes, length, &read));
   TEST_ASSERT_EQUAL(WM_EVENT_SET_POSE, read.kind);
+  TEST_ASSERT_EQUAL_INT64(0, read.arrival_ns);
+  TEST_ASSERT_EQUAL(0, read.source);
+  TEST_ASSERT_EQUAL(0, read.seq);
   TEST_ASSERT_EQUAL_INT64(77, read.t_ns);
   TEST_ASSERT_EQUAL_MEMORY(pose.pose_map_base.p_m, read.as.set_pose.pose_map_base.p_m, sizeof pose.pose_map_base.p_m);
   for (int i = 0; i < 4; i++)
