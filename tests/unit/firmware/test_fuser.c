@@ -139,7 +139,7 @@ static wm_status take_points(void *self, const wm_event *e, wm_innovation *out, 
   return e->kind == WM_EVENT_POINTS ? WM_OK : WM_UNSUPPORTED;
 }
 
-static size_t particle_count, hypothesis_count;
+static size_t particle_count, hypothesis_count, hypotheses_seen;
 
 static size_t some_particles(const void *self, wm_particle *out, size_t capacity) {
   (void)self;
@@ -149,7 +149,7 @@ static size_t some_particles(const void *self, wm_particle *out, size_t capacity
 
 static size_t some_hypotheses(const void *self, wm_hypothesis *out, size_t capacity) {
   (void)self;
-  for (size_t i = 0; i < capacity && i < hypothesis_count; i++) out[i] = (wm_hypothesis){0};
+  for (size_t i = 0; i < capacity && i < hypothesis_count; i++) out[i] = (wm_hypothesis){.weight = (double)i};
   return hypothesis_count;
 }
 
@@ -164,8 +164,11 @@ static void put_cloud(void *context, wm_output_kind kind, const void *record, si
                    (unsigned)cloud->total);
     TEST_ASSERT_EQUAL(sizeof *cloud, bytes);
   }
-  if (kind == WM_OUTPUT_HYPOTHESES)
+  if (kind == WM_OUTPUT_HYPOTHESES) {
     (void)snprintf(word, sizeof word, "H%lld:%u ", (long long)(list->t_ns / MS), (unsigned)list->count);
+    for (size_t i = 0; i < list->count; i++)
+      TEST_ASSERT_EQUAL_DOUBLE((double)hypotheses_seen++, list->places[i].weight);
+  }
   strncat(said, word, sizeof said - strlen(said) - 1);
 }
 
@@ -206,7 +209,7 @@ static void hypotheses_come_in_sets(void) {
                 (wm_output){put_cloud, NULL});
   particle_count = 0;
   const size_t most = sizeof fuser.listed / sizeof fuser.listed[0];
-  hypothesis_count = most + 100;
+  hypothesis_count = most + 100, hypotheses_seen = 0;
   points(0);
   char expected[4096] = "C0:0/0 ";
   for (size_t left = most; left > 0;) {

@@ -64,6 +64,23 @@ static void nothing_is_handed_out_before_the_others_have_spoken_past_it(void) {
   TEST_ASSERT_EQUAL_STRING("10/0", final_ms());
 }
 
+// A source that does not keep its order: the newest stamp is that of no later arrival, and a stamp counts once.
+static void newest_first_and_distinct_stamps_are_counted(void) {
+  wm_merge_source loose = kCamera;
+  loose.in_order = 0;
+  open_merge((wm_merge_source[]){kMotion, loose}, 2);
+  const wm_merge_counts *counts = &merge->sources[1].counts;
+  TEST_ASSERT_EQUAL_INT64(WM_TIME_NONE, counts->newest_ns);
+  arrive(1, 10 * MS, 12 * MS);
+  TEST_ASSERT_EQUAL_INT64(10 * MS, counts->first_ns);
+  arrive(1, 20 * MS, 22 * MS);
+  arrive(1, 15 * MS, 23 * MS);
+  arrive(1, 20 * MS, 24 * MS);
+  TEST_ASSERT_EQUAL_INT64(20 * MS, counts->newest_ns);
+  TEST_ASSERT_EQUAL_INT64(10 * MS, counts->first_ns);
+  TEST_ASSERT_EQUAL_UINT64(2, counts->stamps);
+}
+
 static void motion_comes_first_then_the_rank_then_the_file(void) {
   wm_merge_source second = kCamera;
   second.rank = 7;
@@ -278,6 +295,7 @@ static void any_input_comes_out_in_order_and_is_accounted_for(void) {
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(nothing_is_handed_out_before_the_others_have_spoken_past_it);
+  RUN_TEST(newest_first_and_distinct_stamps_are_counted);
   RUN_TEST(motion_comes_first_then_the_rank_then_the_file);
   RUN_TEST(a_silent_source_costs_its_lateness_and_its_first_datum_after_that_is_fused);
   RUN_TEST(what_is_late_is_counted_and_dropped);
