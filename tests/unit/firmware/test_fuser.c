@@ -166,8 +166,8 @@ static void put_cloud(void *context, wm_output_kind kind, const void *record, si
   }
   if (kind == WM_OUTPUT_HYPOTHESES) {
     (void)snprintf(word, sizeof word, "H%lld:%u ", (long long)(list->t_ns / MS), (unsigned)list->count);
-    for (size_t i = 0; i < list->count; i++)
-      TEST_ASSERT_EQUAL_DOUBLE((double)hypotheses_seen++, list->places[i].weight);
+    for (size_t i = 0; i < list->count; i++, hypotheses_seen++)
+      TEST_ASSERT_EQUAL_DOUBLE((double)hypotheses_seen, list->places[i].weight);
   }
   strncat(said, word, sizeof said - strlen(said) - 1);
 }
