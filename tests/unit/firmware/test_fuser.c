@@ -133,6 +133,29 @@ static void health_holds_no_more_values_than_it_has_room_for(void) {
   TEST_ASSERT_NOT_NULL(wm_health_counter(&health, WM_COUNTER_MAP_FULL));
 }
 
+static void doubtful(const void *self, wm_estimate *out) {
+  tiny_estimate(self, out);
+  out->state = WM_STATE_LOST;
+  out->cause = WM_CAUSE_COUNT - 1;
+  out->cause_source = 5;
+  out->lost_probability = 0.75;
+  out->resets = 3;
+}
+
+static void health_has_what_the_estimate_has(void) {
+  static wm_health health;
+  wm_estimator doubting = kTiny;
+  doubting.estimate = doubtful;
+  wm_fuser_init(&fuser, &doubting, &state, wm_driving_choose(WM_EVENT_BIT(WM_EVENT_TWIST2), 0), (wm_output){put, NULL});
+  twist(10, 1);
+  wm_fuser_health(&fuser, &health);
+  TEST_ASSERT_EQUAL(WM_STATE_LOST, health.state);
+  TEST_ASSERT_EQUAL(WM_CAUSE_COUNT - 1, health.cause);
+  TEST_ASSERT_EQUAL(5, health.cause_source);
+  TEST_ASSERT_EQUAL_DOUBLE(0.75, health.lost_probability);
+  TEST_ASSERT_EQUAL(3, health.resets);
+}
+
 static wm_status take_points(void *self, const wm_event *e, wm_innovation *out, size_t capacity, size_t *count) {
   (void)self, (void)out, (void)capacity;
   *count = 0;
@@ -247,6 +270,7 @@ int main(void) {
   RUN_TEST(observations_are_counted_by_their_verdict);
   RUN_TEST(without_a_pose_there_is_no_row);
   RUN_TEST(health_holds_no_more_values_than_it_has_room_for);
+  RUN_TEST(health_has_what_the_estimate_has);
   RUN_TEST(clouds_are_written_once_a_second);
   RUN_TEST(hypotheses_come_in_sets);
   RUN_TEST(records_have_room_for_points_where_there_are_some);
