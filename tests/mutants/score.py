@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Mutation score: would the tests notice a wrong sign? Changes one place of a source at a time, builds, and runs the tests of its room.
 
-    score.py WORK [--room ROOM ...] [--sample N] [--seed S] [--jobs J] [--json FILE] [--file SOURCE] [--skip-headers] [--without-golden] [--list]
+    score.py WORK [--room ROOM ...] [--sample N] [--seed S] [--jobs J] [--json FILE] [--file SOURCE] [--skip-headers] [--without-golden] [--again] [--list]
 
 WORK gets a copy of the sources and a build of its own; nothing is changed outside of it. A run that was stopped goes on where it
-was: results are kept in WORK/results.jsonl. Remove that file after a change of the tests. Exit code 0 where every room reaches its floor.
+was: results are kept in WORK/results.jsonl. After a change of the tests, --again judges those anew that survived. Exit code 0 where every room reaches its floor.
 
 A mutant is killed by the tests that assert something (stage 1) or by the golden outputs alone (stage 2: some bit of a small drive
 changed). One that the compiler refuses does not count. Survivors are listed: a test is missing, or the mutant changes nothing
@@ -139,12 +139,16 @@ def sources(places):
 
 
 def chosen(room, options):
-    """A sample of the room's mutants by the seed, without those that change nothing."""
-    equivalent = {line.split("  #")[0].strip() for line in EQUIVALENT.read_text().splitlines() if line.strip() and not line.startswith("#")}
+    """A sample of the room's mutants by the seed."""
     places = options.file if options.file else ROOMS[room][0]
     every = [m for path in sources(places) for m in mutants_of(str(path.relative_to(ROOT)), path.read_text())]
-    every = [m for m in every if without_line(m) not in equivalent and not (options.skip_headers and m.file.endswith((".h", ".hpp")))]
+    every = [m for m in every if not (options.skip_headers and m.file.endswith((".h", ".hpp")))]
     return every if options.sample <= 0 else random.Random(f"{options.seed} {room}").sample(every, min(options.sample, len(every)))
+
+
+def argued():
+    """Names of the mutants that change nothing which a test could see."""
+    return {line.split("  #")[0].strip() for line in EQUIVALENT.read_text().splitlines() if line.strip() and not line.startswith("#")}
 
 
 def without_line(mutant):
@@ -154,7 +158,7 @@ def without_line(mutant):
 
 def table(results):
     """A row a room; whether all reach their floor."""
-    rows, is_good = [("room", "mutants", "killed", "golden alone", "survived", "refused", "score", "without golden")], True
+    rows, is_good = [("room", "mutants", "killed", "golden alone", "survived", "argued away", "refused", "score", "without golden")], True
     for room in ROOMS:
         count = collections.Counter(r["verdict"] for r in results if r["room"] == room)
         judged = count["killed"] + count["golden"] + count["survived"]
@@ -162,7 +166,7 @@ def table(results):
             continue
         score = (count["killed"] + count["golden"]) / judged
         is_good = is_good and score >= FLOOR
-        rows.append((room, judged, count["killed"], count["golden"], count["survived"], count["refused"], f"{score:.2f}",
+        rows.append((room, judged, count["killed"], count["golden"], count["survived"], count["argued"], count["refused"], f"{score:.2f}",
                      f"{count['killed'] / judged:.2f}"))
     for row in rows:
         print("| " + " | ".join(str(cell) for cell in row) + " |")
@@ -182,6 +186,7 @@ def main():
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--json", type=pathlib.Path, help="results of all mutants")
+    parser.add_argument("--again", action="store_true", help="judges kept mutants that survived anew")
     parser.add_argument("--list", action="store_true", help="names the mutants and ends")
     options = parser.parse_args()
     rooms = options.room or list(ROOMS)
@@ -192,13 +197,17 @@ def main():
     shop = Workshop(work, options.jobs)
     kept = work / "results.jsonl"
     done = {json.loads(line)["mutant"]: json.loads(line) for line in kept.read_text().splitlines()} if kept.exists() else {}
+    done = {name: row for name, row in done.items() if not (options.again and row["verdict"] == "survived")}
+    equivalent = argued()
     results, killers = [], collections.Counter((r["mutant"].split(":")[0], r["test"]) for r in done.values())
     for room in rooms:
         mutants = chosen(room, options)
         stages = [("killed", ROOMS[room][1])] + ([] if options.without_golden else [("golden", GOLDEN)])
-        times = usual_times(shop, [name for _, names in stages for name in names]) if any(m.name() not in done for m in mutants) else {}
+        times = usual_times(shop, [name for _, names in stages for name in names]) if any(m.name() not in done and without_line(m) not in equivalent for m in mutants) else {}
         for number, mutant in enumerate(mutants, 1):
-            if mutant.name() not in done:
+            if without_line(mutant) in equivalent:
+                done[mutant.name()] = {"room": room, "mutant": mutant.name(), "kind": mutant.kind, "verdict": "argued", "test": ""}
+            elif mutant.name() not in done:
                 begin = time.monotonic()
                 verdict, test = judge(shop, mutant, stages, times, killers)
                 done[mutant.name()] = {"room": room, "mutant": mutant.name(), "kind": mutant.kind, "verdict": verdict, "test": test,
