@@ -30,7 +30,7 @@ FLOOR = 0.9
 # A test that takes this many times its usual time, and at least so long, hangs.
 HANGS, HANGS_S = 10, 30
 
-FILTERS = ["planar", "odometry", "landmark_ekf", "landmark_elevation", "landmark_lost", "priors", "delays", "wheel_heading", "slam",
+FILTERS = ["pose_step", "planar", "odometry", "landmark_ekf", "landmark_elevation", "landmark_lost", "priors", "delays", "wheel_heading", "slam",
            "slam_camera", "slam_lost", "noise_adaption"]
 MOTION = ["motion", "commands", "motion_models", "plane_motion", "drives", "twist_and_gyro", "odometry", "wheel_heading", "delays", "space",
           "planar", "landmark_ekf"]
