@@ -193,6 +193,11 @@ void test_limits_of_states(void) {
     const double inside = 0.5 * (row.lowest + row.highest);
     TEST_ASSERT_EQUAL_DOUBLE(inside, wm::motion_state_within_limits(row.state, inside));
   }
+  for (int state = wm::kVelocityX; state < wm::kMotionStates; state++) {
+    const double most = wm::motion_state_within_limits(state, 1e9);
+    TEST_ASSERT_GREATER_OR_EQUAL_DOUBLE(10, most);
+    TEST_ASSERT_EQUAL_DOUBLE(-most, wm::motion_state_within_limits(state, -1e9));
+  }
   TEST_ASSERT_EQUAL_STRING("motion.lag_s", wm::motion_state_name(wm::kLag));
   TEST_ASSERT_EQUAL_STRING("motion.turn_rate_radps", wm::motion_state_name(wm::kTurnState));
 }
