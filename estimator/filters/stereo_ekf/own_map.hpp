@@ -10,8 +10,8 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "math/rotation.hpp"
-#include "memory/layout.hpp"
+#include "waymark/internal/math/rotation.hpp"
+#include "waymark/internal/memory/layout.hpp"
 #include "waymark/time.h"
 
 namespace wm {
