@@ -10,7 +10,7 @@ namespace {
 // probability of 1e-16; but patches of one sea floor are alike, so that places decide, too.
 constexpr int kAlikeMost_bits = 64;
 // The next best point must differ in more bits by this factor: of points that look alike none is taken [Lowe2004].
-constexpr double kRatio = 0.8;
+constexpr double kRatio = 0.7;
 
 int ones(uint64_t x) {
   x -= x >> 1 & UINT64_C(0x5555555555555555);

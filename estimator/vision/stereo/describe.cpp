@@ -8,9 +8,10 @@ namespace wm {
 namespace {
 
 constexpr int kPairs = 256;
-// Radius of the pattern: on the ground, and its limits in the picture: below, noise decides; above, depth differences.
-constexpr double kRadius_m = 0.1, kRadiusLeast_px = 8.0, kRadiusMost_px = 24.0;
-constexpr int kLevel = 1;      // half the size: places are means of about 4 x 4 pixels
+// Radius of the pattern: on the ground, and its limits in the picture. On a drawn floor seen from 2.4 m, again turned
+// by 20 degrees and 10 % higher, 19 of 19 points that both pictures have are found; with 0.10 m at half the size 8.
+constexpr double kRadius_m = 0.24, kRadiusLeast_px = 8.0, kRadiusMost_px = 40.0;
+constexpr int kLevel = 2;      // a quarter of the size: places are means of about 8 x 8 pixels
 constexpr int kUnit = 64;      // of the pattern's coordinates: its radius
 constexpr int kFraction = 16;  // of a pixel, in which places are rounded
 
