@@ -423,8 +423,10 @@ static void marker_corners(void) {
   TEST_ASSERT_EQUAL(7, sharp.id);
   for (int i = 0; i < 3; i++) TEST_ASSERT_DOUBLE_WITHIN(0.005, place[i], sharp.p_m[i]);
   TEST_ASSERT_DOUBLE_WITHIN(0.02, atan2(-cos(askew), sin(askew)), sharp.yaw_rad);
-  TEST_ASSERT_TRUE(sharp.along_sigma_m > 0.001 && sharp.along_sigma_m < 0.05 && sharp.yaw_sigma_rad > 0);
-  TEST_ASSERT_TRUE(next(corners).as.marker.along_sigma_m > 1.5 * sharp.along_sigma_m);
+  TEST_ASSERT_GREATER_THAN_DOUBLE(0.001, sharp.along_sigma_m);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.05, sharp.along_sigma_m);
+  TEST_ASSERT_GREATER_THAN_DOUBLE(0, sharp.yaw_sigma_rad);
+  TEST_ASSERT_GREATER_THAN_DOUBLE(1.5 * sharp.along_sigma_m, next(corners).as.marker.along_sigma_m);
   at_end(corners);
   TEST_ASSERT_EQUAL(1, corners->counts.malformed);
 }

@@ -43,7 +43,8 @@ void a_patch_is_found_to_a_part_of_a_pixel() {
     TEST_ASSERT_TRUE(wm::align(what, second.plane, {60, 45}, 4, 8, &found));
     TEST_ASSERT_DOUBLE_WITHIN(0.06, 60 + du, found.at.u);
     TEST_ASSERT_DOUBLE_WITHIN(0.06, 45 + dv, found.at.v);
-    TEST_ASSERT_TRUE(found.fit > 0.95 && found.sigma_px < 0.1);
+    TEST_ASSERT_GREATER_THAN_DOUBLE(0.95, found.fit);
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.1, found.sigma_px);
   }
 }
 
@@ -125,7 +126,7 @@ void most_points_decide_how_the_cameras_moved() {
   wm::rigid found;
   uint8_t agrees[60];
   TEST_ASSERT_TRUE(wm::find_motion(pair, points.data(), 60, nullptr, 1.0, 7, &found, agrees));
-  TEST_ASSERT_TRUE(wm::length(found.t - truth.t) < 1e-6);
+  TEST_ASSERT_LESS_THAN_DOUBLE(1e-6, wm::length(found.t - truth.t));
   for (int i = 0; i < 60; i++) TEST_ASSERT_EQUAL(i % 5 >= 2, agrees[i]);
   TEST_ASSERT_FALSE(wm::find_motion(pair, points.data(), wm::kFewest - 1, nullptr, 1.0, 7, &found, agrees));
 }
@@ -237,12 +238,12 @@ course swim(machine *m, int pictures, double gain, const std::vector<sea::partic
 
 void check(const course &c, double disparity_px) {
   TEST_ASSERT_GREATER_THAN(60, c.told / c.pictures);
-  TEST_ASSERT_TRUE(c.covered > 0.6);
-  TEST_ASSERT_TRUE(part(c.disparity_off_px, 0.5) < disparity_px);
-  TEST_ASSERT_TRUE(part(c.disparity_off_px, 0.95) < 4 * disparity_px);
-  TEST_ASSERT_TRUE(part(c.row_off_px, 0.5) < disparity_px);
-  TEST_ASSERT_TRUE(part(c.place_off_m, 0.5) < 0.002);  // a pixel is 6 to 20 mm of floor
-  TEST_ASSERT_TRUE(part(c.place_off_m, 0.95) < 0.015);
+  TEST_ASSERT_GREATER_THAN_DOUBLE(0.6, c.covered);
+  TEST_ASSERT_LESS_THAN_DOUBLE(disparity_px, part(c.disparity_off_px, 0.5));
+  TEST_ASSERT_LESS_THAN_DOUBLE(4 * disparity_px, part(c.disparity_off_px, 0.95));
+  TEST_ASSERT_LESS_THAN_DOUBLE(disparity_px, part(c.row_off_px, 0.5));
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.002, part(c.place_off_m, 0.5));  // a pixel is 6 to 20 mm of floor
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.015, part(c.place_off_m, 0.95));
   TEST_ASSERT_GREATER_THAN(12, c.longest);
 }
 
@@ -260,8 +261,8 @@ void haze_costs_accuracy_not_truth() {
   machine m;
   const course c = swim(&m, 16, 0.45);
   TEST_ASSERT_GREATER_THAN(40, c.told / c.pictures);
-  TEST_ASSERT_TRUE(part(c.disparity_off_px, 0.5) < 0.2);
-  TEST_ASSERT_TRUE(part(c.place_off_m, 0.95) < 0.04);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.2, part(c.disparity_off_px, 0.5));
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.04, part(c.place_off_m, 0.95));
 }
 
 void particles_are_not_told() {
@@ -274,8 +275,8 @@ void particles_are_not_told() {
   const course c = swim(&m, 16, 1.0, &particles);
   TEST_ASSERT_GREATER_THAN(50, c.told / c.pictures);
   // Were particles told, points would be metres of floor from where they began.
-  TEST_ASSERT_TRUE(part(c.place_off_m, 0.97) < 0.03);
-  TEST_ASSERT_TRUE(part(c.disparity_off_px, 0.97) < 0.6);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.03, part(c.place_off_m, 0.97));
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.6, part(c.disparity_off_px, 0.97));
 }
 
 void what_makes_no_sense_gives_nothing() {

@@ -212,6 +212,21 @@ static void zeros_that_stood_for_absent_numbers_become_nan(void) {
   TEST_ASSERT_EQUAL_DOUBLE(0, out.as.marker.yaw_rad);
 }
 
+static void a_number_is_read_from_the_version_on_it_came_with(void) {
+  wm_event in, out;
+  uint8_t bytes[WM_EVENT_ENCODED_MAX];
+  size_t used;
+  fill(&in, WM_EVENT_SIGHTING);
+  in.as.sighting.elevation_rad = 0.25;
+  in.as.sighting.elevation_sigma_rad = 0.5;
+  const size_t length = wm_event_encode(&in, bytes, sizeof bytes);
+  bytes[0] = 4;
+  TEST_ASSERT_EQUAL(WM_OK, wm_event_decode(bytes, length, &out, &used));
+  TEST_ASSERT_EQUAL(length, used);
+  TEST_ASSERT_EQUAL_DOUBLE(0.25, out.as.sighting.elevation_rad);
+  TEST_ASSERT_EQUAL_DOUBLE(0.5, out.as.sighting.elevation_sigma_rad);
+}
+
 static void bytes_are_little_endian_on_every_machine(void) {
   wm_event e = {
       .t_ns = 0x0102030405060708, .arrival_ns = -1, .seq = 0x11223344, .source = 0x5566, .kind = WM_EVENT_LOOKED};
@@ -401,6 +416,7 @@ int main(void) {
   RUN_TEST(another_version_is_refused);
   RUN_TEST(a_version_without_elevation_is_read);
   RUN_TEST(zeros_that_stood_for_absent_numbers_become_nan);
+  RUN_TEST(a_number_is_read_from_the_version_on_it_came_with);
   RUN_TEST(bytes_are_little_endian_on_every_machine);
   RUN_TEST(a_published_pose_comes_back);
   RUN_TEST(a_published_pose_of_the_version_before_is_read);

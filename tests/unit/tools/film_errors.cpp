@@ -18,8 +18,8 @@ void tearDown(void);
 }
 
 using namespace wm::sim;
-using wm::render::Vec2;
-using wm::render::Vec3;
+using wm::images::Vec2;
+using wm::images::Vec3;
 
 namespace {
 
@@ -76,8 +76,8 @@ std::vector<Label> labels_of(const Film &film, size_t camera) {
 
 using Unknowns = Eigen::Matrix<double, 10, 1>;  // turned (3), moved (3), fx, fy, cx, cy (relative)
 
-wm::render::Camera changed(const wm::render::Camera &believed, const Unknowns &x) {
-  wm::render::Camera c = believed;
+wm::images::Camera changed(const wm::images::Camera &believed, const Unknowns &x) {
+  wm::images::Camera c = believed;
   const double nowhere[3] = {0, 0, 0};
   c.T_base_camera = believed.T_base_camera * pose_of(nowhere, x.data());
   c.T_base_camera.translation() += x.segment<3>(3);
@@ -88,7 +88,7 @@ wm::render::Camera changed(const wm::render::Camera &believed, const Unknowns &x
 // Gauss-Newton from the calibration on, by what truth and labels say.
 Unknowns camera_from_labels(const Film &film, size_t number, double &rms_px) {
   const std::vector<Label> labels = labels_of(film, number);
-  TEST_ASSERT_TRUE(labels.size() > 100);
+  TEST_ASSERT_GREATER_THAN(100, labels.size());
   Unknowns x = Unknowns::Zero();
   for (int pass = 0; pass < 8; pass++) {
     Eigen::Matrix<double, 10, 10> A = Eigen::Matrix<double, 10, 10>::Zero();
@@ -97,9 +97,9 @@ Unknowns camera_from_labels(const Film &film, size_t number, double &rms_px) {
     for (const Label &l : labels) {
       const Vec3 in_base = true_pose(film.recording, l.t_s).inverse() * l.place;
       const auto pixel = [&](const Unknowns &at) {
-        const wm::render::Camera c = changed(film.cameras[number].believed, at);
+        const wm::images::Camera c = changed(film.cameras[number].believed, at);
         Vec2 p(0, 0);
-        wm::render::project(c, wm::render::T_base_optical(c).inverse() * in_base, p);
+        wm::images::project(c, wm::images::T_base_optical(c).inverse() * in_base, p);
         return p;
       };
       const Vec2 off = l.pixel - pixel(x);
@@ -126,7 +126,7 @@ void camera_is_found_in_the_labels(const char *name) {
     double rms_px = 0;
     const Unknowns x = camera_from_labels(film, camera, rms_px);
     TEST_ASSERT_TRUE_MESSAGE(rms_px < 0.002, name);  // labels are rounded to 0.001 px
-    const wm::render::Camera &truth = film.cameras[camera].truth, found = changed(film.cameras[camera].believed, x);
+    const wm::images::Camera &truth = film.cameras[camera].truth, found = changed(film.cameras[camera].believed, x);
     const Eigen::AngleAxisd turned(
         Eigen::Matrix3d(truth.T_base_camera.linear().transpose() * found.T_base_camera.linear()));
     TEST_ASSERT_DOUBLE_WITHIN(0.01 * kDegree, 0, turned.angle());
@@ -191,10 +191,10 @@ void test_stamps_and_arrivals_are_as_said() {
         arrival.add(after_s);
       else
         late++;
-      TEST_ASSERT_TRUE(after_s >= (hard ? 0.04 : 0.02));
+      TEST_ASSERT_GREATER_OR_EQUAL_DOUBLE((hard ? 0.04 : 0.02), after_s);
     }
     const double times_two = hard ? 2 : 1, n = stamp.n;
-    TEST_ASSERT_TRUE(n > 800);
+    TEST_ASSERT_GREATER_THAN(800, n);
     TEST_ASSERT_DOUBLE_WITHIN(4 * 0.002 * times_two / std::sqrt(n), 0.010 * times_two, stamp.mean());
     TEST_ASSERT_DOUBLE_WITHIN(0.1, 1, stamp.deviation() / (0.002 * times_two));
     TEST_ASSERT_DOUBLE_WITHIN(0.003 * times_two, 0.040 * times_two, arrival.mean());
@@ -220,7 +220,7 @@ void test_the_map_is_off_as_said() {
       for (int axis = 0; axis < 3; axis++) off.add(r.map[i].p_m[axis] - film.recording.landmarks[i].p_m[axis]);
     }
   }
-  TEST_ASSERT_TRUE(off.n > 400);
+  TEST_ASSERT_GREATER_THAN(400, off.n);
   TEST_ASSERT_DOUBLE_WITHIN(3 / std::sqrt(2 * off.n), 1, off.rms() / 0.02);
 }
 
@@ -260,7 +260,7 @@ void check_bearings(const char *name) {
     const Vec3 p = from_sensor(film, s.t_ns, s.sensor, s.id);
     noise.add(wrap(s.bearing_rad - std::atan2(p.y(), p.x())));
   }
-  TEST_ASSERT_TRUE(noise.n > 3000);
+  TEST_ASSERT_GREATER_THAN(3000, noise.n);
   TEST_ASSERT_DOUBLE_WITHIN(0.05, 1, noise.rms() / (0.3 * kDegree));
   TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.05, outliers / (noise.n + outliers));
 }
@@ -281,7 +281,7 @@ void test_markers_of_pictures_have_their_noise() {
     for (const wm_landmark &l : film.recording.landmarks)
       if (l.id == m.id) yaw.add(wrap(m.yaw_rad - l.yaw_rad + heading));
   }
-  TEST_ASSERT_TRUE(distance.n > 1000);
+  TEST_ASSERT_GREATER_THAN_DOUBLE(1000, distance.n);
   TEST_ASSERT_DOUBLE_WITHIN(0.08, 1, distance.rms() / 0.005);
   TEST_ASSERT_DOUBLE_WITHIN(0.08, 1, yaw.rms() / (0.5 * kDegree));
 }
@@ -297,13 +297,13 @@ void test_stereo_points_of_pictures_have_their_noise() {
     one_side += std::isnan(s.left_px[0]) || std::isnan(s.right_px[0]);
     for (int side = 0; side < 2; side++) {
       const double *px = side ? s.right_px : s.left_px;
-      const wm::render::Camera &c = film.cameras[static_cast<size_t>(side)].truth;
+      const wm::images::Camera &c = film.cameras[static_cast<size_t>(side)].truth;
       Vec2 pixel;
-      TEST_ASSERT_TRUE(wm::render::project(c, wm::render::T_base_optical(c).inverse() * in_base, pixel));
+      TEST_ASSERT_TRUE(wm::images::project(c, wm::images::T_base_optical(c).inverse() * in_base, pixel));
       if (!std::isnan(px[0])) noise.add(px[0] - pixel.x()), noise.add(px[1] - pixel.y());
     }
   }
-  TEST_ASSERT_TRUE(noise.n > 2000);
+  TEST_ASSERT_GREATER_THAN(2000, noise.n);
   TEST_ASSERT_DOUBLE_WITHIN(0.06, 1, noise.rms() / 0.5);
   TEST_ASSERT_TRUE(one_side > 10);
 }

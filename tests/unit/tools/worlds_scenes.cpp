@@ -10,9 +10,9 @@
 #include <string>
 #include <vector>
 
-#include "simulate/render/render.h"
+#include "render/render.h"
 #include "simulate/route.h"
-#include "simulate/worlds/world.h"
+#include "worlds/world.h"
 
 extern "C" {
 #include <apriltag/apriltag.h>
@@ -26,10 +26,10 @@ void setUp(void) {}
 void tearDown(void) {}
 
 using namespace wm::sim;
+using wm::images::Pose;
+using wm::images::Vec2;
+using wm::images::Vec3;
 using wm::render::Image;
-using wm::render::Pose;
-using wm::render::Vec2;
-using wm::render::Vec3;
 
 namespace {
 
@@ -59,10 +59,10 @@ class Motion {
   Pose at(double t_ns) const {
     if (world_.vehicle == Vehicle::six) {
       const State6 s = world_.path.at(t_ns * 1e-9);
-      return wm::render::pose_xyz_rpy({s.xyz_m[0], s.xyz_m[1], s.xyz_m[2]}, s.rpy_rad[0], s.rpy_rad[1], s.rpy_rad[2]);
+      return wm::images::pose_xyz_rpy({s.xyz_m[0], s.xyz_m[1], s.xyz_m[2]}, s.rpy_rad[0], s.rpy_rad[1], s.rpy_rad[2]);
     }
     const State s = drive_.at(t_ns * 1e-9);
-    return wm::render::pose_xyz_rpy({s.x_m, s.y_m, 0}, 0, 0, s.heading_rad);
+    return wm::images::pose_xyz_rpy({s.x_m, s.y_m, 0}, 0, 0, s.heading_rad);
   }
   wm::render::Shot shot(double share, uint64_t frame) const {
     wm::render::Shot s;
@@ -78,7 +78,7 @@ class Motion {
   Drive drive_;
 };
 
-Image picture(const World &world, const wm::render::Camera &camera, const wm::render::Shot &shot, int samples) {
+Image picture(const World &world, const wm::images::Camera &camera, const wm::render::Shot &shot, int samples) {
   wm::render::Quality quality;
   quality.samples = samples;
   std::string error;
@@ -140,7 +140,7 @@ bool edge_offset(const Image &image, double u, double v, double du, double dv, d
 void corridor_labels_lie_on_edges_of_the_picture() {
   const auto world = made("corridor", false, 2);
   const Motion motion(*world);
-  const wm::render::Camera &camera = world->cameras[0].camera;
+  const wm::images::Camera &camera = world->cameras[0].camera;
   std::vector<double> offsets;
   size_t points = 0;
   for (const double share : {0.05, 0.17, 0.33, 0.52, 0.71, 0.9}) {
@@ -149,7 +149,7 @@ void corridor_labels_lie_on_edges_of_the_picture() {
     std::string text;
     world->label(0, camera, shot, text);
     const auto rows = numbers(text);
-    TEST_ASSERT_TRUE(rows.size() > 40);
+    TEST_ASSERT_GREATER_THAN(40, rows.size());
     for (size_t i = 1; i + 1 < rows.size(); i++) {
       const auto &a = rows[i - 1], &p = rows[i], &b = rows[i + 1];
       if (a[1] != p[1] || b[1] != p[1]) continue;
@@ -164,18 +164,18 @@ void corridor_labels_lie_on_edges_of_the_picture() {
     // Each label, looked at through its pixel, is the foot of a wall.
     for (const auto &row : rows) {
       Vec3 direction;
-      TEST_ASSERT_TRUE(wm::render::unproject(camera, {row[2], row[3]}, direction));
-      const Pose T = motion.at(static_cast<double>(shot.t_ns)) * wm::render::T_base_optical(camera);
+      TEST_ASSERT_TRUE(wm::images::unproject(camera, {row[2], row[3]}, direction));
+      const Pose T = motion.at(static_cast<double>(shot.t_ns)) * wm::images::T_base_optical(camera);
       const Vec3 ray = T.linear() * direction;
       const Point foot{T.translation().x() - ray.x() * T.translation().z() / ray.z(),
                        T.translation().y() - ray.y() * T.translation().z() / ray.z()};
       double nearest = 1e9;
       for (const Face &f : world->plan.faces)
         if (f.bottom_m <= 0 && f.mapped) nearest = std::min(nearest, distance_m(foot, f));
-      TEST_ASSERT_TRUE(nearest < 0.02);
+      TEST_ASSERT_LESS_THAN_DOUBLE(0.02, nearest);
     }
   }
-  TEST_ASSERT_TRUE(offsets.size() > points / 2);
+  TEST_ASSERT_GREATER_THAN(points / 2, offsets.size());
   double mean = 0;
   for (double &o : offsets) mean += o / static_cast<double>(offsets.size()), o = std::fabs(o);
   std::sort(offsets.begin(), offsets.end());
@@ -183,8 +183,8 @@ void corridor_labels_lie_on_edges_of_the_picture() {
   std::printf("corridor: %zu of %zu label points at an edge, mean %.3f px, median |.| %.3f, p90 %.3f px\n",
               offsets.size(), points, mean, median, p90);
   TEST_ASSERT_DOUBLE_WITHIN(0.15, 0, mean);
-  TEST_ASSERT_TRUE(median < 0.15);
-  TEST_ASSERT_TRUE(p90 < 0.5);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.15, median);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.5, p90);
 }
 
 // An outside judge: AprilTag's own detector, whose pixel centres lie at +0.5. Its corners run counter-clockwise from
@@ -198,9 +198,9 @@ void office_labels_are_what_apriltag_finds() {
   detector->quad_decimate = 1;
   for (const bool on_walls : {false, true}) {
     const auto world = made("office", false, 4, on_walls);
-    TEST_ASSERT_TRUE(world->truth.size() >= 12);
+    TEST_ASSERT_GREATER_OR_EQUAL(12, world->truth.size());
     const Motion motion(*world);
-    const wm::render::Camera &camera = world->cameras[0].camera;
+    const wm::images::Camera &camera = world->cameras[0].camera;
     int labelled = 0, found = 0, strange = 0;
     double worst = 0;
     for (double share = 0.02; share < 0.34; share += 0.035) {
@@ -235,9 +235,9 @@ void office_labels_are_what_apriltag_finds() {
     std::printf("office, markers on the %s: %d labelled, %d of them found, corners within %.2f px\n",
                 on_walls ? "walls" : "ceiling", labelled, found, worst);
     TEST_ASSERT_TRUE(labelled > 10);
-    TEST_ASSERT_TRUE(found >= labelled * (on_walls ? 7 : 9) / 10);
+    TEST_ASSERT_GREATER_OR_EQUAL(labelled * (on_walls ? 7 : 9) / 10, found);
     TEST_ASSERT_EQUAL(0, strange);
-    TEST_ASSERT_TRUE(worst < 1.0);
+    TEST_ASSERT_LESS_THAN_DOUBLE(1.0, worst);
   }
 }
 
@@ -258,7 +258,7 @@ void office_prints_come_whole_into_view() {
       world->label(0, world->cameras[0].camera, motion.shot(static_cast<double>(i) / pictures, 0), text);
       for (const auto &row : numbers(text)) whole[static_cast<int>(row[1])]++;
     }
-    TEST_ASSERT_TRUE(world->truth.size() >= 9);
+    TEST_ASSERT_GREATER_OR_EQUAL(9, world->truth.size());
     int least = pictures;
     for (const auto &t : world->truth) least = std::min(least, whole[t.id]);
     std::printf("office%s, %zu markers on the %s: each is whole in %d and more of %d pictures\n",
@@ -270,8 +270,8 @@ void office_prints_come_whole_into_view() {
 void hall_labels_point_at_upright_edges() {
   const auto world = made("hall", false, 3);
   const Motion motion(*world);
-  const wm::render::Camera &camera = world->cameras[0].camera;
-  TEST_ASSERT_TRUE(world->lines.size() >= 30);
+  const wm::images::Camera &camera = world->cameras[0].camera;
+  TEST_ASSERT_GREATER_OR_EQUAL(30, world->lines.size());
   size_t labelled = 0, contrast = 0;
   std::vector<double> offsets;
   for (const double share : {0.03, 0.2, 0.41}) {
@@ -280,8 +280,8 @@ void hall_labels_point_at_upright_edges() {
     std::string text;
     world->label(0, camera, shot, text);
     const auto rows = numbers(text);
-    TEST_ASSERT_TRUE(rows.size() >= 15);
-    TEST_ASSERT_TRUE(rows.size() <= world->lines.size());
+    TEST_ASSERT_GREATER_OR_EQUAL(15, rows.size());
+    TEST_ASSERT_LESS_OR_EQUAL(world->lines.size(), rows.size());
     const Pose T = motion.at(static_cast<double>(shot.t_ns));
     for (const auto &row : rows) {
       labelled++;
@@ -303,7 +303,7 @@ void hall_labels_point_at_upright_edges() {
   TEST_ASSERT_TRUE(contrast > labelled / 3);
   std::printf("hall: %zu lines labelled, %zu with contrast, median |.| %.3f px\n", labelled, contrast,
               offsets[offsets.size() / 2]);
-  TEST_ASSERT_TRUE(offsets[offsets.size() / 2] < 0.3);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.3, offsets[offsets.size() / 2]);
 }
 
 // What a label's pixel shows, by a ray of its own.
@@ -312,11 +312,11 @@ void labels_of_signs_and_beacons_show_them() {
     const auto world = made(name, false, 1);
     const Motion motion(*world);
     size_t labelled = 0;
-    TEST_ASSERT_TRUE(world->truth.size() >= 12);
+    TEST_ASSERT_GREATER_OR_EQUAL(12, world->truth.size());
     TEST_ASSERT_TRUE(world->landmarks_known);
     for (double share = 0.05; share < 1; share += 0.06)
       for (size_t k = 0; k < world->cameras.size(); k++) {
-        wm::render::Camera camera = world->cameras[k].camera;
+        wm::images::Camera camera = world->cameras[k].camera;
         camera.readout_ns = 20000000;  // a rolling shutter moves what is seen
         const wm::render::Shot shot = motion.shot(share, 3);
         std::string text;
@@ -324,15 +324,15 @@ void labels_of_signs_and_beacons_show_them() {
         for (const auto &row : numbers(text)) {
           TEST_ASSERT_EQUAL(static_cast<int>(k), static_cast<int>(row[1]));
           Vec3 direction;
-          TEST_ASSERT_TRUE(wm::render::unproject(camera, {row[3], row[4]}, direction));
-          const double t_ns = static_cast<double>(shot.t_ns) + wm::render::row_offset_ns(camera, row[4]);
-          const Pose T = motion.at(t_ns) * wm::render::T_base_optical(camera);
+          TEST_ASSERT_TRUE(wm::images::unproject(camera, {row[3], row[4]}, direction));
+          const double t_ns = static_cast<double>(shot.t_ns) + wm::images::row_offset_ns(camera, row[4]);
+          const Pose T = motion.at(t_ns) * wm::images::T_base_optical(camera);
           const Vec3 ray = T.linear() * direction;
           const wm::render::Hit hit = world->scene.cast(T.translation(), ray);
           TEST_ASSERT_TRUE(hit.there);
           const Vec3 place = world->truth[static_cast<size_t>(row[2]) - 1].p;
-          TEST_ASSERT_TRUE((hit.point - place).norm() < (world->panels.empty() ? 0.15 : 0.03));
-          TEST_ASSERT_TRUE((place - T.translation()).cross(ray).norm() < 0.002);
+          TEST_ASSERT_LESS_THAN_DOUBLE((world->panels.empty() ? 0.15 : 0.03), (hit.point - place).norm());
+          TEST_ASSERT_LESS_THAN_DOUBLE(0.002, (place - T.translation()).cross(ray).norm());
           labelled++;
         }
       }
@@ -342,7 +342,7 @@ void labels_of_signs_and_beacons_show_them() {
 }
 
 void requests_repeat_and_differ() {
-  wm::render::Camera small;
+  wm::images::Camera small;
   for (const char *name : {"corridor", "office", "hall", "seabed"}) {
     std::vector<std::vector<float>> pictures;
     std::vector<std::string> labels;
