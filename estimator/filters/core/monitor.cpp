@@ -50,6 +50,12 @@ constexpr double kFoundWrong = 0.08;  // probability that a contradicted or a fo
 // within kAgain_s, or if the one before did not fit for kProven_s more than it was contradicted. Each further one of
 // these is on probation for as much longer. What fitted more than kLongAgo_s ago does not count.
 constexpr double kProbation_s = 3.0, kAgain_s = 60.0, kProven_s = 5.0, kLongAgo_s = 60.0;
+// A start that is contradicted before the robot drove for kProof_s in agreement may be wrong; so may map, sensors and
+// motion. A pose that is found then is degraded until it has fitted for kProof_s of driving: wrong ones fit by chance,
+// at rest for as long as that lasts, and along a corridor for 28 s (corridor-a, plan mirrored).
+constexpr double kProof_s = 40.0, kDrives_mps = 0.05, kDrives_radps = 0.05;
+// Lost for so long, the filter's covariance is inflated, and what fits again is another pose (lifecycle.hpp).
+constexpr double kInflated_s = 3.0;
 constexpr double kAround_m = 5.0;   // sigma of a lost robot's distance from the map (landmark_ekf.cpp)
 constexpr double kOutside_m = 5.0;  // beyond the map's border and three sigma
 constexpr double kNear = 9.0;       // three sigma, squared
@@ -232,10 +238,10 @@ void clear_windows(wm_monitor *self) {
 void clear(wm_monitor *self) {
   clear_windows(self);
   self->is_noise_at_limit = 0;
-  self->doubt_s = self->fitted_s = self->since_found_s = self->contradicted_s = 0.0;
+  self->doubt_s = self->fitted_s = self->since_found_s = self->contradicted_s = self->proof_s = self->lost_s = 0.0;
   self->cause = WM_CAUSE_NONE;
   self->source = self->silent = -1;
-  self->found = self->is_unsupported = self->is_outside = self->was_lost = self->is_probation = 0;
+  self->found = self->is_unsupported = self->is_outside = self->was_lost = self->is_probation = self->is_found_early = 0;
   self->stepped_ns = WM_TIME_NONE;  // the next step takes the number of resets as it is
 }
 
@@ -249,15 +255,24 @@ void widen_box(wm_monitor *self, double x_m, double y_m) {
       square(kAround_m) + (square(self->high_m[0] - self->low_m[0]) + square(self->high_m[1] - self->low_m[1])) / 24.0;
 }
 
+// Of a pose that was found before any was proven.
+double least_doubt_s(const wm_monitor &self) {
+  return self.is_found_early && self.proof_s < kProof_s ? kProbation_s : 0.0;
+}
+
 // The search found another pose: what contradicted the former one does not count against it.
-void take_found(wm_monitor *self) {
+void take_found(wm_monitor *self, bool was_lost) {
   clear_windows(self);
-  if (!self->was_lost) return;
+  if (!was_lost) return;
+  if (self->proof_s < kProof_s) {
+    self->is_found_early = 1;
+    self->proof_s = 0.0;
+  }
   const bool again = self->found > 0 && self->since_found_s < kAgain_s;
   self->is_probation = again || self->fitted_s < kProven_s || self->contradicted_s > kExcused_s;
   if (!self->is_probation) self->found = 0;
   const double probation_s = kProbation_s * larger(self->found, 1.0) + 0.5 * self->contradicted_s;
-  self->doubt_s = !self->is_probation ? 0.0 : probation_s < kLostAfter_s ? probation_s : kLostAfter_s;
+  self->doubt_s = !self->is_probation ? least_doubt_s(*self) : probation_s < kLostAfter_s ? probation_s : kLostAfter_s;
   self->cause = self->doubt_s > 0.0 ? WM_CAUSE_LOST_AGAIN : WM_CAUSE_NONE;
   self->source = -1;
   self->found++;
@@ -355,7 +370,19 @@ void count_doubt(wm_monitor *self, bool contradicts, bool fits, double dt_s) {
   if (!fits) return;
   const double weight = 1.0 / (1.0 + larger(self->contradicted_s - kExcused_s, 0.0) / kSuspect_s);
   self->fitted_s = self->fitted_s < kLongAgo_s ? self->fitted_s + dt_s : kLongAgo_s;
-  self->doubt_s = larger(self->doubt_s - (self->is_probation ? 1.0 : kFitRate) * weight * dt_s, 0.0);
+  const double left_s = self->doubt_s - (self->is_probation ? 1.0 : kFitRate) * weight * dt_s;
+  self->doubt_s = larger(left_s, least_doubt_s(*self));
+}
+
+// Time of driving in agreement with the observations. Contradictions before kProof_s begin it anew.
+void count_proof(wm_monitor *self, const wm_estimate &e, bool contradicts, bool fits, double dt_s) {
+  if (self->proof_s >= kProof_s) return;
+  const bool drives = square(e.v_mps[0]) + square(e.v_mps[1]) > square(kDrives_mps) ||
+                      std::fabs(e.w_radps[2]) > kDrives_radps;
+  if (contradicts)
+    self->proof_s = 0.0;
+  else if (fits && drives)
+    self->proof_s += dt_s;
 }
 
 // The covariance of the mixture of this pose and one anywhere on the map; a filter that has widened its own keeps it.
@@ -423,16 +450,19 @@ void wm_monitor_step(wm_monitor *self, const wm_estimate *e, const wm_calibratio
     self->resets = e->resets;
     return;
   }
-  if (!is_first && e->resets != self->resets) wm::take_found(self);
+  const bool is_lost = e->state == WM_STATE_LOST, fits_again = !is_lost && self->lost_s > wm::kInflated_s;
+  if (!is_first && (e->resets != self->resets || fits_again)) wm::take_found(self, self->was_lost || is_lost);
   self->resets = e->resets;
   self->since_found_s += dt_s;
-  self->was_lost = e->state == WM_STATE_LOST;
+  self->was_lost = is_lost;
+  self->lost_s = is_lost ? self->lost_s + dt_s : 0.0;
   if (!self->is_map_known) wm::widen_box(self, e->pose_map_base.p_m[0], e->pose_map_base.p_m[1]);
   bool fits;
   const bool is_noisy = wm::test_calibration(self, calibration, count);
   const bool is_turned = wm::test_turn(self, calibration, count);
   const bool contradicts = wm::test_sources(self, e->t_ns, &fits) || is_noisy || is_turned;
   wm::count_contradicted(self, contradicts, fits && !self->was_lost, dt_s);
+  wm::count_proof(self, *e, contradicts, fits && !self->was_lost, dt_s);
   wm::count_doubt(self, contradicts, fits && !self->was_lost, dt_s);
   // Without a map every identity is unknown; that is a matter of the configuration.
   if (e->state != WM_STATE_DEAD_RECKONING || !self->is_map_known) self->is_unsupported = 0;

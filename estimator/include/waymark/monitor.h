@@ -75,6 +75,8 @@ typedef struct wm_monitor {
   double fitted_s;                        // time of fitting observations since the pose was set or found
   double since_found_s;                   // since a search found a pose
   double contradicted_s;                  // lost or contradicted, less a share of the time without doubt
+  double proof_s;                         // of driving in agreement with the observations
+  double lost_s;                          // by the estimator, without a break
   wm_time_ns begun_ns, stepped_ns, next_ns;
   uint32_t resets;
   int32_t cause, source;        // of the present doubt; source -1: none
@@ -82,6 +84,7 @@ typedef struct wm_monitor {
   int32_t is_unsupported, is_outside;
   int32_t was_lost, silent;   // by the estimator; silent: source, -1: none
   int32_t is_probation;       // of a found pose, until it fits
+  int32_t is_found_early;     // a pose was found before one was proven
   int32_t is_noise_at_limit;  // an adapted noise
 } wm_monitor;
 
