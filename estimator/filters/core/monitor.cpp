@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Three tests of a source's recent innovations, each at kAlarm: the share that gates refuse (binomial), the mean square
+// Tests of a source's recent innovations, each at kAlarm: the share that gates refuse (binomial), the mean square
 // over the variance (chi-square), the mean over sigma (normal) [BarShalom2001, ch. 5.4]. Observations of one slot count
 // as one of each landmark, since their errors are correlated. An adapted noise hides what it explains: one at its limit
 // fails a test as well. Failed tests are time of doubt; observations that fit make up for it.
@@ -8,7 +8,9 @@
 #include <cmath>
 #include <cstring>
 
+#include "filters/core/chi_square.hpp"
 #include "filters/core/course_test.hpp"
+#include "filters/core/landmark_bias.hpp"
 #include "filters/core/noise_adaption.hpp"
 #include "filters/core/scale_test.hpp"
 #include "filters/core/turn_check.hpp"
@@ -20,7 +22,6 @@ namespace {
 // Probability that a test fails although the pose is right. Tests overlap: windows of 2, 5 and 10 s are about 2900
 // independent ones an hour and kind, so that a source raises less than one false alarm an hour; it lasts some 10 s.
 constexpr double kAlarm_log = 9.21;  // -log(1e-4)
-constexpr double kAlarm_z = 3.72;    // one-sided quantile of a normal variable
 constexpr double kAlarm_z2 = 3.89;   // two-sided
 // Correlation time of the errors of sightings (as in landmark_evidence.cpp) and of positions (multipath passes in 5 s).
 constexpr double kSlot_s = 0.3, kPositionSlot_s = 5.0;
@@ -183,12 +184,6 @@ bool is_too_large_a_share(double sum, int n, double p) {
   return n * divergence > kAlarm_log;
 }
 
-// Wilson's and Hilferty's approximation of the chi-square quantile.
-double chi_square_limit(double dof) {
-  const double c = 2.0 / (9.0 * dof), root = 1.0 - c + kAlarm_z * std::sqrt(c);
-  return dof * root * root * root;
-}
-
 bool is_biased(const window &w) {
   for (int k = 0; k < WM_MONITOR_KINDS; k++) {
     if (w.of[k] == 0) continue;
@@ -229,6 +224,7 @@ verdict_of_source test(const source &s, wm_time_ns t_ns, bool is_suspect) {
 }
 
 void clear_windows(wm_monitor *self) {
+  landmark_bias_clear(&self->landmarks);
   for (source &s : self->sources) {
     s.opened = 0;
     s.cause = WM_CAUSE_NONE;
@@ -325,6 +321,17 @@ bool test_turn(wm_monitor *self, const wm_calibration_value *values, size_t coun
   for (size_t i = 0; i < count; i++) contradicts = contradicts || turn_check::contradicts(values[i]);
   if (!contradicts) return false;
   self->cause = WM_CAUSE_TURN;
+  self->source = -1;
+  return true;
+}
+
+// Innovations of several landmarks that have a mean. Landmarks that a filter has placed itself are off for long where a
+// line of sight is all that it has.
+bool test_landmarks(wm_monitor *self, wm_time_ns t_ns) {
+  if (self->is_map_known != 1) return false;
+  landmark_bias_test(&self->landmarks, t_ns);
+  if (!landmark_bias_contradicts(self->landmarks)) return false;
+  self->cause = WM_CAUSE_BIASED;
   self->source = -1;
   return true;
 }
@@ -430,6 +437,9 @@ int wm_monitor_take(wm_monitor *self, const wm_event *event, const wm_innovation
     wm_monitor_source *s = &self->sources[event->source];
     s->newest_ns = event->t_ns;
     wm::add_observation(s, *event, records, count);
+    for (size_t i = 0; i < count; i++)
+      if (records[i].verdict == WM_FUSED || records[i].verdict == WM_REJECTED_GATE)
+        wm::landmark_bias_take(&self->landmarks, records[i]);
     if (event->kind == WM_EVENT_POSITION) wm::course_take(&self->course, event->t_ns, event->as.position);
   }
   if (self->begun_ns == WM_TIME_NONE) self->begun_ns = event->t_ns;
@@ -460,7 +470,8 @@ void wm_monitor_step(wm_monitor *self, const wm_estimate *e, const wm_calibratio
   bool fits;
   const bool is_noisy = wm::test_calibration(self, calibration, count);
   const bool is_turned = wm::test_turn(self, calibration, count);
-  const bool contradicts = wm::test_sources(self, e->t_ns, &fits) || is_noisy || is_turned;
+  const bool are_biased = wm::test_landmarks(self, e->t_ns);
+  const bool contradicts = wm::test_sources(self, e->t_ns, &fits) || is_noisy || is_turned || are_biased;
   wm::count_contradicted(self, contradicts, fits && !self->was_lost, dt_s);
   wm::count_proof(self, *e, contradicts, fits && !self->was_lost, dt_s);
   wm::count_doubt(self, contradicts, fits && !self->was_lost, dt_s);

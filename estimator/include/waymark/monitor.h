@@ -64,10 +64,29 @@ typedef struct wm_monitor_course {
   int32_t is_mirrored, is_impossible;
 } wm_monitor_course;
 
+#define WM_MONITOR_LANDMARKS 48
+
+// A residual of a landmark: its slots' mean innovations over sigma, summed up with forgetting.
+typedef struct wm_monitor_landmark {
+  int32_t id;
+  uint16_t source;
+  uint16_t residual;
+  wm_time_ns at_ns, slot_ns;  // of the sum; begin of the present slot
+  double sum, variance;
+  double slot_sum, slot_count;
+} wm_monitor_landmark;
+
+typedef struct wm_monitor_landmarks {
+  wm_monitor_landmark entries[WM_MONITOR_LANDMARKS];
+  uint32_t count;
+  int32_t contradicts;
+} wm_monitor_landmarks;
+
 typedef struct wm_monitor {
   wm_monitor_source sources[WM_MONITOR_SOURCES];
   uint64_t observers;  // bit for each source that may give observations
   wm_monitor_course course;
+  wm_monitor_landmarks landmarks;         // of a known map
   double scale_sigma[WM_MONITOR_SCALES];  // stated; 0: no state
   double spread_m2;                       // variance of a place anywhere on the map, each axis
   double low_m[2], high_m[2];             // the map, else the way so far
