@@ -11,6 +11,7 @@
 #include "filters/core/chi_square.hpp"
 #include "filters/core/course_test.hpp"
 #include "filters/core/landmark_bias.hpp"
+#include "filters/core/lasting_error.hpp"
 #include "filters/core/noise_adaption.hpp"
 #include "filters/core/scale_test.hpp"
 #include "filters/core/turn_check.hpp"
@@ -303,11 +304,12 @@ int32_t silent_source(const wm_monitor &self, wm_time_ns t_ns) {
 
 // Sources in disagreement raise the noise of the motion, or of one of them, as far as it may grow. In 25 good drives,
 // real and simulated, the largest factor is 15.5 (plaza-1).
-// Or they bend a scale far from what the configuration states.
+// Or they bend a scale, or the lasting error of positions, far from what the configuration states.
 bool test_calibration(wm_monitor *self, const wm_calibration_value *values, size_t count) {
   self->is_noise_at_limit = 0;
   for (size_t i = 0; i < count; i++)
-    if (noise_adaption::is_at_limit(values[i]) || scale_contradicts(self->scale_sigma, values[i]))
+    if (noise_adaption::is_at_limit(values[i]) || scale_contradicts(self->scale_sigma, values[i]) ||
+        lasting_error_contradicts(values[i]))
       self->is_noise_at_limit = 1;
   if (!self->is_noise_at_limit) return false;
   self->cause = WM_CAUSE_INCONSISTENT;

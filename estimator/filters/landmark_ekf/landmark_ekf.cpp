@@ -2,8 +2,10 @@
 #include "filters/landmark_ekf/landmark_ekf.hpp"
 
 #include <cstring>
+#include <limits>
 
 #include "filters/core/contract.hpp"
+#include "filters/core/lasting_error.hpp"
 #include "filters/core/recovery.hpp"
 #include "filters/planar/set_pose.hpp"
 #include "filters/registry.h"
@@ -223,6 +225,8 @@ size_t landmark_ekf::list_calibration(wm_calibration_value *out, size_t capacity
     list.add("gnss", "time_offset_s", filter_.value(gnss_time_state_), std::sqrt(filter_.variance(gnss_time_state_)));
   filter_.noise().list(&list);
   filter_.turn_test().list(&list);
+  if (const double sigmas = lasting_error(); sigmas > kLastingMost)
+    list.add(kLastingErrorName, sigmas, std::numeric_limits<double>::quiet_NaN());
   return list.count();
 }
 

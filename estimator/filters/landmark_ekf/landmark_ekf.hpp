@@ -87,6 +87,7 @@ class landmark_ekf {
   void finish_row(wm_residual kind, double observed, double expected, const wm_innovation &record, residual *r) const;
   void decay_tilt(wm_time_ns t_ns);
   void decay_gnss_error(wm_time_ns t_ns, double sigma_m);
+  double lasting_error() const;  // of the receiver, over its sigma; 0 where it is no state
 
   // Gates one or two components jointly, weakens or rejects, updates, writes the records. Returns the log Bayes factor
   // of "anywhere in clutter_volume" against "as expected". `usable` false: the source is known to be wrong.
