@@ -60,6 +60,7 @@ class landmark_ekf {
   struct residual {
     planar_row row;
     double innovation, noise;
+    double least_noise = 0.0;  // at which it is fused
     wm_innovation record;
     noise_adaption::source source;
   };
@@ -139,6 +140,7 @@ class landmark_ekf {
   wm_landmark_ekf_params params_;
   mounted_sensor sensor_[kMaxSensors];
   sensor_slots slots_;
+  int sensor_states_[2];  // the first one, and the one behind the last
   unsigned components_;  // of expect(): whether the angle scale is a state
   int gnss_time_state_, gnss_error_state_;
   wm_time_ns gnss_error_ns_;
