@@ -394,6 +394,16 @@ void count_proof(wm_monitor *self, const wm_estimate &e, bool contradicts, bool 
     self->proof_s += dt_s;
 }
 
+// Turn or positions may be mirrored: the covariance of the mixture with the pose that is right then.
+void weigh_mirror_image(wm_monitor *self, const wm_estimate &e) {
+  const double chance = course_mirrored(self->course);
+  const wm_pose2 image = course_mirror_image(self->course);
+  self->mirrored_m2 = self->mirrored_rad2 = 0.0;
+  if (!(chance > 0.0)) return;
+  self->mirrored_m2 = chance * (square(image.x_m - e.pose_map_base.p_m[0]) + square(image.y_m - e.pose_map_base.p_m[1]));
+  self->mirrored_rad2 = chance * square(wrap(image.heading_rad - e.heading_rad));
+}
+
 // The covariance of the mixture of this pose and one anywhere on the map; a filter that has widened its own keeps it.
 void widen(const wm_monitor &self, double wrong, wm_estimate *e) {
   constexpr int kAxes[] = {0, 1, 5};
@@ -452,6 +462,7 @@ int wm_monitor_take(wm_monitor *self, const wm_event *event, const wm_innovation
 
 void wm_monitor_step(wm_monitor *self, const wm_estimate *e, const wm_calibration_value *calibration, size_t count) {
   wm::course_move(&self->course, *e);
+  wm::weigh_mirror_image(self, *e);
   const bool is_first = self->stepped_ns == WM_TIME_NONE;
   double dt_s = is_first ? 0.0 : wm_seconds_between(self->stepped_ns, e->t_ns);
   if (!(dt_s < wm::kLongStep_s)) dt_s = wm::kLongStep_s;
@@ -489,6 +500,9 @@ int wm_monitor_doubts(const wm_monitor *self) {
 
 void wm_monitor_judge(const wm_monitor *self, wm_estimate *e) {
   if (e->state == WM_STATE_SEARCHING) return;
+  e->covariance[wm_cov_index(0, 0)] += self->mirrored_m2;
+  e->covariance[wm_cov_index(1, 1)] += self->mirrored_m2;
+  e->covariance[wm_cov_index(5, 5)] += self->mirrored_rad2;
   const bool doubts = wm_monitor_doubts(self) != 0;
   if (doubts) {
     const bool is_known_why = self->doubt_s > 0.0 || self->is_unsupported;

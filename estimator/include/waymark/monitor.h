@@ -62,6 +62,10 @@ typedef struct wm_monitor_course {
   wm_time_ns until_ns;
   double impossible_s;  // time of turns that no vehicle can drive, less that of others
   int32_t is_mirrored, is_impossible;
+  // Log likelihood ratio of the mirror image (NAN: not known), the least so far, and where the image lies: turned about
+  // mirror_way_m, then shifted from there to mirror_place_m.
+  double nats, least_nats;
+  double mirror_turn_rad, mirror_way_m[2], mirror_place_m[2];
 } wm_monitor_course;
 
 #define WM_MONITOR_LANDMARKS 48
@@ -88,6 +92,7 @@ typedef struct wm_monitor {
   wm_monitor_course course;
   wm_monitor_landmarks landmarks;         // of a known map
   double scale_sigma[WM_MONITOR_SCALES];  // stated; 0: no state
+  double mirrored_m2, mirrored_rad2;      // what the chance of a mirror image adds to the covariance
   double spread_m2;                       // variance of a place anywhere on the map, each axis
   double low_m[2], high_m[2];             // the map, else the way so far
   double doubt_s;                         // time of contradiction that fitting observations have not made up for
