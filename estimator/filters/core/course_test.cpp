@@ -20,7 +20,7 @@ constexpr double kSparse = 3.0;          // a window reaches back at most so man
 constexpr double kAlarm_log = 9.21;      // -log(1e-4)
 // Prior log odds of a mistaken sign of a turn or an axis in a configuration: one in 55.
 constexpr double kMirrored = -4.0;
-constexpr double kGap_s = 1.5;           // without motion for longer, dead reckoning begins anew
+constexpr double kGap_s = 1.5;  // without motion for longer, dead reckoning begins anew
 // Tyres reach 10 m/s2. Beyond this for 2 s more than not, turn rate or speed has another unit.
 constexpr double kMostAcross_mps2 = 15.0, kImpossible_s = 2.0, kRemembered_s = 10.0;
 

@@ -238,7 +238,8 @@ void clear(wm_monitor *self) {
   self->doubt_s = self->fitted_s = self->since_found_s = self->contradicted_s = self->proof_s = self->lost_s = 0.0;
   self->cause = WM_CAUSE_NONE;
   self->source = self->silent = -1;
-  self->found = self->is_unsupported = self->is_outside = self->was_lost = self->is_probation = self->is_found_early = 0;
+  self->found = self->is_unsupported = self->is_outside = self->was_lost = self->is_probation = self->is_found_early =
+      0;
   self->stepped_ns = WM_TIME_NONE;  // the next step takes the number of resets as it is
 }
 
@@ -386,8 +387,8 @@ void count_doubt(wm_monitor *self, bool contradicts, bool fits, double dt_s) {
 // Time of driving in agreement with the observations. Contradictions before kProof_s begin it anew.
 void count_proof(wm_monitor *self, const wm_estimate &e, bool contradicts, bool fits, double dt_s) {
   if (self->proof_s >= kProof_s) return;
-  const bool drives = square(e.v_mps[0]) + square(e.v_mps[1]) > square(kDrives_mps) ||
-                      std::fabs(e.w_radps[2]) > kDrives_radps;
+  const bool drives =
+      square(e.v_mps[0]) + square(e.v_mps[1]) > square(kDrives_mps) || std::fabs(e.w_radps[2]) > kDrives_radps;
   if (contradicts)
     self->proof_s = 0.0;
   else if (fits && drives)
@@ -400,7 +401,8 @@ void weigh_mirror_image(wm_monitor *self, const wm_estimate &e) {
   const wm_pose2 image = course_mirror_image(self->course);
   self->mirrored_m2 = self->mirrored_rad2 = 0.0;
   if (!(chance > 0.0)) return;
-  self->mirrored_m2 = chance * (square(image.x_m - e.pose_map_base.p_m[0]) + square(image.y_m - e.pose_map_base.p_m[1]));
+  self->mirrored_m2 =
+      chance * (square(image.x_m - e.pose_map_base.p_m[0]) + square(image.y_m - e.pose_map_base.p_m[1]));
   self->mirrored_rad2 = chance * square(wrap(image.heading_rad - e.heading_rad));
 }
 

@@ -74,8 +74,7 @@ wm_verdict landmark_ekf::update(const residual *r, int count, const gate_result 
   if (!filter_.update(*first, r[0].innovation, noise, kPoseStates, kept, source(r[0]))) return WM_REJECTED_NUMERIC;
   if (count == 2) {
     filter_.project(r[1].row, first);
-    if (!filter_.update(*first, left, noise_of(r[1]), kPoseStates, kept, source(r[1])))
-      return WM_REJECTED_NUMERIC;
+    if (!filter_.update(*first, left, noise_of(r[1]), kPoseStates, kept, source(r[1]))) return WM_REJECTED_NUMERIC;
   }
   filter_.noise().forget(filter_.now_ns());
   life_.fused(filter_.now_ns());

@@ -326,7 +326,7 @@ void test_a_first_sighting_that_is_an_outlier_does_not_decide_the_yaw(void) {
   size_t count;
   TEST_ASSERT_EQUAL(WM_OK, ekf->correct(state, &outlier, records, 8, &count));
   TEST_ASSERT_EQUAL(WM_FUSED, records[0].verdict);
-  TEST_ASSERT_EQUAL(30, drive(2, kBearings));
+  TEST_ASSERT_GREATER_OR_EQUAL(27, drive(2, kBearings));  // of 30; 14 where it decides
   TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.0, calibration("camera.yaw_rad"));
 }
 
