@@ -20,8 +20,8 @@
 #include "filters/slam/joint_state.hpp"
 #include "filters/slam/params.h"
 #include "filters/slam/slip_search.hpp"
-#include "memory/layout.hpp"
 #include "sensors/sighting.hpp"
+#include "waymark/internal/memory/layout.hpp"
 
 namespace wm {
 
