@@ -126,7 +126,7 @@ const char *wm_cause_text(unsigned cause) {
                                                      "is refused",
                                                      "has innovations that are larger than stated",
                                                      "has biased innovations",
-                                                     "contradicts poses soon after they are found",
+                                                     "contradicted the last pose; the one found since is on probation",
                                                      "has unknown identities",
                                                      "is silent",
                                                      "does not reach the pose",
