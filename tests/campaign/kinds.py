@@ -207,7 +207,7 @@ def turn_sign(r, w, d):
     d.change(motion_file(w), replays.scaled(("w_radps", "wz_radps"), -1), "measured turn rate times -1")
 
 
-# Kind: what the world has to have ("seen": any stream of observations; "level": ranges in a plane), the function.
+# Kind: what the world has to have (suits() has the words), the function.
 KINDS = {
     "bus": (("can",), bus),
     "outliers and misread identities": (("seen", "features"), outliers),
@@ -216,7 +216,7 @@ KINDS = {
     "wheel slips": (("wheels",), slip),
     "gyro stuck": (("imu",), stuck_gyro),
     "carried off": (("route",), kidnap),
-    "start pose wrong": (("seen",), wrong_start),
+    "start pose wrong": (("anchored",), wrong_start),
     "errors larger than stated": ((), large_errors),
     "wheel radius wrong": (("wheels",), wheel_size),
     "track wrong": (("wheels",), track),
@@ -243,6 +243,8 @@ def suits(kind, name, world):
         has |= {"ranges"}
     if world.seen and world.seen != "gnss.csv":
         has |= {"turnable"}
+    if "map" in has or world.seen in ("gnss.csv", "points.csv"):
+        has |= {"anchored"}  # a map is made from the start pose: nothing contradicts a wrong one
     if has & set(MOTION):
         has |= {"twist"}
     return set(KINDS[kind][0]) <= has
