@@ -122,7 +122,7 @@ def one(options, number):
         replays.command(options.bin_dir / "waymark", "replay", recording, "--config", configuration(options, name, recording, scratch), "--out",
                         scratch / "run")
         row.update(judge(scratch / "run", recording, names))
-    except replays.Refused as refused:
+    except (replays.Refused, AssertionError) as refused:
         row["refused"] = str(refused)[-300:]
     finally:
         if not options.only:

@@ -46,6 +46,7 @@ WORLDS = {
     "edges, filter and scans": World("corridor-low", PLAIN.format("edge_mcl"), "points.csv", ("can", "wheels", "route"), seconds=45, share=0.5),
     "edges, particles": World("corridor-low", PLAIN.format("pf_edges"), "points.csv", ("can", "wheels", "route"), seconds=45, share=0.5),
 }
+RANGED = ("slam, landmarks", "stereo, acoustic", "landmarks, commands")  # sightings with ranges
 MOTION = {"motion": "motion.csv", "motion6": "motion6.csv"}
 
 
@@ -238,8 +239,7 @@ def suits(kind, name, world):
         has |= {"seen"}
     if world.seen in ("sightings.csv", "markers.csv", "stereo.csv", "gnss.csv"):
         has |= {"features"}
-    if world.seen in ("markers.csv", "points.csv") or (world.seen == "sightings.csv" and name not in ("landmarks", "landmarks, laps",
-                                                                                                      "slam, bearings")):
+    if world.seen in ("markers.csv", "points.csv") or name in RANGED:
         has |= {"ranges"}
     if world.seen and world.seen != "gnss.csv":
         has |= {"turnable"}
