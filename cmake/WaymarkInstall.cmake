@@ -42,7 +42,7 @@ if(TARGET waymark-web) # a robot's page comes from the robot
 endif()
 
 # ── the desk's ───────────────────────────────────────────────────────────────────────────────────────────────────────
-foreach(tool detect diff eval import init map reference report simulate suggest)
+foreach(tool detect diff eval import init map reference report suggest)
   if(TARGET waymark-${tool}) # not everything is there for every architecture
     install(TARGETS waymark-${tool} DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT tools)
     wm_install_compressed(${WM_PACKAGE_DIR}/man/waymark-${tool}.1 waymark-${tool}.1 man/man1 tools)
@@ -51,6 +51,12 @@ endforeach()
 # A package of its own: OpenCV and Ceres bring many libraries.
 install(TARGETS waymark-calibrate DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT calibrate)
 wm_install_compressed(${WM_PACKAGE_DIR}/man/waymark-calibrate.1 waymark-calibrate.1 man/man1 calibrate)
+# The simulator's renderer brings Embree.
+if(TARGET waymark-simulate)
+  install(TARGETS waymark-simulate DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT sim)
+  wm_install_compressed(${WM_PACKAGE_DIR}/man/waymark-simulate.1 waymark-simulate.1 man/man1 sim)
+  install(DIRECTORY config/worlds DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/waymark-sim/examples COMPONENT sim)
+endif()
 # Scripts: what they need is Python and the programs above.
 foreach(command batch compare mine)
   install(PROGRAMS ${CMAKE_BINARY_DIR}/fleet/waymark-${command} DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT fleet)
@@ -61,12 +67,11 @@ install(DIRECTORY tools/fleet/waymark_fleet DESTINATION ${CMAKE_INSTALL_DATADIR}
 install(PROGRAMS ${CMAKE_BINARY_DIR}/hil/waymark-hil DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT fleet)
 wm_install_compressed(${WM_PACKAGE_DIR}/man/waymark-hil.1 waymark-hil.1 man/man1 fleet)
 install(DIRECTORY tools/hil/waymark_hil tools/hil/target tools/hil/guest DESTINATION ${CMAKE_INSTALL_DATADIR}/waymark-hil COMPONENT fleet
-  FILES_MATCHING PATTERN "*.py" PATTERN "*.sh")
+  FILES_MATCHING PATTERN "*.py" PATTERN "*.sh" PATTERN "*.c")
 install(FILES toolchain/foreign.sh toolchain/foreign-apt.sh DESTINATION ${CMAKE_INSTALL_DATADIR}/waymark-hil/guest COMPONENT fleet)
 install(DIRECTORY ${CMAKE_BINARY_DIR}/hil/lcm DESTINATION ${CMAKE_INSTALL_DATADIR}/waymark-hil COMPONENT fleet FILES_MATCHING PATTERN "*.py")
 install(FILES tools/fleet/Snakefile DESTINATION ${CMAKE_INSTALL_DATADIR}/waymark-fleet COMPONENT fleet)
 install(DIRECTORY tools/fleet/slurm DESTINATION ${CMAKE_INSTALL_DATADIR}/waymark-fleet COMPONENT fleet)
-install(DIRECTORY config/worlds DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/waymark-tools/examples COMPONENT tools)
 
 # ── the bridge to ROS 2, where it is built ───────────────────────────────────────────────────────────────────────────
 if(TARGET waymark-ros2)
@@ -82,7 +87,8 @@ add_library(wm_public_estimator STATIC $<TARGET_OBJECTS:wm_estimator>)
 set_target_properties(wm_public PROPERTIES OUTPUT_NAME waymark-messages LINKER_LANGUAGE C)
 set_target_properties(wm_public_estimator PROPERTIES OUTPUT_NAME waymark-estimator LINKER_LANGUAGE CXX)
 install(TARGETS wm_public wm_public_estimator DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT dev)
-install(DIRECTORY msgs/include/waymark estimator/include/waymark firmware/library/include/waymark DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT dev)
+install(DIRECTORY msgs/include/waymark estimator/include/waymark firmware/library/include/waymark DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT dev
+  PATTERN internal EXCLUDE) # for the other rooms and the desk
 if(TARGET wm_shared)
   install(TARGETS wm_shared LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library NAMELINK_COMPONENT dev)
 endif()
@@ -102,6 +108,9 @@ endforeach()
 
 # ── what each package says of itself ─────────────────────────────────────────────────────────────────────────────────
 set(packages runtime:waymark tools:waymark-tools calibrate:waymark-calibrate fleet:waymark-fleet dev:libwaymark-dev)
+if(TARGET waymark-simulate)
+  list(APPEND packages sim:waymark-sim)
+endif()
 if(TARGET wm_shared)
   list(APPEND packages library:libwaymark0)
 endif()

@@ -41,8 +41,10 @@ if(NOT WM_SANITIZE)
 endif()
 target_compile_definitions(wm_rules INTERFACE _GNU_SOURCE EIGEN_DONT_VECTORIZE EIGEN_MPL2_ONLY
   # On 32 bits, too: recordings of more than 2 GB, and folders whose places need 64 bits.
-  $<$<EQUAL:${CMAKE_SIZEOF_VOID_P},4>:_FILE_OFFSET_BITS=64>
-  WM_VERSION="${PROJECT_VERSION}")
+  $<$<EQUAL:${CMAKE_SIZEOF_VOID_P},4>:_FILE_OFFSET_BITS=64>)
+# WM_VERSION, in a header of its own: a new version compiles anew only what names it.
+file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/generated/wm_version.h CONTENT "#pragma once\n#define WM_VERSION \"@PROJECT_VERSION@\"\n" @ONLY)
+target_include_directories(wm_rules INTERFACE ${CMAKE_BINARY_DIR}/generated)
 if(WM_SANITIZE)
   target_compile_options(wm_rules INTERFACE -fsanitize=${WM_SANITIZE} -fno-sanitize-recover=all)
   target_link_options(wm_rules INTERFACE -fsanitize=${WM_SANITIZE})

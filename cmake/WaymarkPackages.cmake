@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# Debian packages by CPack: waymark (the robot's), waymark-tools (the desk's), waymark-calibrate, waymark-fleet, libwaymark0, libwaymark-dev, waymark-ros2. docs/boards.md.
+# Debian packages by CPack: waymark (the robot's), waymark-tools (the desk's), waymark-calibrate, waymark-sim, waymark-fleet, libwaymark0, libwaymark-dev, waymark-ros2. docs/boards.md.
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME waymark)
 set(CPACK_PACKAGE_VENDOR Waymark)
@@ -32,11 +32,6 @@ set(page "")
 if(TARGET waymark-web)
   set(page ", libmicrohttpd12 (>= 0.9.75-2)")
 endif()
-set(simulator "")
-if(TARGET waymark-simulate)
-  set(simulator ", libembree3-3 (>= 3.13.5+dfsg)")
-endif()
-
 set(videos "")
 if(TARGET waymark-import)
   set(videos ", libavcodec59 (>= 7:5.1), libavformat59 (>= 7:5.1), libavutil57 (>= 7:5.1), libswscale6 (>= 7:5.1)")
@@ -45,6 +40,11 @@ endif()
 set(urdf "")
 if(TINYXML2_LIBRARY AND TINYXML2_HEADER)
   set(urdf ", libtinyxml2-9 (>= 9.0.0+dfsg)")
+endif()
+
+set(pages "")
+if(HARU_LIBRARY AND HARU_HEADER)
+  set(pages ", libhpdf-2.3.0 (>= 2.3.0+dfsg)")
 endif()
 
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_NAME waymark)
@@ -67,12 +67,23 @@ set(CPACK_DEBIAN_RUNTIME_PACKAGE_CONTROL_EXTRA ${CMAKE_BINARY_DIR}/debian/conffi
 
 set(CPACK_DEBIAN_TOOLS_PACKAGE_NAME waymark-tools)
 set(CPACK_DEBIAN_TOOLS_PACKAGE_SECTION misc)
-set(CPACK_DEBIAN_TOOLS_PACKAGE_DEPENDS "waymark (= ${PROJECT_VERSION}-1), ${base}, ${pictures}${simulator}${videos}${urdf}")
+set(CPACK_DEBIAN_TOOLS_PACKAGE_DEPENDS "waymark (= ${PROJECT_VERSION}-1), ${base}, ${pictures}${videos}${urdf}${pages}")
 set(CPACK_DEBIAN_TOOLS_DESCRIPTION "desk tools for the localization of a robot
-Simulates drives, judges runs against truth, draws reports, makes maps,
-writes the configuration of a new robot: waymark eval, report, simulate, diff,
-map, init.")
+Judges runs against truth, draws reports, makes maps, writes the
+configuration of a new robot: waymark eval, report, diff, map, init.")
 set(CPACK_DEBIAN_TOOLS_PACKAGE_RECOMMENDS waymark-calibrate)
+
+if(TARGET waymark-simulate)
+  list(APPEND CPACK_COMPONENTS_ALL sim)
+  string(APPEND CPACK_DEBIAN_TOOLS_PACKAGE_RECOMMENDS ", waymark-sim")
+  set(CPACK_DEBIAN_SIM_PACKAGE_NAME waymark-sim)
+  set(CPACK_DEBIAN_SIM_PACKAGE_SECTION misc)
+  set(CPACK_DEBIAN_SIM_PACKAGE_DEPENDS "waymark (= ${PROJECT_VERSION}-1), ${base}, ${pictures}, libembree3-3 (>= 3.13.5+dfsg)")
+  set(CPACK_DEBIAN_SIM_DESCRIPTION "simulated drives of a robot, with known truth
+Makes recordings of drives through corridors, offices, streets and over the
+sea floor: CAN, pictures, sightings and labels, with the errors and faults of
+sensors. The same seed gives the same bytes: waymark simulate.")
+endif()
 
 set(boards "")
 if(TARGET wm_calibrate)

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "image/panorama.hpp"
+#include "waymark/internal/image/panorama.hpp"
 
 #include <cstring>
 
 #include "math/arc.hpp"
 #include "math/elementary.hpp"
-#include "sensors/mounting.hpp"
+#include "waymark/internal/sensors/mounting.hpp"
 
 namespace wm {
 namespace {

@@ -5,8 +5,8 @@
 
 #include <cstddef>
 
-#include "sensors/lens.hpp"
 #include "waymark/frame.h"
+#include "waymark/internal/sensors/lens.hpp"
 
 namespace wm {
 

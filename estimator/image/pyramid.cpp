@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "image/pyramid.hpp"
+#include "waymark/internal/image/pyramid.hpp"
 
 #include <cstring>
 

@@ -6,7 +6,7 @@
 
 #include <cstddef>
 
-#include "sensors/lens.hpp"
+#include "waymark/internal/sensors/lens.hpp"
 
 namespace wm {
 

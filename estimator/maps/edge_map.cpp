@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "maps/edge_map.hpp"
+#include "waymark/internal/maps/edge_map.hpp"
 
 #include <bit>
 #include <cstring>

@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "memory/layout.hpp"
+#include "waymark/internal/memory/layout.hpp"
 #include "waymark/setup.h"
 
 namespace wm {

@@ -4,8 +4,8 @@
 #ifndef WAYMARK_ESTIMATOR_MAPS_LIKELIHOOD_HPP
 #define WAYMARK_ESTIMATOR_MAPS_LIKELIHOOD_HPP
 
-#include "maps/edge_map.hpp"
 #include "waymark/event.h"
+#include "waymark/internal/maps/edge_map.hpp"
 
 namespace wm {
 

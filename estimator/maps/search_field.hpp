@@ -8,8 +8,8 @@
 
 #include <cstddef>
 
-#include "maps/edge_map.hpp"
 #include "math/elementary.hpp"
+#include "waymark/internal/maps/edge_map.hpp"
 
 namespace wm {
 

@@ -3,7 +3,7 @@
 #ifndef WAYMARK_ESTIMATOR_MATH_ABSOLUTE_ORIENTATION_HPP
 #define WAYMARK_ESTIMATOR_MATH_ABSOLUTE_ORIENTATION_HPP
 
-#include "math/rotation.hpp"
+#include "waymark/internal/math/rotation.hpp"
 
 namespace wm {
 

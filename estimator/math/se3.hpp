@@ -5,7 +5,7 @@
 #define WAYMARK_ESTIMATOR_MATH_SE3_HPP
 
 #include "math/eigen.hpp"
-#include "math/rotation.hpp"
+#include "waymark/internal/math/rotation.hpp"
 
 namespace wm {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "sensors/lens.hpp"
+#include "waymark/internal/sensors/lens.hpp"
 
 namespace wm {
 

@@ -4,7 +4,7 @@
 #include <limits>
 
 #include "math/elementary.hpp"
-#include "sensors/mounting.hpp"
+#include "waymark/internal/sensors/mounting.hpp"
 
 namespace wm {
 namespace {

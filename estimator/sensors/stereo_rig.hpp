@@ -3,7 +3,7 @@
 #ifndef WAYMARK_ESTIMATOR_STEREO_RIG_HPP
 #define WAYMARK_ESTIMATOR_STEREO_RIG_HPP
 
-#include "math/rotation.hpp"
+#include "waymark/internal/math/rotation.hpp"
 #include "waymark/setup.h"
 
 namespace wm {

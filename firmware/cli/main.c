@@ -5,6 +5,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include <wm_version.h>
 #include "cli/commands.h"
 #include "waymark/text.h"
 
@@ -49,7 +50,7 @@ static const struct {
     {"reference", "smooth a run into a reference trajectory", "waymark-tools"},
     {"report", "show a run as one page", "waymark-tools"},
     {"ros2", "give a run's poses to ROS 2, and its data to the run", "waymark-ros2"},
-    {"simulate", "make a recording of a drive with known truth", "waymark-tools"},
+    {"simulate", "make a recording of a drive with known truth", "waymark-sim"},
     {"suggest", "find noises and priors that fit a run better", "waymark-tools"},
     {"web", "show a run as it goes, as a page for a browser", "waymark"},
 };

@@ -6,6 +6,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
+#include <wm_version.h>
 #include "cli/commands.h"
 #include "cli/options.h"
 #include "output/event_log.h"

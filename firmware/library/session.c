@@ -7,6 +7,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include <wm_version.h>
 #include "library/changed_config.h"
 #include "waymark/yaml.h"
 

@@ -13,6 +13,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include <wm_version.h>
 #include "live/copy_map.h"
 #include "live/lcm_sightings.h"
 #include "live/robot.h"

@@ -3,6 +3,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include <wm_version.h>
 #include "output/crc32.h"
 #include "output/event_log.h"
 #include "output/new_file.h"

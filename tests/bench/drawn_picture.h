@@ -9,9 +9,9 @@
 
 #include "common/fisheye_rig.hpp"
 #include "detector_at_work.h"
-#include "sensors/lens.hpp"
 #include "vision/edges/params.h"
 #include "vision/edges_hough/windows.hpp"
+#include "waymark/internal/sensors/lens.hpp"
 #include "waymark/random.h"
 
 namespace bench {

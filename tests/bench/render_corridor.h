@@ -5,8 +5,8 @@
 
 #include <string>
 
-#include "simulate/render/patterns.h"
-#include "simulate/render/render.h"
+#include "render/patterns.h"
+#include "render/render.h"
 
 namespace wm::render {
 

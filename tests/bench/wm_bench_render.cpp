@@ -7,9 +7,9 @@
 #include <ctime>
 #include <vector>
 
+#include "images/video.h"
+#include "render/sensor.h"
 #include "render_corridor.h"
-#include "simulate/render/sensor.h"
-#include "simulate/render/video.h"
 #include "timing.h"
 
 using namespace wm::render;

@@ -7,8 +7,8 @@
 #include <functional>
 #include <vector>
 
-#include "sensors/lens.hpp"
 #include "waymark/frame.h"
+#include "waymark/internal/sensors/lens.hpp"
 #include "waymark/setup.h"
 
 namespace wm::views {

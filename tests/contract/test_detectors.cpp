@@ -6,10 +6,10 @@
 #include <vector>
 
 #include "common/fisheye_rig.hpp"
-#include "sensors/lens.hpp"
 #include "unity.h"
 #include "vision/edges/params.h"
 #include "waymark/detector.h"
+#include "waymark/internal/sensors/lens.hpp"
 #include "waymark/random.h"
 
 namespace {

@@ -4,8 +4,8 @@
 #include <cstdlib>
 #include <cstring>
 
-#include "vision/cascade/evaluate.hpp"
 #include "waymark/cascade_file.h"
+#include "waymark/internal/vision/cascade/evaluate.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 

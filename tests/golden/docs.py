@@ -81,7 +81,7 @@ def errors_md(tests):
 
 CITED = re.compile(r"\[([A-Z][A-Za-z]*[a-z](?:(?:19|20)\d\d|ND)[a-z]?)(?:, [^\]\n]+)?\](?!\()")
 LISTED = re.compile(r"^\d+\. \*\*\[(\w+)\]\*\*", re.MULTILINE)
-CITING = ["estimator", "msgs", "drivers", "firmware", "tools", "tests", "docs"]
+CITING = ["estimator", "msgs", "drivers", "firmware", "tools", "sim", "tests", "docs"]
 
 
 def references():
@@ -138,7 +138,7 @@ def walks():
 
 
 # Paths of sources in the prose of these pages.
-NAMED = re.compile(r"`((?:firmware|drivers|estimator|msgs|tests|tools)/[\w/.-]+\.(?:c|h|cpp|hpp|py))`")
+NAMED = re.compile(r"`((?:firmware|drivers|estimator|msgs|tests|tools|sim)/[\w/.-]+\.(?:c|h|cpp|hpp|py))`")
 
 
 def named_files():

@@ -15,7 +15,7 @@ DRIVES = 4
 
 
 def run(cache, *options):
-    done = subprocess.run([sys.executable, SOURCE / "tools/montecarlo/pictures.py", SOURCE / "config/worlds/corridor-easy.yaml",
+    done = subprocess.run([sys.executable, SOURCE / "sim/montecarlo/pictures.py", SOURCE / "config/worlds/corridor-easy.yaml",
                            "--config", SOURCE / "config/datasets/corridor.yaml", "--cache", cache, "--drives", str(DRIVES),
                            "--duration", "80", "--bin", BUILD / "bin", "--", *options],
                           capture_output=True, text=True)

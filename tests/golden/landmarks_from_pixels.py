@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Signs from pixels to a pose: a rendered crossing replayed twice and from its event log gives the same bytes, the pose is near the
 truth, the judge finds few false ones; a landmark taught from one picture (`map add-landmark`) is found in another (`map look`). The
-drive cut and put together elsewhere (tools/montecarlo/carried_off.py) has counters without a gap, and wheels that didn't turn meanwhile."""
+drive cut and put together elsewhere (sim/montecarlo/carried_off.py) has counters without a gap, and wheels that didn't turn meanwhile."""
 import csv
 import json
 import math
@@ -12,7 +12,7 @@ import tempfile
 
 from judged import ROOT, check, failures, run
 
-sys.path.insert(0, str(ROOT / "tools/montecarlo"))
+sys.path.insert(0, str(ROOT / "sim/montecarlo"))
 import carried_off
 
 CONFIG = ROOT / "config/datasets/crossing.yaml"

@@ -42,11 +42,11 @@ def main():
         return 77
     offences = 0
     page, player, camera = BUILD / "bin/waymark-web", BUILD / "bin/waymark-play", BUILD / "lib/waymark/waymark-camera"
-    calibrate = BUILD / "bin/waymark-calibrate"
+    calibrate, simulate = BUILD / "bin/waymark-calibrate", BUILD / "bin/waymark-simulate"
     bridge, library = BUILD / "bin/waymark-ros2", BUILD / "lib/libwaymark.so.0"
-    tools = sorted(p for p in (BUILD / "bin").glob("waymark-*") if "montecarlo" not in p.name and p not in (page, player, bridge, calibrate) and p.open("rb").read(2) != b"#!")
+    tools = sorted(p for p in (BUILD / "bin").glob("waymark-*") if "montecarlo" not in p.name and p not in (page, player, bridge, calibrate, simulate) and p.open("rb").read(2) != b"#!")
     components = [("RUNTIME", [BUILD / "bin/waymark", player, *(p for p in (page, camera) if p.exists())]), ("TOOLS", tools), ("CALIBRATE", [calibrate])]
-    components += [(name, [program]) for name, program in (("ROS2", bridge), ("LIBRARY", library)) if program.exists()]
+    components += [(name, [program]) for name, program in (("SIM", simulate), ("ROS2", bridge), ("LIBRARY", library)) if program.exists()]
     for component, programs in components:
         says, needs = declared(component), needed(programs)
         says.pop("waymark", None)

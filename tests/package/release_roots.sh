@@ -45,7 +45,7 @@ wheel='
 set -euo pipefail
 export DEBIAN_FRONTEND=noninteractive
 apt-get -qq update >/dev/null
-apt-get -qq install -y --no-install-recommends python3 python3-venv /out/waymark_*.deb /out/waymark-tools_*.deb >/tmp/apt.log 2>&1 || { tail -20 /tmp/apt.log; exit 1; }
+apt-get -qq install -y --no-install-recommends python3 python3-venv /out/waymark_*.deb /out/waymark-tools_*.deb /out/waymark-sim_*.deb >/tmp/apt.log 2>&1 || { tail -20 /tmp/apt.log; exit 1; }
 python3 -m venv /venv
 /venv/bin/pip -q --disable-pip-version-check install /out/waymark-*.whl
 mkdir /src && tar -C /src -xzf /out/waymark-*.tar.gz && cd /src/waymark-*

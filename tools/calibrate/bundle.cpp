@@ -13,9 +13,9 @@
 namespace wm::calibrate {
 namespace {
 
-using render::Camera;
-using render::Model;
-using render::Pose;
+using images::Camera;
+using images::Model;
+using images::Pose;
 
 constexpr double kPoseGood_px = 8;  // with the guessed focal length
 
@@ -30,7 +30,7 @@ bool find_pose(const Camera &camera, View &view) {
   std::vector<std::pair<Vec3, Vec3>> pairs;
   for (const BoardCorner &corner : view.corners) {
     Vec3 d(0, 0, 1);
-    if (!render::unproject(camera, corner.pixel, d)) continue;
+    if (!images::unproject(camera, corner.pixel, d)) continue;
     const Vec3 p((corner.board.x() - middle.x()) / size, (corner.board.y() - middle.y()) / size, 1);
     Eigen::Matrix3d cross;
     cross << 0, -d.z(), d.y(), d.z(), 0, -d.x(), -d.y(), d.x(), 0;
@@ -171,10 +171,10 @@ std::optional<Calibration> with_model(const Calibration &from, Model model) {
   for (const View &view : from.views)
     for (const BoardCorner &corner : view.corners) {
       Vec3 d(0, 0, 1);
-      if (render::unproject(known, corner.pixel, d)) widest = std::max(widest, std::acos(std::clamp(d.z(), -1.0, 1.0)));
+      if (images::unproject(known, corner.pixel, d)) widest = std::max(widest, std::acos(std::clamp(d.z(), -1.0, 1.0)));
     }
   const auto rays = [&](const Vec2 &pixel, Vec3 &d) {
-    return render::unproject(known, pixel, d) && std::acos(std::clamp(d.z(), -1.0, 1.0)) <= widest;
+    return images::unproject(known, pixel, d) && std::acos(std::clamp(d.z(), -1.0, 1.0)) <= widest;
   };
   const size_t n = known.intrinsics.size();
   std::optional<Calibration> out;
@@ -199,7 +199,7 @@ double find_board(const Camera &camera, const std::vector<BoardCorner> &corners,
 double pixel_sigma(const Calibration &calibration, const Vec2 &pixel) {
   const Camera &camera = calibration.camera;
   Vec3 ray(0, 0, 1);
-  if (!render::unproject(camera, pixel, ray)) return std::nan("");
+  if (!images::unproject(camera, pixel, ray)) return std::nan("");
   const Eigen::VectorXd at = parameters(camera);
   Eigen::MatrixXd J(2, at.size());
   for (Eigen::Index k = 0; k < at.size(); k++) {
@@ -211,7 +211,7 @@ double pixel_sigma(const Calibration &calibration, const Vec2 &pixel) {
     v[k] -= 2 * step;
     set_parameters(v, down);
     Vec2 a(0, 0), b(0, 0);
-    if (!render::project(up, ray, a) || !render::project(down, ray, b)) return std::nan("");
+    if (!images::project(up, ray, a) || !images::project(down, ray, b)) return std::nan("");
     J.col(k) = (a - b) / (2 * step);
   }
   return std::sqrt(std::max(0.0, (J * calibration.covariance * J.transpose()).trace()));

@@ -8,19 +8,19 @@
 #include <vector>
 
 #include "calibrate/corners.h"
-#include "simulate/render/camera.h"
+#include "images/camera.h"
 
 namespace wm::calibrate {
 
 struct View {
   std::string name;
   std::vector<BoardCorner> corners;
-  render::Pose T_camera_board = render::Pose::Identity();  // optical frame
+  images::Pose T_camera_board = images::Pose::Identity();  // optical frame
   double rms_px = 0;
 };
 
 struct Calibration {
-  render::Camera camera;
+  images::Camera camera;
   std::vector<View> views;     // those that were used, with their poses and without the corners that were dropped
   Eigen::MatrixXd covariance;  // of parameters(camera)
   double rms_px = 0;           // per corner, both coordinates
@@ -36,11 +36,11 @@ struct Calibration {
 std::optional<Calibration> calibrate_camera(const std::vector<View> &views, int width, int height);
 
 // The same corners by another model, starting from what the first one found.
-std::optional<Calibration> with_model(const Calibration &from, render::Model model);
+std::optional<Calibration> with_model(const Calibration &from, images::Model model);
 
 // The pose of a board before a camera that is known, from corners alone, refined; what is left in px rms, kNoPixel_px
 // where there is no pose.
-double find_board(const render::Camera &camera, const std::vector<BoardCorner> &corners, render::Pose &T_camera_board);
+double find_board(const images::Camera &camera, const std::vector<BoardCorner> &corners, images::Pose &T_camera_board);
 
 // Standard deviation of the pixel of a ray, by the camera's covariance; NaN where the camera has no ray there.
 double pixel_sigma(const Calibration &calibration, const Vec2 &pixel);

@@ -18,7 +18,7 @@
 namespace wm::calibrate {
 namespace {
 
-using render::Model;
+using images::Model;
 
 struct Arguments {
   std::string from, camera, name = "camera", model = "auto", chessboard, aprilgrid, charuco, dictionary = "5x5", out,
@@ -56,7 +56,7 @@ std::vector<FloorBoard> floor_of(const Arguments &a) {
         !std::isfinite(board.x_m + board.y_m + yaw_deg))
       throw tools::Failure("--floor: '" + text + "' is not PICTURE,X,Y,YAW, as in board01.jpg,1.20,0.00,90",
                            tools::kUsage);
-    board.yaw_rad = yaw_deg * render::kPi / 180;
+    board.yaw_rad = yaw_deg * images::kPi / 180;
     out.push_back(board);
   }
   return out;
@@ -72,7 +72,7 @@ void say(const Calibration &c) {
 // Of the models, the one that leaves the least; the first one where another is better by less than 2 %.
 Calibration best(const Arguments &a, const Calibration &first) {
   Model wanted = Model::equidistant;
-  const bool chosen = render::model_from_name(a.model, wanted);
+  const bool chosen = images::model_from_name(a.model, wanted);
   Calibration out = first;
   say(first);
   if (chosen && wanted == Model::equidistant) return out;
@@ -82,7 +82,7 @@ Calibration best(const Arguments &a, const Calibration &first) {
   for (const Model model : models) {
     const std::optional<Calibration> other = with_model(first, model);
     if (!other) {
-      std::fprintf(stderr, "  %-14s does not fit\n", render::model_name(model));
+      std::fprintf(stderr, "  %-14s does not fit\n", images::model_name(model));
       continue;
     }
     say(*other);
@@ -113,7 +113,7 @@ Calibration calibrate(const Arguments &a, const std::string &name, const BoardPi
   Calibration out = best(a, *first);
   say_parameters(out);
   const Coverage coverage = coverage_of(out);
-  constexpr double kDeg = 180 / render::kPi;
+  constexpr double kDeg = 180 / images::kPi;
   std::fprintf(
       stderr,
       "  the board was in %.0f %% of the picture, out to %.0f degrees from the axis (the picture goes to %.0f)\n"
@@ -144,12 +144,12 @@ Entry entry_of(const std::string &name, const Calibration &c, const std::string 
 // Pair and floor: the poses of the cameras, by one more solution of everything at once.
 void mount(const Arguments &a, const Board &board, const std::vector<BoardPictures> &seen, std::vector<Entry> &entries,
            std::vector<Calibration> calibrations) {
-  constexpr double kDeg = 180 / render::kPi;
+  constexpr double kDeg = 180 / images::kPi;
   std::vector<std::vector<size_t>> shots;
   for (size_t i = 0; i < seen.size(); i++) shots.push_back(shots_of(calibrations[i], seen[i]));
   const Rig rig = solve_rig(calibrations, shots, shape_of(board), floor_of(a));
-  const render::Pose body = render::T_body_optical();
-  const render::Pose first = rig.T_base_first ? *rig.T_base_first * body.inverse() : render::Pose::Identity();
+  const images::Pose body = images::T_body_optical();
+  const images::Pose first = rig.T_base_first ? *rig.T_base_first * body.inverse() : images::Pose::Identity();
   std::fprintf(stderr, "together: %.3f px rms\n", rig.rms_px);
   for (size_t i = 0; i < entries.size(); i++) entries[i].camera = rig.cameras[i].camera;
   if (rig.T_base_first) {

@@ -8,12 +8,12 @@
 #include <vector>
 
 #include "common/grey_picture.h"
-#include "simulate/render/types.h"
+#include "images/types.h"
 
 namespace wm::calibrate {
 
-using render::Vec2;
-using render::Vec3;
+using images::Vec2;
+using images::Vec3;
 
 struct BoardCorner {
   Vec2 pixel;

@@ -6,7 +6,7 @@
 #include <cstdio>
 
 #include "common/failure.h"
-#include "simulate/render/pictures.h"
+#include "images/pictures.h"
 
 namespace wm::calibrate {
 namespace {
@@ -25,7 +25,7 @@ struct Cells {
   }
 };
 
-Vec2 middle(const render::Camera &camera, int column, int row) {
+Vec2 middle(const images::Camera &camera, int column, int row) {
   return {(column + 0.5) * camera.width / kColumns - 0.5, (row + 0.5) * camera.height / kRows - 0.5};
 }
 
@@ -34,7 +34,7 @@ double angle_of(const Vec3 &d) { return std::atan2(d.head<2>().norm(), d.z()); }
 double off(const Calibration &c, const View &view, const BoardCorner &corner) {
   Vec2 pixel(0, 0);
   const bool there =
-      render::project(c.camera, view.T_camera_board * Vec3(corner.board.x(), corner.board.y(), 0), pixel);
+      images::project(c.camera, view.T_camera_board * Vec3(corner.board.x(), corner.board.y(), 0), pixel);
   return there ? (pixel - corner.pixel).norm() : 1e3;
 }
 
@@ -49,7 +49,7 @@ Coverage coverage_of(const Calibration &c) {
     for (int column = 0; column < kColumns; column++) {
       Vec3 d(0, 0, 1);
       const Vec2 at = middle(c.camera, column, row);
-      if (!render::unproject(c.camera, at, d)) continue;
+      if (!images::unproject(c.camera, at, d)) continue;
       shown++;
       out.picture_rad = std::max(out.picture_rad, angle_of(d));
       if (!cells.seen[row][column]) continue;
@@ -64,7 +64,7 @@ Coverage coverage_of(const Calibration &c) {
   for (const View &view : c.views) {
     for (const BoardCorner &corner : view.corners) {
       Vec3 d(0, 0, 1);
-      if (render::unproject(c.camera, corner.pixel, d)) out.widest_rad = std::max(out.widest_rad, angle_of(d));
+      if (images::unproject(c.camera, corner.pixel, d)) out.widest_rad = std::max(out.widest_rad, angle_of(d));
     }
     for (const View &other : c.views) {
       const double along = std::fabs(view.T_camera_board.linear().col(2).dot(other.T_camera_board.linear().col(2)));
@@ -93,14 +93,14 @@ std::vector<std::string> complaints(const Calibration &c, const Coverage &covera
         100 * coverage.covered);
   if (coverage.tilt_rad < 0.5)
     say("the boards differ by %.0f degrees of tilt at most; tilt it by 30 to 45 degrees both ways",
-        coverage.tilt_rad * 180 / render::kPi);
+        coverage.tilt_rad * 180 / images::kPi);
   if (coverage.sigma_worst_px > 1)
     say("the projection is uncertain by %.1f px at the worst place; take more pictures there", coverage.sigma_worst_px);
   return out;
 }
 
 void draw_coverage(const Calibration &c, const tools::GreyPicture &picture, const std::string &file) {
-  render::Picture8 out{c.camera.width, c.camera.height, 3, {}};
+  images::Picture8 out{c.camera.width, c.camera.height, 3, {}};
   out.bytes.resize(static_cast<size_t>(out.width) * static_cast<size_t>(out.height) * 3);
   const Cells cells(c);
   for (int y = 0; y < out.height; y++)
@@ -127,7 +127,7 @@ void draw_coverage(const Calibration &c, const tools::GreyPicture &picture, cons
         }
     }
   std::string error;
-  if (!render::write_png(file, out, error)) throw tools::Failure(error);
+  if (!images::write_png(file, out, error)) throw tools::Failure(error);
 }
 
 }  // namespace wm::calibrate

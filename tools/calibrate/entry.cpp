@@ -24,12 +24,12 @@ std::string list(const std::vector<double> &values) {
 
 }  // namespace
 
-std::string mounting_yaml(const render::Pose &pose) {
-  constexpr double kDeg = 180 / render::kPi;
+std::string mounting_yaml(const images::Pose &pose) {
+  constexpr double kDeg = 180 / images::kPi;
   constexpr double kRounded = 1e-9;       // m and degrees
   constexpr double kUpright = 1 - 1e-12;  // of sin(pitch): roll and yaw are about one axis, and roll is taken as 0
   const Eigen::Matrix3d R = pose.linear();
-  const render::Vec3 p = pose.translation();
+  const images::Vec3 p = pose.translation();
   const double sine = std::clamp(-R(2, 0), -1.0, 1.0);
   const bool upright = std::abs(sine) > kUpright;
   std::vector<double> xyz{p.x(), p.y(), p.z()};
@@ -43,9 +43,9 @@ std::string mounting_yaml(const render::Pose &pose) {
 std::string calibration_yaml(const std::vector<Entry> &entries) {
   std::string out = "cameras:\n";
   for (const Entry &entry : entries) {
-    const render::Camera &c = entry.camera;
+    const images::Camera &c = entry.camera;
     if (!entry.remark.empty()) out += "  # " + entry.remark + "\n";
-    out += "  " + entry.name + ":\n    model: " + render::model_name(c.model) + "\n    size: [" +
+    out += "  " + entry.name + ":\n    model: " + images::model_name(c.model) + "\n    size: [" +
            std::to_string(c.width) + ", " + std::to_string(c.height) + "]\n    intrinsics: " + list(c.intrinsics) +
            "\n";
     if (!c.distortion.empty()) out += "    distortion: " + list(c.distortion) + "\n";

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "simulate/render/camera.h"
+#include "images/camera.h"
 
 namespace wm::calibrate {
 
@@ -13,12 +13,12 @@ namespace wm::calibrate {
 // the camera where it has one, else zeros with a remark.
 struct Entry {
   std::string name;
-  render::Camera camera;
+  images::Camera camera;
   std::string remark;  // "" or one line
   bool mounted = false;
 };
 // "{xyz_m: [...], rpy_deg: [...]}" of a body frame in base_link: Rz(yaw) Ry(pitch) Rx(roll).
-std::string mounting_yaml(const render::Pose &pose);
+std::string mounting_yaml(const images::Pose &pose);
 std::string calibration_yaml(const std::vector<Entry> &entries);
 
 // Writes `text` into a new file; "" or "-": to the screen. Throws tools::Failure where a file of that name is there.

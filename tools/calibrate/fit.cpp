@@ -8,20 +8,20 @@
 namespace wm::calibrate {
 namespace {
 
-using render::Camera;
-using render::Model;
+using images::Camera;
+using images::Model;
 
 // What a ray counts that the model can't show: far worse than any fit, yet not so that one such ray decides all.
 constexpr double kNoPixel_px = 300;
 
 Vec2 miss(const Camera &camera, const Ray &ray) {
   Vec2 pixel(0, 0);
-  return render::project(camera, ray.direction, pixel) ? Vec2(pixel - ray.pixel) : Vec2(kNoPixel_px, kNoPixel_px);
+  return images::project(camera, ray.direction, pixel) ? Vec2(pixel - ray.pixel) : Vec2(kNoPixel_px, kNoPixel_px);
 }
 
 bool possible(const Camera &camera) {
   std::string error;
-  if (!render::camera_valid(camera, error)) return false;
+  if (!images::camera_valid(camera, error)) return false;
   const auto &v = camera.intrinsics;
   if (camera.model == Model::double_sphere) return v[0] > -0.99 && v[0] < 1 && v[1] >= 0 && v[1] < 1;
   return camera.model != Model::omni || (v[0] >= 0 && v[0] < 20);

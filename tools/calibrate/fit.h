@@ -5,21 +5,21 @@
 #include <functional>
 #include <vector>
 
-#include "simulate/render/camera.h"
+#include "images/camera.h"
 
 namespace wm::calibrate {
 
-using render::Vec2;
-using render::Vec3;
+using images::Vec2;
+using images::Vec3;
 
 // Intrinsics and distortion as one vector, and back.
-Eigen::VectorXd parameters(const render::Camera &camera);
-void set_parameters(const Eigen::VectorXd &values, render::Camera &camera);
+Eigen::VectorXd parameters(const images::Camera &camera);
+void set_parameters(const Eigen::VectorXd &values, images::Camera &camera);
 // The names of these parameters: "fx", "k1" ...
-std::vector<std::string> parameter_names(render::Model model);
+std::vector<std::string> parameter_names(images::Model model);
 
 // A camera of this model, without distortion, that images the neighbourhood of its axis with `focal_px`.
-render::Camera undistorted(render::Model model, int width, int height, const Vec2 &centre, double focal_px);
+images::Camera undistorted(images::Model model, int width, int height, const Vec2 &centre, double focal_px);
 
 struct Ray {
   Vec2 pixel;
@@ -30,18 +30,18 @@ std::vector<Ray> sample_rays(const std::function<bool(const Vec2 &, Vec3 &)> &un
                              int columns, int rows);
 
 struct Fit {
-  render::Camera camera;
+  images::Camera camera;
   double mean_px = 0, max_px = 0;  // |fitted - given| over a fine grid
   Vec2 worst{0, 0};                // the pixel of max_px
   size_t rays = 0, failed = 0;     // of the fine grid; failed: the fitted model has no pixel for the ray
 };
 
 // Levenberg-Marquardt from the undistorted camera (double-sphere and omni: from several). Takes some 10 ms.
-Fit fit_model(render::Model model, const std::function<bool(const Vec2 &, Vec3 &)> &unproject, int width, int height,
+Fit fit_model(images::Model model, const std::function<bool(const Vec2 &, Vec3 &)> &unproject, int width, int height,
               const Vec2 &centre);
 
 // The cameras of all minima that its starts lead to, the best first: shapes of a double sphere may fit nearly alike.
-std::vector<render::Camera> fit_minima(render::Model model, const std::function<bool(const Vec2 &, Vec3 &)> &unproject,
+std::vector<images::Camera> fit_minima(images::Model model, const std::function<bool(const Vec2 &, Vec3 &)> &unproject,
                                        int width, int height, const Vec2 &centre);
 
 // The largest angle from the optical axis among the rays, in rad.

@@ -11,19 +11,19 @@
 
 #include "calibrate/entry.h"
 #include "calibrate/flat_file.h"
-#include "simulate/render/camera.h"
+#include "images/camera.h"
 
 namespace wm::calibrate {
 
-using render::Vec2;
-using render::Vec3;
+using images::Vec2;
+using images::Vec3;
 
 struct ForeignCamera {
   std::string name;   // as the file has it; "" where it has none
   std::string model;  // for people: "Kalibr pinhole + fov"
   int width = 0, height = 0;
   Vec2 centre{0, 0};                                                  // near the optical axis, px
-  std::optional<render::Camera> same;                                 // one of our models with the same parameters
+  std::optional<images::Camera> same;                                 // one of our models with the same parameters
   std::function<bool(const Vec2 &pixel, Vec3 &direction)> unproject;  // optical frame; false: no ray
   std::vector<std::string> notes;                                     // what was left out of the file
 };
@@ -59,7 +59,7 @@ ForeignCamera plain_camera(const Matrix3 &k, const std::vector<double> &distorti
 // Kannala-Brandt, four coefficients.
 ForeignCamera fisheye_camera(const Matrix3 &k, const std::vector<double> &distortion, int width, int height);
 // A camera whose model is ours.
-ForeignCamera our_camera(const render::Camera &camera);
+ForeignCamera our_camera(const images::Camera &camera);
 // Devernay and Faugeras' field-of-view model, angle w.
 ForeignCamera fov_camera(const Matrix3 &k, double w, int width, int height);
 // Enhanced unified model (B. Khomutenko et al. 2016): alpha, beta.

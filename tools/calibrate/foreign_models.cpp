@@ -12,9 +12,9 @@ Vec2 normalised(const Matrix3 &k, const Vec2 &pixel) {
   return {(pixel.x() - k.cx - k.skew * y) / k.fx, y};
 }
 
-render::Camera ours(render::Model model, const Matrix3 &k, const std::vector<double> &distortion, int width,
+images::Camera ours(images::Model model, const Matrix3 &k, const std::vector<double> &distortion, int width,
                     int height) {
-  render::Camera out;
+  images::Camera out;
   out.model = model;
   out.width = width;
   out.height = height;
@@ -67,14 +67,14 @@ bool unbend(const std::vector<double> &d, const Vec2 &bent, Vec2 &out) {
 
 }  // namespace
 
-ForeignCamera our_camera(const render::Camera &camera) {
+ForeignCamera our_camera(const images::Camera &camera) {
   ForeignCamera out;
   out.width = camera.width;
   out.height = camera.height;
   const size_t n = camera.intrinsics.size();
   out.centre = {camera.intrinsics[n - 2], camera.intrinsics[n - 1]};
   out.same = camera;
-  out.unproject = [camera](const Vec2 &pixel, Vec3 &direction) { return render::unproject(camera, pixel, direction); };
+  out.unproject = [camera](const Vec2 &pixel, Vec3 &direction) { return images::unproject(camera, pixel, direction); };
   return out;
 }
 
@@ -82,7 +82,7 @@ ForeignCamera plain_camera(const Matrix3 &k, const std::vector<double> &distorti
   std::vector<double> d = distortion;
   while (d.size() > 5 && d.back() == 0) d.pop_back();
   if (d.size() < 4) d.resize(4, 0.0);
-  if (d.size() <= 5 && k.skew == 0) return our_camera(ours(render::Model::pinhole_radtan, k, d, width, height));
+  if (d.size() <= 5 && k.skew == 0) return our_camera(ours(images::Model::pinhole_radtan, k, d, width, height));
   return with_rays(k, width, height, [d](const Vec2 &m, Vec3 &direction) {
     Vec2 p(0, 0);
     if (!unbend(d, m, p)) return false;
@@ -94,16 +94,16 @@ ForeignCamera plain_camera(const Matrix3 &k, const std::vector<double> &distorti
 ForeignCamera fisheye_camera(const Matrix3 &k, const std::vector<double> &distortion, int width, int height) {
   std::vector<double> d = distortion;
   d.resize(4, 0.0);
-  if (k.skew == 0) return our_camera(ours(render::Model::equidistant, k, d, width, height));
-  const render::Camera straight = ours(render::Model::equidistant, {1, 1, 0, 0, 0}, d, width, height);
+  if (k.skew == 0) return our_camera(ours(images::Model::equidistant, k, d, width, height));
+  const images::Camera straight = ours(images::Model::equidistant, {1, 1, 0, 0, 0}, d, width, height);
   return with_rays(k, width, height,
-                   [straight](const Vec2 &m, Vec3 &direction) { return render::unproject(straight, m, direction); });
+                   [straight](const Vec2 &m, Vec3 &direction) { return images::unproject(straight, m, direction); });
 }
 
 ForeignCamera fov_camera(const Matrix3 &k, double w, int width, int height) {
   return with_rays(k, width, height, [w](const Vec2 &m, Vec3 &direction) {
     const double distorted = m.norm();
-    if (distorted * w >= render::kPi / 2) return false;
+    if (distorted * w >= images::kPi / 2) return false;
     const double r = std::tan(distorted * w) / (2 * std::tan(w / 2));
     direction = distorted > 0 ? Vec3(m.x() / distorted * r, m.y() / distorted * r, 1) : Vec3(0, 0, 1);
     return true;

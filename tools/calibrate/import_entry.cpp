@@ -10,7 +10,7 @@
 namespace wm::calibrate {
 namespace {
 
-using render::Model;
+using images::Model;
 
 constexpr double kGood_px = 0.5, kUsable_px = 3;
 constexpr double kPlainWidest_rad = 1.4;  // beyond it a plain lens' model has no use
@@ -26,7 +26,7 @@ void say_fit(const Fit &fit) {
 
 std::vector<Model> candidates(const std::string &model_name, double widest_rad) {
   Model model = Model::equidistant;
-  if (render::model_from_name(model_name, model)) return {model};
+  if (images::model_from_name(model_name, model)) return {model};
   std::vector<Model> out{Model::equidistant, Model::double_sphere};
   if (widest_rad < kPlainWidest_rad) out.push_back(Model::pinhole_radtan);
   return out;
@@ -75,7 +75,7 @@ Entry import_camera(const ForeignCamera &camera, const std::string &name, const 
                      : "poor: the models disagree; calibrate anew with waymark calibrate camera");
   }
   std::string error;
-  if (!render::camera_valid(out.camera, error)) throw tools::Failure(file + ": " + error);
+  if (!images::camera_valid(out.camera, error)) throw tools::Failure(file + ": " + error);
   return out;
 }
 

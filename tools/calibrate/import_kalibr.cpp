@@ -43,15 +43,15 @@ ForeignCamera read_camera(const Entry &entry, const ImportHints &hints) {
   if (model == "pinhole") return pinhole(entry, bending, width, height);
   const bool bare = bending.empty() || bending == "none";
   if (model == "omni" && (bending == "radtan" || bare)) {
-    render::Camera camera{
-        .model = render::Model::omni, .width = width, .height = height, .intrinsics = {}, .distortion = {}};
+    images::Camera camera{
+        .model = images::Model::omni, .width = width, .height = height, .intrinsics = {}, .distortion = {}};
     camera.intrinsics = entry.numbers("intrinsics", 5);
     camera.distortion = bare ? std::vector<double>(4, 0.0) : entry.numbers("distortion_coeffs", 4);
     return our_camera(camera);
   }
   if (model == "ds" && bare) {
-    render::Camera camera{
-        .model = render::Model::double_sphere, .width = width, .height = height, .intrinsics = {}, .distortion = {}};
+    images::Camera camera{
+        .model = images::Model::double_sphere, .width = width, .height = height, .intrinsics = {}, .distortion = {}};
     camera.intrinsics = entry.numbers("intrinsics", 6);
     return our_camera(camera);
   }

@@ -80,8 +80,8 @@ std::vector<ForeignCamera> read_opencv(const FlatFile &file, const ImportHints &
   const std::vector<double> xi = file.numbers("xi.data").empty() ? file.numbers("xi") : file.numbers("xi.data");
   ForeignCamera out;
   if (xi.size() == 1) {  // OpenCV's omnidir: Mei's model
-    render::Camera camera{
-        .model = render::Model::omni, .width = width, .height = height, .intrinsics = {}, .distortion = {}};
+    images::Camera camera{
+        .model = images::Model::omni, .width = width, .height = height, .intrinsics = {}, .distortion = {}};
     camera.intrinsics = {xi[0], m.fx, m.fy, m.cx, m.cy};
     camera.distortion = d;
     camera.distortion.resize(d.size() > 4 ? 5 : 4, 0.0);

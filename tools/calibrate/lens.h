@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // The camera models of simulate/render/camera.h for any number type: with Ceres' dual numbers they give derivatives. A
-// test holds them against render::project.
+// test holds them against images::project.
 #pragma once
 
 #include <cmath>
 
-#include "simulate/render/camera.h"
+#include "images/camera.h"
 
 namespace wm::calibrate {
 
-using render::Model;
+using images::Model;
 
 // How many parameters a model has here: intrinsics, then distortion (radtan with k3, omni without).
 constexpr int lens_parameters(Model model) {

@@ -10,8 +10,8 @@
 
 #include "common/failure.h"
 #include "common/pose.h"
-#include "filters/edge_mcl/floor_camera.hpp"
-#include "maps/edge_map.hpp"
+#include "waymark/internal/filters/edge_mcl/floor_camera.hpp"
+#include "waymark/internal/maps/edge_map.hpp"
 
 namespace wm::calibrate {
 namespace {

@@ -63,7 +63,7 @@ Pose between(const BoardShape &shape, const Seen &first, Seen &second) {
   double least = std::numeric_limits<double>::infinity();
   for (int way = 0; way < ways_round(shape); way++) {
     Seen other = second;
-    turn(2 * render::kPi * way / ways_round(shape), other);
+    turn(2 * images::kPi * way / ways_round(shape), other);
     const Pose T = other.T_camera_board * first.T_camera_board.inverse();
     const double angle = Eigen::AngleAxisd(T.linear()).angle();
     if (angle >= least) continue;
@@ -75,7 +75,7 @@ Pose between(const BoardShape &shape, const Seen &first, Seen &second) {
 }
 
 Pose on_floor(const FloorBoard &board, bool faces_viewer) {
-  return render::pose_xyz_rpy({board.x_m, board.y_m, 0}, faces_viewer ? 0 : render::kPi, 0, board.yaw_rad);
+  return images::pose_xyz_rpy({board.x_m, board.y_m, 0}, faces_viewer ? 0 : images::kPi, 0, board.yaw_rad);
 }
 
 class Assembly {
@@ -131,7 +131,7 @@ class Assembly {
     double least = std::numeric_limits<double>::infinity();
     for (int way = 0; way < ways_round(shape_); way++) {
       Seen other = seen;
-      turn(2 * render::kPi * way / ways_round(shape_), other);
+      turn(2 * images::kPi * way / ways_round(shape_), other);
       const Pose T_base_rig = floor * other.T_camera_board.inverse();
       const double away = T_base_rig.translation().head<2>().norm();
       if (away >= least) continue;
@@ -176,7 +176,7 @@ void take_sigmas(const Bundle &bundle, double variance, Rig &rig) {
   rig.pair_sigma_m = rig.pair_sigma_rad = rig.base_sigma_m = rig.base_sigma_rad = nan;
   if (!unit) return;
   Eigen::Index at = 0;
-  for (const render::Camera &camera : bundle.cameras) at += parameters(camera).size();
+  for (const images::Camera &camera : bundle.cameras) at += parameters(camera).size();
   const auto largest = [&](Eigen::Index from) { return std::sqrt(unit->diagonal().segment<3>(from).maxCoeff()); };
   if (bundle.cameras.size() > 1) {
     rig.pair_sigma_rad = std::sqrt(variance) * largest(at);

@@ -30,11 +30,11 @@ inline constexpr double kFloor_m = 0.005, kFloor_rad = 0.01;  // standard deviat
 struct Rig {
   std::vector<Calibration> cameras;  // one or two
   // The second camera's optical frame in the first's, and the sigmas of its translation (m) and rotation (rad).
-  render::Pose T_first_second = render::Pose::Identity();
+  images::Pose T_first_second = images::Pose::Identity();
   double pair_sigma_m = 0, pair_sigma_rad = 0;
   size_t shared = 0;  // pictures of both
   // The first camera's optical frame in base_link.
-  std::optional<render::Pose> T_base_first;
+  std::optional<images::Pose> T_base_first;
   double base_sigma_m = 0, base_sigma_rad = 0;
   double rms_px = 0;
 };

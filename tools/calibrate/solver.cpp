@@ -13,7 +13,7 @@
 namespace wm::calibrate {
 namespace {
 
-using render::Camera;
+using images::Camera;
 
 constexpr double kHuber_px = 1.5;
 constexpr int kPose = 6;  // a rotation vector and a translation, both from where the pose was at the start
@@ -56,7 +56,7 @@ class Lens {
     for (double &value : camera_.intrinsics) value = plain(v[i++]);
     for (double &value : camera_.distortion) value = plain(v[i++]);
     Vec2 unused(0, 0);
-    if (!render::project(camera_, {plain(point[0]), plain(point[1]), plain(point[2])}, unused)) {
+    if (!images::project(camera_, {plain(point[0]), plain(point[1]), plain(point[2])}, unused)) {
       residual[0] = residual[1] = T(kNoPixel_px);
       return;
     }
@@ -229,7 +229,7 @@ class Problem {
 Vec2 miss(const Camera &camera, const Pose &T, const BoardCorner &corner) {
   Vec2 pixel(0, 0);
   const Vec3 point = T * Vec3(corner.board.x(), corner.board.y(), 0);
-  return render::project(camera, point, pixel) ? Vec2(pixel - corner.pixel) : Vec2(kNoPixel_px, kNoPixel_px);
+  return images::project(camera, point, pixel) ? Vec2(pixel - corner.pixel) : Vec2(kNoPixel_px, kNoPixel_px);
 }
 
 bool solve(Bundle &bundle, bool robust) {

@@ -8,11 +8,11 @@
 
 #include "calibrate/corners.h"
 #include "calibrate/fit.h"
-#include "simulate/render/camera.h"
+#include "images/camera.h"
 
 namespace wm::calibrate {
 
-using render::Pose;
+using images::Pose;
 
 // Corners that one camera saw in one shot.
 struct Sighting {
@@ -28,7 +28,7 @@ struct MeasuredBoard {
 };
 
 struct Bundle {
-  std::vector<render::Camera> cameras;
+  std::vector<images::Camera> cameras;
   std::vector<Pose> T_camera_rig;  // one a camera; that of the first is the identity and is held
   std::vector<Pose> T_rig_board;   // one a shot
   std::vector<Sighting> sightings;
@@ -40,12 +40,12 @@ struct Bundle {
 inline constexpr double kNoPixel_px = 100;
 
 // The distance of a corner's pixel from where it is expected, px.
-Vec2 miss(const render::Camera &camera, const Pose &T_camera_board, const BoardCorner &corner);
+Vec2 miss(const images::Camera &camera, const Pose &T_camera_board, const BoardCorner &corner);
 
 // Adjusts everything. `robust`: Huber's weights from 1.5 px on. False where no step was found.
 bool solve(Bundle &bundle, bool robust);
 // The pose of a board alone, the camera being known, and what is left, px rms by Huber's cost.
-double solve_pose(const render::Camera &camera, const std::vector<BoardCorner> &corners, Pose &T_camera_board);
+double solve_pose(const images::Camera &camera, const std::vector<BoardCorner> &corners, Pose &T_camera_board);
 // Covariance at the solution for residuals with a standard deviation of 1 px: parameters of the first camera, of the
 // second ..., then 6 a camera but the first of T_camera_rig (rotation, translation), then 6 of T_base_rig where boards
 // were measured. Empty where these pictures do not determine them.

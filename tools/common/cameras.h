@@ -7,13 +7,13 @@
 #include <string>
 #include <vector>
 
-#include "simulate/render/camera.h"
+#include "images/camera.h"
 
 namespace wm::tools {
 
 struct NamedCamera {
   std::string name;
-  render::Camera camera;
+  images::Camera camera;
 };
 
 // `cameras` of a calibration.yaml, in its order; empty where it has none. Throws Failure with file and key for what
@@ -25,8 +25,8 @@ const NamedCamera &choose_camera(const std::vector<NamedCamera> &cameras, const 
                                  const std::filesystem::path &calibration);
 
 // Where a pixel's ray meets the floor (z = 0 of base_link), in base_link; empty where it doesn't.
-std::optional<Eigen::Vector2d> floor_point(const render::Camera &camera, const Eigen::Vector2d &pixel);
+std::optional<Eigen::Vector2d> floor_point(const images::Camera &camera, const Eigen::Vector2d &pixel);
 // The pixel that shows a point of the floor; empty where none does, or it lies outside of the picture.
-std::optional<Eigen::Vector2d> floor_pixel(const render::Camera &camera, const Eigen::Vector2d &point_base);
+std::optional<Eigen::Vector2d> floor_pixel(const images::Camera &camera, const Eigen::Vector2d &point_base);
 
 }  // namespace wm::tools

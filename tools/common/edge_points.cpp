@@ -25,7 +25,7 @@ std::vector<EdgePoints> load_edge_points(const std::filesystem::path &run) {
   return out;
 }
 
-std::vector<std::vector<Eigen::Vector2d>> picture_polylines(const EdgePoints &points, const render::Camera &camera,
+std::vector<std::vector<Eigen::Vector2d>> picture_polylines(const EdgePoints &points, const images::Camera &camera,
                                                             double gap_px) {
   std::vector<std::vector<Eigen::Vector2d>> out;
   for (const Eigen::Vector2d &point : points.points) {

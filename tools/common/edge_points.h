@@ -23,7 +23,7 @@ std::vector<EdgePoints> load_edge_points(const std::filesystem::path &run);
 
 // The points in the picture, neighbours joined: a detector that gives points along rays has seen a line where the next
 // ray's point is near by. Points further apart than `gap_px` begin a new polyline; single points are left out.
-std::vector<std::vector<Eigen::Vector2d>> picture_polylines(const EdgePoints &points, const render::Camera &camera,
+std::vector<std::vector<Eigen::Vector2d>> picture_polylines(const EdgePoints &points, const images::Camera &camera,
                                                             double gap_px);
 
 // Frame of each stamp of a camera's pictures: REC/video/CAMERA.csv. Throws Failure.

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "common/grey_picture.h"
 
-#include <turbojpeg.h>
-
 #include <algorithm>
 #include <cstdlib>
 #include <cstring>
@@ -10,6 +8,7 @@
 #include <memory>
 
 #include "common/failure.h"
+#include "images/jpeg.h"
 #include "waymark/map.h"
 #include "waymark/video.h"
 
@@ -22,22 +21,6 @@ std::vector<uint8_t> read_bytes(const fs::path &file) {
   std::ifstream in(file, std::ios::binary);
   if (!in) throw Failure(file.string() + ": cannot be read: " + std::strerror(errno));
   return {std::istreambuf_iterator<char>(in), {}};
-}
-
-GreyPicture decode_jpeg(const std::vector<uint8_t> &bytes, const std::string &path) {
-  const std::unique_ptr<void, int (*)(tjhandle)> handle(tjInitDecompress(), tjDestroy);
-  GreyPicture out;
-  int subsampling = 0, space = 0;
-  if (tjDecompressHeader3(handle.get(), bytes.data(), bytes.size(), &out.width, &out.height, &subsampling, &space) !=
-          0 ||
-      out.width < 1 || out.height < 1 || out.width > 32768 || out.height > 32768)
-    throw Failure(path + ": not a JPEG that can be read");
-  out.pixels.resize(static_cast<size_t>(out.width) * static_cast<size_t>(out.height));
-  if (tjDecompress2(handle.get(), bytes.data(), bytes.size(), out.pixels.data(), out.width, 0, out.height, TJPF_GRAY,
-                    0) != 0 &&
-      tjGetErrorCode(handle.get()) == TJERR_FATAL)
-    throw Failure(path + ": " + tjGetErrorStr2(handle.get()));
-  return out;
 }
 
 bool is_picture(const fs::path &file) {
@@ -96,7 +79,12 @@ void each_frame(const fs::path &recording, const std::string &name, int every,
 
 GreyPicture load_picture(const fs::path &file) {
   const std::vector<uint8_t> bytes = read_bytes(file);
-  if (bytes.size() > 2 && bytes[0] == 0xFF && bytes[1] == 0xD8) return decode_jpeg(bytes, file.string());
+  if (bytes.size() > 2 && bytes[0] == 0xFF && bytes[1] == 0xD8) {
+    images::Picture8 grey;
+    std::string error;
+    if (!images::decode_jpeg(bytes, grey, error)) throw Failure(file.string() + ": " + error);
+    return {grey.width, grey.height, std::move(grey.bytes)};
+  }
   wm_grey grey{};
   wm_error error{};
   if (wm_grey_decode(bytes.data(), bytes.size(), file.c_str(), &grey, &error) != WM_OK) throw Failure(error.text);

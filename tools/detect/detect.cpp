@@ -15,8 +15,8 @@
 #include "common/run_folder.h"
 #include "detect/rows.h"
 #include "detect/sketch.h"
-#include "simulate/render/pictures.h"
-#include "simulate/render/video.h"
+#include "images/pictures.h"
+#include "images/video.h"
 #include "waymark/detectors.h"
 
 extern "C" {
@@ -126,18 +126,18 @@ class Drawer {
     if (kind_ == Drawing::avi) at_ += ".avi";
     fs::create_directories(kind_ == Drawing::avi ? at_.parent_path() : at_);
   }
-  void add(const render::Picture8 &picture, const std::string &name) {
+  void add(const images::Picture8 &picture, const std::string &name) {
     std::string error;
     bool good = true;
     if (kind_ == Drawing::avi) {
       if (!begun_)
-        good = avi_.open(at_, render::AviWriter::Coding::mjpeg, picture.width, picture.height, rate_hz_, error);
+        good = avi_.open(at_, images::AviWriter::Coding::mjpeg, picture.width, picture.height, rate_hz_, error);
       begun_ = true;
       good = good && avi_.add(picture, kQuality, error);
     } else {
       const bool is_jpg = kind_ == Drawing::jpg;
       const fs::path file = at_ / (name + (is_jpg ? ".jpg" : ".png"));
-      good = is_jpg ? render::write_jpeg(file, picture, kQuality, error) : render::write_png(file, picture, error);
+      good = is_jpg ? images::write_jpeg(file, picture, kQuality, error) : images::write_png(file, picture, error);
     }
     if (!good) throw Failure(error);
   }
@@ -151,7 +151,7 @@ class Drawer {
   Drawing kind_;
   fs::path at_;
   double rate_hz_;
-  render::AviWriter avi_;
+  images::AviWriter avi_;
   bool begun_ = false;
 };
 

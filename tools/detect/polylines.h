@@ -4,8 +4,8 @@
 
 #include <vector>
 
-#include "sensors/lens.hpp"
 #include "waymark/event.h"
+#include "waymark/internal/sensors/lens.hpp"
 
 namespace wm::tools {
 

@@ -6,37 +6,37 @@
 
 #include "common/failure.h"
 #include "detect/polylines.h"
-#include "sensors/bearing.hpp"
-#include "sensors/mounting.hpp"
-#include "simulate/render/patterns.h"
+#include "images/picture.h"
+#include "waymark/internal/sensors/bearing.hpp"
+#include "waymark/internal/sensors/mounting.hpp"
 
 namespace wm::tools {
 namespace {
 
-constexpr render::Colour kFound(1.F, 0.82F, 0.1F), kJoined(1.F, 0.35F, 0.2F), kShade(0.F, 0.F, 0.F);
+constexpr images::Colour kFound(1.F, 0.82F, 0.1F), kJoined(1.F, 0.35F, 0.2F), kShade(0.F, 0.F, 0.F);
 constexpr double kUpright_rad = 1.2;  // a bearing without elevation is drawn so far up and down
 constexpr int kPieces = 48, kRing = 24;
 constexpr double kUsualWidth_px = 1280;  // lines and letters are drawn for this width, and grow with the picture
 
-double scale_of(const render::Picture &p) { return std::max(0.6, p.width / kUsualWidth_px); }
+double scale_of(const images::Picture &p) { return std::max(0.6, p.width / kUsualWidth_px); }
 
-void label(const std::string &text, double u, double v, render::Picture *out) {
+void label(const std::string &text, double u, double v, images::Picture *out) {
   const double height = 12 * scale_of(*out);
-  render::draw_text(text.c_str(), u + 1.5, v + 1.5, height, kShade, *out);
-  render::draw_text(text.c_str(), u, v, height, kFound, *out);
+  images::draw_text(text.c_str(), u + 1.5, v + 1.5, height, kShade, *out);
+  images::draw_text(text.c_str(), u, v, height, kFound, *out);
 }
 
-void stroke(const pixel &a, const pixel &b, const render::Colour &colour, render::Picture *out) {
-  render::line(a.u, a.v, b.u, b.v, 2 * scale_of(*out), colour, *out);
+void stroke(const pixel &a, const pixel &b, const images::Colour &colour, images::Picture *out) {
+  images::line(a.u, a.v, b.u, b.v, 2 * scale_of(*out), colour, *out);
 }
 
-void mark(const pixel &at, render::Picture *out) {
+void mark(const pixel &at, images::Picture *out) {
   const double r = 8 * scale_of(*out);
   stroke({at.u - r, at.v}, {at.u + r, at.v}, kFound, out);
   stroke({at.u, at.v - r}, {at.u, at.v + r}, kFound, out);
 }
 
-void draw_path(const std::vector<std::optional<pixel>> &path, render::Picture *out) {
+void draw_path(const std::vector<std::optional<pixel>> &path, images::Picture *out) {
   for (size_t i = 1; i < path.size(); i++)
     if (path[i - 1] && path[i]) stroke(*path[i - 1], *path[i], kFound, out);
 }
@@ -92,18 +92,18 @@ std::vector<std::vector<pixel>> Sketch::polylines(const wm_event &event) const {
   return join_points(event.as.points, camera_);
 }
 
-void Sketch::draw_points(const wm_event &event, render::Picture *out) const {
+void Sketch::draw_points(const wm_event &event, images::Picture *out) const {
   for (const auto &line : polylines(event))
     for (size_t i = 1; i < line.size(); i++) stroke(line[i - 1], line[i], kJoined, out);
   const wm_points &points = event.as.points;
   for (uint32_t i = 0; i < std::min<uint32_t>(points.count, WM_POINTS_MAX); i++) {
     pixel at{};
     const vec3 place = {static_cast<double>(points.x_m[i]), static_cast<double>(points.y_m[i]), 0};
-    if (pixel_of(camera_, place, 0, &at)) render::fill_disc(at.u, at.v, 2 * scale_of(*out), kFound, *out);
+    if (pixel_of(camera_, place, 0, &at)) images::fill_disc(at.u, at.v, 2 * scale_of(*out), kFound, *out);
   }
 }
 
-void Sketch::draw_sighting(const wm_sighting &s, render::Picture *out) const {
+void Sketch::draw_sighting(const wm_sighting &s, images::Picture *out) const {
   if (!std::isfinite(s.bearing_rad)) return;
   const std::string name = s.landmark_id >= 0 ? std::to_string(s.landmark_id) : "";
   if (std::isfinite(s.elevation_rad)) {
@@ -126,7 +126,7 @@ void Sketch::draw_sighting(const wm_sighting &s, render::Picture *out) const {
 }
 
 // A ring of half the marker's width around its middle, across the line of sight.
-void Sketch::draw_marker(const wm_marker &m, render::Picture *out) const {
+void Sketch::draw_marker(const wm_marker &m, images::Picture *out) const {
   const vec3 middle = vec_of(m.p_m);
   const auto at = of_sensor(middle);
   if (!at) return;
@@ -145,17 +145,17 @@ void Sketch::draw_marker(const wm_marker &m, render::Picture *out) const {
   label(std::to_string(m.id), at->u + 10 * scale_of(*out), at->v - 4, out);
 }
 
-void Sketch::draw_stereo(const wm_stereo &point, render::Picture *out) const {
+void Sketch::draw_stereo(const wm_stereo &point, images::Picture *out) const {
   const auto at = of_rectified(point.left_px);
   const double other_px[2] = {point.right_px[0], point.left_px[1]};
   if (const auto other = of_rectified(other_px); at && other) stroke(*at, *other, kJoined, out);
-  if (at) render::fill_disc(at->u, at->v, 3 * scale_of(*out), kFound, *out);
+  if (at) images::fill_disc(at->u, at->v, 3 * scale_of(*out), kFound, *out);
 }
 
-render::Picture8 Sketch::draw(const wm_frame &frame, const std::vector<wm_event> &events,
+images::Picture8 Sketch::draw(const wm_frame &frame, const std::vector<wm_event> &events,
                               const std::string &caption) const {
   const auto width = static_cast<int>(frame.width_px), height = static_cast<int>(frame.height_px);
-  render::Picture p(width, height, 3);
+  images::Picture p(width, height, 3);
   for (int y = 0; y < height; y++)
     for (int x = 0; x < width; x++)
       for (int c = 0; c < 3; c++)
@@ -167,7 +167,7 @@ render::Picture8 Sketch::draw(const wm_frame &frame, const std::vector<wm_event>
     if (event.kind == WM_EVENT_STEREO) draw_stereo(event.as.stereo, &p);
   }
   label(caption, 10, 10 + 14 * scale_of(p), &p);
-  render::Picture8 out{width, height, 3, {}};
+  images::Picture8 out{width, height, 3, {}};
   out.bytes.reserve(p.values.size());
   for (const float value : p.values)
     out.bytes.push_back(static_cast<uint8_t>(std::lround(255 * std::clamp(value, 0.F, 1.F))));

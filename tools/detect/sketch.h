@@ -6,11 +6,11 @@
 #include <string>
 #include <vector>
 
-#include "sensors/lens.hpp"
-#include "simulate/render/pictures.h"
-#include "simulate/render/texture.h"
+#include "images/picture.h"
+#include "images/pictures.h"
 #include "waymark/event.h"
 #include "waymark/frame.h"
+#include "waymark/internal/sensors/lens.hpp"
 #include "waymark/setup.h"
 
 namespace wm::tools {
@@ -25,7 +25,7 @@ class Sketch {
   [[nodiscard]] std::optional<pixel> pixel_of_event(const wm_event &event) const;
   // The picture with what was found drawn in: points of edges and their polylines, sightings, rings around markers,
   // points of a stereo pair with their disparities.
-  [[nodiscard]] render::Picture8 draw(const wm_frame &frame, const std::vector<wm_event> &events,
+  [[nodiscard]] images::Picture8 draw(const wm_frame &frame, const std::vector<wm_event> &events,
                                       const std::string &caption) const;
   // Edge points joined to polylines (detect/polylines.h).
   [[nodiscard]] std::vector<std::vector<pixel>> polylines(const wm_event &event) const;
@@ -34,10 +34,10 @@ class Sketch {
   [[nodiscard]] std::optional<pixel> along(double bearing_rad, double elevation_rad) const;
   [[nodiscard]] std::optional<pixel> of_sensor(const vec3 &point_m) const;
   [[nodiscard]] std::optional<pixel> of_rectified(const double px[2]) const;
-  void draw_points(const wm_event &event, render::Picture *out) const;
-  void draw_sighting(const wm_sighting &sighting, render::Picture *out) const;
-  void draw_marker(const wm_marker &marker, render::Picture *out) const;
-  void draw_stereo(const wm_stereo &point, render::Picture *out) const;
+  void draw_points(const wm_event &event, images::Picture *out) const;
+  void draw_sighting(const wm_sighting &sighting, images::Picture *out) const;
+  void draw_marker(const wm_marker &marker, images::Picture *out) const;
+  void draw_stereo(const wm_stereo &point, images::Picture *out) const;
 
   mounted_camera camera_{};
   mat3 R_base_body_{};

@@ -103,26 +103,26 @@ bool is_within(const std::vector<Pose> &truth, int64_t t_ns) {
 }
 
 // The robot at t_ns (which is within), between the two nearest rows of truth.
-render::Pose pose_at(const std::vector<Pose> &truth, int64_t t_ns) {
+images::Pose pose_at(const std::vector<Pose> &truth, int64_t t_ns) {
   const auto after =
       std::lower_bound(truth.begin(), truth.end(), t_ns, [](const Pose &p, int64_t t) { return p.t_ns < t; });
   const Pose &a = *(after - 1), &b = *after;
   const double s = static_cast<double>(t_ns - a.t_ns) / static_cast<double>(b.t_ns - a.t_ns);
-  render::Pose out = render::Pose::Identity();
+  images::Pose out = images::Pose::Identity();
   out.linear() = a.q.slerp(s, b.q).toRotationMatrix();
   out.translation() = a.p_m + s * (b.p_m - a.p_m);
   return out;
 }
 
 // The shorter side's pixels and the bearing by truth; false where the camera has no picture of it.
-bool by_truth(const render::Camera &camera, const render::Pose &T_map_base, const Panel &panel, double *shorter_px,
+bool by_truth(const images::Camera &camera, const images::Pose &T_map_base, const Panel &panel, double *shorter_px,
               double *bearing_rad) {
-  const render::Pose T_optical_map = (T_map_base * render::T_base_optical(camera)).inverse();
+  const images::Pose T_optical_map = (T_map_base * images::T_base_optical(camera)).inverse();
   const Vector3d corners[4] = {panel.middle - panel.right + panel.up, panel.middle + panel.right + panel.up,
                                panel.middle + panel.right - panel.up, panel.middle - panel.right - panel.up};
   Vector2d p[4];
   for (int i = 0; i < 4; i++)
-    if (!render::project(camera, T_optical_map * corners[i], p[i])) return false;
+    if (!images::project(camera, T_optical_map * corners[i], p[i])) return false;
   *shorter_px = std::min(0.5 * ((p[0] - p[1]).norm() + (p[2] - p[3]).norm()),
                          0.5 * ((p[1] - p[2]).norm() + (p[3] - p[0]).norm()));
   *bearing_rad = bearing_of(T_optical_map * panel.middle);
@@ -130,7 +130,7 @@ bool by_truth(const render::Camera &camera, const render::Pose &T_map_base, cons
 }
 
 // The labels of one camera by frame, as the camera, as calibrated, has their bearings.
-std::map<int64_t, std::vector<Label>> load_labels(const fs::path &recording, size_t index, const render::Camera &camera,
+std::map<int64_t, std::vector<Label>> load_labels(const fs::path &recording, size_t index, const images::Camera &camera,
                                                   const std::map<int64_t, int64_t> &stamps,
                                                   const std::map<int64_t, Panel> &panels,
                                                   const std::vector<Pose> &truth) {
@@ -144,7 +144,7 @@ std::map<int64_t, std::vector<Label>> load_labels(const fs::path &recording, siz
     const auto panel = panels.find(csv.integer(row, id));
     Vector3d ray;
     if (stamp == stamps.end() || panel == panels.end() || !is_within(truth, stamp->second) ||
-        !render::unproject(camera, {csv.number(row, u), csv.number(row, v)}, ray))
+        !images::unproject(camera, {csv.number(row, u), csv.number(row, v)}, ray))
       continue;
     Label label{csv.integer(row, id), bearing_of(ray), elevation_of(ray), 0};
     double bearing = 0;
@@ -192,7 +192,7 @@ void judge_camera(const fs::path &run, const fs::path &recording, size_t index, 
             s.id >= 0 ? std::find_if(wanted.begin(), wanted.end(), [&](const Label &l) { return l.id == s.id; })
                       : nearest(wanted, found, s);
         if (label == wanted.end()) {
-          const render::Pose robot = pose_at(truth, t_ns);
+          const images::Pose robot = pose_at(truth, t_ns);
           const bool stands_there = std::any_of(panels.begin(), panels.end(), [&](const auto &panel) {
             double size = 0, bearing = 0;
             return (s.id < 0 || panel.first == s.id) && by_truth(named.camera, robot, panel.second, &size, &bearing) &&

@@ -11,7 +11,7 @@
 #include "common/recording_folder.h"
 #include "common/run_folder.h"
 #include "common/statistics.h"
-#include "sensors/lens.hpp"
+#include "waymark/internal/sensors/lens.hpp"
 #include "waymark/video.h"
 
 namespace wm::tools {

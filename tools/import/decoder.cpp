@@ -23,7 +23,7 @@ struct Decoder::Libav {
   std::optional<int64_t> first_pts;
   bool drained = false;
   uint64_t damaged = 0;
-  render::Picture8 grey;
+  images::Picture8 grey;
 
   ~Libav() {
     sws_freeContext(scale);

@@ -8,7 +8,7 @@
 #include <optional>
 #include <vector>
 
-#include "simulate/render/pictures.h"
+#include "images/pictures.h"
 
 namespace wm::tools {
 
@@ -26,7 +26,7 @@ class Decoder {
   [[nodiscard]] const char *codec() const;
 
   struct Shown {
-    const render::Picture8 *grey;  // until the next one
+    const images::Picture8 *grey;  // until the next one
     std::optional<double> t_s;     // the container's stamp, from its first picture on; none: it has none
   };
   // None at the end. Throws Failure where the size of the pictures changes.

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "common/failure.h"
+#include "images/video.h"
 #include "import/decoder.h"
-#include "simulate/render/video.h"
 
 namespace wm::tools {
 namespace {
@@ -67,9 +67,9 @@ Imported import_video(const ImportWish &wish) {
   made.made = avi;
   const uint64_t rows = made.own_stamps ? rows_of(stamps) : 0;
 
-  render::AviWriter out;
+  images::AviWriter out;
   std::string problem;
-  if (!out.open(parts.avi.string(), render::AviWriter::Coding::mjpeg, made.width, made.height, decoder.rate_hz(),
+  if (!out.open(parts.avi.string(), images::AviWriter::Coding::mjpeg, made.width, made.height, decoder.rate_hz(),
                 problem))
     throw Failure(problem);
   std::ofstream table(parts.csv);

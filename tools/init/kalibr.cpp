@@ -11,11 +11,11 @@ constexpr double kFarthest_m = 100;    // of a camera from the IMU
 constexpr double kLongestShift_s = 10;
 
 // T_a_b as the file has it, four rows of four.
-std::optional<render::Pose> matrix(const calibrate::FlatFile &file, const std::string &key) {
+std::optional<images::Pose> matrix(const calibrate::FlatFile &file, const std::string &key) {
   if (!file.has(key)) return std::nullopt;
   const std::vector<double> m = file.numbers(key);
   if (m.size() != 16) file.fail(key, "has " + std::to_string(m.size()) + " numbers; 4 rows of 4 are needed");
-  render::Pose out = render::Pose::Identity();
+  images::Pose out = images::Pose::Identity();
   const Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>> rows(m.data());
   out.linear() = rows.topLeftCorner<3, 3>();
   out.translation() = rows.topRightCorner<3, 1>();
@@ -34,7 +34,7 @@ std::optional<render::Pose> matrix(const calibrate::FlatFile &file, const std::s
 
 std::vector<ChainCamera> read_chain(const calibrate::FlatFile &file) {
   std::vector<ChainCamera> out;
-  render::Pose in_first = render::Pose::Identity();
+  images::Pose in_first = images::Pose::Identity();
   for (const std::string &cam : file.children("")) {
     if (!file.has(cam + ".camera_model")) continue;
     ChainCamera one;

@@ -8,14 +8,14 @@
 #include <vector>
 
 #include "calibrate/flat_file.h"
-#include "simulate/render/types.h"
+#include "images/types.h"
 
 namespace wm::init {
 
 struct ChainCamera {
   std::string name;                      // cam0 ...
-  std::optional<render::Pose> in_imu;    // its optical frame in the IMU's
-  std::optional<render::Pose> in_first;  // its optical frame in that of the first camera
+  std::optional<images::Pose> in_imu;    // its optical frame in the IMU's
+  std::optional<images::Pose> in_first;  // its optical frame in that of the first camera
   std::optional<double> shift_s;         // time of the IMU = time of the camera + shift
 };
 

@@ -42,7 +42,7 @@ std::string value_for(const std::vector<std::string> &pairs, const std::string &
   return out;
 }
 
-render::Pose parse_mounting(const std::string &name, const std::string &text) {
+images::Pose parse_mounting(const std::string &name, const std::string &text) {
   std::vector<double> n;
   const char *at = text.data(), *end = at + text.size();
   while (at < end) {
@@ -56,8 +56,8 @@ render::Pose parse_mounting(const std::string &name, const std::string &text) {
     throw Failure("--mounting " + name + "=" + text +
                       ": six numbers are needed: X,Y,Z in m and ROLL,PITCH,YAW in degrees, as in front=0.2,0,0.4,0,0,0",
                   tools::kUsage);
-  const double deg = render::kPi / 180;
-  return render::pose_xyz_rpy({n[0], n[1], n[2]}, n[3] * deg, n[4] * deg, n[5] * deg);
+  const double deg = images::kPi / 180;
+  return images::pose_xyz_rpy({n[0], n[1], n[2]}, n[3] * deg, n[4] * deg, n[5] * deg);
 }
 
 // base_link on the ground, under the middle of the driven (rear) axle, seen from the URDF's base.
@@ -86,7 +86,7 @@ class Ground {
   [[nodiscard]] std::optional<double> wheelbase_m() const {
     return front_x_ ? std::optional(*front_x_ - rear_x_) : std::nullopt;
   }
-  [[nodiscard]] render::Vec3 origin() const {
+  [[nodiscard]] images::Vec3 origin() const {
     return {rear_x_, 0.5 * (left_.centre_m.y() + right_.centre_m.y()),
             0.5 * (left_.centre_m.z() + right_.centre_m.z()) - radius_m()};
   }
@@ -124,7 +124,7 @@ class Mountings {
           robot.urdf->base + "; poses are of this point");
   }
 
-  std::optional<render::Pose> of(const std::string &name, std::string &by) const {
+  std::optional<images::Pose> of(const std::string &name, std::string &by) const {
     if (const std::string text = value_for(robot_.wish.mountings, name, "--mounting"); !text.empty()) {
       by = "given";
       return parse_mounting(name, text);
@@ -154,7 +154,7 @@ class Mountings {
   }
 
   Robot &robot_;
-  render::Pose shift_ = render::Pose::Identity();
+  images::Pose shift_ = images::Pose::Identity();
 };
 
 std::string unmounted(const std::string &kind, const std::string &name) {
@@ -211,13 +211,13 @@ Imported take(std::vector<Imported> &imported, const std::string &name, const st
 
 void mount(Robot &robot, const Mountings &mountings, std::vector<Imported> &of_camera) {
   std::string imu_by;
-  const std::optional<render::Pose> imu = mountings.of("imu", imu_by);
-  std::optional<render::Pose> first;  // optical frame of the chain's first camera
+  const std::optional<images::Pose> imu = mountings.of("imu", imu_by);
+  std::optional<images::Pose> first;  // optical frame of the chain's first camera
   for (size_t i = 0; i < robot.cameras.size(); i++) {
     RobotCamera &camera = robot.cameras[i];
     const std::optional<ChainCamera> &chain = of_camera[i].chain;
     const std::string file = std::filesystem::path(of_camera[i].file).filename().string();
-    std::optional<render::Pose> own = mountings.of(camera.entry.name, camera.mounted_by), by_chain;
+    std::optional<images::Pose> own = mountings.of(camera.entry.name, camera.mounted_by), by_chain;
     const bool given = own && camera.mounted_by == "given";
     if (chain && chain->in_imu && imu) {
       by_chain = *imu * *chain->in_imu;
@@ -227,7 +227,7 @@ void mount(Robot &robot, const Mountings &mountings, std::vector<Imported> &of_c
       if (!given) camera.mounted_by = file + "'s T_cn_cnm1 from the first camera";
     }
     if (by_chain && !given) {
-      const render::Pose body = *by_chain * render::T_body_optical().inverse();
+      const images::Pose body = *by_chain * images::T_body_optical().inverse();
       if (own && (own->translation() - body.translation()).norm() > kMountedApart_m)
         robot.guesses.push_back(
             "mounting of camera " + camera.entry.name + ": of the calibration, since it is measured; the URDF's is " +
@@ -237,7 +237,7 @@ void mount(Robot &robot, const Mountings &mountings, std::vector<Imported> &of_c
     if (own) {
       camera.entry.camera.T_base_camera = *own;
       camera.entry.mounted = true;
-      if (!first) first = *own * render::T_body_optical();
+      if (!first) first = *own * images::T_body_optical();
       camera.entry.remark += "; mounting: " + one_line(camera.mounted_by);
     } else {
       robot.unknown.push_back(unmounted("camera", camera.entry.name));
@@ -301,7 +301,7 @@ void read_geometry(Robot &robot) {
   }
   mount(robot, mountings, of_camera);
   for (const std::string &name : wish.sensors) {
-    RobotSensor sensor{.name = name, .mounting = render::Pose::Identity(), .mounted_by = {}};
+    RobotSensor sensor{.name = name, .mounting = images::Pose::Identity(), .mounted_by = {}};
     if (const auto pose = mountings.of(name, sensor.mounted_by))
       sensor.mounting = *pose;
     else

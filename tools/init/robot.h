@@ -49,7 +49,7 @@ struct RobotCamera {
 };
 struct RobotSensor {
   std::string name;
-  render::Pose mounting = render::Pose::Identity();
+  images::Pose mounting = images::Pose::Identity();
   std::string mounted_by;
 };
 

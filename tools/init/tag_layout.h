@@ -6,13 +6,13 @@
 #include <string>
 #include <vector>
 
-#include "simulate/render/types.h"
+#include "images/types.h"
 
 namespace wm::init {
 
 struct Tag {
   int64_t id;
-  render::Vec3 place_m;
+  images::Vec3 place_m;
 };
 struct TagLayout {
   std::vector<Tag> tags;

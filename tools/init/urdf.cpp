@@ -2,9 +2,9 @@
 #include "init/urdf.h"
 
 #include "common/failure.h"
+#include "images/camera.h"
 #include "init/proposals.h"
 #include "init/text_file.h"
-#include "simulate/render/camera.h"
 
 #ifdef WM_HAS_TINYXML2
 #include <tinyxml2.h>
@@ -22,9 +22,9 @@ std::string Urdf::link_of(const std::string &name) const {
   return "";
 }
 
-render::Pose Urdf::body(const std::string &link) const {
-  const render::Pose &pose = links.at(link);
-  return link.find("optical") == std::string::npos ? pose : pose * render::T_body_optical().inverse();
+images::Pose Urdf::body(const std::string &link) const {
+  const images::Pose &pose = links.at(link);
+  return link.find("optical") == std::string::npos ? pose : pose * images::T_body_optical().inverse();
 }
 
 #ifdef WM_HAS_TINYXML2
@@ -37,7 +37,7 @@ constexpr double kFarthest_m = 1000;  // of a part from its parent: beyond it th
 struct Joint {
   std::string name, parent, child;
   bool is_wheel = false;
-  render::Pose place;  // of the child in the parent
+  images::Pose place;  // of the child in the parent
   int line = 0;
 };
 
@@ -84,8 +84,8 @@ class Reader {
     return value;
   }
 
-  render::Vec3 three(const XMLElement *e, const char *attribute) const {
-    render::Vec3 out = render::Vec3::Zero();
+  images::Vec3 three(const XMLElement *e, const char *attribute) const {
+    images::Vec3 out = images::Vec3::Zero();
     const char *value = e != nullptr ? e->Attribute(attribute) : nullptr;
     if (value == nullptr) return out;
     const std::vector<std::string> words = split(value);
@@ -96,14 +96,14 @@ class Reader {
     return out;
   }
 
-  render::Pose origin(const XMLElement *of) const {
+  images::Pose origin(const XMLElement *of) const {
     const XMLElement *e = of->FirstChildElement("origin");
-    const render::Vec3 rpy = three(e, "rpy");
-    render::Pose out = render::Pose::Identity();
+    const images::Vec3 rpy = three(e, "rpy");
+    images::Pose out = images::Pose::Identity();
     out.translation() = three(e, "xyz");
     out.linear() =
-        (Eigen::AngleAxisd(rpy.z(), render::Vec3::UnitZ()) * Eigen::AngleAxisd(rpy.y(), render::Vec3::UnitY()) *
-         Eigen::AngleAxisd(rpy.x(), render::Vec3::UnitX()))
+        (Eigen::AngleAxisd(rpy.z(), images::Vec3::UnitZ()) * Eigen::AngleAxisd(rpy.y(), images::Vec3::UnitY()) *
+         Eigen::AngleAxisd(rpy.x(), images::Vec3::UnitX()))
             .toRotationMatrix();
     return out;
   }
@@ -143,8 +143,8 @@ class Reader {
   }
 
   // From the link up to the root; throws where the chain is a ring or leads to no link.
-  render::Pose in_root(const std::string &link, std::string &root) const {
-    render::Pose out = render::Pose::Identity();
+  images::Pose in_root(const std::string &link, std::string &root) const {
+    images::Pose out = images::Pose::Identity();
     std::set<std::string> seen;
     root = link;
     for (auto j = of_child_.find(root); j != of_child_.end(); j = of_child_.find(root)) {
@@ -159,7 +159,7 @@ class Reader {
 
   [[nodiscard]] Urdf made() const {
     Urdf out;
-    std::map<std::string, render::Pose> of_root;
+    std::map<std::string, images::Pose> of_root;
     std::string first_root;
     for (const auto &[name, radius] : radius_) {
       std::string root;
@@ -169,7 +169,7 @@ class Reader {
     out.base = radius_.contains("base_footprint") ? "base_footprint"
                : radius_.contains("base_link")    ? "base_link"
                                                   : first_root;
-    const render::Pose to_base = of_root.at(out.base).inverse();
+    const images::Pose to_base = of_root.at(out.base).inverse();
     std::string base_root;
     (void)in_root(out.base, base_root);
     for (const auto &[name, pose] : of_root) {

@@ -7,25 +7,25 @@
 #include <string>
 #include <vector>
 
-#include "simulate/render/types.h"
+#include "images/types.h"
 
 namespace wm::init {
 
 struct UrdfWheel {
   std::string link;
-  render::Vec3 centre_m;  // in the base link
+  images::Vec3 centre_m;  // in the base link
   double radius_m = 0;    // 0: the file has no cylinder or sphere for it
 };
 
 struct Urdf {
   std::string base;                           // base_footprint, base_link, or the root
-  std::map<std::string, render::Pose> links;  // in `base`
+  std::map<std::string, images::Pose> links;  // in `base`
   std::vector<UrdfWheel> wheels;              // continuous joints whose link or joint is named so
 
   // Link of a sensor: `name` itself, else NAME_optical_frame, NAME_optical, NAME_link, NAME_frame; "": none.
   [[nodiscard]] std::string link_of(const std::string &name) const;
   // A sensor's body frame (x along the view) in `base`; a link named ..._optical... looks along its z axis.
-  [[nodiscard]] render::Pose body(const std::string &link) const;
+  [[nodiscard]] images::Pose body(const std::string &link) const;
 };
 
 // False in a build without TinyXML-2.

@@ -12,7 +12,7 @@
 #include "common/csv.h"
 #include "common/failure.h"
 #include "common/grey_picture.h"
-#include "simulate/render/pictures.h"
+#include "images/pictures.h"
 
 namespace wm::tools {
 namespace {
@@ -27,18 +27,18 @@ constexpr int kSamples = 4;  // a pixel, along each axis
 
 // The picture's geometry: rays of pixels and back. Without a calibration a pixel is its own ray.
 struct Optics {
-  std::optional<render::Camera> camera;
+  std::optional<images::Camera> camera;
 
   Vector3d ray(const Vector2d &pixel) const {
     Vector3d out(pixel.x(), pixel.y(), 1);
-    if (camera && !render::unproject(*camera, pixel, out))
+    if (camera && !images::unproject(*camera, pixel, out))
       throw Failure(
           "--corners: the camera has no ray at (" + std::to_string(pixel.x()) + ", " + std::to_string(pixel.y()) + ")",
           kUsage);
     return out;
   }
   bool pixel(const Vector3d &ray, Vector2d *out) const {
-    if (camera) return render::project(*camera, ray, *out);
+    if (camera) return images::project(*camera, ray, *out);
     *out = ray.head<2>() / ray.z();
     return ray.z() > 0;
   }
@@ -70,9 +70,9 @@ double bilinear(const GreyPicture &picture, const Vector2d &at) {
          fy * ((1 - fx) * picture.at(column, row + 1) + fx * picture.at(column + 1, row + 1));
 }
 
-render::Picture8 cut_out(const GreyPicture &picture, const Optics &optics, const Matrix3d &square, int width,
+images::Picture8 cut_out(const GreyPicture &picture, const Optics &optics, const Matrix3d &square, int width,
                          int height) {
-  render::Picture8 out{width, height, 1, {}};
+  images::Picture8 out{width, height, 1, {}};
   for (int y = 0; y < height; y++)
     for (int x = 0; x < width; x++) {
       double sum = 0;
@@ -201,7 +201,7 @@ AddedLandmark add_landmark(const AddLandmark &a) {
   out.height_px = static_cast<int>(std::lround(shrink * high));
   if (std::min(out.width_px, out.height_px) < kSideMin_px)
     throw Failure("--corners: less than " + std::to_string(kSideMin_px) + " pixels a side are too few", kUsage);
-  const render::Picture8 look = cut_out(picture, optics, square, out.width_px, out.height_px);
+  const images::Picture8 look = cut_out(picture, optics, square, out.width_px, out.height_px);
   double sum = 0, squares = 0;
   for (const uint8_t v : look.bytes) sum += v, squares += static_cast<double>(v) * v;
   const double n = static_cast<double>(look.bytes.size());
@@ -215,7 +215,7 @@ AddedLandmark add_landmark(const AddLandmark &a) {
     name = std::to_string(a.id) + "-" + std::to_string(i) + ".png";
   out.picture = folder / "landmarks" / name;
   std::string error;
-  if (!render::write_png(out.picture, look, error)) throw Failure(error);
+  if (!images::write_png(out.picture, look, error)) throw Failure(error);
   char row[160];
   std::snprintf(row, sizeof row, "%d,%s,%.4f,%.4f,%.6f", a.id, name.c_str(), out.width_m, out.height_m, out.yaw_rad);
   append(out.appearances, "id,picture,width_m,height_m,yaw_rad", row);

@@ -8,7 +8,7 @@
 #include <map>
 
 #include "common/failure.h"
-#include "vision/cascade/evaluate.hpp"
+#include "waymark/internal/vision/cascade/evaluate.hpp"
 
 namespace wm::tools {
 namespace {

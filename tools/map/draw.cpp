@@ -3,8 +3,8 @@
 #include <cmath>
 
 #include "common/failure.h"
+#include "images/pictures.h"
 #include "map/layers.h"
-#include "simulate/render/pictures.h"
 
 namespace wm::tools {
 namespace {
@@ -20,7 +20,7 @@ constexpr Shade kElsewhere{200, 203, 208}, kFloor{255, 255, 255}, kEdge{20, 40, 
 void draw_map(const Layers &layers, const Plan &place, double grid_m, int width,
               const std::vector<Eigen::Vector2d> &marks, const std::string &file) {
   const int scale = std::max(1, (layers.width + width - 1) / width);
-  render::Picture8 out{layers.width / scale, layers.height / scale, 3, {}};
+  images::Picture8 out{layers.width / scale, layers.height / scale, 3, {}};
   if (out.width < 1 || out.height < 1) throw Failure(file + ": the map is too small to be drawn");
   out.bytes.resize(static_cast<size_t>(out.width) * static_cast<size_t>(out.height) * 3);
   const auto put = [&](int x, int y, Shade s) {
@@ -56,7 +56,7 @@ void draw_map(const Layers &layers, const Plan &place, double grid_m, int width,
           put(static_cast<int>(std::lround(at.x())) + i, static_cast<int>(std::lround(at.y())) + j, kMark);
   }
   std::string error;
-  if (!render::write_png(file, out, error)) throw Failure(error);
+  if (!images::write_png(file, out, error)) throw Failure(error);
 }
 
 }  // namespace wm::tools

@@ -15,7 +15,7 @@ namespace wm::tools {
 // A plan: what each pixel is, and where the picture lies in the map.
 struct Plan {
   GreyPicture picture;           // 0 wall, 255 floor, between them: how much of the pixel is floor
-  std::vector<uint8_t> unknown;  // 1: nobody knows (occupancy maps); empty: all is known
+  std::vector<uint8_t> unknown;  // 1: unknown (occupancy maps); empty: all is known
   double resolution_m = 0.05;
   double origin_x_m = 0, origin_y_m = 0, origin_yaw_rad = 0;  // outer corner of the lower left pixel
 };

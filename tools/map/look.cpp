@@ -9,8 +9,8 @@
 
 #include "common/failure.h"
 #include "common/grey_picture.h"
-#include "simulate/render/patterns.h"
-#include "simulate/render/pictures.h"
+#include "images/picture.h"
+#include "images/pictures.h"
 #include "waymark/detector.h"
 #include "waymark/recording.h"
 
@@ -57,8 +57,8 @@ wm_estimate pose_of(const LookAtPicture &a) {
 
 // Yellow squares: found; blue crosses: expected there and not found, with the landmark's number at each.
 void draw(const GreyPicture &grey, const std::vector<wm_looked_for> &looks, const std::string &file) {
-  const render::Colour yellow(1.f, 0.85f, 0.1f), blue(0.25f, 0.6f, 1.f);
-  render::Picture p(grey.width, grey.height, 3);
+  const images::Colour yellow(1.f, 0.85f, 0.1f), blue(0.25f, 0.6f, 1.f);
+  images::Picture p(grey.width, grey.height, 3);
   for (size_t i = 0; i < grey.pixels.size(); i++)
     for (size_t c = 0; c < 3; c++) p.values[3 * i + c] = static_cast<float>(grey.pixels[i]) / 255.f;
   for (const wm_looked_for &l : looks) {
@@ -67,23 +67,23 @@ void draw(const GreyPicture &grey, const std::vector<wm_looked_for> &looks, cons
     const double u = found ? l.found_px[0] : l.expected_px[0], v = found ? l.found_px[1] : l.expected_px[1], r = 11;
     if (found) {
       for (const double side : {-r, r}) {
-        render::line(u - r, v + side, u + r, v + side, 1.5, yellow, p);
-        render::line(u + side, v - r, u + side, v + r, 1.5, yellow, p);
+        images::line(u - r, v + side, u + r, v + side, 1.5, yellow, p);
+        images::line(u + side, v - r, u + side, v + r, 1.5, yellow, p);
       }
-      render::line(u - 3, v, u + 3, v, 1, yellow, p);
-      render::line(u, v - 3, u, v + 3, 1, yellow, p);
+      images::line(u - 3, v, u + 3, v, 1, yellow, p);
+      images::line(u, v - 3, u, v + 3, 1, yellow, p);
     } else {
-      render::line(u - 6, v - 6, u + 6, v + 6, 1.5, blue, p);
-      render::line(u - 6, v + 6, u + 6, v - 6, 1.5, blue, p);
+      images::line(u - 6, v - 6, u + 6, v + 6, 1.5, blue, p);
+      images::line(u - 6, v + 6, u + 6, v - 6, 1.5, blue, p);
     }
-    render::draw_text(std::to_string(l.landmark_id).c_str(), u + r + 3, v + 5, 11, found ? yellow : blue, p);
+    images::draw_text(std::to_string(l.landmark_id).c_str(), u + r + 3, v + 5, 11, found ? yellow : blue, p);
   }
-  render::Picture8 out{grey.width, grey.height, 3, {}};
+  images::Picture8 out{grey.width, grey.height, 3, {}};
   for (const float value : p.values)
     out.bytes.push_back(static_cast<uint8_t>(std::lround(255 * std::fmin(1.f, std::fmax(0.f, value)))));
   const bool jpeg = fs::path(file).extension() == ".jpg";
   std::string error;
-  if (!(jpeg ? render::write_jpeg(file, out, 80, error) : render::write_png(file, out, error))) throw Failure(error);
+  if (!(jpeg ? images::write_jpeg(file, out, 80, error) : images::write_png(file, out, error))) throw Failure(error);
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include "common/failure.h"
 #include "common/program.h"
 #include "common/yaml.h"
+#include "images/pictures.h"
 #include "map/add_landmark.h"
 #include "map/check.h"
 #include "map/layers.h"
@@ -17,7 +18,6 @@
 #include "map/survey.h"
 #include "map/survey_bearings.h"
 #include "map/train_cascade.h"
-#include "simulate/render/pictures.h"
 
 namespace {
 
@@ -105,6 +105,7 @@ void parse_check(wm::cli::App &app, Check &a) {
       "Exit code: 0 good, 1 something is wrong, 2 it can't be read.");
 }
 
+#ifdef WM_HAS_HARU
 struct PrintMarkers {
   MarkerSheet sheet;
   std::string ids, out = "markers.pdf";
@@ -129,6 +130,22 @@ void parse_print(wm::cli::App &app, PrintMarkers &a) {
       "  waymark map print-markers --family tag36h11 --ids 0-11 --size 0.08 --out tags.pdf\n"
       "Print at 100 %, measure the ruler, leave the white rim. More: docs/markers.md.");
 }
+
+int print_markers(PrintMarkers &a) {
+  a.sheet.ids = ids_of(a.ids);
+  int pages = 0;
+  const std::string pdf = marker_pdf(a.sheet, &pages);
+  std::ofstream file(a.out, std::ios::binary);
+  file << pdf;
+  file.close();
+  if (!file) throw Failure(a.out + ": could not be written");
+  std::printf(
+      "%s: %zu markers on %d pages\n  print at 100 %% and measure the ruler; calibration.yaml: markers: {family: %s, "
+      "size_m: %g}\n",
+      a.out.c_str(), a.sheet.ids.size(), pages, a.sheet.family.c_str(), a.sheet.size_m);
+  return kDone;
+}
+#endif
 
 void parse_add(wm::cli::App &app, AddLandmark &a) {
   app.description(
@@ -228,24 +245,9 @@ void parse_train(wm::cli::App &app, TrainCascade &a) {
       "Labelled recordings are what `waymark simulate` writes for crossings. More: docs/landmarks.md.");
 }
 
-int print_markers(PrintMarkers &a) {
-  a.sheet.ids = ids_of(a.ids);
-  int pages = 0;
-  const std::string pdf = marker_pdf(a.sheet, &pages);
-  std::ofstream file(a.out, std::ios::binary);
-  file << pdf;
-  file.close();
-  if (!file) throw Failure(a.out + ": could not be written");
-  std::printf(
-      "%s: %zu markers on %d pages\n  print at 100 %% and measure the ruler; calibration.yaml: markers: {family: %s, "
-      "size_m: %g}\n",
-      a.out.c_str(), a.sheet.ids.size(), pages, a.sheet.family.c_str(), a.sheet.size_m);
-  return kDone;
-}
-
 void write_layer(const fs::path &file, const Layers &layers, const std::vector<uint8_t> &layer) {
   std::string error;
-  if (!wm::render::write_png(file, {layers.width, layers.height, 1, layer}, error)) throw Failure(error);
+  if (!wm::images::write_png(file, {layers.width, layers.height, 1, layer}, error)) throw Failure(error);
 }
 
 Plan read_plan(const Make &a) {
@@ -361,9 +363,11 @@ int main(int argc, char **argv) {
   LookAtPicture look_arguments;
   wm::cli::App *look_app = app.add_subcommand("look", "looks for the landmarks in a picture");
   parse_look(*look_app, look_arguments);
+#ifdef WM_HAS_HARU
   PrintMarkers print_arguments;
   wm::cli::App *print_app = app.add_subcommand("print-markers", "prints coded markers at true scale");
   parse_print(*print_app, print_arguments);
+#endif
   TrainCascade train_arguments;
   wm::cli::App *train_app =
       app.add_subcommand("train-cascade", "trains a detector for a class of landmarks from labelled pictures");
@@ -378,7 +382,9 @@ int main(int argc, char **argv) {
       train_cascade(train_arguments);
       return kDone;
     }
+#ifdef WM_HAS_HARU
     if (print_app->parsed()) return print_markers(print_arguments);
+#endif
     return make_app->parsed() ? make(make_arguments) : check(check_arguments);
   });
 }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pages of areas, lines and words at true scale, as PDF 1.4.
+// Pages of areas, lines and words at true scale, by libharu.
 #pragma once
+
+#include <hpdf.h>
 
 #include <string>
 #include <vector>
@@ -9,10 +11,13 @@ namespace wm::tools {
 
 class Pdf {
  public:
-  Pdf(double width_mm, double height_mm) : width_mm_(width_mm), height_mm_(height_mm) {}
+  Pdf(double width_mm, double height_mm);
+  ~Pdf();
+  Pdf(const Pdf &) = delete;
+  Pdf &operator=(const Pdf &) = delete;
 
   // All places are mm from the upper left corner of the newest page; there must be one.
-  void page() { pages_.emplace_back(); }
+  void page();
   struct Point {
     double x_mm, y_mm;
   };
@@ -20,13 +25,13 @@ class Pdf {
   void line(Point a, Point b, double width_mm);
   void text(Point at, double height_mm, const std::string &words);  // from `at` to the right, Helvetica, ASCII
 
-  // The whole file.
-  std::string bytes() const;
+  // The whole file. Throws Failure where libharu could not make it.
+  std::string bytes();
 
  private:
-  std::string place(Point at) const;
+  HPDF_Doc document_;
+  HPDF_Page page_ = nullptr;
   double width_mm_, height_mm_;
-  std::vector<std::string> pages_;
 };
 
 }  // namespace wm::tools

@@ -8,10 +8,10 @@
 #include <random>
 
 #include "common/failure.h"
-#include "image/pyramid.hpp"
 #include "map/train_samples.h"
-#include "math/arc.hpp"
-#include "vision/cascade/evaluate.hpp"
+#include "waymark/internal/image/pyramid.hpp"
+#include "waymark/internal/math/elementary.hpp"
+#include "waymark/internal/vision/cascade/evaluate.hpp"
 
 namespace wm::tools {
 namespace {

@@ -10,7 +10,7 @@
 #include "common/csv.h"
 #include "common/failure.h"
 #include "common/recording_folder.h"
-#include "sensors/lens.hpp"
+#include "waymark/internal/sensors/lens.hpp"
 #include "waymark/recording.h"
 #include "waymark/video.h"
 

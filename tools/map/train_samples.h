@@ -7,7 +7,7 @@
 
 #include "map/boost.h"
 #include "map/train_cascade.h"
-#include "vision/cascade/bands.hpp"
+#include "waymark/internal/vision/cascade/bands.hpp"
 
 namespace wm::tools {
 

@@ -35,7 +35,7 @@ std::optional<Eigen::Vector2d> FloorView::pixel(const Eigen::Vector2d &base) con
   return at;
 }
 
-FloorView view_floor(const render::Camera &camera, const std::vector<uint8_t> &grey) {
+FloorView view_floor(const images::Camera &camera, const std::vector<uint8_t> &grey) {
   const Eigen::Vector3d eye = camera.T_base_camera.translation();
   const int side = static_cast<int>(2 * kReach_m * kPixelsAMetre);
   std::vector<uint8_t> all(static_cast<size_t>(side) * static_cast<size_t>(side), kUnseen);

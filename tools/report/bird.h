@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "simulate/render/camera.h"
+#include "images/camera.h"
 
 namespace wm::tools {
 
@@ -25,6 +25,6 @@ struct FloorView {
 
 // The floor from the camera's foot point to 6 m around it, as far as the picture (rows without gaps) shows it; cut to
 // what it shows, white where nothing is seen. Empty where the camera sees no floor. About 20 ms.
-FloorView view_floor(const render::Camera &camera, const std::vector<uint8_t> &grey);
+FloorView view_floor(const images::Camera &camera, const std::vector<uint8_t> &grey);
 
 }  // namespace wm::tools

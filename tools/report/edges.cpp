@@ -43,7 +43,7 @@ Raster edge_layer(const MapEdges &edges, const wm_raster &raster) {
 }
 
 // In the picture, and in the view from above.
-void mark_mapped(const MapEdges &edges, const render::Camera &camera, const Pose &pose, ReportFrame *frame) {
+void mark_mapped(const MapEdges &edges, const images::Camera &camera, const Pose &pose, ReportFrame *frame) {
   const Eigen::Vector3d eye = pose.p_m + pose.q * camera.T_base_camera.translation();
   std::set<std::pair<int, int>> taken, taken_above;
   const double apart_px = kDotsApart * frame->width_px;
@@ -62,7 +62,7 @@ void mark_mapped(const MapEdges &edges, const render::Camera &camera, const Pose
 }
 
 // A polyline of the picture, from above; what lies outside of the view cuts it.
-void mark_seen(const std::vector<Eigen::Vector2d> &line, const render::Camera &camera, ReportFrame *frame) {
+void mark_seen(const std::vector<Eigen::Vector2d> &line, const images::Camera &camera, ReportFrame *frame) {
   bool goes_on = false;
   for (const Eigen::Vector2d &pixel : line) {
     const auto base = floor_point(camera, pixel);

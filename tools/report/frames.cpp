@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "report/frames.h"
 
-#include <turbojpeg.h>
-
 #include <algorithm>
 #include <cmath>
 #include <memory>
 
 #include "common/cameras.h"
+#include "images/jpeg.h"
 #include "report/data.h"
 #include "report/film.h"
 #include "report/page.h"
@@ -169,14 +168,10 @@ std::string drawn(const ReportData &data, const ReportFrame &frame) {
 }  // namespace
 
 std::string grey_jpeg(const std::vector<uint8_t> &grey, int width, int height) {
-  const std::unique_ptr<void, decltype(&tjDestroy)> coder(tjInitCompress(), tjDestroy);
-  unsigned char *bytes = nullptr;
-  unsigned long size = 0;
-  std::string out;
-  if (tjCompress2(coder.get(), grey.data(), width, 0, height, TJPF_GRAY, &bytes, &size, TJSAMP_GRAY, kQuality, 0) == 0)
-    out.assign(reinterpret_cast<const char *>(bytes), size);
-  tjFree(bytes);
-  return out;
+  images::Jpeg jpeg;
+  std::string error;
+  if (!jpeg.compress({width, height, 1, grey}, kQuality, error)) return {};
+  return {reinterpret_cast<const char *>(jpeg.data()), jpeg.size()};
 }
 
 std::vector<ReportFrame> load_frames(const fs::path &recording, ReportData *data, size_t each) {
@@ -210,8 +205,8 @@ void mark_sightings(const fs::path &recording, const ReportData &data, std::vect
     const auto pose = pose_at(data.trajectory.poses, frame.t_ns, kMaxGapNs);
     if (camera == cameras.end() || mounting == data.mountings.end() || !pose) continue;
     const auto mark = [&](FrameMark::Kind kind, const Eigen::Vector3d &base, const std::string &text) {
-      render::Vec2 pixel;
-      if (render::project(camera->camera, render::T_base_optical(camera->camera).inverse() * base, pixel) &&
+      images::Vec2 pixel;
+      if (images::project(camera->camera, images::T_base_optical(camera->camera).inverse() * base, pixel) &&
           pixel.x() > 0 && pixel.y() > 0 && pixel.x() < frame.width_px && pixel.y() < frame.height_px)
         frame.marks.push_back({kind, pixel.x(), pixel.y(), text});
     };

@@ -19,15 +19,15 @@ constexpr double kFrom_rad = -0.05, kSeenTo_rad = 0.30,
 constexpr int kPieces = 8;
 constexpr double kReach_m = 20;  // lines of the map that are further away are not drawn
 
-std::vector<Eigen::Vector2d> upright(const render::Camera &camera, double azimuth_rad, double to_rad) {
+std::vector<Eigen::Vector2d> upright(const images::Camera &camera, double azimuth_rad, double to_rad) {
   std::vector<Eigen::Vector2d> out;
-  const render::Pose base_to_optical = render::T_base_optical(camera).inverse();
+  const images::Pose base_to_optical = images::T_base_optical(camera).inverse();
   const Vector3d eye = camera.T_base_camera.translation();
   for (int i = 0; i <= kPieces; i++) {
     const double e = kFrom_rad + (to_rad - kFrom_rad) * i / kPieces;
     const Vector3d ray(std::cos(e) * std::cos(azimuth_rad), std::cos(e) * std::sin(azimuth_rad), std::sin(e));
-    render::Vec2 pixel;
-    if (render::project(camera, base_to_optical * (eye + ray), pixel)) out.emplace_back(pixel.x(), pixel.y());
+    images::Vec2 pixel;
+    if (images::project(camera, base_to_optical * (eye + ray), pixel)) out.emplace_back(pixel.x(), pixel.y());
   }
   return out;
 }

@@ -88,9 +88,8 @@ std::string looked_for_section(const ReportData &data) {
                  "its front, and its "
                  "place known well enough to look there. Unlike: something else is there, the landmark is hidden, "
                  "moved or replaced. "
-                 "A landmark that is unlike again and again needs a new picture or a new place. The last four columns "
-                 "are pictures in "
-                 "which it was not to be seen, or nobody knew where.",
+                 "A landmark that is often unlike needs a new picture or a new place. The last four columns "
+                 "count pictures in which it could not be seen, or its place was too uncertain.",
                  "<div class=\"wide\"><table><tr><th>landmark</th><th>expected</th><th>found</th>" + head + "</tr>" +
                      rows + "</table></div><p class=\"note\">" + note + "</p>" +
                      legend({{"<i class=\"key\" style=\"background:var(--blue)\"></i>", "found"},

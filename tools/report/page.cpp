@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include <wm_version.h>
 #include "report/picture.h"
 #include "report/report_json.h"
 #include "report/script.h"

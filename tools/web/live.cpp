@@ -42,7 +42,7 @@ const char *remedy(unsigned device) {
     case WM_DEVICE_PASSIVE: return "many errors on the bus: termination, bit rate, cable";
     case WM_DEVICE_BUS_OFF: return "the controller left the bus: bit rate, short circuit; restart-ms brings it back";
     case WM_DEVICE_STALLED: return "no pictures come; it is switched off and on after four seconds";
-    case WM_DEVICE_FROZEN: return "the same picture again and again: the camera hangs";
+    case WM_DEVICE_FROZEN: return "the same picture repeats: the camera hangs";
     default: return "";
   }
 }

@@ -32,8 +32,8 @@ class Sketch {
   [[nodiscard]] std::optional<Vector2d> pixel(const Vector3d &base) const {
     Vector2d out;
     if (camera_ == nullptr) return std::nullopt;
-    const render::Camera &c = camera_->camera;
-    if (!render::project(c, render::T_base_optical(c).inverse() * base, out)) return std::nullopt;
+    const images::Camera &c = camera_->camera;
+    if (!images::project(c, images::T_base_optical(c).inverse() * base, out)) return std::nullopt;
     if (out.x() < 0 || out.y() < 0 || out.x() > c.width || out.y() > c.height) return std::nullopt;
     return out;
   }
@@ -52,7 +52,7 @@ class Sketch {
   [[nodiscard]] std::optional<Vector2d> along(double bearing_rad, double elevation_rad) const {
     return pixel(eye() + mount_.direction(bearing_rad, elevation_rad));
   }
-  [[nodiscard]] const render::Camera *camera() const { return camera_ != nullptr ? &camera_->camera : nullptr; }
+  [[nodiscard]] const images::Camera *camera() const { return camera_ != nullptr ? &camera_->camera : nullptr; }
 
  private:
   const NamedCamera *camera_;

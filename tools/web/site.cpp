@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 
 SensorMount mount_of(const wm_mounting &m) {
   SensorMount out;
-  out.T_base = render::pose_xyz_rpy({m.xyz_m[0], m.xyz_m[1], m.xyz_m[2]}, m.rpy_rad[0], m.rpy_rad[1], m.rpy_rad[2]);
+  out.T_base = images::pose_xyz_rpy({m.xyz_m[0], m.xyz_m[1], m.xyz_m[2]}, m.rpy_rad[0], m.rpy_rad[1], m.rpy_rad[2]);
   out.yaw_rad = m.rpy_rad[2];
   out.is_steep = std::fabs(out.T_base.linear()(2, 0)) > M_SQRT1_2;
   return out;

@@ -3,12 +3,12 @@
 #ifndef WAYMARK_ESTIMATOR_EDGE_MCL_ALIGN_HPP
 #define WAYMARK_ESTIMATOR_EDGE_MCL_ALIGN_HPP
 
-#include "filters/edge_mcl/floor_camera.hpp"
 #include "filters/edge_mcl/wall_list.hpp"
-#include "maps/edge_map.hpp"
 #include "math/arc.hpp"
 #include "math/eigen.hpp"
 #include "waymark/event.h"
+#include "waymark/internal/filters/edge_mcl/floor_camera.hpp"
+#include "waymark/internal/maps/edge_map.hpp"
 
 namespace wm {
 

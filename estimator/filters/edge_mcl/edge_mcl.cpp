@@ -8,8 +8,8 @@
 #include "filters/planar/set_pose.hpp"
 #include "filters/registry.h"
 #include "math/arc.hpp"
-#include "memory/layout.hpp"
 #include "sensors/points.hpp"
+#include "waymark/internal/memory/layout.hpp"
 
 namespace wm {
 namespace {

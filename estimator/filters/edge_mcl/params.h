@@ -4,7 +4,7 @@
 
 #include <stdint.h>
 
-#include "filters/edge_mcl/camera_states.h"
+#include "waymark/internal/filters/edge_mcl/camera_states.h"
 #include "waymark/params.h"
 
 #ifdef __cplusplus

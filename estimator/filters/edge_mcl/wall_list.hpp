@@ -6,8 +6,8 @@
 
 #include <cstdint>
 
-#include "maps/edge_map.hpp"
 #include "math/elementary.hpp"
+#include "waymark/internal/maps/edge_map.hpp"
 
 namespace wm {
 

@@ -19,8 +19,8 @@
 #include "filters/planar/planar_filter.hpp"
 #include "filters/relocalize/pose_search.hpp"
 #include "maps/landmark_index.hpp"
-#include "memory/layout.hpp"
 #include "sensors/sighting.hpp"
+#include "waymark/internal/memory/layout.hpp"
 
 namespace wm {
 

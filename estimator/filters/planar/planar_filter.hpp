@@ -10,7 +10,7 @@
 #include "filters/planar/planar_motion.hpp"
 #include "filters/planar/wheel_heading.hpp"
 #include "math/covariance.hpp"
-#include "memory/layout.hpp"
+#include "waymark/internal/memory/layout.hpp"
 
 namespace wm {
 

@@ -4,7 +4,7 @@
 #ifndef WAYMARK_ESTIMATOR_POSE_CONSENSUS_HPP
 #define WAYMARK_ESTIMATOR_POSE_CONSENSUS_HPP
 
-#include "math/rotation.hpp"
+#include "waymark/internal/math/rotation.hpp"
 #include "waymark/time.h"
 
 namespace wm {

@@ -19,7 +19,7 @@
 #include "filters/relocalize/line_search.hpp"
 #include "math/elementary.hpp"
 #include "math/half_covariance.hpp"
-#include "memory/layout.hpp"
+#include "waymark/internal/memory/layout.hpp"
 
 namespace wm {
 

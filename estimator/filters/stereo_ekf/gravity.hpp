@@ -4,7 +4,7 @@
 #ifndef WAYMARK_ESTIMATOR_GRAVITY_HPP
 #define WAYMARK_ESTIMATOR_GRAVITY_HPP
 
-#include "math/rotation.hpp"
+#include "waymark/internal/math/rotation.hpp"
 #include "waymark/time.h"
 
 namespace wm {

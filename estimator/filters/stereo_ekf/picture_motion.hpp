@@ -11,7 +11,7 @@
 #include <cstdint>
 
 #include "math/eigen.hpp"
-#include "math/rotation.hpp"
+#include "waymark/internal/math/rotation.hpp"
 
 namespace wm {
 

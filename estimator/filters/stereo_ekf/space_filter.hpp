@@ -15,11 +15,11 @@
 #include <cstddef>
 
 #include "filters/stereo_ekf/states.hpp"
-#include "math/rotation.hpp"
 #include "math/symmetric.hpp"
-#include "memory/layout.hpp"
 #include "motion/spatial.hpp"
 #include "waymark/event.h"
+#include "waymark/internal/math/rotation.hpp"
+#include "waymark/internal/memory/layout.hpp"
 #include "waymark/pose.h"
 
 namespace wm {

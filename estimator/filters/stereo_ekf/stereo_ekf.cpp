@@ -7,9 +7,9 @@
 #include "filters/core/calibration_list.hpp"
 #include "filters/core/contract.hpp"
 #include "filters/registry.h"
-#include "memory/layout.hpp"
 #include "motion/event_time.hpp"
 #include "motion/motion_params.h"
+#include "waymark/internal/memory/layout.hpp"
 
 namespace wm {
 namespace {

@@ -14,10 +14,10 @@
 #include "filters/stereo_ekf/picture_motion.hpp"
 #include "filters/stereo_ekf/space_filter.hpp"
 #include "maps/landmark_index.hpp"
-#include "memory/layout.hpp"
 #include "sensors/sighting_params.h"
 #include "sensors/stereo_rig.hpp"
 #include "waymark/estimator.h"
+#include "waymark/internal/memory/layout.hpp"
 
 namespace wm {
 

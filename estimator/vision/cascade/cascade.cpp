@@ -5,14 +5,14 @@
 #include <limits>
 
 #include "math/arc.hpp"
-#include "memory/layout.hpp"
-#include "sensors/bearing.hpp"
-#include "vision/cascade/bands.hpp"
-#include "vision/cascade/evaluate.hpp"
 #include "vision/cascade/groups.hpp"
 #include "vision/cascade/params.h"
 #include "vision/detector.hpp"
 #include "vision/registry.h"
+#include "waymark/internal/memory/layout.hpp"
+#include "waymark/internal/sensors/bearing.hpp"
+#include "waymark/internal/vision/cascade/bands.hpp"
+#include "waymark/internal/vision/cascade/evaluate.hpp"
 
 namespace wm {
 namespace {

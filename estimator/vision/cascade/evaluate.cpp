@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "vision/cascade/evaluate.hpp"
+#include "waymark/internal/vision/cascade/evaluate.hpp"
 
 #include <cmath>
 

@@ -3,13 +3,13 @@
 #include <cmath>
 #include <cstring>
 
-#include "memory/layout.hpp"
 #include "vision/detector.hpp"
 #include "vision/edges/params.h"
 #include "vision/edges/rays.hpp"
 #include "vision/edges/support.hpp"
 #include "vision/edges_hough/windows.hpp"
 #include "vision/registry.h"
+#include "waymark/internal/memory/layout.hpp"
 
 namespace wm {
 

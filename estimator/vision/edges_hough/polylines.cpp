@@ -2,7 +2,7 @@
 #include "vision/edges_hough/polylines.hpp"
 
 #include "math/elementary.hpp"
-#include "memory/layout.hpp"
+#include "waymark/internal/memory/layout.hpp"
 
 namespace wm {
 

@@ -4,8 +4,8 @@
 #ifndef WAYMARK_ESTIMATOR_VISION_ALIGN_HPP
 #define WAYMARK_ESTIMATOR_VISION_ALIGN_HPP
 
-#include "image/pyramid.hpp"
 #include "vision/landmarks/appearance.hpp"
+#include "waymark/internal/image/pyramid.hpp"
 
 namespace wm {
 

@@ -8,7 +8,7 @@
 #include <cstdint>
 
 #include "image/ray_table.hpp"
-#include "sensors/lens.hpp"
+#include "waymark/internal/sensors/lens.hpp"
 #include "waymark/setup.h"
 
 namespace wm {

@@ -5,8 +5,8 @@
 #ifndef WAYMARK_ESTIMATOR_VISION_GLOBAL_SEARCH_HPP
 #define WAYMARK_ESTIMATOR_VISION_GLOBAL_SEARCH_HPP
 
-#include "image/panorama.hpp"
 #include "vision/landmarks/guess.hpp"
+#include "waymark/internal/image/panorama.hpp"
 
 namespace wm {
 

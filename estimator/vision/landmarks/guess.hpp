@@ -3,8 +3,8 @@
 #ifndef WAYMARK_ESTIMATOR_VISION_GUESS_HPP
 #define WAYMARK_ESTIMATOR_VISION_GUESS_HPP
 
-#include "sensors/lens.hpp"
 #include "vision/landmarks/appearance.hpp"
+#include "waymark/internal/sensors/lens.hpp"
 #include "waymark/pose.h"
 
 namespace wm {

@@ -5,11 +5,11 @@
 #include <initializer_list>
 #include <limits>
 
-#include "memory/layout.hpp"
-#include "sensors/bearing.hpp"
 #include "vision/detector.hpp"
 #include "vision/landmarks/recognise.hpp"
 #include "vision/registry.h"
+#include "waymark/internal/memory/layout.hpp"
+#include "waymark/internal/sensors/bearing.hpp"
 
 namespace wm {
 

@@ -4,11 +4,11 @@
 #include <cstring>
 #include <initializer_list>
 
-#include "memory/layout.hpp"
-#include "sensors/mounting.hpp"
 #include "vision/detector.hpp"
 #include "vision/lines/line_tracks.hpp"
 #include "vision/registry.h"
+#include "waymark/internal/memory/layout.hpp"
+#include "waymark/internal/sensors/mounting.hpp"
 
 namespace wm {
 

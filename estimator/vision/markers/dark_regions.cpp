@@ -3,7 +3,7 @@
 
 #include <cstring>
 
-#include "memory/layout.hpp"
+#include "waymark/internal/memory/layout.hpp"
 
 namespace wm {
 

@@ -4,8 +4,8 @@
 #define WAYMARK_ESTIMATOR_VISION_OUTLINE_HPP
 
 #include "image/tangent.hpp"
-#include "memory/layout.hpp"
 #include "vision/markers/dark_regions.hpp"
+#include "waymark/internal/memory/layout.hpp"
 #include "waymark/setup.h"
 
 namespace wm {

@@ -4,7 +4,7 @@
 #ifndef WAYMARK_ESTIMATOR_VISION_CORNERS_HPP
 #define WAYMARK_ESTIMATOR_VISION_CORNERS_HPP
 
-#include "image/pyramid.hpp"
+#include "waymark/internal/image/pyramid.hpp"
 
 namespace wm {
 

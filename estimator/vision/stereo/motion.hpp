@@ -4,8 +4,8 @@
 #ifndef WAYMARK_ESTIMATOR_VISION_STEREO_MOTION_HPP
 #define WAYMARK_ESTIMATOR_VISION_STEREO_MOTION_HPP
 
-#include "math/rotation.hpp"
 #include "vision/stereo/params.h"
+#include "waymark/internal/math/rotation.hpp"
 
 namespace wm {
 

@@ -5,8 +5,8 @@
 #ifndef WAYMARK_ESTIMATOR_VISION_PATCH_HPP
 #define WAYMARK_ESTIMATOR_VISION_PATCH_HPP
 
-#include "image/pyramid.hpp"
-#include "sensors/lens.hpp"
+#include "waymark/internal/image/pyramid.hpp"
+#include "waymark/internal/sensors/lens.hpp"
 
 namespace wm {
 

@@ -5,7 +5,7 @@
 #define WAYMARK_ESTIMATOR_VISION_RECTIFY_HPP
 
 #include "image/picture_sample.hpp"
-#include "image/pyramid.hpp"
+#include "waymark/internal/image/pyramid.hpp"
 
 namespace wm {
 

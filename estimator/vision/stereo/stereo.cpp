@@ -2,12 +2,12 @@
 // Detector `stereo`: world points in both pictures of a stereo pair, tracked from picture to picture.
 #include <cstring>
 
-#include "memory/layout.hpp"
 #include "vision/detector.hpp"
 #include "vision/registry.h"
 #include "vision/stereo/corners.hpp"
 #include "vision/stereo/rectify.hpp"
 #include "vision/stereo/track.hpp"
+#include "waymark/internal/memory/layout.hpp"
 
 namespace wm {
 

@@ -6,9 +6,9 @@
 #include <cmath>
 #include <vector>
 
-#include "sensors/lens.hpp"
 #include "vision/stereo/motion.hpp"
 #include "waymark/frame.h"
+#include "waymark/internal/sensors/lens.hpp"
 #include "waymark/random.h"
 
 namespace sea {

@@ -10,10 +10,10 @@
 
 #include "events.hpp"
 #include "math/eigen.hpp"
-#include "math/rotation.hpp"
 #include "motion/motion_params.h"
 #include "unity.h"
 #include "waymark/estimator.h"
+#include "waymark/internal/math/rotation.hpp"
 #include "waymark/random.h"
 
 namespace {

@@ -11,12 +11,12 @@
 #include <vector>
 
 #include "common/fisheye_rig.hpp"
-#include "sensors/bearing.hpp"
 #include "unity.h"
-#include "vision/cascade/evaluate.hpp"
 #include "vision/cascade/params.h"
 #include "waymark/cascade_file.h"
 #include "waymark/detector.h"
+#include "waymark/internal/sensors/bearing.hpp"
+#include "waymark/internal/vision/cascade/evaluate.hpp"
 #include "waymark/random.h"
 #ifdef WM_HAS_OPENCV
 #include <opencv2/objdetect.hpp>

@@ -2,8 +2,8 @@
 // Camera models: there and back, and where a model has no pixel or no ray.
 #include <cmath>
 
-#include "sensors/lens.hpp"
 #include "unity.h"
+#include "waymark/internal/sensors/lens.hpp"
 
 namespace {
 

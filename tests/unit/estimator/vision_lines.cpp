@@ -9,10 +9,10 @@
 #include <string>
 #include <vector>
 
-#include "sensors/lens.hpp"
 #include "unity.h"
 #include "vision/lines/votes.hpp"
 #include "waymark/detector.h"
+#include "waymark/internal/sensors/lens.hpp"
 #include "waymark/random.h"
 
 namespace {

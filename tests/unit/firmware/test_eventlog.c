@@ -2,6 +2,7 @@
 #include <stdlib.h>
 #include <sys/stat.h>
 
+#include <wm_version.h>
 #include "log_fixture.h"
 #include "output/run_folder.h"
 #include "unity.h"

@@ -15,6 +15,7 @@ MAY_USE = {
     "drivers": ["msgs"],
     "firmware": ["msgs", "estimator", "drivers"],
     "tools": ["msgs", "estimator", "drivers", "firmware"],
+    "sim": ["msgs", "estimator", "drivers", "firmware", "tools"],
 }
 
 # Inside firmware/, bottom up: a folder includes its own headers and those of the folders before it, as "folder/header.h".
@@ -62,8 +63,12 @@ FOLDER_EXCEPTIONS = set()
 INCLUDE = re.compile(r'^\s*#\s*include\s+([<"])([^>"]+)[>"]')
 
 
+# Headers of the estimator for the other rooms that are not installed. A folder in it is one of the estimator's.
+INTERNAL = "waymark/internal/"
+
+
 def public_headers(room):
-    if room == "firmware":  # headers stand beside their sources; none is installed
+    if room in ("firmware", "tools", "sim"):  # headers stand beside their sources; none is installed
         return {str(p.relative_to(ROOT / room)) for p in (ROOT / room).rglob("*.h")}
     base = ROOT / room / "include"
     return {str(p.relative_to(base)) for p in base.rglob("*.h")} | {str(p.relative_to(base)) for p in base.rglob("*.hpp")}
@@ -82,6 +87,8 @@ def check_includes():
                 where, header = f"{path.relative_to(ROOT)}:{number}", match.group(2)
                 if header in owner and owner[header] != room and owner[header] not in uses + detector:
                     yield f"{where}: {room}/ may not include {header}, which is {owner[header]}/'s"
+                elif room != "estimator" and (ROOT / "estimator" / header).is_file() and not (ROOT / room / header).is_file():
+                    yield f"{where}: {header} is private to the estimator: other rooms include its include/ folder alone"
                 elif match.group(1) == '"' and header.startswith("waymark/") and header not in owner \
                         and not header.startswith("waymark/lcm/"):
                     yield f"{where}: {header} is in no room's include folder"
@@ -96,15 +103,19 @@ def check_folders():
         inside = path.relative_to(room)
         folder = str(inside.parent) if str(inside.parent) != "." else ""
         if inside.parts[0] == "include":
-            folder = None  # the public headers: they include msgs and each other
+            # The public headers include msgs and each other. What only the project's rooms may include keeps its folder's rules.
+            shared = str(inside.parent).partition(INTERNAL)
+            folder = shared[2] if shared[1] else None
         elif folder not in FOLDER_MAY_USE:
             yield f"estimator/{inside}:1: {folder}/ is not in house.py's table of folders: add what it may include"
             continue
         for number, line in enumerate(path.read_text().splitlines(), 1):
             match = INCLUDE.match(line)
-            if not match or match.group(1) != '"' or match.group(2).startswith("waymark/"):
+            if not match or match.group(1) != '"':
                 continue
-            header = match.group(2)
+            header = match.group(2).removeprefix(INTERNAL)
+            if header.startswith("waymark/"):
+                continue
             target = header.rpartition("/")[0]
             if folder is not None and (target == folder or target in FOLDER_MAY_USE[folder]):
                 continue

@@ -8,15 +8,15 @@
 #include "calibrate/bundle.h"
 #include "calibrate/corners.h"
 #include "calibrate/coverage.h"
-#include "simulate/render/patterns.h"
-#include "simulate/render/render.h"
+#include "render/patterns.h"
+#include "render/render.h"
 #include "unity.h"
 
 using namespace wm::calibrate;
-using wm::render::Camera;
-using wm::render::Model;
-using wm::render::Pose;
-using wm::render::Vec3;
+using wm::images::Camera;
+using wm::images::Model;
+using wm::images::Pose;
+using wm::images::Vec3;
 using wm::tools::GreyPicture;
 
 void setUp() {}
@@ -55,8 +55,8 @@ std::unique_ptr<wm::render::Scene> board_scene() {
 
 // The camera before the board, which it sees in the direction (azimuth, elevation) of its body frame, tilted.
 Pose place(double distance, double azimuth, double elevation, double tilt_yaw, double tilt_pitch, double roll) {
-  const Pose board_in_view = wm::render::pose_xyz_rpy({0, 0, 0}, 0, -elevation, azimuth) *
-                             wm::render::pose_xyz_rpy({distance, 0, 0}, roll, tilt_pitch, tilt_yaw);
+  const Pose board_in_view = wm::images::pose_xyz_rpy({0, 0, 0}, 0, -elevation, azimuth) *
+                             wm::images::pose_xyz_rpy({distance, 0, 0}, roll, tilt_pitch, tilt_yaw);
   return board_in_view.inverse();
 }
 
@@ -102,10 +102,10 @@ void differ(const Camera &truth, const Camera &found, double widest, double *mea
     for (double azimuth = 0; azimuth < 6.2; azimuth += 0.3) {
       const Vec3 d(std::sin(angle) * std::cos(azimuth), std::sin(angle) * std::sin(azimuth), std::cos(angle));
       Vec2 a(0, 0), b(0, 0);
-      if (!wm::render::project(truth, d, a) || a.x() < 0 || a.y() < 0 || a.x() > truth.width - 1 ||
+      if (!wm::images::project(truth, d, a) || a.x() < 0 || a.y() < 0 || a.x() > truth.width - 1 ||
           a.y() > truth.height - 1)
         continue;
-      TEST_ASSERT_TRUE(wm::render::project(found, d, b));
+      TEST_ASSERT_TRUE(wm::images::project(found, d, b));
       sum += (a - b).norm();
       *max_px = std::max(*max_px, (a - b).norm());
       n++;
@@ -136,7 +136,7 @@ void test_fisheye_of_200_degrees() {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.2, found->rms_px);
   TEST_ASSERT_LESS_THAN_DOUBLE(0.3, mean);
   TEST_ASSERT_LESS_THAN_DOUBLE(1.0, most);
-  TEST_ASSERT_GREATER_THAN_DOUBLE(wm::render::kPi / 2, coverage.widest_rad);
+  TEST_ASSERT_GREATER_THAN_DOUBLE(wm::images::kPi / 2, coverage.widest_rad);
   TEST_ASSERT_TRUE(complaints(*found, coverage).empty());
 }
 

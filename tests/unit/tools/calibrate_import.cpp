@@ -12,7 +12,7 @@
 #include "unity.h"
 
 using namespace wm::calibrate;
-using wm::render::Model;
+using wm::images::Model;
 
 void setUp() {}
 void tearDown() {}
@@ -194,7 +194,7 @@ void test_what_is_no_calibration() {
 }
 
 void test_a_fit_to_the_same_model_is_exact() {
-  wm::render::Camera camera;
+  wm::images::Camera camera;
   camera.intrinsics = {-0.18, 0.62, 310, 312, 640, 360};
   camera.model = Model::double_sphere;
   const ForeignCamera foreign = our_camera(camera);
@@ -216,7 +216,7 @@ void test_real_ocamcalib() {
   const double inverse[] = {730.949123,  315.876984,  -177.960849, -352.468231,
                             -678.144608, -615.917273, -262.086205, -42.961956};
   for (double angle = 0.1; angle < 1.2; angle += 0.1) {
-    const double theta = angle - wm::render::kPi / 2;
+    const double theta = angle - wm::images::kPi / 2;
     double rho = 0;
     for (int i = 7; i >= 0; i--) rho = rho * theta + inverse[i];
     Vec3 d(0, 0, 1);

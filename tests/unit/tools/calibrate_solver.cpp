@@ -15,8 +15,8 @@
 #include "waymark/random.h"
 
 using namespace wm::calibrate;
-using wm::render::Camera;
-using wm::render::Pose;
+using wm::images::Camera;
+using wm::images::Pose;
 
 void setUp() {}
 void tearDown() {}
@@ -52,7 +52,7 @@ void lens_agrees() {
   for (double y = 20; y < 600; y += 40)
     for (double x = 20; x < 800; x += 40) {
       Vec3 d(0, 0, 1);
-      if (!wm::render::unproject(camera, {x, y}, d)) continue;
+      if (!wm::images::unproject(camera, {x, y}, d)) continue;
       const Vec3 p = 2.5 * d;
       double pixel[2];
       lens_pixel<model>(v.data(), p.data(), pixel);
@@ -77,7 +77,7 @@ View view_of(const Camera &camera, const Pose &T_camera_board, int name, wm_rand
     for (int column = 0; column < kColumns; column++) {
       Vec2 pixel(0, 0);
       const Vec3 p = T_camera_board * Vec3((column - 4) * kSquare_m, (row - 2.5) * kSquare_m, 0);
-      if (!wm::render::project(camera, p, pixel) || pixel.x() < 0 || pixel.y() < 0 || pixel.x() > 799 ||
+      if (!wm::images::project(camera, p, pixel) || pixel.x() < 0 || pixel.y() < 0 || pixel.x() > 799 ||
           pixel.y() > 599)
         continue;
       const double u = kNoise_px * wm_random_next_normal(&noise), v = kNoise_px * wm_random_next_normal(&noise);
@@ -127,7 +127,7 @@ double errors_over_sigmas(Model model) {
         for (double x = 100; x < 800; x += 100) {
           Vec3 d(0, 0, 1);
           Vec2 there(0, 0);
-          TEST_ASSERT_TRUE(wm::render::unproject(truth, {x, y}, d) && wm::render::project(found->camera, d, there));
+          TEST_ASSERT_TRUE(wm::images::unproject(truth, {x, y}, d) && wm::images::project(found->camera, d, there));
           squares += std::pow((there - Vec2(x, y)).norm() / pixel_sigma(*found, {x, y}), 2);
           n++;
         }
@@ -137,7 +137,7 @@ double errors_over_sigmas(Model model) {
     squares += off.dot(found->covariance.ldlt().solve(off));
     n += static_cast<double>(at.size());
   }
-  std::printf("%s: errors %.3f sigmas over %d trials\n", wm::render::model_name(model), std::sqrt(squares / n), trials);
+  std::printf("%s: errors %.3f sigmas over %d trials\n", wm::images::model_name(model), std::sqrt(squares / n), trials);
   return std::sqrt(squares / n);
 }
 
@@ -169,9 +169,9 @@ void test_a_pair_and_its_mounting() {
     second.push_back(view_of(right, T_left_right.inverse() * place, static_cast<int>(second.size()), noise, true));
   }
   // The board on the floor: its middle 0.9 m ahead of the rear axle, the camera 0.5 m above the floor, looking down.
-  const Pose T_base_left = wm::render::pose_xyz_rpy({0.4, 0.05, 0.5}, 0.02, 0.7, -0.03) * wm::render::T_body_optical();
+  const Pose T_base_left = wm::images::pose_xyz_rpy({0.4, 0.05, 0.5}, 0.02, 0.7, -0.03) * wm::images::T_body_optical();
   const FloorBoard floor{"16", 0.9, 0.1, 1.6};
-  const Pose T_base_board = wm::render::pose_xyz_rpy({0.9, 0.1, 0}, wm::render::kPi, 0, 1.6);
+  const Pose T_base_board = wm::images::pose_xyz_rpy({0.9, 0.1, 0}, wm::images::kPi, 0, 1.6);
   first.push_back(view_of(left, T_base_left.inverse() * T_base_board, 16, noise));
   const auto a = calibrate_camera(first, 800, 600);
   const auto plain = calibrate_camera(second, 800, 600);

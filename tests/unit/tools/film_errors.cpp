@@ -18,8 +18,8 @@ void tearDown(void);
 }
 
 using namespace wm::sim;
-using wm::render::Vec2;
-using wm::render::Vec3;
+using wm::images::Vec2;
+using wm::images::Vec3;
 
 namespace {
 
@@ -76,8 +76,8 @@ std::vector<Label> labels_of(const Film &film, size_t camera) {
 
 using Unknowns = Eigen::Matrix<double, 10, 1>;  // turned (3), moved (3), fx, fy, cx, cy (relative)
 
-wm::render::Camera changed(const wm::render::Camera &believed, const Unknowns &x) {
-  wm::render::Camera c = believed;
+wm::images::Camera changed(const wm::images::Camera &believed, const Unknowns &x) {
+  wm::images::Camera c = believed;
   const double nowhere[3] = {0, 0, 0};
   c.T_base_camera = believed.T_base_camera * pose_of(nowhere, x.data());
   c.T_base_camera.translation() += x.segment<3>(3);
@@ -97,9 +97,9 @@ Unknowns camera_from_labels(const Film &film, size_t number, double &rms_px) {
     for (const Label &l : labels) {
       const Vec3 in_base = true_pose(film.recording, l.t_s).inverse() * l.place;
       const auto pixel = [&](const Unknowns &at) {
-        const wm::render::Camera c = changed(film.cameras[number].believed, at);
+        const wm::images::Camera c = changed(film.cameras[number].believed, at);
         Vec2 p(0, 0);
-        wm::render::project(c, wm::render::T_base_optical(c).inverse() * in_base, p);
+        wm::images::project(c, wm::images::T_base_optical(c).inverse() * in_base, p);
         return p;
       };
       const Vec2 off = l.pixel - pixel(x);
@@ -126,7 +126,7 @@ void camera_is_found_in_the_labels(const char *name) {
     double rms_px = 0;
     const Unknowns x = camera_from_labels(film, camera, rms_px);
     TEST_ASSERT_TRUE_MESSAGE(rms_px < 0.002, name);  // labels are rounded to 0.001 px
-    const wm::render::Camera &truth = film.cameras[camera].truth, found = changed(film.cameras[camera].believed, x);
+    const wm::images::Camera &truth = film.cameras[camera].truth, found = changed(film.cameras[camera].believed, x);
     const Eigen::AngleAxisd turned(
         Eigen::Matrix3d(truth.T_base_camera.linear().transpose() * found.T_base_camera.linear()));
     TEST_ASSERT_DOUBLE_WITHIN(0.01 * kDegree, 0, turned.angle());
@@ -297,9 +297,9 @@ void test_stereo_points_of_pictures_have_their_noise() {
     one_side += std::isnan(s.left_px[0]) || std::isnan(s.right_px[0]);
     for (int side = 0; side < 2; side++) {
       const double *px = side ? s.right_px : s.left_px;
-      const wm::render::Camera &c = film.cameras[static_cast<size_t>(side)].truth;
+      const wm::images::Camera &c = film.cameras[static_cast<size_t>(side)].truth;
       Vec2 pixel;
-      TEST_ASSERT_TRUE(wm::render::project(c, wm::render::T_base_optical(c).inverse() * in_base, pixel));
+      TEST_ASSERT_TRUE(wm::images::project(c, wm::images::T_base_optical(c).inverse() * in_base, pixel));
       if (!std::isnan(px[0])) noise.add(px[0] - pixel.x()), noise.add(px[1] - pixel.y());
     }
   }

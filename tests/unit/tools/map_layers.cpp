@@ -4,10 +4,10 @@
 #include <cstring>
 
 #include "common/failure.h"
+#include "images/pictures.h"
 #include "made.h"
 #include "map/check.h"
 #include "map/layers.h"
-#include "simulate/render/pictures.h"
 #include "unity.h"
 
 using namespace wm::tools;
@@ -135,7 +135,7 @@ void test_check_says_what_is_wrong() {
   const Layers m = make_layers(plan, {});
   std::string error;
   const auto write = [&](const char *name, std::vector<uint8_t> layer) {
-    TEST_ASSERT_TRUE(wm::render::write_png(folder.path() / name, {m.width, m.height, 1, std::move(layer)}, error));
+    TEST_ASSERT_TRUE(wm::images::write_png(folder.path() / name, {m.width, m.height, 1, std::move(layer)}, error));
   };
   write("edges.png", m.edges);
   write("drivable.png", m.drivable);

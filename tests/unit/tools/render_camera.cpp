@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Camera models against themselves, against finite differences, and against values worked out by hand.
-#include "simulate/render/camera.h"
+#include "images/camera.h"
 
 #include <cmath>
 #include <cstring>

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "simulate/render/camera.h"
+#include "images/camera.h"
 
 namespace wm::render {
 

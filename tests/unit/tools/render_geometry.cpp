@@ -7,8 +7,8 @@
 #include <cstdio>
 #include <vector>
 
+#include "render/render.h"
 #include "render_cameras.h"
-#include "simulate/render/render.h"
 
 extern "C" {
 #include "unity.h"

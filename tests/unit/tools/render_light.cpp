@@ -3,8 +3,8 @@
 #include <cmath>
 #include <cstring>
 
-#include "simulate/render/patterns.h"
-#include "simulate/render/render.h"
+#include "render/patterns.h"
+#include "render/render.h"
 
 extern "C" {
 #include "unity.h"

@@ -6,8 +6,8 @@
 #include <cstdlib>
 #include <cstring>
 
-#include "simulate/render/sensor.h"
-#include "simulate/render/video.h"
+#include "images/video.h"
+#include "render/sensor.h"
 
 extern "C" {
 #include "unity.h"

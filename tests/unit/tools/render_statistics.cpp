@@ -10,9 +10,9 @@
 #include <map>
 #include <sstream>
 
+#include "render/sensor.h"
 #include "simulate/film.h"
 #include "simulate/motion.h"
-#include "simulate/render/sensor.h"
 
 extern "C" {
 #include "unity.h"

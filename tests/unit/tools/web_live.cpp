@@ -213,7 +213,7 @@ void what_is_seen_and_what_is_expected_meet() {
   camera.camera.height = 400;
   camera.camera.intrinsics = {300, 300, 319.5, 199.5};
   camera.camera.distortion = {0, 0, 0, 0};
-  camera.camera.T_base_camera = wm::render::pose_xyz_rpy({0, 0, 1}, 0, 0.4, 0);
+  camera.camera.T_base_camera = wm::images::pose_xyz_rpy({0, 0, 1}, 0, 0.4, 0);
   site.cameras = {camera};
   site.sensors["front"].T_base = camera.camera.T_base_camera;
   std::vector<uint8_t> edges(100 * 100), floor(100 * 100, 255);

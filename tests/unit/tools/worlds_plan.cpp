@@ -9,10 +9,10 @@
 
 #include "common/trials.h"
 #include "simulate/route.h"
-#include "simulate/worlds/corridor.h"
-#include "simulate/worlds/path6.h"
-#include "simulate/worlds/raster.h"
-#include "simulate/worlds/rooms.h"
+#include "worlds/corridor.h"
+#include "worlds/path6.h"
+#include "worlds/raster.h"
+#include "worlds/rooms.h"
 
 extern "C" {
 #include "unity.h"

@@ -10,9 +10,9 @@
 #include <string>
 #include <vector>
 
-#include "simulate/render/render.h"
+#include "render/render.h"
 #include "simulate/route.h"
-#include "simulate/worlds/world.h"
+#include "worlds/world.h"
 
 extern "C" {
 #include <apriltag/apriltag.h>
@@ -26,10 +26,10 @@ void setUp(void) {}
 void tearDown(void) {}
 
 using namespace wm::sim;
+using wm::images::Pose;
+using wm::images::Vec2;
+using wm::images::Vec3;
 using wm::render::Image;
-using wm::render::Pose;
-using wm::render::Vec2;
-using wm::render::Vec3;
 
 namespace {
 
@@ -59,10 +59,10 @@ class Motion {
   Pose at(double t_ns) const {
     if (world_.vehicle == Vehicle::six) {
       const State6 s = world_.path.at(t_ns * 1e-9);
-      return wm::render::pose_xyz_rpy({s.xyz_m[0], s.xyz_m[1], s.xyz_m[2]}, s.rpy_rad[0], s.rpy_rad[1], s.rpy_rad[2]);
+      return wm::images::pose_xyz_rpy({s.xyz_m[0], s.xyz_m[1], s.xyz_m[2]}, s.rpy_rad[0], s.rpy_rad[1], s.rpy_rad[2]);
     }
     const State s = drive_.at(t_ns * 1e-9);
-    return wm::render::pose_xyz_rpy({s.x_m, s.y_m, 0}, 0, 0, s.heading_rad);
+    return wm::images::pose_xyz_rpy({s.x_m, s.y_m, 0}, 0, 0, s.heading_rad);
   }
   wm::render::Shot shot(double share, uint64_t frame) const {
     wm::render::Shot s;
@@ -78,7 +78,7 @@ class Motion {
   Drive drive_;
 };
 
-Image picture(const World &world, const wm::render::Camera &camera, const wm::render::Shot &shot, int samples) {
+Image picture(const World &world, const wm::images::Camera &camera, const wm::render::Shot &shot, int samples) {
   wm::render::Quality quality;
   quality.samples = samples;
   std::string error;
@@ -140,7 +140,7 @@ bool edge_offset(const Image &image, double u, double v, double du, double dv, d
 void corridor_labels_lie_on_edges_of_the_picture() {
   const auto world = made("corridor", false, 2);
   const Motion motion(*world);
-  const wm::render::Camera &camera = world->cameras[0].camera;
+  const wm::images::Camera &camera = world->cameras[0].camera;
   std::vector<double> offsets;
   size_t points = 0;
   for (const double share : {0.05, 0.17, 0.33, 0.52, 0.71, 0.9}) {
@@ -164,8 +164,8 @@ void corridor_labels_lie_on_edges_of_the_picture() {
     // Each label, looked at through its pixel, is the foot of a wall.
     for (const auto &row : rows) {
       Vec3 direction;
-      TEST_ASSERT_TRUE(wm::render::unproject(camera, {row[2], row[3]}, direction));
-      const Pose T = motion.at(static_cast<double>(shot.t_ns)) * wm::render::T_base_optical(camera);
+      TEST_ASSERT_TRUE(wm::images::unproject(camera, {row[2], row[3]}, direction));
+      const Pose T = motion.at(static_cast<double>(shot.t_ns)) * wm::images::T_base_optical(camera);
       const Vec3 ray = T.linear() * direction;
       const Point foot{T.translation().x() - ray.x() * T.translation().z() / ray.z(),
                        T.translation().y() - ray.y() * T.translation().z() / ray.z()};
@@ -200,7 +200,7 @@ void office_labels_are_what_apriltag_finds() {
     const auto world = made("office", false, 4, on_walls);
     TEST_ASSERT_GREATER_OR_EQUAL(12, world->truth.size());
     const Motion motion(*world);
-    const wm::render::Camera &camera = world->cameras[0].camera;
+    const wm::images::Camera &camera = world->cameras[0].camera;
     int labelled = 0, found = 0, strange = 0;
     double worst = 0;
     for (double share = 0.02; share < 0.34; share += 0.035) {
@@ -270,7 +270,7 @@ void office_prints_come_whole_into_view() {
 void hall_labels_point_at_upright_edges() {
   const auto world = made("hall", false, 3);
   const Motion motion(*world);
-  const wm::render::Camera &camera = world->cameras[0].camera;
+  const wm::images::Camera &camera = world->cameras[0].camera;
   TEST_ASSERT_GREATER_OR_EQUAL(30, world->lines.size());
   size_t labelled = 0, contrast = 0;
   std::vector<double> offsets;
@@ -316,7 +316,7 @@ void labels_of_signs_and_beacons_show_them() {
     TEST_ASSERT_TRUE(world->landmarks_known);
     for (double share = 0.05; share < 1; share += 0.06)
       for (size_t k = 0; k < world->cameras.size(); k++) {
-        wm::render::Camera camera = world->cameras[k].camera;
+        wm::images::Camera camera = world->cameras[k].camera;
         camera.readout_ns = 20000000;  // a rolling shutter moves what is seen
         const wm::render::Shot shot = motion.shot(share, 3);
         std::string text;
@@ -324,9 +324,9 @@ void labels_of_signs_and_beacons_show_them() {
         for (const auto &row : numbers(text)) {
           TEST_ASSERT_EQUAL(static_cast<int>(k), static_cast<int>(row[1]));
           Vec3 direction;
-          TEST_ASSERT_TRUE(wm::render::unproject(camera, {row[3], row[4]}, direction));
-          const double t_ns = static_cast<double>(shot.t_ns) + wm::render::row_offset_ns(camera, row[4]);
-          const Pose T = motion.at(t_ns) * wm::render::T_base_optical(camera);
+          TEST_ASSERT_TRUE(wm::images::unproject(camera, {row[3], row[4]}, direction));
+          const double t_ns = static_cast<double>(shot.t_ns) + wm::images::row_offset_ns(camera, row[4]);
+          const Pose T = motion.at(t_ns) * wm::images::T_base_optical(camera);
           const Vec3 ray = T.linear() * direction;
           const wm::render::Hit hit = world->scene.cast(T.translation(), ray);
           TEST_ASSERT_TRUE(hit.there);
@@ -342,7 +342,7 @@ void labels_of_signs_and_beacons_show_them() {
 }
 
 void requests_repeat_and_differ() {
-  wm::render::Camera small;
+  wm::images::Camera small;
   for (const char *name : {"corridor", "office", "hall", "seabed"}) {
     std::vector<std::vector<float>> pictures;
     std::vector<std::string> labels;

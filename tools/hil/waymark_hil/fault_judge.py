@@ -11,12 +11,18 @@ _HEALTH_PERIOD_S = 1.0  # health is sent once a second: a state is seen up to so
 _AS_BEFORE = 3
 _COUNTED_S = 0.2  # a gap is counted when the next datum comes
 FLAGS = {"motion_stale": 1, "fusion_stale": 2, "jumped": 4}
-CAUSES = ["none", "contradicted", "refused", "inconsistent", "biased", "lost_again", "unknown_identities", "silent", "off_map"]
+CAUSES = ["none", "contradicted", "refused", "inconsistent", "biased", "lost_again", "unknown_identities", "silent", "off_map", "turn"]
 
 
 def plain(text):
     """A name with one spelling: bus-off, bus_off and "bus off" are the same."""
     return str(text).lower().replace("-", "_").replace(" ", "_")
+
+
+def is_in(fault, from_s, until_s):
+    """Whether some of a fault is in a part of the drive."""
+    ends_s = fault.get("until_s")
+    return fault["from_s"] < until_s and (ends_s is None or ends_s > from_s or ends_s == fault["from_s"] >= from_s)
 
 
 class Heard:

@@ -707,7 +707,7 @@ async function look() {
         else if (next.why) $('picture-note').textContent = next.why;
       }
     }
-  } catch (e) { /* the state has it that nobody answers */ }
+  } catch (e) { /* the state line shows a server that does not answer */ }
   await wait;
   setTimeout(look, card.hidden ? 2000 : 0);
 }

@@ -11,7 +11,7 @@ from ..tables import Array
 
 _PICTURE_PARTS = {"camera_info", "compressed", "image", "image_raw", "image_rect", "image_mono", "image_color", "raw", "detections",
                   "tag_detections", "apriltag", "camera"}
-_OTHER_CLOCK_NS = 60_000_000_000  # nobody waits for a datum for a minute
+_OTHER_CLOCK_NS = 60_000_000_000  # longest gap within one clock; a larger step is another clock
 
 
 def stamp_ns(message: Any, log_ns: int) -> int:
