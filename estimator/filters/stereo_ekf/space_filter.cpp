@@ -118,6 +118,7 @@ bool space_filter::factorize_and_gate(const row_block &block, const gates &limit
       d -= square(f->l[k][m]) * f->d[m];
     }
     const double nis = square(left) / d;
+    out->innovation[k] = left;  // what the rows before it leave: its variance is that, too
     out->variance[k] = d;
     out->nis[k] = nis;
     if (!(d > 0.0) || !finite(nis)) return false;

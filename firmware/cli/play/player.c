@@ -57,8 +57,8 @@ static void put(player *self, const wm_play_item *item, uint8_t *copy) {
   (void)pthread_mutex_unlock(&t->lock);
 }
 
-// Under a real-time policy (chrt) decoding and encoding must not keep the sending thread waiting. Who sets the policy later takes the sending
-// thread alone, by its name.
+// Under a real-time policy (chrt) decoding and encoding must not keep the sending thread waiting. Who sets the policy
+// later takes the sending thread alone, by its name.
 static void step_back(void) {
   int policy;
   struct sched_param param;

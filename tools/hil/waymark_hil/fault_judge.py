@@ -176,6 +176,9 @@ def _recovers(checks, group, heard, from_s, until_s, within_s):
     usual_m = _AS_BEFORE * lcm_log.sigma_m(before[-1][1]) if before else math.inf
     well_s = next((t - until_s for t, p in heard.poses_between(until_s, heard.end_s)
                    if not p.status_flags & FLAGS["motion_stale"] and lcm_log.sigma_m(p) <= usual_m and p.state in (1, before[-1][1].state if before else 1)), math.inf)
+    if math.isinf(well_s) and until_s + within_s > heard.end_s:
+        checks.add(group, "pose within_s", None, f"not as good as before when the drive ends, {heard.end_s - until_s:.1f} s after its end; {within_s:g} s are allowed")
+        return
     checks.at_most(group, "pose within_s", well_s, within_s, f"as good as before {well_s:.2f} s after its end (sigma below {usual_m:.3f} m), {within_s:g} s are allowed")
 
 
