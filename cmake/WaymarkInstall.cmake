@@ -67,7 +67,7 @@ install(DIRECTORY tools/fleet/waymark_fleet DESTINATION ${CMAKE_INSTALL_DATADIR}
 install(PROGRAMS ${CMAKE_BINARY_DIR}/hil/waymark-hil DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT fleet)
 wm_install_compressed(${WM_PACKAGE_DIR}/man/waymark-hil.1 waymark-hil.1 man/man1 fleet)
 install(DIRECTORY tools/hil/waymark_hil tools/hil/target tools/hil/guest DESTINATION ${CMAKE_INSTALL_DATADIR}/waymark-hil COMPONENT fleet
-  FILES_MATCHING PATTERN "*.py" PATTERN "*.sh")
+  FILES_MATCHING PATTERN "*.py" PATTERN "*.sh" PATTERN "*.c")
 install(FILES toolchain/foreign.sh toolchain/foreign-apt.sh DESTINATION ${CMAKE_INSTALL_DATADIR}/waymark-hil/guest COMPONENT fleet)
 install(DIRECTORY ${CMAKE_BINARY_DIR}/hil/lcm DESTINATION ${CMAKE_INSTALL_DATADIR}/waymark-hil COMPONENT fleet FILES_MATCHING PATTERN "*.py")
 install(FILES tools/fleet/Snakefile DESTINATION ${CMAKE_INSTALL_DATADIR}/waymark-fleet COMPONENT fleet)

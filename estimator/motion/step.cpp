@@ -300,6 +300,17 @@ void add_overdue_noise(const motion_segment &segment, const wm_motion_params &p,
   noise->distance_m2 += distance_m2 * least(square(rotation_rad2) / 8.0, 0.5);
 }
 
+}  // namespace wm
+
+void wm_motion_unseen(const wm_motion_params *params, double blind_s, double *xy_m, double *heading_rad) {
+  const double hold_s = params->hold_max_s, held_s = blind_s < hold_s ? blind_s : hold_s, unknown_s = blind_s - held_s;
+  *xy_m = 0.5 * params->noise_hold_mps2 * held_s * (held_s + unknown_s);
+  const double held_rad = 0.5 * params->noise_hold_radps2 * wm::square(held_s);
+  *heading_rad = std::sqrt(wm::square(held_rad) + wm::square(wm::kUnknownRate_radps) * unknown_s);
+}
+
+namespace wm {
+
 void add_sampling_noise(const motion_input &input, motion_noise *noise) {
   noise->distance_m2 += static_cast<double>(input.sampling[0]);
   noise->rotation_rad2 += static_cast<double>(input.sampling[1]);

@@ -234,7 +234,7 @@ static int run(const arguments *args) {
     now = reload.next;
     options.start = NULL;
     if (report.has_last && wm_saved_pose_is_worth_it(&report.last)) {
-      wm_start_from_estimate(&report.last, BLIND_S, &start);
+      wm_start_from_estimate(&report.last, now.config.motion, BLIND_S, &start);
       options.start = &start;
     }
     // A log and a recording hold one configuration each.

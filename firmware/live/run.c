@@ -119,7 +119,7 @@ static int start_where_it_was(live *self) {
   }
   double now_s = live_utc_s(), age_s = now_s - saved.utc_s;
   if (!wm_saved_pose_start(&saved, now_s, params->start_max_age_s, params->start_moved_m,
-                           params->start_moved_deg * M_PI / 180, start)) {
+                           params->start_moved_deg * M_PI / 180, self->assembly.setup.motion, start)) {
     live_say(self, "start: the saved pose is %.0f s old, more than start.max_age_s; it is not used", age_s);
     return 0;
   }

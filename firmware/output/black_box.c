@@ -142,7 +142,7 @@ static void begin_log(black_box *self, const wm_estimate *pose, wm_time_ns now_n
   if (self->rotate_ns != WM_TIME_NONE && rename(now, before) != 0 && errno != ENOENT) unwritable(self, strerror(errno));
   self->rotate_ns = now_ns + self->keep_ns;
   if (pose->state == WM_STATE_TRACKING || pose->state == WM_STATE_DEAD_RECKONING)
-    wm_start_from_estimate(pose, 0, &self->assembly.setup.start);
+    wm_start_from_estimate(pose, self->assembly.setup.motion, 0, &self->assembly.setup.start);
   create_log(self);
 }
 

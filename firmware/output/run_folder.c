@@ -349,7 +349,8 @@ static wm_status begin_log_again(wm_run_folder *self, wm_error *err) {
   if (failed) return wm_fail(err, WM_IO, "%s: can't be put aside: %s", path, strerror(failed));
   self->continued = *self->assembly;
   self->continued.kept = NULL;
-  if (self->newest.t_ns != WM_TIME_NONE) wm_start_from_estimate(&self->newest, 0, &self->continued.setup.start);
+  if (self->newest.t_ns != WM_TIME_NONE)
+    wm_start_from_estimate(&self->newest, self->continued.setup.motion, 0, &self->continued.setup.start);
   status = wm_log_create(&self->log, path, &self->continued, err);
   if (status != WM_OK) self->log.failed = EIO;
   return status;

@@ -112,31 +112,34 @@ static void go_on(wm_start *start, double way_m, double turn_rad) {
   q[3] = c * w - s * z;
 }
 
-static double together(double a, double b, double c) { return sqrt(a * a + b * b + c * c); }
+static double together(double a, double b, double c, double d) { return sqrt(a * a + b * b + c * c + d * d); }
 
 // A clock that went back (a board without a battery before its time is set) gives no age.
 int wm_saved_pose_start(const wm_saved_pose *saved, double utc_s, double max_age_s, double moved_m, double moved_rad,
-                        wm_start *out) {
+                        const wm_motion_params *motion, wm_start *out) {
   double age_s = utc_s - saved->utc_s;
   if (age_s > max_age_s || saved->is_lost) return 0;
   *out = saved->start;
   int drives = age_s >= 0 && age_s <= DRIVES_S;
   double on_s = drives ? fmin(age_s, GOES_ON_S) : 0, blind_s = drives ? age_s : GOES_ON_S;
+  double unseen_m, unseen_rad;
+  wm_motion_unseen(motion, drives ? age_s : 0, &unseen_m, &unseen_rad);
   go_on(out, saved->speed_mps * on_s, saved->rate_radps * on_s);
-  out->sigma_xy_m = together(out->sigma_xy_m, moved_m, saved->speed_mps * blind_s);
+  out->sigma_xy_m = together(out->sigma_xy_m, moved_m, saved->speed_mps * blind_s, unseen_m);
   out->sigma_heading_rad =
-      fmin(together(out->sigma_heading_rad, moved_rad, saved->rate_radps * blind_s), SIGMA_ANY_HEADING_RAD);
+      fmin(together(out->sigma_heading_rad, moved_rad, saved->rate_radps * blind_s, unseen_rad), SIGMA_ANY_HEADING_RAD);
   return 1;
 }
 
-void wm_start_from_estimate(const wm_estimate *e, double blind_s, wm_start *out) {
+void wm_start_from_estimate(const wm_estimate *e, const wm_motion_params *motion, double blind_s, wm_start *out) {
   double speed_mps = sqrt(e->v_mps[0] * e->v_mps[0] + e->v_mps[1] * e->v_mps[1]);
   double xy = sigma_xy(e->covariance), heading = sigma_heading(e->covariance);
-  double blind_m = speed_mps * blind_s, blind_rad = fabs(e->w_radps[2]) * blind_s;
+  double blind_m = speed_mps * blind_s, blind_rad = fabs(e->w_radps[2]) * blind_s, unseen_m, unseen_rad;
+  wm_motion_unseen(motion, blind_s, &unseen_m, &unseen_rad);
   wm_start_init(out);
   memcpy(out->p_m, e->pose_map_base.p_m, sizeof out->p_m);
   memcpy(out->q_xyzw, e->pose_map_base.q_xyzw, sizeof out->q_xyzw);
   out->heading_rad = e->heading_rad;
-  out->sigma_xy_m = sqrt(xy * xy + blind_m * blind_m);
-  out->sigma_heading_rad = sqrt(heading * heading + blind_rad * blind_rad);
+  out->sigma_xy_m = together(xy, blind_m, unseen_m, 0);
+  out->sigma_heading_rad = together(heading, blind_rad, unseen_rad, 0);
 }

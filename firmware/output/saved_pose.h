@@ -3,6 +3,7 @@
 #ifndef WAYMARK_OUTPUT_SAVED_POSE_H
 #define WAYMARK_OUTPUT_SAVED_POSE_H
 
+#include "waymark/motion.h"
 #include "waymark/pose.h"
 #include "waymark/setup.h"
 #include "waymark/status.h"
@@ -23,13 +24,15 @@ wm_status wm_saved_pose_read(const char *path, wm_saved_pose *out, wm_error *err
 int wm_saved_pose_is_one(const wm_estimate *pose);
 // Whether it can be a start: not lost, sigma below 50 m and pi.
 int wm_saved_pose_is_worth_it(const wm_estimate *pose);
-// The estimate as a start in this process: `blind_s` of motion at its speed is added to its sigma.
-void wm_start_from_estimate(const wm_estimate *pose, double blind_s, wm_start *out);
+// The estimate as a start in this process: `blind_s` of motion at its speed, or of another one that began since
+// (wm_motion_unseen), is added to its sigmas.
+void wm_start_from_estimate(const wm_estimate *pose, const wm_motion_params *motion, double blind_s, wm_start *out);
 // The saved pose as a start; 0 where it is lost or older than max_age_s (`utc_s` is now). Sigmas grow by moved_m and
 // moved_rad for a motion while the robot was off. A robot that drove at the save is carried on at its speed for its
-// age, two seconds at most. For ten seconds its speed is taken as anything between zero and twice that; after that it
-// is taken to have stopped within two seconds of driving.
+// age, two seconds at most. For ten seconds its speed is taken as anything between zero and twice that, and it may have
+// braked, accelerated or begun to turn since (wm_motion_unseen); after that it is taken to have stopped within two
+// seconds of driving.
 int wm_saved_pose_start(const wm_saved_pose *saved, double utc_s, double max_age_s, double moved_m, double moved_rad,
-                        wm_start *out);
+                        const wm_motion_params *motion, wm_start *out);
 
 #endif

@@ -72,6 +72,11 @@ def mahalanobis2(d, p):
 
 def errors(run, recording):
     """(t_s, tracking, error in m, error in sigma) at each stamp of the truth at which the run has a pose."""
+    return ((t_s, state == "tracking", error_m, sigmas) for t_s, state, error_m, sigmas in stated_errors(run, recording))
+
+
+def stated_errors(run, recording):
+    """As errors, with the state's name."""
     trajectory, truth = rows(run / "trajectory.csv"), rows(recording / "truth.csv")
     axes = "xyz" if trajectory and "cov_zz" in trajectory[0] else "xy"
     place = [f"{a}_m" for a in axes]
@@ -86,7 +91,7 @@ def errors(run, recording):
         share = (t - int(a["t_ns"])) / (int(b["t_ns"]) - int(a["t_ns"]))
         d = [float(row[k]) - float(a[k]) - share * (float(b[k]) - float(a[k])) for k in place]
         p = [[float(a["cov_" + min(i, j) + max(i, j)]) for j in axes] for i in axes]
-        yield t * 1e-9, a["state"] == "tracking", sum(x * x for x in d) ** 0.5, mahalanobis2(d, p) ** 0.5
+        yield t * 1e-9, a["state"], sum(x * x for x in d) ** 0.5, mahalanobis2(d, p) ** 0.5
 
 
 def confidently_wrong(run, recording):

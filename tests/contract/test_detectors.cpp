@@ -138,15 +138,17 @@ void check_events(size_t count) {
     TEST_ASSERT_EQUAL_INT64(1000, e.t_ns);
     if (e.kind == WM_EVENT_SIGHTING) {
       const wm_sighting &seen = e.as.sighting;
-      TEST_ASSERT_TRUE(std::fabs(seen.bearing_rad) <= 3.1416 && seen.bearing_sigma_rad > 0);
+      TEST_ASSERT_DOUBLE_WITHIN(3.1416, 0.0, seen.bearing_rad);
+      TEST_ASSERT_GREATER_THAN_DOUBLE(0, seen.bearing_sigma_rad);
       TEST_ASSERT_TRUE(std::isnan(seen.range_m) || (seen.range_m > 0 && seen.range_sigma_m > 0));
       if (seen.landmark_id == -1) continue;  // one of a class
-      TEST_ASSERT_TRUE(seen.landmark_id > 0);
+      TEST_ASSERT_GREATER_THAN(0, seen.landmark_id);
       for (size_t k = 0; k < i; k++) TEST_ASSERT_TRUE(events[k].as.sighting.landmark_id != seen.landmark_id);
     }
     if (e.kind != WM_EVENT_POINTS) continue;
     const wm_points &points = e.as.points;
-    TEST_ASSERT_TRUE(points.count > 0 && points.count <= WM_POINTS_MAX);
+    TEST_ASSERT_GREATER_THAN(0, points.count);
+    TEST_ASSERT_LESS_OR_EQUAL(WM_POINTS_MAX, points.count);
     TEST_ASSERT_EQUAL(0, points.camera);
     for (uint32_t k = 0; k < points.count; k++) {
       TEST_ASSERT_TRUE(std::isfinite(points.x_m[k]) && std::isfinite(points.y_m[k]));

@@ -146,10 +146,11 @@ void assert_sound(const wm_estimate &e) {
   const double det = p[2][2] * minor - p[0][2] * (p[0][2] * p[1][1] - p[0][1] * p[1][2]) +
                      p[1][2] * (p[0][2] * p[0][1] - p[1][2] * p[0][0]);
   TEST_ASSERT_TRUE(p[0][0] > 0 && p[1][1] > 0 && p[2][2] > 0);
-  TEST_ASSERT_TRUE(minor > -1e-9 * p[0][0] * p[1][1]);
-  TEST_ASSERT_TRUE(det > -1e-9 * p[0][0] * p[1][1] * p[2][2]);
+  TEST_ASSERT_GREATER_THAN_DOUBLE(-1e-9 * p[0][0] * p[1][1], minor);
+  TEST_ASSERT_GREATER_THAN_DOUBLE(-1e-9 * p[0][0] * p[1][1] * p[2][2], det);
   TEST_ASSERT_TRUE(std::isfinite(e.pose_map_base.p_m[0]) && std::isfinite(e.pose_map_base.p_m[1]));
-  TEST_ASSERT_TRUE(e.heading_rad > -3.1415926535897936 && e.heading_rad <= 3.1415926535897936);
+  TEST_ASSERT_GREATER_THAN_DOUBLE(-3.1415926535897936, e.heading_rad);
+  TEST_ASSERT_LESS_OR_EQUAL_DOUBLE(3.1415926535897936, e.heading_rad);
   const double *q = e.pose_map_base.q_xyzw;
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 1.0, q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
   TEST_ASSERT_TRUE(e.state <= WM_STATE_LOST);
@@ -365,7 +366,8 @@ void test_the_lost_probability_is_a_probability_or_absent(void) {
     } else if (std::isnan(e.lost_probability)) {
       absent++;
     } else {
-      TEST_ASSERT_TRUE(e.lost_probability >= 0 && e.lost_probability <= 1);
+      TEST_ASSERT_GREATER_OR_EQUAL_DOUBLE(0, e.lost_probability);
+      TEST_ASSERT_LESS_OR_EQUAL_DOUBLE(1, e.lost_probability);
       given++;
     }
   }
@@ -381,7 +383,8 @@ void test_counters_are_typed(void) {
     a.take(event_at(i, 0.02 * (double)i));
     wm_counter counters[WM_HEALTH_COUNTERS_MAX];
     const size_t count = estimator->counters(a.state, counters, WM_HEALTH_COUNTERS_MAX);
-    TEST_ASSERT_TRUE(count > 0 && count <= WM_HEALTH_COUNTERS_MAX);
+    TEST_ASSERT_GREATER_THAN(0, count);
+    TEST_ASSERT_LESS_OR_EQUAL(WM_HEALTH_COUNTERS_MAX, count);
     TEST_ASSERT_EQUAL(count, estimator->counters(a.state, counters, 0));
     bool seen[WM_COUNTER_KIND_COUNT] = {};
     for (size_t k = 0; k < count; k++) {

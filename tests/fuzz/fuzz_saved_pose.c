@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Any bytes as the pose that a run saved: refused with a text, or a start that is finite, whatever the clock says.
 #include <math.h>
+#include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -16,8 +17,11 @@ static void check(int good) {
 }
 
 static void check_start(const wm_saved_pose *saved, double utc_s) {
+  static max_align_t motion[512];
   wm_start start;
-  if (!wm_saved_pose_start(saved, utc_s, 1e12, 0.4, 0.1, &start)) return;
+  check(sizeof motion >= wm_motion_params_table.bytes);
+  wm_params_defaults(&wm_motion_params_table, motion);
+  if (!wm_saved_pose_start(saved, utc_s, 1e12, 0.4, 0.1, (const wm_motion_params *)motion, &start)) return;
   for (int i = 0; i < 2; i++) check(isfinite(start.p_m[i]));
   check(isfinite(start.heading_rad) && isfinite(start.sigma_xy_m) && isfinite(start.sigma_heading_rad));
   check(start.sigma_xy_m > 0 && start.sigma_heading_rad > 0);

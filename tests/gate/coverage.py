@@ -4,7 +4,8 @@
 
     coverage.py BUILD [--json FILE] [--worst N]     BUILD: a build with --coverage in which the tests have run (./dev coverage)
 
-The figures are of the unit, contract and end-to-end tests of the robot's rooms. --worst lists the sources with the most lines that no
+The figures are of the unit, contract and end-to-end tests of the robot's rooms. The commands that scripts test count as not run: the
+floor of firmware is lower therefore. --worst lists the sources with the most lines that no
 test runs. Exit code 1 below a floor."""
 import argparse
 import json
@@ -15,13 +16,16 @@ import sys
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 # Room: its folders or files, and the least share of its lines. Rooms without a floor are shown.
 ROOMS = {
-    "estimator": (["estimator/"], 0.95),
+    "estimator": (["estimator/"], 0.97),
     "merge": (["firmware/fusion/merge.c", "firmware/fusion/fuser.c", "firmware/fusion/predictor.c", "firmware/fusion/pipeline.c"], 0.95),
-    "CAN": (["drivers/can/"], 0.95),
-    "codec": (["msgs/src/"], 0.95),
-    "drivers": (["drivers/"], 0.85),
-    "firmware": (["firmware/"], 0.80),
+    "CAN": (["drivers/can/"], 0.95),  # without what needs an interface
+    "codec": (["msgs/src/"], 0.98),
+    "drivers": (["drivers/"], 0.90),
+    "firmware": (["firmware/"], 0.65),
 }
+
+# Run by hardware in the loop alone: a CAN interface of the kernel, a camera.
+DEVICES = ("drivers/can/socketcan.c", "drivers/can/device_open.c", "drivers/camera/v4l2.c")
 
 
 def measure(build):
@@ -31,7 +35,8 @@ def measure(build):
     for room in ("estimator", "drivers", "firmware", "msgs"):
         command += ["--filter", f"{ROOT}/{room}/"]
     summary = json.loads(subprocess.run([*command, build], capture_output=True, text=True, check=True).stdout)
-    return {f["filename"]: [f["line_covered"], f["line_total"], f["branch_covered"], f["branch_total"]] for f in summary["files"]}
+    return {f["filename"]: [f["line_covered"], f["line_total"], f["branch_covered"], f["branch_total"]] for f in summary["files"]
+            if f["filename"] not in DEVICES}
 
 
 def main():

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""A run of `slam` that is killed (SIGKILL) at random moments while it drives goes on: with its map, at its pose, and no file of
-it is ever half written. A recording is played, of which each run gets the rest. Needs what lcm_tools.py needs (else 77).
+"""A run of `slam` that is killed (SIGKILL) at random moments while it drives goes on: with its map, at its pose, no pose further off
+than its sigma, and no file of it is ever half written. A recording is played, of which each run gets the rest. Needs what lcm_tools.py needs (else 77).
 
     restarts.py KILLS"""
 import math
@@ -22,6 +22,7 @@ import lcm_tools
 
 V_MPS, W_RADPS, LANDMARKS = 0.5, 0.25, 12
 RIGHT_M, RIGHT_WITHIN_S, LAP_S = 0.15, 5.0, 20.0
+SIGMAS = 4.0
 # At the end of the last drive. Each kill costs what the map gained since it was kept: 0.09 to 0.17 m in 5 runs, by the load.
 END_M = 0.25
 RANDOM = random.Random(7)
@@ -81,6 +82,13 @@ def off_m(pose):
     return math.hypot(pose.position_m[0] - x, pose.position_m[1] - y)
 
 
+def sigmas(pose):
+    """Position and heading, each over its sigma: the larger one."""
+    _, _, heading = truth(pose.t_ns * 1e-9)
+    turned = math.remainder(2 * math.atan2(pose.orientation_xyzw[2], pose.orientation_xyzw[3]) - heading, math.tau)
+    return max(off_m(pose) / math.sqrt(pose.covariance[0][0] + pose.covariance[1][1]), abs(turned) / math.sqrt(pose.covariance[5][5]))
+
+
 def check_files(work):
     """Each is whole, whatever the moment of the kill."""
     text = (work / "pose.yaml").read_text()
@@ -115,7 +123,7 @@ def one_run(work, subscriber, at_s, seconds, command):
     time.sleep(0.05)
     poses = [p for _, p in subscriber.poses]
     wrong = [p.t_ns * 1e-9 - at_s for p in poses if off_m(p) > RIGHT_M]
-    return {"first_s": first_s, "wrong_until_s": max(wrong, default=0.0), "said": said, "poses": poses,
+    return {"first_s": first_s, "sigmas": max(sigmas(p) for p in poses), "wrong_until_s": max(wrong, default=0.0), "said": said, "poses": poses,
             "landmarks": [landmarks_of(h) for h in subscriber.healths], "killed_at_s": poses[-1].t_ns * 1e-9}
 
 
@@ -134,14 +142,16 @@ def inside(kills):
         subscriber = Subscriber(waymark)
         subscriber.start()
         run = one_run(work, subscriber, 0.0, LAP_S, command)
-        first, wrong, kept = [], [], check_files(work)
+        first, wrong, beyond, kept = [], [], [], check_files(work)
         for kill in range(kills):
             down_s = RANDOM.uniform(0.1, 1.5)
+            time.sleep(down_s)
             run = one_run(work, subscriber, run["killed_at_s"] + down_s, RANDOM.uniform(1.5, 6.0), command)
             assert "continues with the map" in run["said"], run["said"]
             assert all(n >= kept for n in run["landmarks"]), f"{kept} landmarks were kept, {run['landmarks']} came back"
             first.append(run["first_s"])
             wrong.append(run["wrong_until_s"])
+            beyond.append(run["sigmas"])
             kept = check_files(work)
         # The box of one that is killed begins with the map that it took up, and gives its poses.
         run = one_run(work, subscriber, run["killed_at_s"] + 0.5, 6.0, [*command, "--out", work / "killed"])
@@ -162,8 +172,9 @@ def inside(kills):
         print(f"the black box of a killed run gives its {both} poses bit by bit")
         end = run["poses"][-1]
         print(f"{kills} kills: a pose after {sorted(first)[len(first) // 2]:.2f} s (median), {max(first):.2f} s (most); right for good "
-              f"after {max(wrong):.2f} s at most; {kept} landmarks kept at last, {off_m(end):.3f} m off at the end")
+              f"after {max(wrong):.2f} s at most, errors at most {max(beyond):.1f} sigma; {kept} landmarks kept at last, {off_m(end):.3f} m off at the end")
         assert max(wrong) < RIGHT_WITHIN_S
+        assert max(beyond) < SIGMAS, f"{max(beyond):.1f} sigma off"
         assert kept >= LANDMARKS and off_m(end) < END_M
     finally:
         shutil.rmtree(work)

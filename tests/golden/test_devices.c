@@ -236,7 +236,7 @@ static void another_configuration_is_taken_while_it_drives(void) {
   wm_run_options options = {.seed = 1, .speed = 1, .duration_s = LONGEST_S, .stop = &over, .say = hear};
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_run_live(&config, robot, &options, &live, &err), err.text);
   TEST_ASSERT_TRUE(live.has_last && !live.wants_restart);
-  wm_start_from_estimate(&live.last, 0.5, &start);
+  wm_start_from_estimate(&live.last, config.motion, 0.5, &start);
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, live.last.pose_map_base.p_m[0], start.p_m[0]);
   TEST_ASSERT_GREATER_THAN_DOUBLE(0.45, start.sigma_xy_m);  // half a second at 1 m/s
   wm_recording_close(robot);

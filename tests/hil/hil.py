@@ -5,8 +5,9 @@ real (emulated) CAN controller, under qemu's instruction clock, fed from a recor
 
 usage: hil.py [--arch arm64|armhf] [--package DEB] WORK WAYMARK WAYMARK_SIMULATE [PART ...]
 
-WORK keeps the guest's image from run to run; WAYMARK is this computer's; parts: can, camera, libcamera, play, landmarks, motion, edges, walls,
-service, board, power; all of them but power where none is named. Without --arch the guest runs WAYMARK itself, under systemd the package; else the package in all parts.
+The guest's image is made once, for these tests and for `waymark hil` (WAYMARK_HIL_CACHE, ~/.cache/waymark/hil). WAYMARK is this computer's.
+Parts: can, camera, libcamera, play, landmarks, motion, edges, walls, service, board, power; all of them but power where none is named.
+Without --arch the guest runs WAYMARK itself, under systemd the package; else the package in all parts.
 The service and power parts run the package under systemd; without one they are left out. armhf is arm64's kernel with armhf's programs.
 
 Judged on the host: the guest's own checks; the log of its run gives its poses bit by bit; its poses are those of a replay
@@ -249,6 +250,17 @@ def run_part(work, machine, waymark, simulate, steps):
     return failures
 
 
+def link_image(arch, work):
+    """The image of all tests and of `waymark hil`, made where it is not there; WORK/image leads to it."""
+    folder, link = guest.folder_of(arch), work / "image"
+    folder.mkdir(parents=True, exist_ok=True)
+    work.mkdir(parents=True, exist_ok=True)
+    if link.is_dir() and not link.is_symlink():
+        shutil.rmtree(link)  # one of its own
+    link.unlink(missing_ok=True)
+    link.symlink_to(guest.prepare(arch, folder))
+
+
 def arguments():
     parser = argparse.ArgumentParser(add_help=False)
     parser.add_argument("--arch", choices=MACHINES, default="amd64")
@@ -268,7 +280,7 @@ def main():
         if shutil.which(program) is None:
             print(f"{program} is not there: skipped")
             return 77
-    guest.prepare(args.arch, work)
+    link_image(args.arch, work)
     shutil.rmtree(work / "share", ignore_errors=True)
     (work / "share/out").mkdir(parents=True)
     shutil.copytree(HERE / "guest", work / "share/guest")

@@ -5,15 +5,17 @@
 import json
 import math
 import pathlib
+import re
 import sys
 import tempfile
+import types
 import unittest
 
 import yaml
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "tools/hil"), str(ROOT / "tools/fleet")]
-from waymark_hil import HilError, compare, fault_judge, lcm_log, limits, poses, recording, samples, scenario, verdict  # noqa: E402
+from waymark_hil import HilError, compare, fault_judge, guest, lcm_log, limits, poses, recording, samples, scenario, stamps, targets, verdict  # noqa: E402
 
 TYPES = lcm_log.types(sys.argv.pop(1))
 END_S, RATE_HZ = 30.0, 50
@@ -56,7 +58,12 @@ class Drive:
         reference = [(k * 0.1, k * 0.1, 0.0, 0.0, 0.0) for k in range(int(10 * END_S))]
         heard = fault_judge.Heard(self.poses, self.healths, reference, self.said, END_S)
         fault_judge.judge(checks, self.fault, heard, self.done, "by the truth")
+        self.checks = checks
         return [check.name for check in checks.failed()]
+
+    def status(self, name):
+        """Of a check of the last judgement."""
+        return next(check.status for check in self.checks if check.name == name)
 
 
 class Faults(unittest.TestCase):
@@ -96,6 +103,15 @@ class Faults(unittest.TestCase):
         self.drive.poses = [(t, p if t < 15 else pose(t, t, 0.4)) for t, p in self.drive.poses]
         self.assertEqual(self.drive.failures(), ["pose within_s"])
 
+    def test_a_pose_whose_time_is_not_over(self):
+        """Nothing is known of a recovery that may come after the drive's end; one that came is good."""
+        self.drive.fault["pose"] = {"within_s": 20.0}
+        usual = list(self.drive.poses)
+        self.drive.poses = [(t, p if t < 15 else pose(t, t, 0.4)) for t, p in usual]
+        self.assertEqual([self.drive.failures(), self.drive.status("pose within_s")], [[], "skipped"])
+        self.drive.poses = [(t, pose(t, t, 0.4) if 15 < t < 28 else p) for t, p in usual]
+        self.assertEqual([self.drive.failures(), self.drive.status("pose within_s")], [[], "passed"])
+
     def test_poses_that_stop(self):
         self.drive.fault["pose"] = {"gap_max_s": 0.5, "rate_hz": 40}
         self.drive.poses = [(t, p) for t, p in self.drive.poses if not 11 < t < 13]
@@ -119,6 +135,16 @@ class Faults(unittest.TestCase):
         self.assertEqual(self.drive.failures(), [])
         self.drive.said *= 2
         self.assertEqual(len(self.drive.failures()), 1)
+
+    def test_names_are_those_of_the_run(self):
+        text = (ROOT / "msgs/src/names.c").read_text()
+        for table, names in (("kCauses", ["", *fault_judge.CAUSES[1:]]), ("kStates", lcm_log.STATES), ("kDeviceStates", ["", *lcm_log.DEVICES[1:]])):
+            self.assertEqual(re.findall(r'"([^"]*)"', re.search(rf"{table}\[\] = {{(.*?)}};", text, re.DOTALL)[1]), list(names), table)
+
+    def test_faults_in_a_part(self):
+        for fault, part, is_in in (((10, 15), (0, 30), True), ((10, 15), (15, 30), False), ((10, 15), (14, 30), True), ((10, 15), (0, 10), False),
+                                   ((10, None), (20, 30), True), ((10, 10), (10, 30), True), ((10, 10), (11, 30), False)):
+            self.assertEqual(fault_judge.is_in({"from_s": fault[0], "until_s": fault[1]}, *part), is_in, (fault, part))
 
     def test_a_fault_that_did_not_happen(self):
         self.drive.done = {"done": False, "why": "EPERM"}
@@ -155,7 +181,9 @@ class Written(unittest.TestCase):
         self.assertEqual(result["checks"][0]["value"], None)
 
 
-class Files(unittest.TestCase):
+class InFolder(unittest.TestCase):
+    """With a folder of its own."""
+
     def setUp(self):
         self.temporary = tempfile.TemporaryDirectory()
         self.folder = pathlib.Path(self.temporary.name)
@@ -167,6 +195,8 @@ class Files(unittest.TestCase):
         path.write_text(text)
         return path
 
+
+class Files(InFolder):
     def robot(self):
         self.write("rec/recording.yaml", "format: waymark-recording/1\nname: r\nvehicle: {initial_pose: {t_ns: 5, x_m: 1, y_m: 2, heading_rad: 1e-3}}\n")
         self.write("rec/can.log", "(10.000000) can0 101#00\n(10.500000) can1 102##100112233445566778899\n(11.000000) can0 101#01\n")
@@ -211,6 +241,15 @@ class Files(unittest.TestCase):
         self.assertEqual(derived["initial_pose"].keys(), {"x_m", "y_m", "heading_rad"})
         self.assertIn("speed_mps: 1e-3", (out / "robot.yaml").read_text())
 
+    def test_a_later_start(self):
+        table = self.write("before/published.csv", "t_ns,x_m,y_m,z_m,qx,qy,qz,qw\n100,1,2,0.5,0,0,0,1\n200,3,4,0.6,0,0,1,0\n300,5,6,0.7,0,0,0,1\n")
+        for start, keys in (({"x_m": "9", "y_m": "9", "heading_rad": "1", "sigma_xy_m": "0.5"}, {"x_m", "y_m", "qx", "qy", "qz", "qw", "sigma_xy_m"}),
+                            ({"x_m": "9", "y_m": "9", "z_m": "9"}, {"x_m", "y_m", "z_m", "qx", "qy", "qz", "qw"})):
+            self.assertTrue(scenario.begin_at({"initial_pose": start}, self.folder, table, 299))
+            derived = yaml.safe_load((self.folder / "robot.yaml").read_text())["initial_pose"]
+            self.assertEqual((derived.keys(), derived["x_m"], derived["qz"]), (keys, 3, 1))
+        self.assertFalse(scenario.begin_at({"initial_pose": {}}, self.folder, table, 99))
+
     def test_bad_configurations(self):
         rec = self.robot()
         for text in ("a: [", "just text", "dbc: missing.dbc\n", "devices: 5\n"):
@@ -236,6 +275,92 @@ class Files(unittest.TestCase):
         self.assertIsNone(samples.wake_us(self.folder))
         self.write("cyclictest.json", json.dumps({"thread": {"0": {"histogram": {"10": 990, "40": 9, "900": 1}}}}))
         self.assertEqual(samples.wake_us(self.folder), {"what": "cyclictest", "p99_us": 10.0, "max_us": 900.0})
+
+
+class Stamps(InFolder):
+    """10 s of a bus at 100 Hz and a camera at 10 Hz, and what the target recorded of it on its own clock."""
+
+    OFFSET_NS, SETTLE_S = 5_000_000_000_123, 1.0
+
+    def judged(self, lost_frame=(), lost_picture=(), frame_late_ms=0.2, picture_late_ms=0.4, faults=(), recorded=True):
+        """{name: status} and the figures; the bus has another name on the target."""
+        def table(name, shift_ns, leave_out):
+            self.write(name, "frame,t_ns\n" + "".join(f"{k},{k * 10**8 + shift_ns}\n" for k in range(100) if k not in leave_out))
+
+        def log(name, bus, shift_ns, leave_out):
+            self.write(name, "".join(f"({t // 10**9}.{t % 10**9:09d}) {bus} 101#{k % 256:02X}\n" for k in range(1000) if k not in leave_out for t in (k * 10**7 + shift_ns,)))
+        log("rec/can.log", "can0", 0, ())
+        table("rec/video/front.csv", 0, ())
+        if recorded:
+            log("out/recorded/can.log", "can7", self.OFFSET_NS + int(frame_late_ms * 1e6), lost_frame)
+            table("out/recorded/video/front.csv", self.OFFSET_NS + int(picture_late_ms * 1e6), lost_picture)
+        facts = {"recording": self.folder / "rec", "from_s": 0.0, "until_s": 9.9, "faults": list(faults)}
+        one = types.SimpleNamespace(checks=verdict.Checks(), out=self.folder / "out", facts=facts, played={"offset_ns": self.OFFSET_NS}, figures={},
+                                    start_ns=self.OFFSET_NS, limits=limits.read(None, False)[0])
+        stamps.judge(one, [("can0", "can7")], ["front"], self.SETTLE_S)
+        return {check.name: check.status for check in one.checks}, one
+
+    def test_all_is_there(self):
+        found, one = self.judged()
+        self.assertEqual(set(found.values()), {"passed"})
+        self.assertAlmostEqual(one.figures["skew_front_p99_ms"], 0.2, places=3)
+        self.assertIn("870 of 870", one.checks[0].text)  # from the second second on, and what is on its way at the end is left out
+
+    def test_a_skew(self):
+        for late_ms, status in ((1.1, "passed"), (1.3, "failed"), (-1.0, "failed")):
+            self.assertEqual(self.judged(picture_late_ms=late_ms)[0]["skew of front and CAN"], status, late_ms)
+
+    def test_what_is_lost(self):
+        self.assertEqual(self.judged(lost_frame=(500,))[0], {"can:can0": "failed", "camera:front": "passed", "skew of front and CAN": "passed"})
+        self.assertEqual(self.judged(lost_picture=(50,))[0]["camera:front"], "failed")
+        self.assertEqual(self.judged(lost_frame=(10,), lost_picture=(3,))[0]["camera:front"], "passed")  # before it had settled
+
+    def test_nothing_was_recorded(self):
+        self.assertEqual(self.judged(recorded=False)[0], {"recorded": "failed"})
+
+    def test_with_faults(self):
+        self.assertEqual(set(self.judged(lost_frame=(500,), picture_late_ms=30, faults=("one",))[0].values()), {"skipped"})
+
+
+class Guests(unittest.TestCase):
+    def test_rate_of_instructions(self):
+        machine, words = guest.at_rate("amd64", 2000)
+        self.assertEqual((machine, words), (guest.MACHINES["amd64"], "tsc_early_khz=2000000 tsc=reliable"))
+        machine, words = guest.at_rate("arm64", 3000)
+        self.assertEqual((machine["qemu"][-1], words), ("cortex-a57,cntfrq=3000000000", ""))
+        for arch in guest.MACHINES:
+            self.assertEqual(guest.at_rate(arch, 1000), (guest.MACHINES[arch], ""))
+
+    def test_an_end(self):
+        """A guest that is done, one that works without an end, one that waits on a busy desk."""
+        with tempfile.TemporaryDirectory() as folder:
+            log = pathlib.Path(folder) / "log"
+            self.assertTrue(guest.boot(["sh", "-c", "echo GUEST-RC 0"], log))
+            self.assertFalse(guest.boot(["sh", "-c", "while :; do :; done"], log, 0.3))
+            self.assertIn("was ended by the desk", log.read_text())
+            self.assertTrue(guest.boot(["sh", "-c", "sleep 1.5; echo GUEST-RC 0"], log, 1))
+            self.assertNotIn("was ended", log.read_text())
+
+    def test_the_rate_is_stated(self):
+        self.assertEqual(targets.Guest("amd64", None, None).name, "guest amd64")
+        other = targets.Guest("amd64", None, None, 3000)  # so that the two are not compared
+        self.assertEqual((other.name, other.computer), ("guest amd64, 3000 MIPS", ["one processor that does 3000 million instructions a second"]))
+
+
+class Boards(unittest.TestCase):
+    """Who may do what root does."""
+
+    def prepared(self, *lines):
+        board, quiet = targets.Host("pi@board", [], {}), types.SimpleNamespace(say=lambda text: None)
+        board._ask = lambda command: "\n".join(("waymark 0.1.0", *lines))
+        board.prepare(quiet)
+        return board
+
+    def test_users(self):
+        self.assertEqual(self.prepared("4", "0", "alone").as_root, "")
+        self.assertEqual((self.prepared("1", "1000", "sudo").as_root, self.prepared("1", "1000", "sudo").single_core), ("sudo -n ", True))
+        with self.assertRaisesRegex(HilError, "NOPASSWD"):
+            self.prepared("4", "1000", "alone")
 
 
 class Compared(unittest.TestCase):

@@ -85,18 +85,8 @@ wm_verdict slam::begin_annulus(const context &at, const wm_sighting &s, const re
 // Of a circle: the second derivative across the line of sight adds (P_tt / range)^2 / 2 to the range's
 // variance [Julier1997]. P_tt is of the landmark's place in base_link: a turn of the whole map changes no range.
 double slam::curvature_variance(const context &at, int landmark, const landmark_rows &v) const {
-  const wm_pose2 from = sensor_pose(at.sensor, at.past), place = pose_of(landmark);
-  const double dx = place.x_m - from.x_m, dy = place.y_m - from.y_m, distance2 = dx * dx + dy * dy;
-  if (!(distance2 > square(kOnSensor_m))) return 0.0;
-  const double distance = std::sqrt(distance2), t[2] = {-dy / distance, dx / distance};
-  const int state = joint_.landmark_state(landmark);
-  joint_row across;
-  for (int k = 0; k < 2; k++) {
-    across.add(state + k, t[k]);
-    across.add(k == 0 ? kX : kY, -t[k]);
-  }
-  across.add(kHeading, -distance);
-  return 0.5 * square(joint_.variance_of(across) / v.expected[0]);
+  const relative_place place = relative_place_of(at, landmark);
+  return place.distance_m > kOnSensor_m ? 0.5 * square(place.across_m2 / v.expected[0]) : 0.0;
 }
 
 // A range that a member's gate refuses leaves its place; its weight falls to that of a false range.

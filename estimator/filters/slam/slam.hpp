@@ -167,6 +167,10 @@ class slam {
     double length_m;
     bool has_heading;  // false: ambiguous, or not accurate enough
   };
+  // A landmark as seen from the sensor: its distance, and the variances along and across the line of sight.
+  struct relative_place {
+    double distance_m, along_m2, across_m2, along_across_m2;
+  };
   // Two landmarks that may be one line: their states, the difference of their places and its covariance.
   struct landmark_pair {
     int fresh, lost;
@@ -220,6 +224,7 @@ class slam {
   sensor_errors errors_of(int sensor) const;
   wm_pose2 sensor_pose(int sensor, const past_pose &past) const;
   int lend(const context &at);
+  relative_place relative_place_of(const context &at, int landmark) const;
   gate_limits gates() const { return {sightings().gate_soft, sightings().gate_hard}; }
   void prepare(int landmark, landmark_rows *v, joint_state::innovation_block *out);
   wm_verdict fuse_rows(const context &at, const landmark_rows &v, const gate_result &g,
@@ -277,6 +282,7 @@ class slam {
   marker_reading read_marker(const wm_marker &m, const double p_m[3], double yaw_rad) const;
   marker_reading choose_pose(const context &at, const wm_marker &m, const marker_reading &first, int landmark);
   planar_observation observation_of(const wm_marker &m, const marker_reading &r) const;
+  void expect_known_marker(const context &at, const marker_reading &r, int landmark, int count, landmark_rows *out);
   double marker_nis(const context &at, int landmark, const marker_reading &r);
   void expect_marker(const context &at, const marker_reading &r, const wm_pose2 &place, int error_state,
                      landmark_rows *out) const;

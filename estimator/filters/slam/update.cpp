@@ -29,6 +29,26 @@ wm_pose2 slam::sensor_pose(int sensor, const past_pose &past) const {
   return compose(past.pose, {m.x_m + e[kMountX], m.y_m + e[kMountY], m.yaw_rad + e[kYaw]});
 }
 
+// P_tt and P_rt are those of the landmark's place in base_link.
+slam::relative_place slam::relative_place_of(const context &at, int landmark) const {
+  const wm_pose2 from = sensor_pose(at.sensor, at.past), place = pose_of(landmark);
+  const double dx = place.x_m - from.x_m, dy = place.y_m - from.y_m, distance2 = dx * dx + dy * dy;
+  if (!(distance2 > square(kOnSensor_m))) return {std::sqrt(distance2), 0.0, 0.0, 0.0};
+  const double distance = std::sqrt(distance2), along[2] = {dx / distance, dy / distance};
+  const int state = joint_.landmark_state(landmark);
+  joint_row r, t;
+  for (int k = 0; k < 2; k++) {
+    const double across = k == 0 ? -along[1] : along[0];
+    const int own = k == 0 ? kX : kY;
+    r.add(state + k, along[k]);
+    r.add(own, -along[k]);
+    t.add(state + k, across);
+    t.add(own, -across);
+  }
+  t.add(kHeading, -distance);
+  return {distance, joint_.variance_of(r), joint_.variance_of(t), joint_.covariance_of(r, t)};
+}
+
 // The states of this sensor's time-correlated error on this landmark, decayed to now. -1: none is carried.
 int slam::lend(const context &at) {
   const int64_t key = static_cast<int64_t>(at.id) * kSlamSensors + at.sensor;

@@ -323,7 +323,6 @@ void space_filter::remove_point(int slot) {
 
 void space_filter::set_pose(const pose3 &pose, const double covariance[6][6]) {
   settle();
-  remove_points();
   decorrelate(kPlace, kPose6, 0.0);
   pose_ = {pose.p, normalized(pose.q)};
   r_ = matrix_of(pose_.q);

@@ -40,6 +40,10 @@ const char *wm_motion_params_clash(const wm_motion_params *params, const char **
 const char *wm_motion_lacks(const wm_motion_params *params, const wm_wheels *wheels, uint32_t kinds,
                             uint32_t quantities);
 
+// Sigmas of what the robot may have done in `blind_s` without data, besides going on as it did: as of a motion that is
+// overdue (noise.hold_mps2, noise.hold_radps2, hold_max_s).
+void wm_motion_unseen(const wm_motion_params *params, double blind_s, double *xy_m, double *heading_rad);
+
 // motion.model `auto` becomes `constant_velocity` where no source (`kinds`) gives motion.
 void wm_motion_choose(wm_motion_params *params, uint32_t kinds);
 

@@ -57,7 +57,8 @@ static void put(player *self, const wm_play_item *item, uint8_t *copy) {
   (void)pthread_mutex_unlock(&t->lock);
 }
 
-// Under a real-time policy (chrt) decoding and encoding must not keep the sending thread waiting.
+// Under a real-time policy (chrt) decoding and encoding must not keep the sending thread waiting. Who sets the policy
+// later takes the sending thread alone, by its name.
 static void step_back(void) {
   int policy;
   struct sched_param param;
@@ -69,6 +70,7 @@ static void step_back(void) {
 static void *read_ahead(void *context) {
   player *self = context;
   struct player_threads *t = self->threads;
+  (void)prctl(PR_SET_NAME, "wm-play-read", 0UL, 0UL, 0UL);
   step_back();
   wm_status status = WM_OK;
   while (status == WM_OK && !atomic_load(&self->stop)) {
@@ -163,6 +165,7 @@ static void give_out(player *self, wm_play_item *item, wm_time_ns due_ns) {
 static void *send_in_time(void *context) {
   player *self = context;
   waiting w;
+  (void)prctl(PR_SET_NAME, "wm-play-send", 0UL, 0UL, 0UL);
   (void)prctl(PR_SET_TIMERSLACK, 1UL, 0UL, 0UL, 0UL);  // else sleeps end up to 50 us late
   while (take(self, &w)) {
     const wm_time_ns due_ns = player_monotonic_ns(self, w.item.due_ns);

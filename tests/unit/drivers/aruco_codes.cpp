@@ -62,7 +62,7 @@ void distances_are_as_said() {
     std::free(codes);
     if (least < family.distance) std::printf("%s: %d, not %d\n", *name, least, family.distance);
     TEST_ASSERT_GREATER_OR_EQUAL(family.distance, least);
-    TEST_ASSERT_TRUE(2 * wm_square_corrected(&family) < family.distance);
+    TEST_ASSERT_LESS_THAN(family.distance, 2 * wm_square_corrected(&family));
   }
 }
 

@@ -110,7 +110,7 @@ static void damage(void) {
   for (size_t n = 0; n + 20 < sizeof good; n++) {
     wm_cascade_free(&cascade);
     TEST_ASSERT_EQUAL(WM_BAD_CONFIG, wm_cascade_parse(good, n, "cut.xml", &cascade, &err));
-    TEST_ASSERT_TRUE(strlen(err.text) > 10);
+    TEST_ASSERT_GREATER_THAN(10, strlen(err.text));
   }
   static const char kBytes[] = {'<', '>', '/', '9', '-', ' ', '\0', '\xff'};
   for (size_t n = 0; n + 1 < sizeof good; n++)

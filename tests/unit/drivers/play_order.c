@@ -133,7 +133,7 @@ static void all_data_come_in_the_order_of_their_times(void) {
   TEST_ASSERT_EQUAL(8, count);
   TEST_ASSERT_EQUAL_INT64(100000000000LL, wm_play_first_ns(play));
   for (; next(); before_ns = item.due_ns) {
-    TEST_ASSERT_TRUE(item.due_ns >= before_ns);
+    TEST_ASSERT_GREATER_OR_EQUAL_INT64(before_ns, item.due_ns);
     can0 += is("can:can0");
     can1 += is("can:can1");
     pictures += item.kind == WM_PLAY_PICTURE;
@@ -208,7 +208,7 @@ static uint64_t hash_of(double open_s, double from_s, int *count) {
   *count = 0;
   open_at(open_s, 0, 1);
   while (next()) {
-    TEST_ASSERT_TRUE(at_s() >= open_s);
+    TEST_ASSERT_GREATER_OR_EQUAL_DOUBLE(open_s, at_s());
     if (at_s() < from_s || item.kind == WM_PLAY_FAULT) continue;
     hash = mix(hash, &item.due_ns, sizeof item.due_ns);
     hash = mix(hash, &item.t_ns, sizeof item.t_ns);
@@ -234,7 +234,7 @@ static void the_same_items_come_again_also_from_later_on(void) {
   const uint64_t once = hash_of(0, 2, &n[0]), again = hash_of(0, 2, &n[1]), later = hash_of(2, 2, &n[2]);
   TEST_ASSERT_EQUAL(n[0], n[1]);
   TEST_ASSERT_EQUAL(n[0], n[2]);
-  TEST_ASSERT_TRUE(n[0] > 333);
+  TEST_ASSERT_GREATER_THAN(333, n[0]);
   TEST_ASSERT_EQUAL_HEX64(once, again);
   TEST_ASSERT_EQUAL_HEX64(once, later);
   TEST_ASSERT_NOT_EQUAL_HEX64(once, hash_of(0, 0, &n[3]));
@@ -244,12 +244,13 @@ static void passes_follow_each_other(void) {
   int n = 0;
   wm_time_ns before_ns = -1;
   open_at(1, 2, 3);
-  for (; next(); before_ns = item.due_ns, n++) TEST_ASSERT_TRUE(item.due_ns >= before_ns);
+  for (; next(); before_ns = item.due_ns, n++) TEST_ASSERT_GREATER_OR_EQUAL_INT64(before_ns, item.due_ns);
   open_at(1, 2, 1);
   int once = 0;
   while (next()) once++;
   TEST_ASSERT_EQUAL(3 * once, n);
-  TEST_ASSERT_TRUE(before_ns > 3900000000 && before_ns < 4200000000);
+  TEST_ASSERT_GREATER_THAN_INT64(3900000000, before_ns);
+  TEST_ASSERT_LESS_THAN_INT64(4200000000, before_ns);
 }
 
 // ── faults ──────────────────────────────────────────────────────────────────────────────────────────────────────────

@@ -73,8 +73,10 @@ void the_same_place_of_a_room_that_looks_the_same_is_listed(void) {
   const wm::hypothesis *there = listed(twin(kHere));
   TEST_ASSERT_NOT_NULL(there);
   TEST_ASSERT_EQUAL(1, alike.aliased());
-  TEST_ASSERT_TRUE(there->odds > 0 && there->odds < 1e-3);
-  TEST_ASSERT_TRUE(there->covariance[0] > 0 && there->covariance[0] < 0.05);
+  TEST_ASSERT_GREATER_THAN_DOUBLE(0, there->odds);
+  TEST_ASSERT_LESS_THAN_DOUBLE(1e-3, there->odds);
+  TEST_ASSERT_GREATER_THAN_DOUBLE(0, there->covariance[0]);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.05, there->covariance[0]);
 }
 
 // GIVEN that WHEN the robot drives on THEN odometry carries the place along.
@@ -105,7 +107,7 @@ void the_odds_turn_with_what_is_seen(void) {
   const wm_pose2 believed = wm::compose(kHere, {0.3, 0.3, 0.0});
   look(10, believed, 0.4);
   TEST_ASSERT_NOT_NULL(listed(twin(kHere)));
-  TEST_ASSERT_TRUE(listed(twin(kHere))->odds > 100 * before);
+  TEST_ASSERT_GREATER_THAN_DOUBLE(100 * before, listed(twin(kHere))->odds);
   look(20, believed, 0.4);
   const double weight = listed(twin(kHere))->odds;
   TEST_ASSERT_GREATER_THAN_DOUBLE(1.0, weight);
@@ -122,7 +124,7 @@ void what_is_explained_beyond_the_usual_says_nothing(void) {
   const wm_pose2 believed = wm::compose(kHere, {0.3, 0.3, 0.0});
   alike.carry(believed, {});
   for (int i = 0; i < 10; i++) alike.update_aliased(map, field, scan, 0.4, 0.0, 1e-5, 40000);
-  TEST_ASSERT_TRUE(alike.aliased_odds() < 1e-3);
+  TEST_ASSERT_LESS_THAN_DOUBLE(1e-3, alike.aliased_odds());
 }
 
 // GIVEN a fit whose information can't be inverted WHEN its covariance is asked for THEN there is none, and what the

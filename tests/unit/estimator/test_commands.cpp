@@ -68,7 +68,7 @@ void test_a_change_of_command_is_doubted(void) {
   }
   start_commands(0.1, 0.08);
   for (int i = 0; i <= 100; i++) feed(make::twist(0.02 * i, 0.1, -0.004 * i));
-  TEST_ASSERT_TRUE(turn_var < 0.2 * 0.08 * 0.08 * 0.4 * 0.4);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.2 * 0.08 * 0.08 * 0.4 * 0.4, turn_var);
 }
 
 // GIVEN a drive that takes speed and radius WHEN a wider turn is commanded THEN it drives the widest that it knows.

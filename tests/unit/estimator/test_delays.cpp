@@ -127,7 +127,7 @@ void test_coarse_counts_behind_early_stamps_leave_the_track() {
   Robot(0.0, -0.15).drive(50);
   const wm_calibration_value track = found("motion.track_scale");
   TEST_ASSERT_DOUBLE_WITHIN(0.03, 1, track.value);
-  TEST_ASSERT_TRUE(found("noise.turn_factor").value < 4);
+  TEST_ASSERT_LESS_THAN(4, found("noise.turn_factor").value);
 }
 
 }  // namespace

@@ -37,7 +37,8 @@ void a_scans_innovation_is_a_distance(void) {
   TEST_ASSERT_EQUAL(WM_FUSED, out[0].verdict);
   TEST_ASSERT_DOUBLE_WITHIN(0.015, 0.04, std::fabs(out[0].observed - out[0].expected));
   const double sigma_m = std::sqrt(out[0].variance);
-  TEST_ASSERT_TRUE(sigma_m > 0.005 && sigma_m < 0.2);
+  TEST_ASSERT_GREATER_THAN_DOUBLE(0.005, sigma_m);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.2, sigma_m);
   const double nis = (out[0].observed - out[0].expected) * (out[0].observed - out[0].expected) / out[0].variance;
   TEST_ASSERT_DOUBLE_WITHIN(1e-9 * nis, nis, out[0].nis);
 }
@@ -54,7 +55,7 @@ void seeing_the_same_again_makes_it_no_surer(void) {
   const double stood = variance();
   TEST_ASSERT_TRUE(stood > 0.6 * at_first && stood <= at_first);
   d.go(f, 5, 0.5, 0.0);
-  TEST_ASSERT_TRUE(variance() < 0.4 * stood);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.4 * stood, variance());
 }
 
 // GIVEN 1 s of motion without a scan WHEN the first scan comes THEN it counts for that second, not for a scan's usual
@@ -110,7 +111,8 @@ void places_that_look_the_same_are_listed_beside_the_pose(void) {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.05, d.go(f, 6, 1.0, 0.0));
   wm_hypothesis all[200];
   const size_t count = f.ops->hypotheses(f.state, all, 200);
-  TEST_ASSERT_TRUE(count > 0 && count <= 200);
+  TEST_ASSERT_GREATER_THAN(0, count);
+  TEST_ASSERT_LESS_OR_EQUAL(200, count);
   TEST_ASSERT_EQUAL(count, f.ops->hypotheses(f.state, nullptr, 0));
   double sum = 0;
   for (size_t i = 0; i < count; i++) {
@@ -118,8 +120,10 @@ void places_that_look_the_same_are_listed_beside_the_pose(void) {
     const double dx = h.x_m - d.truth.x_m, dy = h.y_m - d.truth.y_m;
     TEST_ASSERT_TRUE(std::sqrt(dx * dx + dy * dy) > 0.5 ||
                      std::fabs(wm::wrap(h.heading_rad - d.truth.heading_rad)) > 0.25);
-    TEST_ASSERT_TRUE(h.covariance[0] > 0 && h.covariance[2] > 0 && h.covariance[5] > 0);
-    TEST_ASSERT_TRUE(h.weight >= 0);
+    TEST_ASSERT_GREATER_THAN_DOUBLE(0, h.covariance[0]);
+    TEST_ASSERT_GREATER_THAN_DOUBLE(0, h.covariance[2]);
+    TEST_ASSERT_GREATER_THAN_DOUBLE(0, h.covariance[5]);
+    TEST_ASSERT_GREATER_OR_EQUAL_DOUBLE(0, h.weight);
     sum += h.weight;
   }
   TEST_ASSERT_TRUE(sum > 0 && sum < 0.01);
@@ -139,7 +143,7 @@ void motion_sensors_that_fall_silent_are_not_believed(void) {
   d.go(f, 0.1, 0.5, 0.0);
   const wm_estimate e = f.estimate();
   TEST_ASSERT_EQUAL(WM_STATE_LOST, e.state);
-  TEST_ASSERT_TRUE(e.covariance[wm_cov_index(0, 0)] > d.error_of(f) * d.error_of(f));
+  TEST_ASSERT_GREATER_THAN_DOUBLE(d.error_of(f) * d.error_of(f), e.covariance[wm_cov_index(0, 0)]);
   d.go(f, 6, 0.5, 0.0);
   TEST_ASSERT_EQUAL(WM_STATE_TRACKING, f.estimate().state);
   TEST_ASSERT_LESS_THAN_DOUBLE(0.1, d.error_of(f));
@@ -316,7 +320,7 @@ void listed_hypotheses_are_part_of_the_probability_of_being_lost(void) {
       const size_t count = f.ops->hypotheses(f.state, all, 200);
       double sum = 0;
       for (size_t k = 0; k < count; k++) sum += all[k].weight;
-      TEST_ASSERT_TRUE(f.estimate().lost_probability > sum - 0.02);
+      TEST_ASSERT_GREATER_THAN_DOUBLE(sum - 0.02, f.estimate().lost_probability);
     }
   }
 }

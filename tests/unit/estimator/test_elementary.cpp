@@ -84,8 +84,8 @@ void test_corners(void) {
   TEST_ASSERT_EQUAL_DOUBLE(wm::kPi / 4, wm::atan2(1.5e308, 1.5e308));
   TEST_ASSERT_DOUBLE_IS_NAN(wm::atan2(NAN, 1.0));
   TEST_ASSERT_DOUBLE_IS_NAN(wm::sin(INFINITY));
-  TEST_ASSERT_TRUE(std::fabs(wm::sin(1e300)) <= 1.0);
-  TEST_ASSERT_TRUE(std::fabs(wm::cos(3e10)) <= 1.0);
+  TEST_ASSERT_DOUBLE_WITHIN(1.0, 0.0, wm::sin(1e300));
+  TEST_ASSERT_DOUBLE_WITHIN(1.0, 0.0, wm::cos(3e10));
   TEST_ASSERT_EQUAL_DOUBLE(0.0, wm::exp(-1000.0));
   TEST_ASSERT_TRUE(std::isinf(wm::exp(1000.0)));
   TEST_ASSERT_DOUBLE_IS_NAN(wm::log(-1.0));

@@ -225,7 +225,7 @@ void test_correction_is_that_of_the_whole_matrix(void) {
       for (size_t i = 0; i < n; i++) unscaled.push_back(a.state->value((int)i));
     if (form == kScaled) {
       const size_t speed = (size_t)a.state->motion_state(wm::kSpeedScale);
-      TEST_ASSERT_TRUE(std::fabs(mean[speed] - 1.0) > 1e-4);
+      TEST_ASSERT_GREATER_THAN_DOUBLE(1e-4, std::fabs(mean[speed] - 1.0));
       TEST_ASSERT_DOUBLE_WITHIN(1e-6, 1.0, a.state->value((int)speed));
       const double larger = a.state->value((int)speed) / mean[speed];
       for (size_t i : {size_t{0}, (size_t)s}) {  // seen from the start, 1, 2
@@ -292,7 +292,7 @@ void test_frozen_landmarks_stay_and_the_robot_is_corrected(void) {
   TEST_ASSERT_TRUE(a.state->fuse(block, &none, wm::joint_state::scope::robot));
   TEST_ASSERT_EQUAL_DOUBLE(4.0, a.state->value(s));
   TEST_ASSERT_EQUAL_DOUBLE(before[(size_t)s][(size_t)s], a.state->variance(s));
-  TEST_ASSERT_TRUE(a.state->variance(wm::kX) < before[0][0]);
+  TEST_ASSERT_LESS_THAN_DOUBLE(before[0][0], a.state->variance(wm::kX));
   TEST_ASSERT_TRUE(a.state->value(wm::kX) != 1.0);
 }
 
@@ -346,7 +346,7 @@ void test_a_row_with_missing_entries_is_refused(void) {
   const double innovation = 1.0, noise = 0.1, none = 0.0, before = a.state->value(0);
   joint_state::innovation_block block;
   a.state->prepare(&row, &innovation, &noise, 1, &block);
-  TEST_ASSERT_TRUE(block.nis > 1e6);
+  TEST_ASSERT_GREATER_THAN_DOUBLE(1e6, block.nis);
   TEST_ASSERT_FALSE(a.state->fuse(block, &none, wm::joint_state::scope::all));
   TEST_ASSERT_EQUAL_DOUBLE(before, a.state->value(0));
 }

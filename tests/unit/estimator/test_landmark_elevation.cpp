@@ -207,9 +207,9 @@ void test_it_tells_the_distance_and_not_more_than_the_tilt_allows(void) {
   const wm_estimate e = estimate();
   std::printf("known to %.3f m\n", std::sqrt(e.covariance[0]));
   const double lasting_m = 0.007 * (8.0 * 8.0 + 1.5 * 1.5) / 1.5;
-  TEST_ASSERT_TRUE(std::fabs(e.pose_map_base.p_m[0]) < 0.1);
-  TEST_ASSERT_TRUE(std::sqrt(e.covariance[0]) < 1.1 * lasting_m);
-  TEST_ASSERT_TRUE(std::sqrt(e.covariance[0]) > 0.8 * lasting_m);
+  TEST_ASSERT_DOUBLE_WITHIN(0.1, 0.0, e.pose_map_base.p_m[0]);
+  TEST_ASSERT_LESS_THAN_DOUBLE(1.1 * lasting_m, std::sqrt(e.covariance[0]));
+  TEST_ASSERT_GREATER_THAN_DOUBLE(0.8 * lasting_m, std::sqrt(e.covariance[0]));
 }
 
 // Bearings of three landmarks fit some pose, as three always do, and those of two while driving: the pose is found with
@@ -278,9 +278,9 @@ void test_heights_reject_a_wrong_start(void) {
   };
   std::printf("off: %.3f by bearings, %.3f by heights, too; right: %.3f and %.3f\n", off(false, 0.5), off(true, 0.5),
               off(false, 0.0), off(true, 0.0));
-  TEST_ASSERT_TRUE(off(true, 0.5) > 0.5);
-  TEST_ASSERT_TRUE(off(false, 0.5) < 0.1);
-  TEST_ASSERT_TRUE(off(true, 0.0) < 0.05);
+  TEST_ASSERT_GREATER_THAN_DOUBLE(0.5, off(true, 0.5));
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.1, off(false, 0.5));
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.05, off(true, 0.0));
 }
 
 }  // namespace

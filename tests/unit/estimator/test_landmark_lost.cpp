@@ -93,7 +93,8 @@ void drive(double for_s, int seen, sees how = sees::right) {
     for (const double value : e.covariance) TEST_ASSERT_TRUE(wm::finite(value));
     TEST_ASSERT_TRUE(wm::finite(off) && wm::finite(e.heading_rad));
     const double p = e.lost_probability;
-    TEST_ASSERT_TRUE(p >= 0.0 && p <= 1.0);
+    TEST_ASSERT_GREATER_OR_EQUAL_DOUBLE(0.0, p);
+    TEST_ASSERT_LESS_OR_EQUAL_DOUBLE(1.0, p);
     const bool tracks = e.state == WM_STATE_TRACKING || e.state == WM_STATE_DEAD_RECKONING;
     if (tracks && p < 0.5 && now_s > judged_from_s)
       TEST_ASSERT_LESS_THAN_DOUBLE(0.3 + 5.0 * std::sqrt(e.covariance[0] + e.covariance[7]), off);

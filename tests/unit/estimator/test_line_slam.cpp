@@ -179,7 +179,8 @@ void test_six_of_ten_are_lies(void) {
   for (int method : {WM_SLAM_LINE_UNSCENTED, WM_SLAM_LINE_INVERSE_DISTANCE}) {
     begin(method);
     const outcome o = drive(50, 6);
-    TEST_ASSERT_TRUE(lies > 0.55 * told && lies < 0.65 * told);
+    TEST_ASSERT_GREATER_THAN_DOUBLE(0.55 * told, lies);
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.65 * told, lies);
     TEST_ASSERT_LESS_THAN_DOUBLE(0.25, o.largest_m);
     TEST_ASSERT_LESS_THAN_DOUBLE(4 * M_PI / 180, o.largest_rad);
     TEST_ASSERT_GREATER_OR_EQUAL(kLines / 2, o.right);

@@ -145,7 +145,7 @@ double mean_inside(const stated &by, bool has_landmarks, double adapt_log_sigma 
 
 void expect_consistent(const stated &by, bool has_landmarks, bool lasting = false) {
   const double share = mean_inside(by, has_landmarks, 1.4, lasting);
-  TEST_ASSERT_TRUE(share >= 0.85);
+  TEST_ASSERT_GREATER_OR_EQUAL_DOUBLE(0.85, share);
 }
 
 void test_right_noise_stays_consistent() {
@@ -155,7 +155,7 @@ void test_right_noise_stays_consistent() {
 }
 
 void test_noise_of_the_motion_stated_four_times_too_small() {
-  TEST_ASSERT_TRUE(mean_inside({.motion = 0.25}, true, 0.0) < 0.6);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.6, mean_inside({.motion = 0.25}, true, 0.0));
   expect_consistent({.motion = 0.25}, true);
   expect_consistent({.motion = 0.25}, true, true);
 }
@@ -166,13 +166,13 @@ void test_noise_of_the_motion_stated_four_times_too_large() {
 }
 
 void test_noise_of_the_sensor_stated_wrong() {
-  TEST_ASSERT_TRUE(mean_inside({.sensor = 0.25}, true, 0.0) < 0.87);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.87, mean_inside({.sensor = 0.25}, true, 0.0));
   expect_consistent({.sensor = 0.25}, true);
   expect_consistent({.sensor = 4.0}, true);
 }
 
 void test_noise_of_the_receiver_stated_wrong() {
-  TEST_ASSERT_TRUE(mean_inside({.receiver = 0.25}, false, 0.0) < 0.6);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.6, mean_inside({.receiver = 0.25}, false, 0.0));
   expect_consistent({.receiver = 0.25}, false);
   expect_consistent({.receiver = 4.0}, false);
 }

@@ -243,6 +243,19 @@ void test_a_twist_in_space_does_not_hold_for_ever(void) {
   TEST_ASSERT_GREATER_THAN_DOUBLE(1.0, out.covariance[wm_cov_index(1, 1)]);
 }
 
+// GIVEN twists in space that are silent WHEN an observation corrects the pose meanwhile THEN what is added to it until
+// the next one depends on the time since it, not on that since the begin of the silence.
+void test_in_space_a_silence_adds_by_the_time_since_the_correction(void) {
+  start(make::no_wheels());
+  for (int i = 0; i <= 10; i++) feed_six(0.1 * i, 1.0, 0.0);
+  const double after_s[] = {4.0, 10.0, 61.0, 601.0};
+  double grown_m2[4];
+  for (int i = 0; i < 4; i++)
+    grown_m2[i] = carried_in_space(after_s[i], after_s[i] + 0.25).covariance[wm_cov_index(0, 0)];
+  for (int i = 1; i < 4; i++) TEST_ASSERT_DOUBLE_WITHIN(1e-6, grown_m2[0], grown_m2[i]);
+  TEST_ASSERT_DOUBLE_WITHIN(0.1, 1.0, std::sqrt(grown_m2[0]));
+}
+
 // GIVEN 1 m/s in space WHEN 138 m/s come for 0.2 s THEN the speed holds.
 void test_a_twist_in_space_that_nothing_reaches_is_refused(void) {
   start(make::no_wheels());
@@ -308,6 +321,7 @@ int main(void) {
   RUN_TEST(test_a_copy_continues_identically);
   RUN_TEST(test_a_pose_in_space_is_carried_in_space);
   RUN_TEST(test_a_twist_in_space_does_not_hold_for_ever);
+  RUN_TEST(test_in_space_a_silence_adds_by_the_time_since_the_correction);
   RUN_TEST(test_a_twist_in_space_that_nothing_reaches_is_refused);
   RUN_TEST(test_derivatives_of_compositions);
   return UNITY_END();

@@ -96,7 +96,7 @@ void test_the_kind_gives_the_noise() {
     ekf->estimate(state.get(), &e);
     variance[commands] = e.covariance[wm_cov_index(5, 5)];
   }
-  TEST_ASSERT_TRUE(variance[1] > 3.0 * variance[0]);
+  TEST_ASSERT_GREATER_THAN_DOUBLE(3.0 * variance[0], variance[1]);
 }
 
 void test_a_prior_is_a_multiple_of_the_sensors_own_sigma() {
@@ -174,8 +174,8 @@ void test_a_vague_receiver_finds_the_robot_too() {
       ekf->estimate(state.get(), &e);
       if (e.state == WM_STATE_TRACKING) found = i;
     }
-    TEST_ASSERT_TRUE(found > 0);
-    TEST_ASSERT_TRUE(e.covariance[0] > 0.01 * sigma_m * sigma_m);
+    TEST_ASSERT_GREATER_THAN(0, found);
+    TEST_ASSERT_GREATER_THAN_DOUBLE(0.01 * sigma_m * sigma_m, e.covariance[0]);
   }
 }
 

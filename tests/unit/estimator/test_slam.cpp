@@ -34,9 +34,9 @@ void test_landmarks_are_found_by_bearings_alone_whatever_the_method(void) {
 void test_identities_of_bearings_that_come_back_are_landmarks_own(void) {
   begin();
   drive(10, false);
-  TEST_ASSERT_TRUE(counted(WM_COUNTER_LANDMARKS_MERGED) >= 0.0);  // listed: they may be a tracker's
+  TEST_ASSERT_GREATER_OR_EQUAL_DOUBLE(0.0, counted(WM_COUNTER_LANDMARKS_MERGED));  // listed: they may be a tracker's
   drive(50, false);
-  TEST_ASSERT_TRUE(counted(WM_COUNTER_LANDMARKS_MERGED) < 0.0);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.0, counted(WM_COUNTER_LANDMARKS_MERGED));
   TEST_ASSERT_LESS_THAN_DOUBLE(0.3, off());
 }
 
@@ -405,7 +405,8 @@ void test_a_line_is_found_and_keeps_its_ties_to_every_pose(void) {
         for (int i = 0; i < b.count; i++) sum += l.by_pose[k][3 * i + c];
         TEST_ASSERT_DOUBLE_WITHIN(1e-6, k == c ? 1.0 : 0.0, sum);
       }
-    TEST_ASSERT_TRUE(l.noise[0][0] > 0.0 && l.noise[1][1] > 0.0);
+    TEST_ASSERT_GREATER_THAN_DOUBLE(0.0, l.noise[0][0]);
+    TEST_ASSERT_GREATER_THAN_DOUBLE(0.0, l.noise[1][1]);
     b.azimuth_rad[2] += 3.0;  // behind the pose
     TEST_ASSERT_FALSE(wm::find_line(b, unscented).solved);
   }

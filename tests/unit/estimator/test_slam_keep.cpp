@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A map that outlives a restart (waymark/keeper.h): kept with its joint covariance, taken up, refused where it is
 // wrong.
+#include <cstdio>
 #include <vector>
 
 #include "slam_room.hpp"
@@ -102,6 +103,31 @@ void test_a_robot_that_was_moved_while_off_is_found_in_its_map() {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.1, worst_landmark(&found));
 }
 
+// GIVEN a kept map WHEN the robot drove on and turned while it was off, within the start's sigmas THEN no pose is
+// further off than its sigma: at such angles a correction is far from linear.
+void test_a_robot_that_turned_while_off_is_never_surely_wrong() {
+  for (const bool with_codes : {false, true}) {
+    double worst = 0.0, late_m = 0.0;
+    make_room();
+    coded = with_codes;
+    learn();
+    const wm_pose2 stood = truth;
+    for (const double turn : {-0.9, -0.6, -0.3, 0.3, 0.6, 0.9})
+      for (const double side : {-1.0, 0.0, 1.0}) {
+        truth = stood;
+        restart(truth.x_m + 0.3 * side, truth.y_m - 0.4 * side, truth.heading_rad + turn, 0.4, 0.5);
+        for (int i = 0; i < 30; i++) {
+          drive(0.1);
+          worst = std::fmax(worst, off() / sigma());
+        }
+        late_m = std::fmax(late_m, off());
+      }
+    std::printf("%s: at most %.1f sigma off, %.3f m after 3 s\n", with_codes ? "markers" : "landmarks", worst, late_m);
+    TEST_ASSERT_LESS_THAN_DOUBLE(4.0, worst);
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.15, late_m);
+  }
+}
+
 void test_without_a_pose_it_is_searched_in_the_map() {
   coded = true;
   learn();
@@ -181,6 +207,7 @@ int main(void) {
   RUN_TEST(test_map_and_calibration_are_taken_up_with_their_covariances);
   RUN_TEST(test_a_map_that_was_taken_up_is_kept_again);
   RUN_TEST(test_a_robot_that_was_moved_while_off_is_found_in_its_map);
+  RUN_TEST(test_a_robot_that_turned_while_off_is_never_surely_wrong);
   RUN_TEST(test_without_a_pose_it_is_searched_in_the_map);
   RUN_TEST(test_an_image_that_is_wrong_is_refused_with_the_reason);
   RUN_TEST(test_a_map_at_its_capacity_is_kept);

@@ -42,9 +42,9 @@ void check_found(bool of_markers) {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.15, worst_landmark(&count));
   carry(-1.0, 1.0, 2.4);
   const found f = watch(15);
-  TEST_ASSERT_TRUE(f.lost_s >= 0.0);
+  TEST_ASSERT_GREATER_OR_EQUAL_DOUBLE(0.0, f.lost_s);
   TEST_ASSERT_LESS_THAN_DOUBLE(5.0, f.lost_s);
-  TEST_ASSERT_TRUE(f.right_s >= 0.0);
+  TEST_ASSERT_GREATER_OR_EQUAL_DOUBLE(0.0, f.right_s);
   TEST_ASSERT_LESS_THAN_DOUBLE(10.0, f.right_s);
   TEST_ASSERT_GREATER_THAN_DOUBLE(2.0, f.sigma_m);
   TEST_ASSERT_LESS_THAN_DOUBLE(0.3, off());
@@ -132,7 +132,8 @@ void test_a_pattern_of_lines_gives_the_pose(void) {
     TEST_ASSERT_DOUBLE_WITHIN(0.05, pose.x_m, found.pose.x_m);
     TEST_ASSERT_DOUBLE_WITHIN(0.05, pose.y_m, found.pose.y_m);
     TEST_ASSERT_DOUBLE_WITHIN(0.02, pose.heading_rad, found.pose.heading_rad);
-    TEST_ASSERT_TRUE(found.covariance[0][0] > 0.0 && found.covariance[0][0] < 0.01);
+    TEST_ASSERT_GREATER_THAN_DOUBLE(0.0, found.covariance[0][0]);
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.01, found.covariance[0][0]);
   }
 }
 

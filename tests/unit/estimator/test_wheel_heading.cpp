@@ -82,16 +82,16 @@ void test_the_gyro_tells_the_wheels_and_the_wheels_hold_the_heading(void) {
   TEST_ASSERT_DOUBLE_WITHIN(4 * with.sigma_heading(), 0, wm::wrap(with.filter->pose().heading_rad - heading));
   const wm_calibration_value difference = named(with, "motion.wheel_difference");
   TEST_ASSERT_DOUBLE_WITHIN(4 * difference.sigma, 0.01, difference.value);
-  TEST_ASSERT_TRUE(difference.sigma < 0.001);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.001, difference.sigma);
   const wm_calibration_value bias = named(with, "motion.yaw_rate_bias_radps");
   TEST_ASSERT_DOUBLE_WITHIN(4 * bias.sigma, 0.004, bias.value);
   // The bad gyro alone has walked by 0.002 sqrt(120) and more, by its bias.
   std::printf("sigma of the heading %g with the wheels, %g without; difference %g +- %g\n", with.sigma_heading(),
               without.sigma_heading(), difference.value, difference.sigma);
-  TEST_ASSERT_TRUE(without.sigma_heading() > 0.02);
-  TEST_ASSERT_TRUE(with.sigma_heading() < 0.6 * without.sigma_heading());
+  TEST_ASSERT_GREATER_THAN_DOUBLE(0.02, without.sigma_heading());
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.6 * without.sigma_heading(), with.sigma_heading());
   for (int i = 0; i < with.filter->states(); i++) {
-    TEST_ASSERT_TRUE(with.filter->variance(i) >= 0);
+    TEST_ASSERT_GREATER_OR_EQUAL_DOUBLE(0, with.filter->variance(i));
     for (int j = 0; j < i; j++) TEST_ASSERT_EQUAL_DOUBLE(with.filter->covariance(i, j), with.filter->covariance(j, i));
   }
 }
@@ -155,7 +155,7 @@ void test_a_day_leaves_the_covariance_sound(void) {
     for (int a = 0; a < car.filter->states(); a++)
       for (int b = 0; b <= a; b++) {
         const double bound = std::sqrt(car.filter->variance(a) * car.filter->variance(b));
-        TEST_ASSERT_TRUE(std::fabs(car.filter->covariance(a, b)) <= bound * (1 + 1e-9) + 1e-15);
+        TEST_ASSERT_DOUBLE_WITHIN(bound * (1 + 1e-9) + 1e-15, 0.0, car.filter->covariance(a, b));
         TEST_ASSERT_TRUE(car.filter->covariance(a, b) == car.filter->covariance(b, a));
       }
   }

@@ -90,7 +90,7 @@ void expect_wall(double share) {
   }
   TEST_ASSERT_GREATER_THAN(100, p.count);
   TEST_ASSERT_GREATER_OR_EQUAL(static_cast<uint32_t>(share * p.count), right);
-  TEST_ASSERT_TRUE(normal_off / right < 0.03);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.03, normal_off / right);
 }
 
 double plain_floor(double, double) { return 130; }

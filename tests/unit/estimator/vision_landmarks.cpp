@@ -199,9 +199,9 @@ void found_where_it_is_with_the_sigma_that_it_has() {
   std::printf("found %d of 24, off by at most %.4f degrees, %.2f of its sigma, elevations %.2f\n", count,
               largest * 180 / M_PI, std::sqrt(squares / count), std::sqrt(up_squares / count));
   TEST_ASSERT_GREATER_OR_EQUAL(22, count);
-  TEST_ASSERT_TRUE(largest < 0.001);
-  TEST_ASSERT_TRUE(std::sqrt(squares / count) < 1.3);
-  TEST_ASSERT_TRUE(std::sqrt(up_squares / count) < 1.3);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.001, largest);
+  TEST_ASSERT_LESS_THAN_DOUBLE(1.3, std::sqrt(squares / count));
+  TEST_ASSERT_LESS_THAN_DOUBLE(1.3, std::sqrt(up_squares / count));
 }
 
 void a_landmark_without_sigma_is_found() {
@@ -210,7 +210,7 @@ void a_landmark_without_sigma_is_found() {
   const Place at = {1.5, 0.2, 0.1};
   const wm_estimate guess = pose_of(at, 0.05, 0.01);
   TEST_ASSERT_EQUAL(1, eyes.look(draw(at, {}), &guess));
-  TEST_ASSERT_TRUE(events[0].as.sighting.bearing_sigma_rad > 0.0);
+  TEST_ASSERT_GREATER_THAN_DOUBLE(0.0, events[0].as.sighting.bearing_sigma_rad);
 }
 
 void what_is_not_there_is_not_found_and_said_why() {
@@ -262,7 +262,7 @@ void found_anywhere_without_a_pose() {
   std::printf("without a pose: found %d of 24, off by at most %.4f degrees, %.2f of its sigma\n", found,
               largest * 180 / M_PI, std::sqrt(squares / found));
   TEST_ASSERT_GREATER_OR_EQUAL(16, found);
-  TEST_ASSERT_TRUE(std::sqrt(squares / found) < 1.5);
+  TEST_ASSERT_LESS_THAN_DOUBLE(1.5, std::sqrt(squares / found));
 }
 
 // How many of 8 pictures from there (12 m away) it is found in without a pose, each time where it is.
@@ -367,7 +367,7 @@ void a_motion_that_is_no_number_misleads_nothing() {
     moving.v_mps[0] = moving.w_radps[2] = nonsense[i];
     moving.t_ns = i == 4 ? WM_TIME_NONE : 5000;
     TEST_ASSERT_EQUAL(1, eyes.look(picture, &moving, 5000 + i * 100 * WM_NS_PER_MS));
-    TEST_ASSERT_TRUE(std::fabs(events[0].as.sighting.bearing_rad - true_bearing(at)) < 0.002);
+    TEST_ASSERT_DOUBLE_WITHIN(0.002, true_bearing(at), events[0].as.sighting.bearing_rad);
   }
 }
 
@@ -418,7 +418,7 @@ void a_moving_robot_is_expected_where_it_was() {
   guess.v_mps[0] = 3;
   guess.w_radps[2] = 0.6;
   TEST_ASSERT_EQUAL(1, eyes.look(draw(at, Scene{}), &guess));
-  TEST_ASSERT_TRUE(std::fabs(events[0].as.sighting.bearing_rad - true_bearing(at)) < 0.001);
+  TEST_ASSERT_DOUBLE_WITHIN(0.001, true_bearing(at), events[0].as.sighting.bearing_rad);
 }
 
 void rows_have_their_own_times() {

@@ -169,7 +169,8 @@ void sub_pixel_and_honest() {
   std::printf("%d lines: RMS %.4f deg, mean %.4f deg, normalised error %.3f\n", count, rms, sum / count / kDeg, ratio);
   TEST_ASSERT_LESS_THAN_DOUBLE(0.02, rms);
   TEST_ASSERT_LESS_THAN_DOUBLE(0.002, std::fabs(sum / count) / kDeg);
-  TEST_ASSERT_TRUE(ratio > 0.9 && ratio < 1.1);
+  TEST_ASSERT_GREATER_THAN_DOUBLE(0.9, ratio);
+  TEST_ASSERT_LESS_THAN_DOUBLE(1.1, ratio);
 }
 
 // The robot turns by five degrees a picture, then back: each line keeps its number.

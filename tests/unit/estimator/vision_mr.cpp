@@ -61,9 +61,11 @@ void place_and_turn_are_right() {
     TEST_ASSERT_DOUBLE_WITHIN(0.001, -view.centre_m.x, m.p_m[1]);
     TEST_ASSERT_DOUBLE_WITHIN(0.001, -view.centre_m.y, m.p_m[2]);
     const double yaw = std::remainder(m.yaw_rad + M_PI / 2 + tilt, 2 * M_PI);
-    TEST_ASSERT_TRUE(std::fabs(yaw) < 4 * m.yaw_sigma_rad + 0.002);
-    TEST_ASSERT_TRUE(m.yaw_sigma_rad > 0 && m.along_sigma_m > 0 && m.along_sigma_m < 0.02);
-    TEST_ASSERT_TRUE(m.bloom_px > 0.02);
+    TEST_ASSERT_DOUBLE_WITHIN(4 * m.yaw_sigma_rad + 0.002, 0.0, yaw);
+    TEST_ASSERT_GREATER_THAN_DOUBLE(0, m.yaw_sigma_rad);
+    TEST_ASSERT_GREATER_THAN_DOUBLE(0, m.along_sigma_m);
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.02, m.along_sigma_m);
+    TEST_ASSERT_GREATER_THAN_DOUBLE(0.02, m.bloom_px);
   }
 }
 
@@ -126,8 +128,8 @@ void nearly_face_on_the_turn_is_as_unsure_as_it_says() {
     }
   printf("nearly face on: NEES of the turn %.2f, sigma %.3f rad, %d seen\n", nees / seen, sigma / seen, seen);
   TEST_ASSERT_GREATER_OR_EQUAL(40, seen);
-  TEST_ASSERT_TRUE(nees / seen < 1.3);
-  TEST_ASSERT_TRUE(sigma / seen < 0.15);
+  TEST_ASSERT_LESS_THAN_DOUBLE(1.3, nees / seen);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.15, sigma / seen);
 }
 
 // Two prints of one identity, or one seen twice in a mirror's place: both are given, each where it is.

@@ -314,7 +314,7 @@ static double score_of(double off_m) {
   return evidence_score(&evidence);
 }
 static void positions_with_a_large_sigma_tell_good_poses_from_wrong_ones(void) {
-  TEST_ASSERT_TRUE(score_of(0) > score_of(30) + 0.4);
+  TEST_ASSERT_GREATER_THAN_DOUBLE(score_of(30) + 0.4, score_of(0));
   TEST_ASSERT_TRUE(score_of(30) > score_of(60) + 1);
 }
 

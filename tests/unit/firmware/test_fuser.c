@@ -133,6 +133,136 @@ static void health_holds_no_more_values_than_it_has_room_for(void) {
   TEST_ASSERT_NOT_NULL(wm_health_counter(&health, WM_COUNTER_MAP_FULL));
 }
 
+static void doubtful(const void *self, wm_estimate *out) {
+  tiny_estimate(self, out);
+  out->state = WM_STATE_LOST;
+  out->cause = WM_CAUSE_COUNT - 1;
+  out->cause_source = 5;
+  out->lost_probability = 0.75;
+  out->resets = 3;
+}
+
+static void health_has_what_the_estimate_has(void) {
+  static wm_health health;
+  wm_estimator doubting = kTiny;
+  doubting.estimate = doubtful;
+  wm_fuser_init(&fuser, &doubting, &state, wm_driving_choose(WM_EVENT_BIT(WM_EVENT_TWIST2), 0), (wm_output){put, NULL});
+  twist(10, 1);
+  wm_fuser_health(&fuser, &health);
+  TEST_ASSERT_EQUAL(WM_STATE_LOST, health.state);
+  TEST_ASSERT_EQUAL(WM_CAUSE_COUNT - 1, health.cause);
+  TEST_ASSERT_EQUAL(5, health.cause_source);
+  TEST_ASSERT_EQUAL_DOUBLE(0.75, health.lost_probability);
+  TEST_ASSERT_EQUAL(3, health.resets);
+}
+
+static wm_status take_points(void *self, const wm_event *e, wm_innovation *out, size_t capacity, size_t *count) {
+  (void)self, (void)out, (void)capacity;
+  *count = 0;
+  return e->kind == WM_EVENT_POINTS ? WM_OK : WM_UNSUPPORTED;
+}
+
+static size_t particle_count, hypothesis_count, hypotheses_seen;
+
+static size_t some_particles(const void *self, wm_particle *out, size_t capacity) {
+  (void)self;
+  for (size_t i = 0; i < capacity && i < particle_count; i++) out[i] = (wm_particle){0};
+  return particle_count;
+}
+
+static size_t some_hypotheses(const void *self, wm_hypothesis *out, size_t capacity) {
+  (void)self;
+  for (size_t i = 0; i < capacity && i < hypothesis_count; i++) out[i] = (wm_hypothesis){.weight = (double)i};
+  return hypothesis_count;
+}
+
+// What came out of clouds: "C10:3/5" 3 particles of 5 at 10 ms, "H10:2" two hypotheses.
+static void put_cloud(void *context, wm_output_kind kind, const void *record, size_t bytes) {
+  char word[64] = "";
+  (void)context;
+  const wm_particle_set *cloud = record;
+  const wm_hypothesis_set *list = record;
+  if (kind == WM_OUTPUT_PARTICLES) {
+    (void)snprintf(word, sizeof word, "C%lld:%u/%u ", (long long)(cloud->t_ns / MS), (unsigned)cloud->count,
+                   (unsigned)cloud->total);
+    TEST_ASSERT_EQUAL(sizeof *cloud, bytes);
+  }
+  if (kind == WM_OUTPUT_HYPOTHESES) {
+    (void)snprintf(word, sizeof word, "H%lld:%u ", (long long)(list->t_ns / MS), (unsigned)list->count);
+    for (size_t i = 0; i < list->count; i++, hypotheses_seen++)
+      TEST_ASSERT_EQUAL_DOUBLE((double)hypotheses_seen, list->places[i].weight);
+  }
+  strncat(said, word, sizeof said - strlen(said) - 1);
+}
+
+static void points(wm_time_ns ms) {
+  static wm_event e;
+  e = (wm_event){.t_ns = ms * MS, .arrival_ns = ms * MS, .kind = WM_EVENT_POINTS, .source = 1};
+  wm_fuser_feed(&fuser, &e);
+}
+
+static void clouds_are_written_once_a_second(void) {
+  wm_estimator clouds = kTiny;
+  clouds.correct = take_points;
+  clouds.particles = some_particles;
+  wm_fuser_init(&fuser, &clouds, &state, wm_driving_choose(WM_EVENT_BIT(WM_EVENT_TWIST2), 0),
+                (wm_output){put_cloud, NULL});
+  particle_count = 3;
+  points(0);
+  points(999);
+  particle_count = WM_PARTICLES_MAX + 5;
+  points(1000);
+  twist(2500, 1);  // no points
+  char expected[80];
+  (void)snprintf(expected, sizeof expected, "C0:3/3 C1000:%u/%u ", (unsigned)WM_PARTICLES_MAX,
+                 (unsigned)WM_PARTICLES_MAX + 5);
+  TEST_ASSERT_EQUAL_STRING(expected, said);
+  TEST_ASSERT_EQUAL_UINT64(3, fuser.counts[1].fused);
+  sighting(2600, 0.5);
+  TEST_ASSERT_EQUAL_UINT64(1, fuser.counts[1].refused[WM_UNSUPPORTED]);
+  TEST_ASSERT_EQUAL_UINT64(3, fuser.counts[1].fused);
+}
+
+static void hypotheses_come_in_sets(void) {
+  wm_estimator clouds = kTiny;
+  clouds.correct = take_points;
+  clouds.particles = some_particles;
+  clouds.hypotheses = some_hypotheses;
+  wm_fuser_init(&fuser, &clouds, &state, wm_driving_choose(WM_EVENT_BIT(WM_EVENT_TWIST2), 0),
+                (wm_output){put_cloud, NULL});
+  particle_count = 0;
+  const size_t most = sizeof fuser.listed / sizeof fuser.listed[0];
+  hypothesis_count = most + 100, hypotheses_seen = 0;
+  points(0);
+  char expected[4096] = "C0:0/0 ";
+  for (size_t left = most; left > 0;) {
+    const size_t set = left < WM_HYPOTHESES_MAX ? left : WM_HYPOTHESES_MAX;
+    (void)snprintf(expected + strlen(expected), sizeof expected - strlen(expected), "H0:%u ", (unsigned)set);
+    left -= set;
+  }
+  TEST_ASSERT_EQUAL_STRING(expected, said);
+}
+
+static void records_have_room_for_points_where_there_are_some(void) {
+  TEST_ASSERT_EQUAL(sizeof(wm_event), wm_output_bytes(WM_EVENT_BIT(WM_EVENT_POINTS) | WM_EVENT_BIT(WM_EVENT_TWIST2)));
+  const size_t small = wm_output_bytes(WM_EVENT_BIT(WM_EVENT_TWIST2));
+  TEST_ASSERT_GREATER_OR_EQUAL(sizeof(wm_published), small);
+  TEST_ASSERT_GREATER_OR_EQUAL(WM_EVENT_SMALL_BYTES, small);
+  TEST_ASSERT_LESS_THAN(sizeof(wm_event), small);
+}
+
+static void increments_drive_and_twists_before_a_gyro(void) {
+  const uint32_t q = WM_EVENT_BIT(WM_EVENT_QUANTITIES), t = WM_EVENT_BIT(WM_EVENT_TWIST2),
+                 i = WM_EVENT_BIT(WM_EVENT_INCREMENT);
+  const uint32_t yaw = 1u << WM_Q_YAW_RATE;
+  TEST_ASSERT_EQUAL_HEX32(i, wm_driving_choose(i | q | t, yaw).kinds);
+  TEST_ASSERT_EQUAL_HEX32(WM_TWIST_EVENTS, wm_driving_choose(q | t, yaw).kinds);
+  TEST_ASSERT_EQUAL_HEX32(q, wm_driving_choose(q | t, yaw | 1u << WM_Q_VEHICLE_SPEED).kinds);
+  TEST_ASSERT_EQUAL_HEX32(q, wm_driving_choose(q, yaw).kinds);
+  TEST_ASSERT_EQUAL_HEX32(yaw, wm_driving_choose(q, yaw).quantities);
+  TEST_ASSERT_EQUAL_HEX32(WM_EVENT_BIT(WM_EVENT_SIGHTING), wm_driving_choose(WM_EVENT_BIT(WM_EVENT_SIGHTING), 0).kinds);
+}
+
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(a_row_holds_the_state_after_all_events_up_to_its_stamp);
@@ -140,6 +270,11 @@ int main(void) {
   RUN_TEST(observations_are_counted_by_their_verdict);
   RUN_TEST(without_a_pose_there_is_no_row);
   RUN_TEST(health_holds_no_more_values_than_it_has_room_for);
+  RUN_TEST(health_has_what_the_estimate_has);
+  RUN_TEST(clouds_are_written_once_a_second);
+  RUN_TEST(hypotheses_come_in_sets);
+  RUN_TEST(records_have_room_for_points_where_there_are_some);
+  RUN_TEST(increments_drive_and_twists_before_a_gyro);
   RUN_TEST(ticks_drive_before_yaw_rate_before_speed_before_twists);
   return UNITY_END();
 }

@@ -64,6 +64,38 @@ static void nothing_is_handed_out_before_the_others_have_spoken_past_it(void) {
   TEST_ASSERT_EQUAL_STRING("10/0", final_ms());
 }
 
+// A source that does not keep its order: the newest stamp is that of no later arrival, and a stamp counts once.
+static void newest_first_and_distinct_stamps_are_counted(void) {
+  wm_merge_source loose = kCamera;
+  loose.in_order = 0;
+  open_merge((wm_merge_source[]){kMotion, loose}, 2);
+  const wm_merge_counts *counts = wm_merge_source_counts(merge, 1);
+  TEST_ASSERT_EQUAL_INT64(WM_TIME_NONE, counts->newest_ns);
+  arrive(1, 10 * MS, 12 * MS);
+  TEST_ASSERT_EQUAL_INT64(10 * MS, counts->first_ns);
+  arrive(1, 20 * MS, 22 * MS);
+  arrive(1, 15 * MS, 23 * MS);
+  arrive(1, 20 * MS, 24 * MS);
+  TEST_ASSERT_EQUAL_INT64(20 * MS, counts->newest_ns);
+  TEST_ASSERT_EQUAL_INT64(10 * MS, counts->first_ns);
+  TEST_ASSERT_EQUAL_UINT64(2, counts->stamps);
+}
+
+static void p99_of_the_lateness(void) {
+  open_merge((wm_merge_source[]){kMotion, kCamera}, 2);
+  for (int i = 0; i < 99; i++) arrive(1, i * 10 * MS, i * 10 * MS + 5 * MS);
+  arrive(1, 990 * MS, 1040 * MS);
+  TEST_ASSERT_EQUAL_INT64(6 * MS, wm_merge_lateness_p99(merge, 1));  // 99 of 100 are below
+  arrive(1, 1100 * MS, 1150 * MS);
+  TEST_ASSERT_EQUAL_INT64(51 * MS, wm_merge_lateness_p99(merge, 1));
+  open_merge((wm_merge_source[]){kMotion, kCamera}, 2);
+  arrive(1, 0, 2000 * MS);  // beyond the last bin: as it was
+  TEST_ASSERT_EQUAL_INT64(2000 * MS, wm_merge_lateness_p99(merge, 1));
+  open_merge((wm_merge_source[]){kMotion, kCamera}, 2);
+  arrive(1, 0, 0);
+  TEST_ASSERT_EQUAL_INT64(0, wm_merge_lateness_p99(merge, 1));
+}
+
 static void motion_comes_first_then_the_rank_then_the_file(void) {
   wm_merge_source second = kCamera;
   second.rank = 7;
@@ -257,7 +289,7 @@ static void any_input_comes_out_in_order_and_is_accounted_for(void) {
       arrive((int)random_below(3), t, now);
       pushed++;
       for (const wm_event *e; (e = wm_merge_front(merge)) != NULL; wm_merge_pop(merge)) {
-        TEST_ASSERT_TRUE(e->t_ns >= last);
+        TEST_ASSERT_GREATER_OR_EQUAL_INT64(last, e->t_ns);
         last = e->t_ns;
         given++;
       }
@@ -278,6 +310,8 @@ static void any_input_comes_out_in_order_and_is_accounted_for(void) {
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(nothing_is_handed_out_before_the_others_have_spoken_past_it);
+  RUN_TEST(newest_first_and_distinct_stamps_are_counted);
+  RUN_TEST(p99_of_the_lateness);
   RUN_TEST(motion_comes_first_then_the_rank_then_the_file);
   RUN_TEST(a_silent_source_costs_its_lateness_and_its_first_datum_after_that_is_fused);
   RUN_TEST(what_is_late_is_counted_and_dropped);

@@ -55,7 +55,7 @@ static void it_carries_the_fused_pose_to_now(void) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 5, p.now.pose_map_base.p_m[0]);
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 2.12, p.now.pose_map_base.p_m[1]);
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.22, p.pose_odom_base.x_m);
-  TEST_ASSERT_TRUE(p.now.covariance[wm_cov_index(1, 1)] >= 1e-4);
+  TEST_ASSERT_GREATER_OR_EQUAL_DOUBLE(1e-4, p.now.covariance[wm_cov_index(1, 1)]);
   TEST_ASSERT_EQUAL_UINT32(0, p.status_flags);
 }
 
@@ -67,6 +67,29 @@ static void stamps_rise_strictly(void) {
   TEST_ASSERT_EQUAL(0, wm_predictor_publish(&predictor, 20 * MS, &p));
   TEST_ASSERT_EQUAL(0, wm_predictor_publish(&predictor, 10 * MS, &p));
   TEST_ASSERT_EQUAL(1, wm_predictor_publish(&predictor, 21 * MS, &p));
+}
+
+// The map is turned against odom: a fast drive along a curve is no jump, and a jump has its true size.
+static void odom_is_turned_into_the_map(void) {
+  wm_published p;
+  const double turns[] = {0.4, 2.0, -1.2, M_PI};
+  for (size_t i = 0; i < sizeof turns / sizeof turns[0]; i++) {
+    tearDown();
+    setUp();
+    for (int ms = 0; ms <= 400; ms += 10) move(ms, 10, 1.5);
+    fuse(0, 5, -3, turns[i], 0);
+    for (int ms = 20; ms <= 400; ms += 20) {
+      TEST_ASSERT_EQUAL(1, wm_predictor_publish(&predictor, ms * MS, &p));
+      TEST_ASSERT_EQUAL_HEX32(0, p.status_flags & WM_PUB_JUMPED);
+    }
+    TEST_ASSERT_EQUAL_UINT32(0, p.jumps);
+    const wm_pose3 at = p.now.pose_map_base;
+    fuse(400, at.p_m[0] + 0.3, at.p_m[1] - 0.4, p.now.heading_rad, 0);
+    TEST_ASSERT_EQUAL(1, wm_predictor_publish(&predictor, 410 * MS, &p));
+    TEST_ASSERT_EQUAL_UINT32(1, p.jumps);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.5, p.last_jump_m);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0, p.last_jump_rad);
+  }
 }
 
 static void a_move_of_map_against_odom_is_announced_once(void) {
@@ -148,6 +171,7 @@ int main(void) {
   UNITY_BEGIN();
   RUN_TEST(it_carries_the_fused_pose_to_now);
   RUN_TEST(stamps_rise_strictly);
+  RUN_TEST(odom_is_turned_into_the_map);
   RUN_TEST(a_move_of_map_against_odom_is_announced_once);
   RUN_TEST(a_pose_set_anew_is_announced_however_small_the_move);
   RUN_TEST(pictures_are_told_the_pose_or_the_motion_alone);

@@ -16,13 +16,18 @@
 
 static char folder[64], path[128];
 static wm_error err;
+static wm_motion_params *motion;  // defaults: noise.hold_mps2 1, noise.hold_radps2 0.5, hold_max_s 2
 
 void setUp(void) {
+  motion = malloc(wm_motion_params_table.bytes);
+  TEST_ASSERT_NOT_NULL(motion);
+  wm_params_defaults(&wm_motion_params_table, motion);
   (void)snprintf(folder, sizeof folder, "/tmp/wm_state_XXXXXX");
   TEST_ASSERT_NOT_NULL(mkdtemp(folder));
   (void)snprintf(path, sizeof path, "%s/pose.yaml", folder);
 }
 void tearDown(void) {
+  free(motion);
   (void)unlink(path);
   (void)rmdir(folder);  // fails the next test's count where something else was left there
 }
@@ -50,10 +55,10 @@ static void a_pose_is_there_again(void) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-5, 0.3, saved.start.sigma_xy_m);
   TEST_ASSERT_EQUAL_INT64(WM_TIME_NONE, saved.start.t_ns);
 
-  TEST_ASSERT_TRUE(wm_saved_pose_start(&saved, 2100, 600, 0.4, 0, &start));
+  TEST_ASSERT_TRUE(wm_saved_pose_start(&saved, 2100, 600, 0.4, 0, motion, &start));
   TEST_ASSERT_DOUBLE_WITHIN(1e-5, 0.5, start.sigma_xy_m);
-  TEST_ASSERT_TRUE(wm_saved_pose_start(&saved, 5, 600, 0, 0, &start));  // the clock isn't set yet
-  TEST_ASSERT_FALSE(wm_saved_pose_start(&saved, 2700, 600, 0, 0, &start));
+  TEST_ASSERT_TRUE(wm_saved_pose_start(&saved, 5, 600, 0, 0, motion, &start));  // the clock isn't set yet
+  TEST_ASSERT_FALSE(wm_saved_pose_start(&saved, 2700, 600, 0, 0, motion, &start));
 }
 
 // Killed while it drove: it is where it would be by now, as far off as it may have driven. An hour later it stands.
@@ -65,17 +70,36 @@ static void a_pose_that_was_moving_goes_on(void) {
   wm_start start;
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_saved_pose_write(path, &e, 1000, &err), err.text);
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_saved_pose_read(path, &saved, &err), err.text);
-  TEST_ASSERT_TRUE(wm_saved_pose_start(&saved, 1000.5, 600, 0.4, 0, &start));
+  TEST_ASSERT_TRUE(wm_saved_pose_start(&saved, 1000.5, 600, 0.4, 0, motion, &start));
   double half = M_PI / 16;  // of the turn
   TEST_ASSERT_DOUBLE_WITHIN(1e-4, 10 + 1 * cos(M_PI / 2 + half), start.p_m[0]);
   TEST_ASSERT_DOUBLE_WITHIN(1e-4, -2 + 1 * sin(M_PI / 2 + half), start.p_m[1]);
   TEST_ASSERT_DOUBLE_WITHIN(1e-4, M_PI / 2 + 2 * half, start.heading_rad);
   TEST_ASSERT_DOUBLE_WITHIN(1e-4, sin(M_PI / 4 + half), start.q_xyzw[2]);
   TEST_ASSERT_DOUBLE_WITHIN(1e-4, cos(M_PI / 4 + half), start.q_xyzw[3]);
-  TEST_ASSERT_DOUBLE_WITHIN(1e-3, sqrt(0.09 + 0.16 + 1), start.sigma_xy_m);
-  TEST_ASSERT_TRUE(wm_saved_pose_start(&saved, 4600, 6000, 0, 0, &start));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-3, sqrt(0.09 + 0.16 + 1 + 0.125 * 0.125), start.sigma_xy_m);
+  TEST_ASSERT_TRUE(wm_saved_pose_start(&saved, 4600, 6000, 0, 0, motion, &start));
   TEST_ASSERT_DOUBLE_WITHIN(1e-4, 10, start.p_m[0]);
   TEST_ASSERT_DOUBLE_WITHIN(1e-3, sqrt(0.09 + 16), start.sigma_xy_m);
+}
+
+// Killed while it drove straight on: within the second since then it may have begun to turn, and braked or accelerated.
+// Later than two seconds nothing is known of the motion. A robot that was off for an hour stands.
+static void a_turn_that_began_after_the_save_is_within_sigma(void) {
+  wm_estimate e = tracking(10, 0.01);
+  e.v_mps[0] = 0.3;
+  wm_saved_pose saved;
+  wm_start start;
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_saved_pose_write(path, &e, 1000, &err), err.text);
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_saved_pose_read(path, &saved, &err), err.text);
+  TEST_ASSERT_TRUE(wm_saved_pose_start(&saved, 1001.2, 600, 0, 0, motion, &start));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-3, sqrt(0.01 * 0.01 + 0.36 * 0.36), start.sigma_heading_rad);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-3, sqrt(0.01 * 0.01 + 0.36 * 0.36 + 0.72 * 0.72), start.sigma_xy_m);
+  TEST_ASSERT_TRUE(wm_saved_pose_start(&saved, 1006, 600, 0, 0, motion, &start));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-3, sqrt(0.01 * 0.01 + 1 + 0.3 * 0.3 * 4), start.sigma_heading_rad);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-3, sqrt(0.01 * 0.01 + 1.8 * 1.8 + 6 * 6), start.sigma_xy_m);
+  TEST_ASSERT_TRUE(wm_saved_pose_start(&saved, 4600, 6000, 0, 0, motion, &start));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-3, 0.01, start.sigma_heading_rad);
 }
 
 // A run that lost its pose does not leave the one from before, with a sigma of then: the next run searches.
@@ -91,15 +115,15 @@ static void a_lost_pose_replaces_the_one_before(void) {
     TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_saved_pose_write(path, &e, 1001, &err), err.text);
     TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_saved_pose_read(path, &saved, &err), err.text);
     TEST_ASSERT_TRUE(saved.is_lost);
-    TEST_ASSERT_FALSE(wm_saved_pose_start(&saved, 1002, 600, 0, 0, &start));
+    TEST_ASSERT_FALSE(wm_saved_pose_start(&saved, 1002, 600, 0, 0, motion, &start));
   }
   e = tracking(14, 8);
   e.covariance[wm_cov_index(5, 5)] = 1.6 * 1.6;
   e.w_radps[2] = 1.0;
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_saved_pose_write(path, &e, 1002, &err), err.text);
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_saved_pose_read(path, &saved, &err), err.text);
-  TEST_ASSERT_TRUE(wm_saved_pose_start(&saved, 1004, 600, 0, 0, &start));
-  TEST_ASSERT_DOUBLE_WITHIN(1e-5, 8, start.sigma_xy_m);
+  TEST_ASSERT_TRUE(wm_saved_pose_start(&saved, 1004, 600, 0, 0, motion, &start));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-3, sqrt(64 + 4), start.sigma_xy_m);           // 2 s later
   TEST_ASSERT_DOUBLE_WITHIN(0.01, M_PI / sqrt(3), start.sigma_heading_rad);  // any heading
 }
 
@@ -335,6 +359,7 @@ int main(void) {
   UNITY_BEGIN();
   RUN_TEST(a_pose_is_there_again);
   RUN_TEST(a_pose_that_was_moving_goes_on);
+  RUN_TEST(a_turn_that_began_after_the_save_is_within_sigma);
   RUN_TEST(a_pose_that_is_worth_nothing_is_not_kept);
   RUN_TEST(a_lost_pose_replaces_the_one_before);
   RUN_TEST(a_file_that_is_none_is_refused_with_its_line);

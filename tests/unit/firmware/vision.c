@@ -130,7 +130,7 @@ static size_t drain(wm_source *source, uint8_t *out, size_t capacity) {
     TEST_ASSERT_EQUAL(i % 3 == 2 ? WM_EVENT_LOOKED : WM_EVENT_POINTS, event.kind);
     if (event.kind == WM_EVENT_POINTS) TEST_ASSERT_GREATER_THAN(20, event.as.points.count);
     size_t n = wm_event_bytes(&event);
-    TEST_ASSERT_TRUE(n <= capacity - used);
+    TEST_ASSERT_LESS_OR_EQUAL(capacity - used, n);
     memcpy(out + used, &event, n);
     used += n;
     i++;

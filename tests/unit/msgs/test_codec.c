@@ -31,7 +31,8 @@ static void fill_field(wm_event *e, const wm_event_field *field) {
     const int32_t edges[] = {INT32_MIN, -1, INT32_MAX, (int32_t)bits};
     switch ((wm_field_type)field->type) {
       case WM_FIELD_F64: memcpy(at + i * sizeof number, &number, sizeof number); break;
-      case WM_FIELD_I64: memcpy(at + i * sizeof bits, &bits, sizeof bits); break;
+      case WM_FIELD_I64:
+      case WM_FIELD_U64: memcpy(at + i * sizeof bits, &bits, sizeof bits); break;
       case WM_FIELD_I32: memcpy(at, &edges[bits % 4], sizeof edges[0]); break;
       case WM_FIELD_U16: memcpy(at, &bits, sizeof(uint16_t)); break;
     }
@@ -80,7 +81,7 @@ static void fields_cover_their_structs(void) {
       [WM_EVENT_MARKER] = sizeof none->as.marker,       [WM_EVENT_STEREO] = sizeof none->as.stereo,
       [WM_EVENT_LOOKED] = sizeof none->as.looked,       [WM_EVENT_SET_POSE] = sizeof none->as.set_pose};
   static const size_t kBytes[] = {
-      [WM_FIELD_F64] = sizeof(double), [WM_FIELD_I64] = 8, [WM_FIELD_I32] = 4, [WM_FIELD_U16] = 2};
+      [WM_FIELD_F64] = sizeof(double), [WM_FIELD_I64] = 8, [WM_FIELD_U64] = 8, [WM_FIELD_I32] = 4, [WM_FIELD_U16] = 2};
   for (unsigned kind = 1; kind < WM_EVENT_KIND_COUNT; kind++) {
     size_t count, covered = 0, widest = 1;
     const wm_event_field *fields = wm_event_fields(kind, &count);
@@ -210,6 +211,21 @@ static void zeros_that_stood_for_absent_numbers_become_nan(void) {
   TEST_ASSERT_TRUE(isnan(out.as.marker.along_sigma_m) && isnan(out.as.marker.bloom_px));
   TEST_ASSERT_EQUAL_DOUBLE(0.25, out.as.marker.yaw_sigma_rad);
   TEST_ASSERT_EQUAL_DOUBLE(0, out.as.marker.yaw_rad);
+}
+
+static void a_number_is_read_from_the_version_on_it_came_with(void) {
+  wm_event in, out;
+  uint8_t bytes[WM_EVENT_ENCODED_MAX];
+  size_t used;
+  fill(&in, WM_EVENT_SIGHTING);
+  in.as.sighting.elevation_rad = 0.25;
+  in.as.sighting.elevation_sigma_rad = 0.5;
+  const size_t length = wm_event_encode(&in, bytes, sizeof bytes);
+  bytes[0] = 4;
+  TEST_ASSERT_EQUAL(WM_OK, wm_event_decode(bytes, length, &out, &used));
+  TEST_ASSERT_EQUAL(length, used);
+  TEST_ASSERT_EQUAL_DOUBLE(0.25, out.as.sighting.elevation_rad);
+  TEST_ASSERT_EQUAL_DOUBLE(0.5, out.as.sighting.elevation_sigma_rad);
 }
 
 static void bytes_are_little_endian_on_every_machine(void) {
@@ -401,6 +417,7 @@ int main(void) {
   RUN_TEST(another_version_is_refused);
   RUN_TEST(a_version_without_elevation_is_read);
   RUN_TEST(zeros_that_stood_for_absent_numbers_become_nan);
+  RUN_TEST(a_number_is_read_from_the_version_on_it_came_with);
   RUN_TEST(bytes_are_little_endian_on_every_machine);
   RUN_TEST(a_published_pose_comes_back);
   RUN_TEST(a_published_pose_of_the_version_before_is_read);

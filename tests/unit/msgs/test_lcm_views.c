@@ -26,10 +26,23 @@ static void places_arrive_whole(void) {
   TEST_ASSERT_EQUAL(1000, part.total);
   TEST_ASSERT_EQUAL_INT64(7, part.t_ns);
   TEST_ASSERT_EQUAL_DOUBLE(4e6 + 239, heard[239].x_m);
+  TEST_ASSERT_EQUAL_DOUBLE(-0.25, heard[0].y_m);
+  TEST_ASSERT_EQUAL_DOUBLE(0.5, heard[0].heading_rad);
   TEST_ASSERT_EQUAL_DOUBLE(0.125, heard[0].weight);
   TEST_ASSERT_DOUBLE_IS_NAN(heard[0].covariance[0]);
   TEST_ASSERT_EQUAL_DOUBLE(0.25, heard[0].covariance[5]);
   TEST_ASSERT_EQUAL(0, wm_lcm_places(sent, 2, 2, 7, bytes, 100));
+}
+
+// A short list behind a long one has the same bytes as before it.
+static void lists_forget_the_one_before(void) {
+  static uint8_t again[WM_LCM_MESSAGE_MAX];
+  static wm_place many[WM_LCM_PLACES_MAX];
+  for (size_t i = 0; i < WM_LCM_PLACES_MAX; i++) many[i] = (wm_place){1, 2, 3, 4, {5, 6, 7, 8, 9, 10}};
+  const size_t length = wm_lcm_places(many, 1, 1, 7, bytes, sizeof bytes);
+  TEST_ASSERT_GREATER_THAN(0, wm_lcm_places(many, WM_LCM_PLACES_MAX, WM_LCM_PLACES_MAX, 7, again, sizeof again));
+  TEST_ASSERT_EQUAL(length, wm_lcm_places(many, 1, 1, 7, again, sizeof again));
+  TEST_ASSERT_EQUAL_MEMORY(bytes, again, length);
 }
 
 static void a_map_arrives_in_parts(void) {
@@ -90,6 +103,7 @@ static void counts_beyond_the_room_are_refused(void) {
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(places_arrive_whole);
+  RUN_TEST(lists_forget_the_one_before);
   RUN_TEST(a_map_arrives_in_parts);
   RUN_TEST(landmarks_are_read_as_they_were_sent);
   RUN_TEST(counts_beyond_the_room_are_refused);

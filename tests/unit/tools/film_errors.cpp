@@ -88,7 +88,7 @@ wm::images::Camera changed(const wm::images::Camera &believed, const Unknowns &x
 // Gauss-Newton from the calibration on, by what truth and labels say.
 Unknowns camera_from_labels(const Film &film, size_t number, double &rms_px) {
   const std::vector<Label> labels = labels_of(film, number);
-  TEST_ASSERT_TRUE(labels.size() > 100);
+  TEST_ASSERT_GREATER_THAN(100, labels.size());
   Unknowns x = Unknowns::Zero();
   for (int pass = 0; pass < 8; pass++) {
     Eigen::Matrix<double, 10, 10> A = Eigen::Matrix<double, 10, 10>::Zero();
@@ -191,10 +191,10 @@ void test_stamps_and_arrivals_are_as_said() {
         arrival.add(after_s);
       else
         late++;
-      TEST_ASSERT_TRUE(after_s >= (hard ? 0.04 : 0.02));
+      TEST_ASSERT_GREATER_OR_EQUAL_DOUBLE((hard ? 0.04 : 0.02), after_s);
     }
     const double times_two = hard ? 2 : 1, n = stamp.n;
-    TEST_ASSERT_TRUE(n > 800);
+    TEST_ASSERT_GREATER_THAN(800, n);
     TEST_ASSERT_DOUBLE_WITHIN(4 * 0.002 * times_two / std::sqrt(n), 0.010 * times_two, stamp.mean());
     TEST_ASSERT_DOUBLE_WITHIN(0.1, 1, stamp.deviation() / (0.002 * times_two));
     TEST_ASSERT_DOUBLE_WITHIN(0.003 * times_two, 0.040 * times_two, arrival.mean());
@@ -220,7 +220,7 @@ void test_the_map_is_off_as_said() {
       for (int axis = 0; axis < 3; axis++) off.add(r.map[i].p_m[axis] - film.recording.landmarks[i].p_m[axis]);
     }
   }
-  TEST_ASSERT_TRUE(off.n > 400);
+  TEST_ASSERT_GREATER_THAN(400, off.n);
   TEST_ASSERT_DOUBLE_WITHIN(3 / std::sqrt(2 * off.n), 1, off.rms() / 0.02);
 }
 
@@ -260,7 +260,7 @@ void check_bearings(const char *name) {
     const Vec3 p = from_sensor(film, s.t_ns, s.sensor, s.id);
     noise.add(wrap(s.bearing_rad - std::atan2(p.y(), p.x())));
   }
-  TEST_ASSERT_TRUE(noise.n > 3000);
+  TEST_ASSERT_GREATER_THAN(3000, noise.n);
   TEST_ASSERT_DOUBLE_WITHIN(0.05, 1, noise.rms() / (0.3 * kDegree));
   TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.05, outliers / (noise.n + outliers));
 }
@@ -281,7 +281,7 @@ void test_markers_of_pictures_have_their_noise() {
     for (const wm_landmark &l : film.recording.landmarks)
       if (l.id == m.id) yaw.add(wrap(m.yaw_rad - l.yaw_rad + heading));
   }
-  TEST_ASSERT_TRUE(distance.n > 1000);
+  TEST_ASSERT_GREATER_THAN_DOUBLE(1000, distance.n);
   TEST_ASSERT_DOUBLE_WITHIN(0.08, 1, distance.rms() / 0.005);
   TEST_ASSERT_DOUBLE_WITHIN(0.08, 1, yaw.rms() / (0.5 * kDegree));
 }
@@ -303,7 +303,7 @@ void test_stereo_points_of_pictures_have_their_noise() {
       if (!std::isnan(px[0])) noise.add(px[0] - pixel.x()), noise.add(px[1] - pixel.y());
     }
   }
-  TEST_ASSERT_TRUE(noise.n > 2000);
+  TEST_ASSERT_GREATER_THAN(2000, noise.n);
   TEST_ASSERT_DOUBLE_WITHIN(0.06, 1, noise.rms() / 0.5);
   TEST_ASSERT_TRUE(one_side > 10);
 }

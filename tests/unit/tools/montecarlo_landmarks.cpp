@@ -39,8 +39,8 @@ void test_as_driven_it_is_right_all_the_time() {
     TEST_ASSERT_EQUAL(0, o.moved_seen);
     TEST_ASSERT_FALSE(o.detected_after_s.has_value());
     // A look each tenth of a second of a drive of half a minute.
-    TEST_ASSERT_TRUE(o.outcome.samples.size() > 250);
-    TEST_ASSERT_TRUE(o.outcome.samples.back().t_s > 25);
+    TEST_ASSERT_GREATER_THAN(250, o.outcome.samples.size());
+    TEST_ASSERT_GREATER_THAN_DOUBLE(25, o.outcome.samples.back().t_s);
   }
 }
 
@@ -62,7 +62,7 @@ void test_carried_off_it_is_elsewhere_and_says_so() {
     return std::hypot(a.x_m - b.x_m, a.y_m - b.y_m);
   };
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0, apart(at_s - 0.1));
-  TEST_ASSERT_TRUE(apart(at_s + 0.1) > 3);
+  TEST_ASSERT_GREATER_THAN_DOUBLE(3, apart(at_s + 0.1));
   TEST_ASSERT_TRUE(run_landmark_trial(world, config, trial("kidnap")).detected_after_s.has_value());
 }
 

@@ -61,7 +61,7 @@ uint32_t read_through(const fs::path &folder) {
                             err.text);
   size_t count = 0;
   wm_source *const *sources = wm_recording_sources(opened, &count);
-  TEST_ASSERT_TRUE(count > 0);
+  TEST_ASSERT_GREATER_THAN(0, count);
   for (size_t i = 0; i < count; i++) {
     wm_event e{};
     size_t events = 0;

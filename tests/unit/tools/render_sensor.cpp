@@ -17,6 +17,7 @@ void tearDown(void);
 void setUp(void) {}
 void tearDown(void) {}
 
+using namespace wm::images;
 using namespace wm::render;
 
 namespace {
@@ -99,7 +100,7 @@ void test_auto_exposure_follows_slowly_and_wanders(void) {
   double gain = 0;
   for (uint64_t i = 2; i < 60; i++) {
     const double next = steady.next(even(50, 50, 0.4f), i);
-    if (i > 2) TEST_ASSERT_TRUE(next <= gain + 1e-9);
+    if (i > 2) TEST_ASSERT_LESS_OR_EQUAL_DOUBLE(gain + 1e-9, next);
     gain = next;
   }
   TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.5, gain);

@@ -40,7 +40,8 @@ void test_plan_and_map_of_a_flat_agree() {
       TEST_ASSERT_DOUBLE_WITHIN(0.1, drawn.clearance_m(p, false), mapped.clearance_m(p));  // a cell either way
     }
   TEST_ASSERT_TRUE(asked > 500);
-  TEST_ASSERT_TRUE(drawn.faces.size() > 20 && mapped.faces.size() > 10);
+  TEST_ASSERT_GREATER_THAN(20, drawn.faces.size());
+  TEST_ASSERT_GREATER_THAN(10, mapped.faces.size());
 }
 
 // Its picture alone, with the map's resolution; the map's origin is 0, 0.
@@ -77,13 +78,13 @@ void test_shipped_scenarios_with_a_building_can_be_driven() {
     wm_error err{};
     TEST_ASSERT_EQUAL_MESSAGE(WM_OK, load_scenario(worlds() + name, scenario, &err), err.text);
     TEST_ASSERT_EQUAL_MESSAGE(WM_OK, prepare(scenario, 1, film, &err), err.text);
-    TEST_ASSERT_TRUE(film.recording.length_m > 15);
+    TEST_ASSERT_GREATER_THAN_DOUBLE(15, film.recording.length_m);
     TEST_ASSERT_TRUE(film.world->map.has_value());
     const State start = film.recording.drive.at(0), end = film.recording.drive.at(1e9);
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, 3.14159265358979 / 2, start.heading_rad);
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, 5.4, end.x_m);
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, 2.4, end.y_m);
-    TEST_ASSERT_TRUE(film.recording.drive.at(film.recording.duration_s - 1).speed_mps < 0);  // backwards
+    TEST_ASSERT_LESS_THAN_DOUBLE(0, film.recording.drive.at(film.recording.duration_s - 1).speed_mps);  // backwards
   }
 }
 

@@ -56,10 +56,10 @@ void test_commands_are_obeyed_after_the_dead_time_with_the_response() {
   a.turn_scale = 1.1;
   const Recording r = driven(a);
   TEST_ASSERT_TRUE(r.can.empty());
-  TEST_ASSERT_TRUE(worst(r, a) < 0.01);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.01, worst(r, a));
   Actuators other = a;
   other.dead_s = 0.3;
-  TEST_ASSERT_TRUE(worst(r, other) > 0.05);
+  TEST_ASSERT_GREATER_THAN_DOUBLE(0.05, worst(r, other));
   // The controller keeps to the route in spite of the drive: the robot comes back.
   const State end = r.drive.at(1e9);
   TEST_ASSERT_TRUE(std::isfinite(end.x_m) && r.length_m > 50);
@@ -82,7 +82,7 @@ void test_acceleration_is_limited() {
   a.acceleration_mps2 = 0.4;
   const Recording r = driven(a);
   for (double t = 0; t < r.duration_s - 0.02; t += 0.01)
-    TEST_ASSERT_TRUE(std::fabs(r.drive.at(t + 0.01).speed_mps - r.drive.at(t).speed_mps) < 0.0041);
+    TEST_ASSERT_DOUBLE_WITHIN(0.0041, r.drive.at(t).speed_mps, r.drive.at(t + 0.01).speed_mps);
 }
 
 // A wheel that is asked for less than the static friction stands.

@@ -158,7 +158,7 @@ void test_slip_is_as_large_and_as_slow_as_said() {
           squares += square(share[i]), products += share[i] * share[i - 10], n++;
     }
   }
-  TEST_ASSERT_TRUE(n > 1500);
+  TEST_ASSERT_GREATER_THAN(1500, n);
   // Stamps jitter by 2 ms: of two stamps half a second apart that is another 0.57 %.
   const double stamps = 2 * square(0.002 / 0.5);
   TEST_ASSERT_DOUBLE_WITHIN(0.15, 1, (squares / n) / (square(0.005) + stamps));
@@ -186,7 +186,8 @@ void test_the_steering_table_is_off_as_said() {
         const double off = angle - std::atan(w.wheelbase_m * r.drive.at(since(r, f.t_ns)).curvature_1pm);
         sum += off, n++, spread += square(off);
       }
-      TEST_ASSERT_TRUE(std::sqrt(spread / n - square(sum / n)) < 0.1 * kDegree);  // jitter of the stamps, rounding
+      TEST_ASSERT_LESS_THAN_DOUBLE(0.1 * kDegree,
+                                   std::sqrt(spread / n - square(sum / n)));  // jitter of the stamps, rounding
       squares += square(sum / n) / runs;
     }
     TEST_ASSERT_DOUBLE_WITHIN(0.37, 1, std::sqrt(squares) / said);
@@ -235,7 +236,7 @@ void test_can_stamps_jitter_and_no_frame_overtakes_its_like() {
       squares += square(since(r, wheels[k].t_ns) - static_cast<double>(k) / 50);
     TEST_ASSERT_DOUBLE_WITHIN(0.1, 1, std::sqrt(squares / static_cast<double>(wheels.size())) / said);
     for (size_t k = 1; k < rates.size(); k++) {
-      TEST_ASSERT_TRUE(rates[k].t_ns > rates[k - 1].t_ns);
+      TEST_ASSERT_GREATER_THAN_INT64(rates[k - 1].t_ns, rates[k].t_ns);
       TEST_ASSERT_EQUAL_UINT((counter(rates[k - 1], Bus_message::yaw_rate) + 1) & 255,
                              counter(rates[k], Bus_message::yaw_rate));
     }
@@ -300,7 +301,8 @@ void test_faults_of_the_bus() {
     late += wait_ns > 0;
   }
   TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.1, late / static_cast<double>(rates.size()));
-  for (size_t i = 1; i < waited.can.size(); i++) TEST_ASSERT_TRUE(waited.can[i].t_ns >= waited.can[i - 1].t_ns);
+  for (size_t i = 1; i < waited.can.size(); i++)
+    TEST_ASSERT_GREATER_OR_EQUAL_INT64(waited.can[i - 1].t_ns, waited.can[i].t_ns);
 }
 
 void test_a_slip_and_a_dead_encoder() {

@@ -59,7 +59,7 @@ struct Sum {
 };
 
 void check_rms(double wanted, const Sum &s) {
-  TEST_ASSERT_TRUE(s.n > 200);
+  TEST_ASSERT_GREATER_THAN(200, s.n);
   TEST_ASSERT_DOUBLE_WITHIN(4 / std::sqrt(2 * s.n), 1, s.rms() / wanted);
   TEST_ASSERT_DOUBLE_WITHIN(4 * wanted / std::sqrt(s.n), 0, s.mean());
 }
@@ -90,7 +90,7 @@ void test_markers_have_their_noise() {
       height.add(m.p_m[2] - p.z());
       for (const wm_landmark &l : made.landmarks)
         if (l.id == m.id) heading.add(wrap(m.yaw_rad - l.yaw_rad + at.heading_rad));
-      TEST_ASSERT_TRUE(std::hypot(p.x(), p.y()) <= 2);
+      TEST_ASSERT_LESS_OR_EQUAL_DOUBLE(2, std::hypot(p.x(), p.y()));
     }
   }
   check_rms(0.01, distance);
@@ -146,10 +146,10 @@ void test_fifteen_points_are_seen_well_enough() {
     const Vector3d away = Vector3d(made.start.p_m) - Vector3d(made.truth6[0].xyz_m);
     for (int i = 0; i < 3; i++) start.add(away[i]);
     farthest = std::max(farthest, away.norm());
-    TEST_ASSERT_TRUE(away.norm() <= 20);
+    TEST_ASSERT_LESS_OR_EQUAL_DOUBLE(20, away.norm());
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, 20 / std::sqrt(5.0), made.start.sigma_xy_m);
   }
-  TEST_ASSERT_TRUE(few / steps < 0.05);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.05, few / steps);
   TEST_ASSERT_TRUE(farthest > 17);
   TEST_ASSERT_DOUBLE_WITHIN(0.2, 1, start.rms() / (20 / std::sqrt(5.0)));
 }
@@ -268,7 +268,7 @@ void test_a_landmark_less_changes_nothing_of_the_others() {
   size_t next = 0;
   for (const Sighting &s : all.sightings) {
     if (s.id > 10) continue;
-    TEST_ASSERT_TRUE(next < ten.sightings.size());
+    TEST_ASSERT_LESS_THAN(ten.sightings.size(), next);
     TEST_ASSERT_EQUAL_DOUBLE(s.bearing_rad, ten.sightings[next++].bearing_rad);
   }
   TEST_ASSERT_EQUAL(ten.sightings.size(), next);

@@ -205,7 +205,8 @@ void test_drop_outs_and_clock_errors_are_in_the_stamps() {
     TEST_ASSERT_INT64_WITHIN(2, film.recording.clock_start_ns + std::llround(1e9 * (t.t_s * 1.0001 + 0.010)),
                              t.stamp_ns);
     const double late_s = static_cast<double>(t.arrival_ns - film.recording.clock_start_ns) * 1e-9 - t.t_s;
-    TEST_ASSERT_TRUE(late_s >= 0.0199 && late_s <= 0.0601);
+    TEST_ASSERT_GREATER_OR_EQUAL_DOUBLE(0.0199, late_s);
+    TEST_ASSERT_LESS_OR_EQUAL_DOUBLE(0.0601, late_s);
   }
 }
 

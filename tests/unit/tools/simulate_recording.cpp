@@ -106,7 +106,7 @@ void test_bearings_are_those_of_truth() {
     if (std::strncmp(all[i]->name, "sightings:", 10) != 0) continue;
     for (const wm_event &e : events_of(all[i])) {
       const wm_sighting &s = e.as.sighting;
-      TEST_ASSERT_TRUE(s.sensor < sensor_count);
+      TEST_ASSERT_LESS_THAN(sensor_count, s.sensor);
       const wm_mounting &mounting = sensors[s.sensor].mounting;
       const State at = made.drive.at(static_cast<double>(e.t_ns - made.clock_start_ns) * 1e-9);
       const double x =
@@ -152,7 +152,7 @@ void test_counts_and_yaw_rate_lead_to_the_end() {
         const State at = made.drive.at(static_cast<double>(e.t_ns - made.clock_start_ns) * 1e-9);
         const double straight_m = 0.058;  // of the table
         if (std::fabs(at.curvature_1pm) < 1e-12) TEST_ASSERT_DOUBLE_WITHIN(1.1e-5, straight_m, value);
-        if (at.curvature_1pm > 0.02) TEST_ASSERT_TRUE(value > straight_m);  // to the left
+        if (at.curvature_1pm > 0.02) TEST_ASSERT_GREATER_THAN_DOUBLE(straight_m, value);  // to the left
       }
     }
     if (std::isnan(left)) continue;

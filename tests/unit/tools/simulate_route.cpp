@@ -95,7 +95,7 @@ void test_speed_and_acceleration_keep_their_limits() {
   const double h = 1e-3;
   for (double t = 0; t <= drive.duration_s(); t += h) {
     const double v = drive.at(t).speed_mps;
-    TEST_ASSERT_TRUE(std::fabs(v - last) <= 0.8 * h * 1.001 + 1e-9);
+    TEST_ASSERT_DOUBLE_WITHIN(0.8 * h * 1.001 + 1e-9, last, v);
     last = v;
     fastest = std::fmax(fastest, v);
     slowest = std::fmin(slowest, v);
@@ -142,7 +142,7 @@ void test_the_length_is_that_of_the_part_that_is_driven() {
   const double whole = cut.length_m();
   cut.cut(0.4 * cut.duration_s());
   TEST_ASSERT_DOUBLE_WITHIN(0.01, way(cut), cut.length_m());
-  TEST_ASSERT_TRUE(cut.length_m() < 0.7 * whole);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.7 * whole, cut.length_m());
   wm_error err;
   TEST_ASSERT_EQUAL(WM_OK, carried.carry(0.3 * carried.duration_s(), 0.2 * carried.duration_s(), &err));
   TEST_ASSERT_DOUBLE_WITHIN(0.01, way(carried), carried.length_m());

@@ -114,7 +114,7 @@ void test_a_file_that_is_not_there_is_named() {
 void setUp(void) {
   std::ifstream file(std::string(std::getenv("WM_SOURCE_DIR")) + "/config/worlds/crossing.yaml");
   crossing.assign(std::istreambuf_iterator<char>(file), {});
-  TEST_ASSERT_TRUE(crossing.size() > 1000);
+  TEST_ASSERT_GREATER_THAN(1000, crossing.size());
 }
 
 int main() {

@@ -92,7 +92,7 @@ void test_bearings_have_the_noise_and_the_outliers_that_are_asked_for() {
       all++;
       outliers += s.outlier;
       TEST_ASSERT_EQUAL_INT64(150000000, s.arrival_ns - s.t_ns);
-      TEST_ASSERT_TRUE(std::fabs(s.bearing_rad) < 0.5 * crossing.cameras[s.sensor].field_of_view_rad + 0.05);
+      TEST_ASSERT_DOUBLE_WITHIN(0.5 * crossing.cameras[s.sensor].field_of_view_rad + 0.05, 0.0, s.bearing_rad);
       if (s.outlier) continue;
       const double e = wrap(s.bearing_rad - true_bearing(crossing, r, s));
       sum += e;
@@ -101,7 +101,7 @@ void test_bearings_have_the_noise_and_the_outliers_that_are_asked_for() {
     }
   }
   const double sigma = 0.3 * kPi / 180;
-  TEST_ASSERT_TRUE(n > 5000);
+  TEST_ASSERT_GREATER_THAN(5000, n);
   TEST_ASSERT_DOUBLE_WITHIN(0.05, 1, squares / n / (sigma * sigma));  // 3 sigma of a variance of 7000 draws
   TEST_ASSERT_DOUBLE_WITHIN(4 * sigma / std::sqrt(n), 0, sum / n);
   TEST_ASSERT_DOUBLE_WITHIN(4 * std::sqrt(0.05 * 0.95 / all), 0.05, outliers / all);
@@ -200,7 +200,7 @@ void test_faults_happen_as_often_as_asked() {
   size_t back = 0, late = 0;
   for (size_t i = 1; i < r.can.size(); i++) back += r.can[i].t_ns < r.can[i - 1].t_ns;
   for (size_t i = 1; i < r.sightings.size(); i++) {
-    TEST_ASSERT_TRUE(r.sightings[i].arrival_ns >= r.sightings[i - 1].arrival_ns);
+    TEST_ASSERT_GREATER_OR_EQUAL_INT64(r.sightings[i - 1].arrival_ns, r.sightings[i].arrival_ns);
     late += r.sightings[i].arrival_ns - r.sightings[i].t_ns == 250000000;
   }
   TEST_ASSERT_DOUBLE_WITHIN(0.006, 0.02, static_cast<double>(back) / static_cast<double>(r.can.size()));

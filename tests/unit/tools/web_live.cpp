@@ -77,7 +77,7 @@ void numbers_that_are_none_become_null() {
   TEST_ASSERT_TRUE(seen["health"]["left_s"].is_null());
   TEST_ASSERT_TRUE(seen["health"]["lost_probability"].is_null());
   TEST_ASSERT_EQUAL(0, seen["trail"]["points"].size());
-  TEST_ASSERT_TRUE(seen["health"]["findings"].size() >= 1);
+  TEST_ASSERT_GREATER_OR_EQUAL(1, seen["health"]["findings"].size());
   TEST_ASSERT_TRUE(seen["health"]["sources"][0]["is_bad"].get<bool>());
   TEST_ASSERT_TRUE(!seen["health"]["sources"][0]["remedy"].get<std::string>().empty());
 }
@@ -245,7 +245,7 @@ void what_is_seen_and_what_is_expected_meet() {
   for (int i = 0; i < 2; i++)
     TEST_ASSERT_DOUBLE_WITHIN(0.2, seen["dots"][0][i].get<double>(), seen["map_dots"][0][i].get<double>());
   TEST_ASSERT_EQUAL(3, seen["map_marks"][0][2].get<int>());
-  TEST_ASSERT_TRUE(seen["jpeg"].get<std::string>().size() > 100);
+  TEST_ASSERT_GREATER_THAN(100, seen["jpeg"].get<std::string>().size());
   around.pose.reset();
   TEST_ASSERT_EQUAL(0, json::parse(picture_json(*looked, site, &map, around, 2))["map_dots"].size());
 }

@@ -55,8 +55,8 @@ void corridor_ways_keep_clear_of_walls() {
       if (s.speed_mps < 0) backwards_m -= 0.25 * s.speed_mps;
       backwards_longest_m = std::max(backwards_longest_m, stretch_m);
     }
-    TEST_ASSERT_TRUE(backwards_m > 25);
-    TEST_ASSERT_TRUE(backwards_longest_m > 12);
+    TEST_ASSERT_GREATER_THAN_DOUBLE(25, backwards_m);
+    TEST_ASSERT_GREATER_THAN_DOUBLE(12, backwards_longest_m);
     shortest = std::min(shortest, drive.length_m());
     longest = std::max(longest, drive.length_m());
   }
@@ -78,7 +78,7 @@ void room_ways_keep_clear_of_furniture() {
       for (double t = 0; t <= drive.duration_s() / drawn.route.laps; t += 0.25) {
         const State s = drive.at(t);
         const double gap = clearance_m(drawn.plan, round, s.x_m, s.y_m, s.heading_rad);
-        TEST_ASSERT_TRUE(gap > 0.08);
+        TEST_ASSERT_GREATER_THAN_DOUBLE(0.08, gap);
         least[hall] = std::min(least[hall], gap);
       }
       const State begin = drive.at(0), end = drive.at(drive.duration_s());
@@ -113,7 +113,7 @@ void corridors_are_connected() {
       const int j = static_cast<int>((0.5 * (h.area.y0_m + h.area.y1_m) - b.y0_m) / cell);
       TEST_ASSERT_TRUE_MESSAGE(seen[static_cast<size_t>(j * nx + i)], "a hallway can't be reached");
     }
-    TEST_ASSERT_TRUE(drawn.hallways.size() >= 7);
+    TEST_ASSERT_GREATER_OR_EQUAL(7, drawn.hallways.size());
   }
 }
 
@@ -166,7 +166,7 @@ void map_agrees_with_plan() {
       double nearest = 1e9;
       for (const Face &f : drawn.plan.faces)
         if (f.bottom_m <= 0) nearest = std::min(nearest, distance_m(p, f));
-      TEST_ASSERT_TRUE(nearest <= 0.7072 * r);
+      TEST_ASSERT_LESS_OR_EQUAL_DOUBLE(0.7072 * r, nearest);
     }
   TEST_ASSERT_TRUE(edges > 1000);
   // The other way round: each metre of wall is in the picture.

@@ -149,7 +149,7 @@ void corridor_labels_lie_on_edges_of_the_picture() {
     std::string text;
     world->label(0, camera, shot, text);
     const auto rows = numbers(text);
-    TEST_ASSERT_TRUE(rows.size() > 40);
+    TEST_ASSERT_GREATER_THAN(40, rows.size());
     for (size_t i = 1; i + 1 < rows.size(); i++) {
       const auto &a = rows[i - 1], &p = rows[i], &b = rows[i + 1];
       if (a[1] != p[1] || b[1] != p[1]) continue;
@@ -172,10 +172,10 @@ void corridor_labels_lie_on_edges_of_the_picture() {
       double nearest = 1e9;
       for (const Face &f : world->plan.faces)
         if (f.bottom_m <= 0 && f.mapped) nearest = std::min(nearest, distance_m(foot, f));
-      TEST_ASSERT_TRUE(nearest < 0.02);
+      TEST_ASSERT_LESS_THAN_DOUBLE(0.02, nearest);
     }
   }
-  TEST_ASSERT_TRUE(offsets.size() > points / 2);
+  TEST_ASSERT_GREATER_THAN(points / 2, offsets.size());
   double mean = 0;
   for (double &o : offsets) mean += o / static_cast<double>(offsets.size()), o = std::fabs(o);
   std::sort(offsets.begin(), offsets.end());
@@ -183,8 +183,8 @@ void corridor_labels_lie_on_edges_of_the_picture() {
   std::printf("corridor: %zu of %zu label points at an edge, mean %.3f px, median |.| %.3f, p90 %.3f px\n",
               offsets.size(), points, mean, median, p90);
   TEST_ASSERT_DOUBLE_WITHIN(0.15, 0, mean);
-  TEST_ASSERT_TRUE(median < 0.15);
-  TEST_ASSERT_TRUE(p90 < 0.5);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.15, median);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.5, p90);
 }
 
 // An outside judge: AprilTag's own detector, whose pixel centres lie at +0.5. Its corners run counter-clockwise from
@@ -198,7 +198,7 @@ void office_labels_are_what_apriltag_finds() {
   detector->quad_decimate = 1;
   for (const bool on_walls : {false, true}) {
     const auto world = made("office", false, 4, on_walls);
-    TEST_ASSERT_TRUE(world->truth.size() >= 12);
+    TEST_ASSERT_GREATER_OR_EQUAL(12, world->truth.size());
     const Motion motion(*world);
     const wm::images::Camera &camera = world->cameras[0].camera;
     int labelled = 0, found = 0, strange = 0;
@@ -235,9 +235,9 @@ void office_labels_are_what_apriltag_finds() {
     std::printf("office, markers on the %s: %d labelled, %d of them found, corners within %.2f px\n",
                 on_walls ? "walls" : "ceiling", labelled, found, worst);
     TEST_ASSERT_TRUE(labelled > 10);
-    TEST_ASSERT_TRUE(found >= labelled * (on_walls ? 7 : 9) / 10);
+    TEST_ASSERT_GREATER_OR_EQUAL(labelled * (on_walls ? 7 : 9) / 10, found);
     TEST_ASSERT_EQUAL(0, strange);
-    TEST_ASSERT_TRUE(worst < 1.0);
+    TEST_ASSERT_LESS_THAN_DOUBLE(1.0, worst);
   }
 }
 
@@ -258,7 +258,7 @@ void office_prints_come_whole_into_view() {
       world->label(0, world->cameras[0].camera, motion.shot(static_cast<double>(i) / pictures, 0), text);
       for (const auto &row : numbers(text)) whole[static_cast<int>(row[1])]++;
     }
-    TEST_ASSERT_TRUE(world->truth.size() >= 9);
+    TEST_ASSERT_GREATER_OR_EQUAL(9, world->truth.size());
     int least = pictures;
     for (const auto &t : world->truth) least = std::min(least, whole[t.id]);
     std::printf("office%s, %zu markers on the %s: each is whole in %d and more of %d pictures\n",
@@ -271,7 +271,7 @@ void hall_labels_point_at_upright_edges() {
   const auto world = made("hall", false, 3);
   const Motion motion(*world);
   const wm::images::Camera &camera = world->cameras[0].camera;
-  TEST_ASSERT_TRUE(world->lines.size() >= 30);
+  TEST_ASSERT_GREATER_OR_EQUAL(30, world->lines.size());
   size_t labelled = 0, contrast = 0;
   std::vector<double> offsets;
   for (const double share : {0.03, 0.2, 0.41}) {
@@ -280,8 +280,8 @@ void hall_labels_point_at_upright_edges() {
     std::string text;
     world->label(0, camera, shot, text);
     const auto rows = numbers(text);
-    TEST_ASSERT_TRUE(rows.size() >= 15);
-    TEST_ASSERT_TRUE(rows.size() <= world->lines.size());
+    TEST_ASSERT_GREATER_OR_EQUAL(15, rows.size());
+    TEST_ASSERT_LESS_OR_EQUAL(world->lines.size(), rows.size());
     const Pose T = motion.at(static_cast<double>(shot.t_ns));
     for (const auto &row : rows) {
       labelled++;
@@ -303,7 +303,7 @@ void hall_labels_point_at_upright_edges() {
   TEST_ASSERT_TRUE(contrast > labelled / 3);
   std::printf("hall: %zu lines labelled, %zu with contrast, median |.| %.3f px\n", labelled, contrast,
               offsets[offsets.size() / 2]);
-  TEST_ASSERT_TRUE(offsets[offsets.size() / 2] < 0.3);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.3, offsets[offsets.size() / 2]);
 }
 
 // What a label's pixel shows, by a ray of its own.
@@ -312,7 +312,7 @@ void labels_of_signs_and_beacons_show_them() {
     const auto world = made(name, false, 1);
     const Motion motion(*world);
     size_t labelled = 0;
-    TEST_ASSERT_TRUE(world->truth.size() >= 12);
+    TEST_ASSERT_GREATER_OR_EQUAL(12, world->truth.size());
     TEST_ASSERT_TRUE(world->landmarks_known);
     for (double share = 0.05; share < 1; share += 0.06)
       for (size_t k = 0; k < world->cameras.size(); k++) {
@@ -331,8 +331,8 @@ void labels_of_signs_and_beacons_show_them() {
           const wm::render::Hit hit = world->scene.cast(T.translation(), ray);
           TEST_ASSERT_TRUE(hit.there);
           const Vec3 place = world->truth[static_cast<size_t>(row[2]) - 1].p;
-          TEST_ASSERT_TRUE((hit.point - place).norm() < (world->panels.empty() ? 0.15 : 0.03));
-          TEST_ASSERT_TRUE((place - T.translation()).cross(ray).norm() < 0.002);
+          TEST_ASSERT_LESS_THAN_DOUBLE((world->panels.empty() ? 0.15 : 0.03), (hit.point - place).norm());
+          TEST_ASSERT_LESS_THAN_DOUBLE(0.002, (place - T.translation()).cross(ray).norm());
           labelled++;
         }
       }

@@ -1,7 +1,7 @@
 #!/bin/bash
 # SPDX-License-Identifier: Apache-2.0
 # Makes what a guest needs, once for a kernel version, in the folder that is named: Debian's PREEMPT_RT kernel with its
-# modules, v4l2loopback (and for amd64 vimc) built for it, a small root file system, an initramfs. Packages come from Debian
+# modules, v4l2loopback (and for amd64 vimc and guest_second) built for it, a small root file system, an initramfs. Packages come from Debian
 # alone. An armhf guest has arm64's kernel, which runs its programs.
 # usage: prepare.sh FOLDER [amd64|arm64|armhf]   (4 minutes, 3 GB; needs the packages that docs/dependencies.md lists for hil)
 # Two that are begun at once wait for each other; the second finds the image ready.
@@ -31,10 +31,10 @@ its_apt() { if [ "$machine" = amd64 ]; then "$@"; else env APT_CONFIG="$apt_fold
 kernel=$(its_apt apt-cache depends "linux-image-rt-$machine" | awk '/Depends: linux-image-/{sub("linux-image-", "", $2); print $2; exit}')
 [ -n "$kernel" ] || { echo "apt knows no linux-image-rt-$machine (apt-get update?)"; exit 1; }
 cd "$folder"
-made_of="$kernel $(cat "$here/prepare.sh" "$here/initramfs.sh" | sha256sum)"
+made_of="$kernel $(cat "$here/prepare.sh" "$here/initramfs.sh" "$here/guest_second.c" | sha256sum)"
 if [ "$(cat made_of 2>/dev/null)" = "$made_of" ] && [ -f init.cpio.gz ]; then exit 0; fi
 echo "preparing a guest with $kernel in $folder"
-rm -rf debs files root v4l2loopback vimc made_of root.ext4 init.cpio.gz
+rm -rf debs files root v4l2loopback vimc second made_of root.ext4 init.cpio.gz
 
 version=$(echo "$kernel" | cut -d. -f1,2)
 mkdir debs files
@@ -79,10 +79,15 @@ if [ "$arch" = amd64 ]; then
   tar -xf files/usr/src/linux-source-*.tar.xz --wildcards --strip-components=4 '*/drivers/media/test-drivers/vimc'
   modules vimc CONFIG_VIDEO_VIMC=m
   install -D vimc/vimc.ko "root/usr/lib/modules/$kernel/extra/vimc.ko"
+  mkdir second
+  cp "$here/guest_second.c" second/
+  echo 'obj-m := guest_second.o' >second/Makefile
+  modules second
+  install -D second/guest_second.ko "root/usr/lib/modules/$kernel/extra/guest_second.ko"
 fi
 /sbin/depmod -b root "$kernel"
 
 mke2fs -q -F -t ext4 -d root -O ^has_journal root.ext4 1500M
 bash "$here/initramfs.sh" root "$kernel" root/bin/busybox "$PWD/init.cpio.gz"
-rm -rf root debs files v4l2loopback vimc
+rm -rf root debs files v4l2loopback vimc second
 echo "$made_of" >made_of

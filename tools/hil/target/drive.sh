@@ -242,7 +242,10 @@ if [ "$faults" = 1 ]; then
 fi
 wake_ups
 nap $((lead_s - 2))
-[ "$plays" = 0 ] || chrt -a -f -p 45 "$player" >/dev/null 2>&1 # not before: reading the recording at this priority would hold the run up
+# The sending thread alone: what reads and decodes is seconds ahead, and would keep it waiting at the same priority.
+[ "$plays" = 0 ] || for task in /proc/"$player"/task/[0-9]*; do
+  [ "$(<"$task/comm")" != wm-play-send ] || chrt -f -p 45 "${task##*/}" >/dev/null 2>&1
+done
 step drive
 wait "$player"
 code=$?

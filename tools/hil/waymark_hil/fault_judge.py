@@ -11,12 +11,18 @@ _HEALTH_PERIOD_S = 1.0  # health is sent once a second: a state is seen up to so
 _AS_BEFORE = 3
 _COUNTED_S = 0.2  # a gap is counted when the next datum comes
 FLAGS = {"motion_stale": 1, "fusion_stale": 2, "jumped": 4}
-CAUSES = ["none", "contradicted", "refused", "inconsistent", "biased", "lost_again", "unknown_identities", "silent", "off_map"]
+CAUSES = ["none", "contradicted", "refused", "inconsistent", "biased", "lost_again", "unknown_identities", "silent", "off_map", "turn"]
 
 
 def plain(text):
     """A name with one spelling: bus-off, bus_off and "bus off" are the same."""
     return str(text).lower().replace("-", "_").replace(" ", "_")
+
+
+def is_in(fault, from_s, until_s):
+    """Whether some of a fault is in a part of the drive."""
+    ends_s = fault.get("until_s")
+    return fault["from_s"] < until_s and (ends_s is None or ends_s > from_s or ends_s == fault["from_s"] >= from_s)
 
 
 class Heard:
@@ -170,6 +176,9 @@ def _recovers(checks, group, heard, from_s, until_s, within_s):
     usual_m = _AS_BEFORE * lcm_log.sigma_m(before[-1][1]) if before else math.inf
     well_s = next((t - until_s for t, p in heard.poses_between(until_s, heard.end_s)
                    if not p.status_flags & FLAGS["motion_stale"] and lcm_log.sigma_m(p) <= usual_m and p.state in (1, before[-1][1].state if before else 1)), math.inf)
+    if math.isinf(well_s) and until_s + within_s > heard.end_s:
+        checks.add(group, "pose within_s", None, f"not as good as before when the drive ends, {heard.end_s - until_s:.1f} s after its end; {within_s:g} s are allowed")
+        return
     checks.at_most(group, "pose within_s", well_s, within_s, f"as good as before {well_s:.2f} s after its end (sigma below {usual_m:.3f} m), {within_s:g} s are allowed")
 
 

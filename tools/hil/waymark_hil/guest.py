@@ -14,10 +14,13 @@ SCRIPTS = pathlib.Path(__file__).resolve().parent.parent / "guest"
 # Two controllers a bus: one receives, one plays. SJA1000 on PCI is what Debian's kernel and qemu both have.
 _BUS = ["-object", "can-bus,id=cb{0}", "-device", "kvaser_pci,canbus=cb{0}", "-device", "kvaser_pci,canbus=cb{0}"]
 # Instruction clocks: 250 million a second, idle time is the host's; 500 million, idle time is skipped, so that who sleeps
-# wakes in time whatever else the host does; as that, but idle time is the host's, as a disk is waited for; 1000 million, about what a
-# core of a board does (docs/boards.md), idle time is skipped.
+# wakes in time whatever else the host does; as that, but idle time is the host's, as a disk is waited for; 1000 million, which is
+# qemu's largest, idle time is skipped.
 SLOW, FAST, SYSTEM, BOARD = "shift=2,sleep=on", "shift=1,sleep=off", "shift=1,sleep=on", "shift=0,sleep=off"
-GUEST_S = 3600  # on this computer's clock, which may do much else
+# Million instructions a second of a guest's processor for `waymark hil`: of those that one core of a board does, 1400 to 4000 (docs/boards.md).
+MIPS, MIPS_LEAST, MIPS_MOST = 2000, 1000, 4000
+GUEST_S = 3600  # of a processor's time: a busy desk gives a guest a tenth of one
+BUSY_DESK = 10
 _ARM = {"qemu": ["qemu-system-aarch64", "-machine", "virt", "-cpu", "cortex-a57"], "console": "ttyAMA0"}
 # What a guest is made of, by Debian's name of its architecture; `cc` makes helpers for it.
 MACHINES = {
@@ -31,6 +34,18 @@ _NEEDS = {"qemu-system-x86_64": "qemu-system-x86", "qemu-system-aarch64": "qemu-
           "qemu-arm-static": "qemu-user-static", "qemu-aarch64-static": "qemu-user-static"}
 
 
+def at_rate(arch, mips):
+    """(the machine, words for its kernel) for so many million instructions a second by the guest's own clock. qemu's instruction clock does 1000 at
+    most, with a counter of time at 1 GHz. A guest that takes this counter for a faster one has a longer second, with more instructions."""
+    machine = dict(MACHINES[arch])
+    if mips == MIPS_LEAST:
+        return machine, ""
+    if arch == "amd64":  # the counter's rate is not measured again, and the kernel does not compare it with slower clocks
+        return machine, f"tsc_early_khz={1000 * mips} tsc=reliable"
+    machine["qemu"] = [*machine["qemu"][:-1], f"{machine['qemu'][-1]},cntfrq={1000000 * mips}"]
+    return machine, ""
+
+
 def buses(count):
     """Options for so many buses."""
     return [word.format(number) for number in range(count) for word in _BUS]
@@ -41,6 +56,11 @@ def cache():
     if given := os.environ.get("WAYMARK_HIL_CACHE"):
         return pathlib.Path(given)
     return pathlib.Path(os.environ.get("XDG_CACHE_HOME") or pathlib.Path.home() / ".cache") / "waymark/hil"
+
+
+def folder_of(arch):
+    """Where an architecture's image is: one for all tests."""
+    return cache() if arch == "amd64" else cache() / arch
 
 
 def missing(arch, has_image=False):
@@ -76,12 +96,21 @@ def command_of(image, machine, share, script, devices=(), clock=SLOW, init="", m
         "-display", "none", "-monitor", "none", "-serial", "stdio", *(() if "-nic" in devices else ("-nic", "none")), *devices)]
 
 
+def processor_s(pid):
+    """A process's time on processors until now."""
+    try:
+        words = pathlib.Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()
+    except OSError:
+        return 0.0
+    return (int(words[11]) + int(words[12])) / os.sysconf("SC_CLK_TCK")
+
+
 def boot(command, log, limit_s=GUEST_S, watch=None):
-    """Runs a guest; what it prints is kept in `log`, and new lines go to `watch`. Judged by its last word, not by qemu's. After the word
+    """Runs a guest, for so much of a processor's time; what it prints is kept in `log`, and new lines go to `watch`. Judged by its last word, not by qemu's. After the word
     NO MORE POWER it is killed at a random moment, as a cut of the power would: what it has given to its disk is there."""
     with open(log, "w", encoding="utf-8") as out:
         guest = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=out, stderr=subprocess.STDOUT)
-    end_s, has_power, seen = time.monotonic() + limit_s, True, 0
+    end_s, has_power, is_late, seen = time.monotonic() + BUSY_DESK * limit_s, True, False, 0
     try:
         while guest.poll() is None:
             text = log.read_text(errors="replace")
@@ -94,7 +123,8 @@ def boot(command, log, limit_s=GUEST_S, watch=None):
             has_power = "NO MORE POWER" not in text
             if not has_power:
                 time.sleep(random.uniform(0, 3))
-            if not has_power or time.monotonic() > end_s:
+            is_late = has_power and (processor_s(guest.pid) > limit_s or time.monotonic() > end_s)
+            if not has_power or is_late:
                 guest.kill()
                 guest.wait()
             time.sleep(0.5)
@@ -102,4 +132,7 @@ def boot(command, log, limit_s=GUEST_S, watch=None):
         if guest.poll() is None:
             guest.kill()
             guest.wait()
+    if is_late:
+        with open(log, "a", encoding="utf-8") as out:
+            out.write(f"\nthe guest was ended by the desk: it was not done after {limit_s:.0f} s of a processor, or {BUSY_DESK * limit_s:.0f} s in all\n")
     return "GUEST-RC 0" in log.read_text(errors="replace") or not has_power

@@ -14,7 +14,7 @@ import time
 
 from waymark_fleet.plan import PlanError, desk_program
 
-from . import HilError, compare, guest, limits, page, recording, scenario, targets, verdict
+from . import HilError, compare, fault_judge, guest, limits, page, recording, scenario, targets, verdict
 from .judge import Judge
 from .progress import Progress
 
@@ -47,6 +47,8 @@ def parser():
     out.add_argument("--record", action="store_true", help="the target records beside the run, and its stamps are judged datum by datum")
     out.add_argument("--program", metavar="FILE", help="the waymark of --guest amd64 and --local; this one by default")
     out.add_argument("--package", metavar="FILE", help="the package that a guest installs; needed for arm64 and armhf")
+    out.add_argument("--mips", metavar="N", type=int, default=guest.MIPS,
+                     help=f"million instructions a second of a guest's one processor, {guest.MIPS_LEAST} to {guest.MIPS_MOST} (default {guest.MIPS})")
     out.add_argument("--played", metavar="FILE", help="--local: a waymark with a recording in the place of the kernel's drivers (build/tests/waymark-played)")
     out.add_argument("--compare", metavar=("BEFORE", "AFTER"), nargs=2, help="folders of two tests; or with REC two programs, packages or configurations, which are tested first")
     out.add_argument("--json", action="store_true", help="print result.json")
@@ -86,7 +88,9 @@ def _target(given, waymark):
     if given.host:
         return targets.Host(given.host, shlex.split(given.ssh), pairs)
     if given.guest:
-        return targets.Guest(given.guest, program, given.package)
+        if not guest.MIPS_LEAST <= given.mips <= guest.MIPS_MOST:
+            raise HilError(f"--mips {given.mips}: {guest.MIPS_LEAST} to {guest.MIPS_MOST} million instructions a second are possible")
+        return targets.Guest(given.guest, program, given.package, given.mips)
     if given.local:
         return targets.Local(program, given.played)
     raise HilError("where? --guest amd64, --host USER@BOARD or --local (waymark hil --help)")
@@ -142,11 +146,11 @@ def _played_world(folder, given, buses, cameras):
     (played / "devices").write_text("".join([f"{run} can:{name}\n" for name, run in buses] + [f"{camera['device']} camera:{camera['name']}\n" for camera in cameras]))
 
 
-def _runner_plan(faults, end_s, played):
-    """faults.plan: those that happen to the computer and its processes, and to adapters that no played driver takes away."""
+def _runner_plan(faults, from_s, end_s, played):
+    """faults.plan: those that happen to the computer and its processes, and to adapters that no played driver takes away, in the part that is played."""
     lines = []
     for number, fault in enumerate(faults):
-        if fault["by"] != "runner" or (played and fault.get("by_played_driver")):
+        if fault["by"] != "runner" or (played and fault.get("by_played_driver")) or not fault_judge.is_in(fault, from_s, end_s):
             continue
         until_s = fault.get("until_s")
         numbers = [fault.get(key) for key in ("free_kb", "share", "cpus") if key in fault]
@@ -175,7 +179,7 @@ def _write_plan(folder, given, target, rec, faults, derived, waymark):
     play += ["--from", f"{from_s:g}"] if from_s else []
     play += ["--until", f"{until_s:g}"] if given.until_s is not None else []
     bits = max((bus.bits / max(rec.seconds, 1) for bus in rec.buses), default=0)
-    runner = _runner_plan(faults, until_s, target.played)
+    runner = _runner_plan(faults, from_s, until_s, target.played)
     (folder / "faults.plan").write_text(runner)
     is_local = target.where == "local"
     plays = not target.played or bool(rec.streams or rec.has_sightings)
@@ -194,6 +198,18 @@ def _write_plan(folder, given, target, rec, faults, derived, waymark):
             "map": str((folder / config["map"]).resolve()) if "map" in config else None}
 
 
+def _begin_later(config, folder, rec, from_s, waymark):
+    """With --from the start pose is where a replay of what comes before ends: that of the recording is of its first moment."""
+    if from_s <= 0 or "initial_pose" not in config:
+        return
+    before = folder / "before"
+    done = subprocess.run([waymark, "replay", rec.path, "--config", folder / "robot.yaml", "--until", f"{from_s + 0.2:g}", "--out", before],
+                          capture_output=True, text=True, check=False)
+    if done.returncode or not scenario.begin_at(config, folder, before / "published.csv", rec.first_ns + round(from_s * 1e9)):
+        raise HilError(f"--from {from_s:g}: a replay until there gives no start pose: {(done.stderr.strip() or 'no pose').splitlines()[-1]}")
+    shutil.rmtree(before)
+
+
 def _folder_of(given, rec, target):
     """The test's folder, new: one that has another test's files is refused, unless it is one of ours."""
     name = re.sub(r"[^\w.-]+", "-", f"hil-{rec.name}-{target.name}")
@@ -208,6 +224,7 @@ def _folder_of(given, rec, target):
 def test(given, beside, types):
     """Runs and judges one test. Its result, as result.json has it."""
     waymark = desk_program("waymark", beside)[0]
+    sheet = page.sheet(beside)  # a program that is missing is known before the test, not after it
     if not given.config:
         raise HilError("--config FILE is needed: the robot's configuration")
     rec = recording.read(given.recording)
@@ -222,6 +239,7 @@ def test(given, beside, types):
     survives = any(fault["fault"] in ("process_killed", "power_cut") for fault in faults)
     derived = scenario.derive(given.config, rec, folder, target.single_core, survives)
     os.symlink(rec.path.resolve(), folder / "recording")
+    _begin_later(derived[0], folder, rec, given.from_s, waymark)
     if target.played:
         _played_world(folder, given, derived[1], derived[2])
     facts = _write_plan(folder, given, target, rec, faults, derived, waymark)
@@ -233,11 +251,11 @@ def test(given, beside, types):
     judge.all(is_good)
     progress.end()
     computer = (folder / "out/computer.txt").read_text(errors="replace").split("\n") if (folder / "out/computer.txt").exists() else []
-    result = {"name": f"waymark hil {rec.name}", "recording": rec.name, "config": str(given.config), "target": target.name, "computer": [line for line in computer if line],
+    result = {"name": f"waymark hil {rec.name}", "recording": rec.name, "config": str(given.config), "target": target.name, "computer": [*(line for line in computer if line), *target.computer],
               "seconds": facts["seconds"], "took_s": round(time.monotonic() - begun_s, 1), "figures": {k: v for k, v in judge.figures.items() if v is not None},
               "threads": getattr(judge, "threads", []), "play": judge.played.get("streams", []), "per_second": page.per_second(judge.series)}
     result = verdict.write(folder, result, checks, judge.said[-20000:])
-    (folder / "report.html").write_text(page.make(page.sheet(beside), result, judge.series, faults), encoding="utf-8")
+    (folder / "report.html").write_text(page.make(sheet, result, judge.series, faults), encoding="utf-8")
     for name in ("same", "desk", "state"):
         shutil.rmtree(folder / name, ignore_errors=True)
     for again in folder.glob("again-*"):

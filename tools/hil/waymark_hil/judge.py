@@ -34,7 +34,7 @@ class Judge:
         # The recording's first datum on the target's clock; --from is due at the stamp of the file.
         self.start_ns = int(start) - round(facts["from_s"] * 1e9) if start.isdigit() else None
         self.faults = facts.get("faults") or []
-        self.before_faults_s = min((fault["from_s"] for fault in self.faults), default=float("inf"))
+        self.before_faults_s = min((fault["from_s"] for fault in self.faults if fault_judge.is_in(fault, facts["from_s"], facts["until_s"])), default=float("inf"))
 
     def replay(self, *words):
         """`waymark replay`; its output. HilError with its last line."""
@@ -115,11 +115,16 @@ class Judge:
         heard_poses, healths = lcm_log.heard(self.types, self.out / "heard.lcm", self.facts["prefix"])
         return [p for _, p in heard_poses if p.t_ns > 0], [h for _, h in healths]
 
+    def _part(self):
+        """Words for a replay of the part that was played, and a little more: the poses of its end lie between two."""
+        words = ["--from", f"{self.facts['from_s']:g}"] if self.facts["from_s"] > 0 else []
+        return words + (["--until", f"{self.facts['until_s'] + 1:g}"] if self.facts["is_cut"] else [])
+
     def _reference(self, offset_ns):
-        """Where the robot was, on the target's clock: truth where there is one, else the replay of the whole recording."""
+        """Where the robot was, on the target's clock: truth where there is one, else the replay at the desk."""
         truth = self.facts["recording"] / "truth.csv"
         rows = poses.table(truth) if truth.is_file() else poses.table(self.folder / "desk/published.csv")
-        return [((t + offset_ns - self.start_ns) * 1e-9, x, y, heading, z) for t, x, y, heading, z in rows], "truth" if truth.is_file() else "replay of the whole recording"
+        return [((t + offset_ns - self.start_ns) * 1e-9, x, y, heading, z) for t, x, y, heading, z in rows], "truth" if truth.is_file() else "replay at the desk"
 
     def poses(self):
         """Poses over LCM beside the replay of what the run saw, and beside the truth."""
@@ -130,8 +135,8 @@ class Judge:
             self.checks.add("poses", "heard", False, f"{len(self.heard)} poses were heard over LCM")
             return
         try:
-            said = self.replay(recording, "--config", config, "--frames-of", log, "--out", self.folder / "same")
-            self.replay(recording, "--config", config, "--out", self.folder / "desk")
+            said = self.replay(recording, "--config", config, *self._part(), "--frames-of", log, "--out", self.folder / "same")
+            self.replay(recording, "--config", config, *self._part(), "--out", self.folder / "desk")
         except HilError as error:
             self.checks.add("poses", "replay at the desk", False, str(error))
             return
@@ -208,7 +213,7 @@ class Judge:
                             + ("" if sent is None else f", {sent} sent"), float(errors), 0.0)
 
     def timing(self):
-        """Deadlines, wake-ups beside cyclictest, memory."""
+        """Deadlines, wake-ups beside cyclictest, memory. Where faults are, their bounds of rate and gaps judge what a missed deadline does."""
         timing = load(self.drives[0] / "timing.json", {}) if self.drives else {}
         if len(self.drives) > 1:
             timing = load(self.drives[-1] / "timing.json", {})
@@ -217,7 +222,7 @@ class Judge:
             return
         missed, total = timing["deadlines_missed"], max(timing["deadlines_total"], 1)
         limit = self.limits["deadlines_missed_share"]
-        self.checks.add("timing", "deadlines", None if limit is None else missed / total <= limit, f"{missed} of {total} missed", missed / total, limit)
+        self.checks.add("timing", "deadlines", None if limit is None or self.faults else missed / total <= limit, f"{missed} of {total} missed", missed / total, limit)
         self.figures |= {"deadlines_missed_share": missed / total}
         for stage in ("wake", "loop", "correct", "detect", "send", "predict"):
             if (timing.get(stage) or {}).get("count"):
@@ -279,7 +284,9 @@ class Judge:
             elif event == "begin":
                 done[int(number)] = {"done": True}
         for number, fault in enumerate(self.faults):
-            if fault["name"] in self.facts["left_out"]:
+            if not fault_judge.is_in(fault, self.facts["from_s"], self.facts["until_s"]):
+                done[number] = {"done": False, "absent": True, "why": "not in the part that was played"}
+            elif fault["name"] in self.facts["left_out"]:
                 done[number] = {"done": False, "absent": True, "why": "not on this target: its controllers cannot be told to do it"}
             elif self.facts["played"] and fault.get("by_played_driver"):
                 done[number] = {"done": True}

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The robot's configuration for a target, derived from the user's and the recording: its files, and devices that the player feeds."""
+import csv
 import pathlib
 import re
 import shutil
@@ -99,6 +100,21 @@ def _start(recording):
     """The recording's start pose. Its stamp is of the recording's clock, and near the first motion: it is left out."""
     start = (recording.about.get("vehicle") or {}).get("initial_pose")
     return {key: value for key, value in start.items() if key != "t_ns"} if isinstance(start, dict) else None
+
+
+def begin_at(config, folder, published, t_ns):
+    """Writes FOLDER/robot.yaml anew with a start pose at t_ns of the recording's clock: the last that a replay published until then. What the
+    start pose states beside the place (its sigmas) stays. False where the replay had none."""
+    with open(published, newline="", encoding="utf-8") as file:
+        rows = [row for row in csv.DictReader(file) if int(row["t_ns"]) <= t_ns]
+    if not rows:
+        return False
+    start = {key: value for key, value in config["initial_pose"].items() if key.startswith("sigma_")}
+    has_height = "z_m" in config["initial_pose"]
+    keys = ["x_m", "y_m", *(["z_m"] if has_height else []), "qx", "qy", "qz", "qw"]
+    config["initial_pose"] = {**{key: rows[-1][key] for key in keys}, **start}
+    (folder / "robot.yaml").write_text(dump(config), encoding="utf-8")
+    return True
 
 
 def derive(path, recording, folder, single_core, survives):

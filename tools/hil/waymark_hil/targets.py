@@ -20,6 +20,7 @@ class Target:
     """A place with interfaces. `name` is for people; `plan` has what plan.sh needs beside the recording's facts."""
 
     name, where, single_core = "", "local", False
+    computer = []  # facts that the target does not have of itself
     played = None  # program with a recording in the place of the kernel's drivers
 
     def player_of(self, interface):
@@ -95,10 +96,11 @@ class Guest(Target):
 
     where, single_core = "guest", True
 
-    def __init__(self, arch, program, package):
-        self.arch, self.program, self.package = arch, program, package
-        self.name = f"guest {arch}"
-        self.folder = guest.cache() if arch == "amd64" else guest.cache() / arch
+    def __init__(self, arch, program, package, mips=guest.MIPS):
+        self.arch, self.program, self.package, self.mips = arch, program, package, mips
+        self.name = f"guest {arch}" + ("" if mips == guest.MIPS else f", {mips} MIPS")
+        self.computer = [f"one processor that does {mips} million instructions a second"]
+        self.folder = guest.folder_of(arch)
         if arch != "amd64" and not package:
             raise HilError(f"--guest {arch} needs --package FILE.deb, Waymark's package for {arch} (./dev board arm64 package)")
 
@@ -129,8 +131,8 @@ class Guest(Target):
                 if path.name not in ("share", "out", "state"):
                     tar.add(path, path.name)
         megabytes = (share / "test.tar").stat().st_size >> 20
-        machine = guest.MACHINES[self.arch]
-        command = guest.command_of(self.image, machine, share, "hil.sh", guest.buses(len(facts["buses"])), guest.BOARD, memory_mb=1024 + 4 * megabytes)
+        machine, words = guest.at_rate(self.arch, self.mips)
+        command = guest.command_of(self.image, machine, share, "hil.sh", guest.buses(len(facts["buses"])), guest.BOARD, words, memory_mb=1024 + 4 * megabytes)
         limit_s = 300 + 20 * facts["seconds"]
         is_good = guest.boot(command, folder / "target.log", limit_s, progress.line)
         for path in (share / "out").iterdir():
@@ -145,7 +147,7 @@ class Host(Target):
     where = "host"
 
     def __init__(self, address, options, pairs):
-        self.address, self.options, self.pairs = address, options, pairs
+        self.address, self.options, self.pairs, self.as_root = address, options, pairs, ""
         self.name = f"host {address}"
 
     def player_of(self, interface):
@@ -161,9 +163,15 @@ class Host(Target):
         return done.stdout.strip()
 
     def prepare(self, progress):
-        found = self._ask("command -v bash >/dev/null && waymark --version && nproc")
-        self.single_core = found.splitlines()[-1] == "1"
-        progress.say(f"{self.address}: {found.splitlines()[0]}")
+        # Interfaces, modules and real-time priorities take root, as the service of the run has it.
+        found = self._ask("command -v bash >/dev/null && waymark --version && nproc && id -u && { sudo -n true >/dev/null 2>&1 && echo sudo || echo alone; }")
+        version, *_, processors, user, may = found.splitlines()
+        self.single_core = processors == "1"
+        if user != "0" and may != "sudo":
+            raise HilError(f"{self.address}: this user is not root, and may not use sudo without a password (`sudo -n true` fails): "
+                           "add it to /etc/sudoers.d with NOPASSWD: ALL, or name root@...")
+        self.as_root = "" if user == "0" else "sudo -n "
+        progress.say(f"{self.address}: {version}{', by sudo' if self.as_root else ''}")
 
     def run(self, folder, facts, progress):
         place = self._ask("mktemp -d /tmp/waymark-hil-XXXXXX")
@@ -178,12 +186,12 @@ class Host(Target):
             sent.stdin.close()
             if sent.wait():
                 raise HilError(f"{self.address}: the test could not be copied to {place}")
-            code = _run(self._ssh(f"exec bash {place}/target/drive.sh"), folder / "target.log", progress)
-            fetched = subprocess.Popen(self._ssh(f"tar -C {place} -cf - out"), stdout=subprocess.PIPE, stdin=subprocess.DEVNULL)
+            code = _run(self._ssh(f"exec {self.as_root}bash {place}/target/drive.sh"), folder / "target.log", progress)
+            fetched = subprocess.Popen(self._ssh(f"{self.as_root}tar -C {place} -cf - out"), stdout=subprocess.PIPE, stdin=subprocess.DEVNULL)
             with tarfile.open(fileobj=fetched.stdout, mode="r|") as tar:
                 tar.extractall(folder, **({"filter": "data"} if hasattr(tarfile, "data_filter") else {}))
             if fetched.wait():
                 raise HilError(f"{self.address}: out/ could not be copied back")
             return code == 0
         finally:
-            subprocess.run(self._ssh(f"rm -rf {place}"), check=False, stdin=subprocess.DEVNULL, capture_output=True, timeout=60)
+            subprocess.run(self._ssh(f"{self.as_root}rm -rf {place}"), check=False, stdin=subprocess.DEVNULL, capture_output=True, timeout=60)
