@@ -253,6 +253,7 @@ wm_status csv_read(csv_reader *self, csv_row *row, wm_error *err) {
     return csv_fail(self, err, WM_BAD_DATA, text);
   }
   row->line = self->lines.number;
+  row->name = "", row->name_length = 0;
   for (size_t i = 0; self->format->columns[i].name; i++) {
     const csv_column *column = &self->format->columns[i];
     csv_field field = self->place[i] >= 0 ? self->fields[self->place[i]] : (csv_field){"", 0};

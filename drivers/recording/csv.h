@@ -38,7 +38,7 @@ typedef struct csv_format {
 typedef struct csv_row {
   int64_t whole[CSV_COLUMNS_MAX];  // CSV_TIME and CSV_WHOLE; WM_TIME_NONE where absent
   double number[CSV_COLUMNS_MAX];  // CSV_NUMBER; NaN where absent
-  const char *name;                // CSV_NAME; not terminated, holds until the next row
+  const char *name;                // CSV_NAME, "" where absent; not terminated, holds until the next row
   size_t name_length;
   long line;
 } csv_row;

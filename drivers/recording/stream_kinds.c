@@ -136,12 +136,27 @@ static const char *fill_corners(const fill_context *self, const csv_row *row, wm
   return wm_corner_reader_pose(self->corners, px, row->number[FIRST + 10], &out->as.marker);
 }
 
+// 64 hexadecimal digits, the first word's first; nothing: none. False: neither.
+static int read_appearance(const csv_row *row, uint64_t out[4]) {
+  memset(out, 0, 4 * sizeof out[0]);
+  if (row->name_length == 0) return 1;
+  if (row->name_length != 64) return 0;
+  for (size_t i = 0; i < 64; i++) {
+    const char c = row->name[i];
+    const int digit = c >= '0' && c <= '9' ? c - '0' : c >= 'a' && c <= 'f' ? c - 'a' + 10 : -1;
+    if (digit < 0) return 0;
+    out[i / 16] = out[i / 16] << 4 | (uint64_t)digit;
+  }
+  return 1;
+}
+
 static const char *fill_stereo(const fill_context *self, const csv_row *row, wm_event *out) {
   (void)self;
   const double *px = &row->number[FIRST + 1];
   if (isnan(px[0]) != isnan(px[1]) || isnan(px[2]) != isnan(px[3])) return "one of u and v is empty";
   if (isnan(px[0]) && isnan(px[2])) return "no camera sees the point";
   out->as.stereo = (wm_stereo){.id = (int32_t)row->whole[FIRST], .left_px = {px[0], px[1]}, .right_px = {px[2], px[3]}};
+  if (!read_appearance(row, out->as.stereo.appearance)) return "appearance is not 64 hexadecimal digits (0-9, a-f)";
   return NULL;
 }
 
@@ -341,7 +356,8 @@ const stream_kind kStreamStereo = {"stereo.csv",
                                      {"ul_px", CSV_NUMBER, CSV_MAY_EMPTY, PIXEL},
                                      {"vl_px", CSV_NUMBER, CSV_MAY_EMPTY, PIXEL},
                                      {"ur_px", CSV_NUMBER, CSV_MAY_EMPTY, PIXEL},
-                                     {"vr_px", CSV_NUMBER, CSV_MAY_EMPTY, PIXEL}}},
+                                     {"vr_px", CSV_NUMBER, CSV_MAY_EMPTY, PIXEL},
+                                     {"appearance", CSV_NAME, CSV_OPTIONAL, 0, 0}}},
                                    .fill = fill_stereo};
 
 const stream_kind kStreamPoints = {"points.csv",

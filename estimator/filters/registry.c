@@ -23,7 +23,8 @@ int wm_estimator_reads(const wm_estimator *estimator, const char *key) {
 }
 
 const wm_keeper *wm_keeper_of(const wm_estimator *estimator) {
-  return estimator == &wm_slam_estimator ? &wm_slam_keeper : NULL;
+  if (estimator == &wm_slam_estimator) return &wm_slam_keeper;
+  return estimator == &wm_stereo_ekf_estimator ? &wm_stereo_ekf_keeper : NULL;
 }
 
 const wm_estimator *wm_estimator_find(const char *name) {

@@ -17,6 +17,7 @@ extern const wm_estimator wm_pf_edges_estimator;
 extern const wm_estimator wm_stereo_ekf_estimator;
 extern const wm_estimator wm_slam_estimator;
 extern const wm_keeper wm_slam_keeper;
+extern const wm_keeper wm_stereo_ekf_keeper;
 
 #ifdef __cplusplus
 }

@@ -36,7 +36,8 @@ const config_key kConfigKeys[] = {
      "File that keeps the robot's last pose, on devices: a run begins there, if it isn't older than start.max_age_s, "
      "whatever `initial_pose` is."},
     {"start.saved_map", "path", "none",
-     "File for the map of `slam`, on devices, with its covariances and the calibration states. The next run continues "
+     "File for the map of `slam`, or of `stereo_ekf` with slam.key_frames, on devices, with its covariances and the "
+     "calibration states. The next run continues "
      "with it, if estimator, parameters and calibration are the same. Its start pose is `start.saved_pose`; without "
      "one the robot is relocalized in the map."},
     {"black_box.folder", "path", "none",

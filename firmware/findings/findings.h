@@ -91,6 +91,8 @@ extern const wm_finding_kind kFindingKinds[WM_FOUND_COUNT];
 typedef enum wm_severity { WM_SEVERITY_GOOD, WM_SEVERITY_NOTE, WM_SEVERITY_BAD } wm_severity;
 // "good", "note", "bad"
 const char *wm_severity_name(unsigned severity);
+// Of a share of updates that gates refused.
+wm_severity wm_refused_severity(uint64_t refused, uint64_t updates);
 
 #define WM_FINDING_ABOUT_MAX 48
 #define WM_FINDING_FIX_MAX 320

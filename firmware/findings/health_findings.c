@@ -9,6 +9,9 @@
 // Shares of a source's observations that the gate refused. With good configurations at most 14 % (docs/check.md).
 #define REFUSED_NOTE 0.07
 #define REFUSED_BAD 0.20
+// Detectors with this share of false detections exist (echoes, misread codes), and a drive draws more or fewer. Beyond
+// so many standard deviations of the draw, less than one of a thousand drives has as many.
+#define REFUSED_SIGMAS 3.1
 // Of the estimator's cycles. A robot's loop misses none; a computer that is shared with other work misses a few.
 #define DEADLINES_NOTE 0.001
 
@@ -81,12 +84,21 @@ static void about_device(const wm_source_health *s, wm_findings *out) {
           wm_device_state_name(s->device));
 }
 
+wm_severity wm_refused_severity(uint64_t refused, uint64_t updates) {
+  const double n = (double)updates, share = updates > 0 ? (double)refused / n : 0;
+  if (share <= REFUSED_NOTE) return WM_SEVERITY_GOOD;
+  const double drawn = updates > 0 ? REFUSED_SIGMAS * sqrt(REFUSED_BAD * (1 - REFUSED_BAD) / n) : 0;
+  return share > REFUSED_BAD + drawn ? WM_SEVERITY_BAD : WM_SEVERITY_NOTE;
+}
+
 static void about_refused(const wm_source_health *s, wm_findings *out) {
   const uint64_t refused = s->rejected[WM_REJECTED_GATE] + s->rejected[WM_REJECTED_SEARCHING], all = refused + s->fused;
   const uint64_t unknown = s->rejected[WM_REJECTED_UNKNOWN_ID];
   const double share = all > 0 ? (double)refused / (double)all : 0;
-  if (all >= OBSERVATIONS_MIN && share > REFUSED_NOTE && !wm_findings_has(out, WM_FOUND_OBSERVATIONS_REFUSED, s->name))
-    wm_find(out, WM_FOUND_OBSERVATIONS_REFUSED, share > REFUSED_BAD ? WM_SEVERITY_BAD : WM_SEVERITY_NOTE, s->name, NULL,
+  const wm_severity severity = wm_refused_severity(refused, all);
+  if (all >= OBSERVATIONS_MIN && severity != WM_SEVERITY_GOOD &&
+      !wm_findings_has(out, WM_FOUND_OBSERVATIONS_REFUSED, s->name))
+    wm_find(out, WM_FOUND_OBSERVATIONS_REFUSED, severity, s->name, NULL,
             "%.0f of 100 of its observations contradict the pose and were refused", 100 * share)
         ->size = share;
   if (unknown >= OBSERVATIONS_MIN && unknown > s->received / 2)
@@ -114,7 +126,7 @@ const char *wm_cause_text(unsigned cause) {
                                                      "is refused",
                                                      "has innovations that are larger than stated",
                                                      "has biased innovations",
-                                                     "contradicts poses soon after they are found",
+                                                     "contradicted the last pose; the one found since is on probation",
                                                      "has unknown identities",
                                                      "is silent",
                                                      "does not reach the pose",

@@ -11,8 +11,7 @@
 #include "output/likelihood.h"
 
 #define OBSERVATIONS_MIN 20
-#define REFUSED_NOTE 0.07
-#define REFUSED_BAD 0.20
+#define REFUSED_BAD 0.20  // as in health_findings.c
 #define LOST_BAD 0.05
 #define SQUARES_BAD 3.0  // mean square of innovations over their sigma; 1 is expected, correlated errors make it less
 #define DEGRADED_NOTE 0.01  // good drives are degraded for less
@@ -133,8 +132,9 @@ static void refused(const drive_evidence *self, const wm_assembly *assembly, siz
   }
   const char *name = wm_assembly_source_name(assembly, i);
   const double share = fused + refused > 0 ? (double)refused / (double)(fused + refused) : 0;
-  if (fused + refused >= OBSERVATIONS_MIN && share > REFUSED_NOTE)
-    wm_find(out, WM_FOUND_OBSERVATIONS_REFUSED, share > REFUSED_BAD ? WM_SEVERITY_BAD : WM_SEVERITY_NOTE, name, NULL,
+  const wm_severity severity = wm_refused_severity(refused, fused + refused);
+  if (fused + refused >= OBSERVATIONS_MIN && severity != WM_SEVERITY_GOOD)
+    wm_find(out, WM_FOUND_OBSERVATIONS_REFUSED, severity, name, NULL,
             "%.0f of 100 of its updates contradict the pose and are refused", 100 * share)
         ->size = share;
   if (squares > SQUARES_BAD)

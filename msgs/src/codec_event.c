@@ -34,6 +34,9 @@ static void put_field(wm_writer *w, const wm_event *e, const wm_event_field *fie
   switch ((wm_field_type)field->type) {
     case WM_FIELD_F64: wm_put_f64s(w, at, field->count); break;
     case WM_FIELD_I64: wm_put_i64(w, *(const int64_t *)at); break;
+    case WM_FIELD_U64:
+      for (size_t i = 0; i < field->count; i++) wm_put_u64(w, ((const uint64_t *)at)[i]);
+      break;
     case WM_FIELD_I32: wm_put_i32(w, *(const int32_t *)at); break;
     case WM_FIELD_U16: wm_put_u16(w, *(const uint16_t *)at); break;
   }
@@ -96,6 +99,9 @@ static void get_field(wm_reader *r, unsigned version, const wm_event_field *fiel
   switch ((wm_field_type)field->type) {
     case WM_FIELD_F64: get_numbers(r, version, field, at); break;
     case WM_FIELD_I64: *(int64_t *)at = wm_get_i64(r); break;
+    case WM_FIELD_U64:
+      for (size_t i = 0; i < field->count; i++) ((uint64_t *)at)[i] = version < field->since ? 0 : wm_get_u64(r);
+      break;
     case WM_FIELD_I32: *(int32_t *)at = wm_get_i32(r); break;
     case WM_FIELD_U16: *(uint16_t *)at = wm_get_u16(r); break;
   }

@@ -29,7 +29,8 @@ static const wm_event_field kMarker[] = {FIELD(marker, sensor, U16),
                                          FIELD_FROM(marker, yaw_sigma_rad, F64, 1, 0, 4),
                                          FIELD_FROM(marker, bloom_px, F64, 1, 0, 4)};
 static const wm_event_field kStereo[] = {FIELD(stereo, id, I32), FIELDS(stereo, left_px, F64, 2),
-                                         FIELDS(stereo, right_px, F64, 2)};
+                                         FIELDS(stereo, right_px, F64, 2),
+                                         FIELD_FROM(stereo, appearance, U64, 4, 6, 0)};
 static const wm_event_field kLooked[] = {FIELD(looked, sensor, U16)};
 static const wm_event_field kSetPose[] = {FIELDS(set_pose, pose_map_base.p_m, F64, 3),
                                           FIELDS(set_pose, pose_map_base.q_xyzw, F64, 4),

@@ -7,15 +7,11 @@
 #include <map>
 #include <memory>
 
-#include "montecarlo/montecarlo.h"
+#include "montecarlo/six.h"
 #include "simulate/simulate.h"
 
 namespace wm::montecarlo {
-namespace {
 
-constexpr size_t kPoints = 1024;
-
-// calibration.yaml's part that the estimator needs: the pair of the scenario's stereo sensor.
 wm_rig rig_of(const sim::Scenario &scenario) {
   wm_rig rig;
   wm_rig_init(&rig);
@@ -47,7 +43,6 @@ wm_rig rig_of(const sim::Scenario &scenario) {
   return rig;
 }
 
-// By stamp, motion first, then as the sources stand.
 std::vector<wm_event> events_of(const sim::Recording &recording) {
   std::vector<wm_event> out;
   const auto add = [&](const auto &seen, wm_event_kind kind, uint16_t source) -> wm_event & {
@@ -78,8 +73,11 @@ std::vector<wm_event> events_of(const sim::Recording &recording) {
     seen.bearing_rad = s.bearing_rad;
     seen.range_m = s.range_m;
   }
-  for (const sim::StereoSeen &s : recording.stereo)
-    add(s, WM_EVENT_STEREO, 2).as.stereo = {s.id, {s.left_px[0], s.left_px[1]}, {s.right_px[0], s.right_px[1]}};
+  for (const sim::StereoSeen &s : recording.stereo) {
+    wm_stereo &seen = add(s, WM_EVENT_STEREO, 2).as.stereo;
+    seen = {s.id, {s.left_px[0], s.left_px[1]}, {s.right_px[0], s.right_px[1]}, {}};
+    std::copy(s.appearance, s.appearance + 4, seen.appearance);
+  }
   for (const sim::Fix &f : recording.fixes)
     add(f, WM_EVENT_POSITION, 3).as.position = {{f.p_m[0], f.p_m[1], f.p_m[2]}, f.sigma_xy_m, f.sigma_z_m};
   std::stable_sort(out.begin(), out.end(), [](const wm_event &a, const wm_event &b) {
@@ -87,15 +85,6 @@ std::vector<wm_event> events_of(const sim::Recording &recording) {
   });
   return out;
 }
-
-struct alignas(64) Block {
-  char bytes[64];
-};
-
-struct Error6 {
-  Eigen::Vector3d position, rotation;
-  double nees;
-};
 
 Error6 error_of(const wm_estimate &estimate, const sim::State6 &truth) {
   const double *q = estimate.pose_map_base.q_xyzw, *rpy = truth.rpy_rad.data();
@@ -114,6 +103,14 @@ Error6 error_of(const wm_estimate &estimate, const sim::State6 &truth) {
   out.nees = error.dot(P.ldlt().solve(error));
   return out;
 }
+
+namespace {
+
+constexpr size_t kPoints = 1024;
+
+struct alignas(64) Block {
+  char bytes[64];
+};
 
 // A point of the state, as it was last.
 struct Point {

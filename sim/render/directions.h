@@ -5,7 +5,7 @@
 
 #include <vector>
 
-#include "images/camera.h"
+#include "render/types.h"
 
 namespace wm::render {
 

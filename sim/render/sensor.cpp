@@ -67,7 +67,7 @@ double Sensor::vignetting_at(double u_px, double v_px) const {
   return std::max(1 - model_.vignetting * r2, 0.0);
 }
 
-void Sensor::develop(const Image &image, const Exposure &exposure, uint64_t frame, Picture8 &out) const {
+void Sensor::develop(const Image &image, const Exposure &exposure, uint64_t frame, images::Picture8 &out) const {
   out.width = image.width, out.height = image.height, out.channels = image.channels;
   out.bytes.resize(image.values.size());
   const auto gain = static_cast<float>(exposure.gain);

@@ -31,7 +31,7 @@ class Sensor {
   // `centre` in pixels is where vignetting is zero.
   Sensor(const SensorModel &model, uint64_t seed, int width, int height, const Vec2 &centre_px);
   // Develops a frame. Noise depends on (seed, frame, pixel) alone.
-  void develop(const Image &image, const Exposure &exposure, uint64_t frame, Picture8 &out) const;
+  void develop(const Image &image, const Exposure &exposure, uint64_t frame, images::Picture8 &out) const;
   double vignetting_at(double u_px, double v_px) const;
 
  private:

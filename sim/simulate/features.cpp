@@ -80,6 +80,24 @@ void see_marker(const Scenario &sc, size_t number, const Seen &seen, const Eigen
   out.markers.push_back(row);
 }
 
+namespace {
+
+// The 256 bits of a point's patch at one look: its own, or those of one of sixteen sorts of points that are everywhere,
+// with wrong ones.
+void look_at_patch(const Sensor &s, uint64_t seed, const FeatureDice &dice, uint64_t landmark, uint64_t out[4]) {
+  constexpr uint64_t kSorts = 16, kSort = UINT64_C(1) << 32, kBits = 256;
+  const Random random(seed);
+  const bool alike = random.uniform(Stream::appearance, landmark, kBits) < s.alike_fraction;
+  const uint64_t whose = alike ? kSort + landmark % kSorts : landmark;
+  for (uint64_t bit = 0; bit < kBits; bit++) {
+    const bool own = (alike ? Random(0) : random).uniform(Stream::appearance, whose, bit) < 0.5;
+    const bool wrong = dice.patch(bit) < s.appearance_noise;
+    out[bit / 64] = out[bit / 64] << 1 | static_cast<uint64_t>(own != wrong);
+  }
+}
+
+}  // namespace
+
 void see_stereo(const Scenario &sc, size_t number, const Seen &seen, const double left[2], const double right[2],
                 Recording &out) {
   const Sensor &s = sc.sensors[number];
@@ -103,6 +121,7 @@ void see_stereo(const Scenario &sc, size_t number, const Seen &seen, const doubl
     row.left_px[0] = s.size_px[0] * dice.anything(0);
     row.left_px[1] = s.size_px[1] * dice.anything(1);
   }
+  if (s.tracks) look_at_patch(s, out.seed, dice, seen.landmark, row.appearance);
   out.stereo.push_back(row);
 }
 

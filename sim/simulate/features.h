@@ -19,6 +19,7 @@ class FeatureDice {
   double outlier() const { return random_.uniform(Stream::feature_outlier, k_, base_ | 15); }
   double anything(uint64_t channel) const { return random_.uniform(Stream::feature_outlier, k_, base_ | channel); }
   double missed() const { return random_.uniform(Stream::feature_missed, k_, base_); }
+  double patch(uint64_t bit) const { return random_.uniform(Stream::appearance_noise, k_ << 8 | bit, base_ >> 4); }
   double one_side() const { return random_.uniform(Stream::feature_missed, k_, base_ | 1); }
 
  private:

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <map>
 
 #include "simulate/angle.h"
 #include "simulate/features.h"
@@ -119,6 +120,24 @@ void look_for_landmarks(const Scenario &sc, size_t number, Recording &r) {
   });
 }
 
+// A tracker gives a point that comes back after a second another number.
+void number_tracks(Recording &r) {
+  constexpr wm_time_ns kForgotten_ns = WM_NS_PER_S;
+  struct Track {
+    wm_time_ns seen_ns;
+    int32_t number;
+  };
+  std::map<int32_t, Track> tracks;
+  int32_t next = 1 << 30;  // as our detector's
+  for (StereoSeen &row : r.stereo) {
+    const auto [at, is_new] = tracks.try_emplace(row.id, Track{row.t_ns, 0});
+    Track &track = at->second;
+    if (is_new || row.t_ns - track.seen_ns > kForgotten_ns) track.number = next++;
+    track.seen_ns = row.t_ns;
+    row.id = track.number;
+  }
+}
+
 void look_by_stereo(const Scenario &sc, size_t number, Recording &r) {
   const Sensor &s = sc.sensors[number];
   const StereoPair pair = StereoPair::drawn(s, sc.errors, r.seed);
@@ -131,6 +150,7 @@ void look_by_stereo(const Scenario &sc, size_t number, Recording &r) {
         see_stereo(sc, number, {k, i, l.id, t_ns, arrival_ns}, left, right, r);
     }
   });
+  if (s.tracks) number_tracks(r);
 }
 
 void look_north(const Scenario &sc, size_t number, Recording &r) {

@@ -63,6 +63,8 @@ enum class Stream : uint64_t {
   accelerometer_bias,
   vibration,
   bump,
+  appearance,
+  appearance_noise,
 };
 
 class Random {

@@ -147,6 +147,10 @@ struct Sensor {
   double sigma_px = 0, focal_px = 420, centre_px[2] = {319.5, 239.5}, baseline_m = 0.3;
   int size_px[2] = {640, 480};
   double one_side_fraction = 0;  // only one of both pictures has the point
+  // As a tracker sees it: a point has an appearance and, when it comes back, another number.
+  bool tracks = false;
+  double appearance_noise = 0;  // share of an appearance's bits that are wrong, drawn for each look
+  double alike_fraction = 0;    // share of the points that look like one of sixteen others
   // gnss and depth
   double sigma_xy_m = 0, sigma_z_m = 0;
   double wander_m = 0, wander_s = 30;  // gnss: each axis wanders so much, with this correlation time

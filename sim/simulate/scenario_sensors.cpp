@@ -36,6 +36,11 @@ void read_stereo(Reader &r, const wm_yaml_node &map, Sensor &out) {
   r.numbers(map, "centre_px", 2, 2, out.centre_px);
   r.number(map, "baseline_m", 1e-3, 100, 1, out.baseline_m);
   r.number(map, "one_side_percent", 0, 100, kPercent, out.one_side_fraction);
+  out.tracks = there(r, map, "appearance_noise_percent");
+  r.number(map, "appearance_noise_percent", 0, 50, kPercent, out.appearance_noise);
+  r.number(map, "alike_percent", 0, 100, kPercent, out.alike_fraction);
+  if (r.ok() && !out.tracks && there(r, map, "alike_percent"))
+    return r.fail(map, "alike_percent needs appearance_noise_percent");
   double size[2];
   if (r.numbers(map, "size", 2, 2, size) != 2 || !r.ok()) return;
   if (size[0] < 16 || size[0] > 8192 || size[1] < 16 || size[1] > 8192)
@@ -94,6 +99,8 @@ void read_sensor(Reader &r, const wm_yaml_node &map, bool pictured, Sensor &out)
                                       "outlier_percent",
                                       "size",
                                       "one_side_percent",
+                                      "appearance_noise_percent",
+                                      "alike_percent",
                                       "sigma_xy_m",
                                       "wander_m",
                                       "missed_percent",
@@ -117,7 +124,8 @@ void read_sensor(Reader &r, const wm_yaml_node &map, bool pictured, Sensor &out)
   only(r, map, "heading_sigma_deg", out.kind == Kind::markers, "markers");
   for (const char *key : {"range_m", "ids", "missed_percent"})
     only(r, map, key, looks || stereo, "landmarks, markers or stereo");
-  for (const char *key : {"focal_px", "centre_px", "baseline_m", "size", "sigma_px", "one_side_percent"})
+  for (const char *key : {"focal_px", "centre_px", "baseline_m", "size", "sigma_px", "one_side_percent",
+                          "appearance_noise_percent", "alike_percent"})
     only(r, map, key, stereo, "stereo");
   for (const char *key : {"sigma_xy_m", "wander_m", "wander_s"}) only(r, map, key, out.kind == Kind::gnss, "gnss");
   only(r, map, "sigma_z_m", position, "gnss or depth");

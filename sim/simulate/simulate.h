@@ -40,6 +40,7 @@ struct StereoSeen {
   int32_t id;
   double left_px[2], right_px[2];  // NaN where that picture hasn't got it
   bool outlier;
+  uint64_t appearance[4] = {};
 };
 
 // A row of gnss.csv. A depth sensor's row knows nothing of x and y: sigma_xy_m is kNoIdea_m.

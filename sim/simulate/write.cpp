@@ -230,11 +230,17 @@ wm_status write_markers(const Recording &r, const std::string &path, wm_error *e
 
 wm_status write_stereo(const Recording &r, const std::string &path, wm_error *err) {
   File f(path);
-  f.text("t_ns,id,ul_px,vl_px,ur_px,vr_px,arrival_ns\n");
-  for (const StereoSeen &p : r.stereo)
-    f.print("%" PRId64 ",%d,%s,%s,%s,%s,%" PRId64 "\n", p.t_ns, p.id, number(p.left_px[0], 4).c_str(),
-            number(p.left_px[1], 4).c_str(), number(p.right_px[0], 4).c_str(), number(p.right_px[1], 4).c_str(),
-            p.arrival_ns);
+  const auto looks = [](const StereoSeen &p) { return p.appearance[0] != 0; };
+  const bool appearances = std::any_of(r.stereo.begin(), r.stereo.end(), looks);
+  f.print("t_ns,id,ul_px,vl_px,ur_px,vr_px%s,arrival_ns\n", appearances ? ",appearance" : "");
+  for (const StereoSeen &p : r.stereo) {
+    f.print("%" PRId64 ",%d,%s,%s,%s,%s", p.t_ns, p.id, number(p.left_px[0], 4).c_str(),
+            number(p.left_px[1], 4).c_str(), number(p.right_px[0], 4).c_str(), number(p.right_px[1], 4).c_str());
+    if (appearances)
+      f.print(",%016" PRIx64 "%016" PRIx64 "%016" PRIx64 "%016" PRIx64, p.appearance[0], p.appearance[1],
+              p.appearance[2], p.appearance[3]);
+    f.print(",%" PRId64 "\n", p.arrival_ns);
+  }
   return f.close(err);
 }
 

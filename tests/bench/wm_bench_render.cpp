@@ -12,6 +12,7 @@
 #include "render_corridor.h"
 #include "timing.h"
 
+using namespace wm::images;
 using namespace wm::render;
 
 namespace {

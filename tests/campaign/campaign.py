@@ -36,6 +36,7 @@ import scans
 from kinds import KINDS, WORLDS, replays
 
 WRONG_SIGMA, WRONG_S, FAR_M, UNSAID_S, RIGHT_SIGMA, DEGRADED_MOST = 5, 2, 0.5, 10, 3.5, 0.01
+LARGEST = 20  # of an error, in the unit of its key: what the simulator takes
 CORRIDORS = 8  # seeds of the corridors, whose maps are kept
 
 
@@ -61,7 +62,7 @@ def simulated(options, name, seed, drive, scratch):
     if drive.errors != 1:
         # The start's and the map's sigmas are stated by the recording: they stay.
         stated = ("start", "landmark", "compass")
-        scenario["errors"] = {k: v if k.startswith(stated) else v * drive.errors for k, v in scenario.get("errors", {}).items()}
+        scenario["errors"] = {k: v if k.startswith(stated) else min(v * drive.errors, max(v, LARGEST)) for k, v in scenario.get("errors", {}).items()}
     (scratch / "scenario.yaml").write_text(yaml.safe_dump(scenario))
     whole = scratch / "whole"
     replays.command(options.bin_dir / "waymark-simulate", scratch / "scenario.yaml", "--no-video", "--seed", seed, "--duration", world.seconds,
@@ -121,7 +122,7 @@ def one(options, number):
         replays.command(options.bin_dir / "waymark", "replay", recording, "--config", configuration(options, name, recording, scratch), "--out",
                         scratch / "run")
         row.update(judge(scratch / "run", recording, names))
-    except replays.Refused as refused:
+    except (replays.Refused, AssertionError) as refused:
         row["refused"] = str(refused)[-300:]
     finally:
         if not options.only:

@@ -46,6 +46,7 @@ WORLDS = {
     "edges, filter and scans": World("corridor-low", PLAIN.format("edge_mcl"), "points.csv", ("can", "wheels", "route"), seconds=45, share=0.5),
     "edges, particles": World("corridor-low", PLAIN.format("pf_edges"), "points.csv", ("can", "wheels", "route"), seconds=45, share=0.5),
 }
+RANGED = ("slam, landmarks", "stereo, acoustic", "landmarks, commands")  # sightings with ranges
 MOTION = {"motion": "motion.csv", "motion6": "motion6.csv"}
 
 
@@ -207,7 +208,7 @@ def turn_sign(r, w, d):
     d.change(motion_file(w), replays.scaled(("w_radps", "wz_radps"), -1), "measured turn rate times -1")
 
 
-# Kind: what the world has to have ("seen": any stream of observations; "level": ranges in a plane), the function.
+# Kind: what the world has to have (suits() has the words), the function.
 KINDS = {
     "bus": (("can",), bus),
     "outliers and misread identities": (("seen", "features"), outliers),
@@ -216,7 +217,7 @@ KINDS = {
     "wheel slips": (("wheels",), slip),
     "gyro stuck": (("imu",), stuck_gyro),
     "carried off": (("route",), kidnap),
-    "start pose wrong": (("seen",), wrong_start),
+    "start pose wrong": (("anchored",), wrong_start),
     "errors larger than stated": ((), large_errors),
     "wheel radius wrong": (("wheels",), wheel_size),
     "track wrong": (("wheels",), track),
@@ -238,11 +239,12 @@ def suits(kind, name, world):
         has |= {"seen"}
     if world.seen in ("sightings.csv", "markers.csv", "stereo.csv", "gnss.csv"):
         has |= {"features"}
-    if world.seen in ("markers.csv", "points.csv") or (world.seen == "sightings.csv" and name not in ("landmarks", "landmarks, laps",
-                                                                                                      "slam, bearings")):
+    if world.seen in ("markers.csv", "points.csv") or name in RANGED:
         has |= {"ranges"}
     if world.seen and world.seen != "gnss.csv":
         has |= {"turnable"}
+    if "map" in has or world.seen in ("gnss.csv", "points.csv"):
+        has |= {"anchored"}  # a map is made from the start pose: nothing contradicts a wrong one
     if has & set(MOTION):
         has |= {"twist"}
     return set(KINDS[kind][0]) <= has

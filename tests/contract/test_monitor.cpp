@@ -27,6 +27,7 @@ struct seen {
   double turn_s = INFINITY;                        // the first time that the turn is the cause
   double confident_s = 0.0;                        // tracking, since the observations contradict
   bool has_cause = true;
+  bool is_lasting = false;        // the lasting error of positions is a value of the calibration
   uint8_t cause = WM_CAUSE_NONE;  // at the first doubt
   double sigma_m = 0.0;           // at the end
 };
@@ -98,6 +99,8 @@ seen drive(const char *name, drives::scene &scene, const std::vector<parameters:
     wm_calibration_value values[WM_HEALTH_CALIBRATION_MAX];
     const size_t listed = of.calibration ? of.calibration(state.get(), values, WM_HEALTH_CALIBRATION_MAX) : 0;
     const size_t known = listed < WM_HEALTH_CALIBRATION_MAX ? listed : WM_HEALTH_CALIBRATION_MAX;
+    for (size_t i = 0; i < known; i++)
+      out.is_lasting = out.is_lasting || std::strcmp(values[i].name, "gnss.lasting_error") == 0;
     if (wm_monitor_take(&monitor, &e, records, count)) wm_monitor_step(&monitor, &estimate, values, known);
     wm_monitor_judge(&monitor, &estimate);
     note(estimate, t_s, t_s - last_s, &out);
@@ -244,24 +247,29 @@ void a_turn_that_no_vehicle_can_drive_is_degraded(void) {
   TEST_ASSERT_EQUAL(WM_CAUSE_TURN, out.cause);
 }
 
-// Markers that are measured with their frame bend the scales of both wheels.
-void a_scale_far_from_what_is_stated_is_degraded(void) {
+// State after five seconds with this value of the calibration.
+uint8_t state_with(const wm_setup &setup, const wm_calibration_value &value) {
+  wm_monitor monitor;
+  wm_monitor_init(&monitor, &setup, 1);
+  wm_estimate out{};
+  out.state = WM_STATE_TRACKING;
+  for (int i = 1; i < 5; i++) {
+    out.t_ns = i * WM_NS_PER_S;
+    wm_monitor_step(&monitor, &out, &value, 1);
+  }
+  wm_monitor_judge(&monitor, &out);
+  return out.state;
+}
+
+// Markers that are measured with their frame bend the scales of both wheels; a receiver's lasting error is one of a
+// course that the robot does not drive.
+void values_far_from_what_is_stated_are_degraded(void) {
   const parameters::values motion(wm_motion_params_table, {{"states.left_scale_sigma", 0.02}});
   wm_setup setup{};
   setup.motion = static_cast<const wm_motion_params *>(static_cast<const void *>(motion.data()));
-  wm_monitor monitor;
-  for (const double scale : {1.05, 1.25}) {
-    wm_monitor_init(&monitor, &setup, 1);
-    const wm_calibration_value value = {"motion.left_scale", scale, 0.003};
-    wm_estimate out{};
-    out.state = WM_STATE_TRACKING;
-    for (int i = 1; i < 5; i++) {
-      out.t_ns = i * WM_NS_PER_S;
-      wm_monitor_step(&monitor, &out, &value, 1);
-    }
-    wm_monitor_judge(&monitor, &out);
-    TEST_ASSERT_EQUAL(scale > 1.2 ? WM_STATE_DEGRADED : WM_STATE_TRACKING, out.state);
-  }
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, state_with(setup, {"motion.left_scale", 1.05, 0.003}));
+  TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, {"motion.left_scale", 1.25, 0.003}));
+  TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, {"gnss.lasting_error", 5.0, NAN}));
 }
 
 // A map with a fault fits by chance now and then: after a minute of contradiction it does not count like a found pose.
@@ -273,6 +281,54 @@ void a_run_that_was_contradicted_for_long_has_to_fit_for_longer(void) {
   TEST_ASSERT_EQUAL(WM_STATE_LOST, again.drive(60, WM_REJECTED_GATE).state);
   TEST_ASSERT_EQUAL(WM_STATE_TRACKING, once.drive(60, WM_FUSED).state);
   TEST_ASSERT_NOT_EQUAL(WM_STATE_TRACKING, again.drive(100, WM_FUSED).state);
+}
+
+// Four landmarks seen ten times a second; `off`: of their ranges, in sigma, beside an error of 0.8.
+wm_estimate drive_by_landmarks(const double off[4], wm_verdict of_last) {
+  lone robot(true);
+  wm_estimate out{};
+  for (wm_time_ns t_ns = 0; t_ns < 20 * WM_NS_PER_S; t_ns += 100 * WM_NS_PER_MS) {
+    for (int k = 0; k < 4; k++) {
+      wm_event e{};
+      e.kind = WM_EVENT_SIGHTING;
+      e.t_ns = t_ns;
+      wm_innovation record{};
+      record.t_ns = t_ns;
+      record.landmark_id = k;
+      record.residual = WM_RESIDUAL_RANGE;
+      record.verdict = static_cast<uint8_t>(k == 3 ? of_last : WM_FUSED);
+      record.observed = 0.1 * (off[k] + ((t_ns / (100 * WM_NS_PER_MS) + k) % 2 ? 0.8 : -0.8));
+      record.variance = 0.01;
+      out = robot.estimate;
+      out.t_ns = t_ns;
+      if (wm_monitor_take(&robot.monitor, &e, &record, 1)) wm_monitor_step(&robot.monitor, &out, nullptr, 0);
+      wm_monitor_judge(&robot.monitor, &out);
+    }
+  }
+  return out;
+}
+
+// Their means cancel in the mean of the source: a mirrored map. One landmark alone has been moved.
+void landmarks_that_are_off_to_both_sides_are_degraded(void) {
+  const double none[4] = {0, 0, 0, 0}, both[4] = {0.9, -0.9, 0.9, -0.9}, one[4] = {0, 0, 0, 9};
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, drive_by_landmarks(none, WM_FUSED).state);
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, drive_by_landmarks(one, WM_REJECTED_GATE).state);
+  const wm_estimate mirrored = drive_by_landmarks(both, WM_FUSED);
+  TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, mirrored.state);
+  TEST_ASSERT_EQUAL(WM_CAUSE_BIASED, mirrored.cause);
+}
+
+// Positions that drift away from the way: a lasting error of the receiver is a state, which follows.
+void drift(wm_event *e) {
+  if (e->kind == WM_EVENT_POSITION) e->as.position.p_m[0] += 0.5 * wm_seconds_between(0, e->t_ns);
+}
+void positions_far_from_the_way_are_doubt(void) {
+  drives::scene scene(motion::twist, drives::kPositions, 0, kEnd_s);
+  const std::vector<parameters::setting> settings = {{"correlated.gnss_m", 1.0}, {"correlated.gnss_tau_s", 20.0}};
+  const seen good = drive("landmark_ekf", scene, settings, nullptr);
+  const seen bad = drive("landmark_ekf", scene, settings, drift);
+  TEST_ASSERT_TRUE(!good.is_lasting && std::isinf(good.doubted_s));
+  TEST_ASSERT_TRUE(bad.is_lasting);
 }
 
 void a_pose_off_the_map_is_degraded(void) {
@@ -300,21 +356,38 @@ void identities_that_the_map_lacks_are_doubt(void) {
   TEST_ASSERT_EQUAL(WM_STATE_DEAD_RECKONING, mapless.drive(12, WM_REJECTED_UNKNOWN_ID).state);
 }
 
-// A search finds a pose for a robot that was lost before it had ever fitted, and for one that had driven well for long.
-void a_found_pose_is_on_probation_unless_the_one_before_was_proven(void) {
+// A search finds a pose for a robot that was lost before its start had been proven by driving, and for one that had
+// driven well for long. A start that fits at rest proves nothing.
+void a_found_pose_is_degraded_unless_the_one_before_was_proven(void) {
   lone robot(true), proven(true);
-  (void)proven.drive(20, WM_FUSED);
+  (void)robot.drive(60, WM_FUSED);
+  for (lone *one : {&robot, &proven}) one->estimate.v_mps[0] = 0.5;
+  (void)robot.drive(10, WM_FUSED);
+  (void)proven.drive(45, WM_FUSED);
   for (lone *one : {&robot, &proven}) {
     one->estimate.state = WM_STATE_LOST;
     (void)one->drive(1, WM_REJECTED_GATE);
     one->estimate.state = WM_STATE_TRACKING;
     one->estimate.resets++;
   }
-  const wm_estimate found = robot.drive(1, WM_FUSED);
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, proven.drive(1, WM_FUSED).state);
+  const wm_estimate found = robot.drive(35, WM_FUSED);
   TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, found.state);
   TEST_ASSERT_EQUAL(WM_CAUSE_LOST_AGAIN, found.cause);
-  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, robot.drive(6, WM_FUSED).state);
-  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, proven.drive(1, WM_FUSED).state);
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, robot.drive(20, WM_FUSED).state);
+}
+
+// Lost for long, a filter inflates its covariance, and another pose fits: that is a found one, though not by a search.
+void a_pose_that_fits_after_long_is_a_found_one(void) {
+  for (const double lost_s : {1.0, 6.0}) {
+    lone robot(true);
+    robot.estimate.v_mps[0] = 0.5;
+    (void)robot.drive(10, WM_FUSED);
+    robot.estimate.state = WM_STATE_LOST;
+    (void)robot.drive(lost_s, WM_FUSED);
+    robot.estimate.state = WM_STATE_TRACKING;
+    TEST_ASSERT_EQUAL(lost_s > 3.0 ? WM_STATE_DEGRADED : WM_STATE_TRACKING, robot.drive(20, WM_FUSED).state);
+  }
 }
 
 }  // namespace
@@ -332,10 +405,13 @@ int main(void) {
   RUN_TEST(a_turn_with_the_wrong_sign_is_named);
   RUN_TEST(positions_that_turn_to_the_other_side_are_degraded);
   RUN_TEST(a_turn_that_no_vehicle_can_drive_is_degraded);
-  RUN_TEST(a_scale_far_from_what_is_stated_is_degraded);
+  RUN_TEST(values_far_from_what_is_stated_are_degraded);
   RUN_TEST(a_run_that_was_contradicted_for_long_has_to_fit_for_longer);
   RUN_TEST(a_pose_off_the_map_is_degraded);
   RUN_TEST(identities_that_the_map_lacks_are_doubt);
-  RUN_TEST(a_found_pose_is_on_probation_unless_the_one_before_was_proven);
+  RUN_TEST(landmarks_that_are_off_to_both_sides_are_degraded);
+  RUN_TEST(positions_far_from_the_way_are_doubt);
+  RUN_TEST(a_found_pose_is_degraded_unless_the_one_before_was_proven);
+  RUN_TEST(a_pose_that_fits_after_long_is_a_found_one);
   return UNITY_END();
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The camera models of simulate/render/camera.h for any number type: with Ceres' dual numbers they give derivatives. A
+// The camera models of images/camera.h for any number type: with Ceres' dual numbers they give derivatives. A
 // test holds them against images::project.
 #pragma once
 

@@ -15,9 +15,12 @@ namespace {
 
 constexpr double kSlot_s = 5.0;          // as the monitor's for positions: multipath passes
 constexpr int kWindows[] = {6, 16, 33};  // slots: 30, 80 and 165 s
+constexpr int kSlotsLeast = 3;           // of three places a mirror image can be told
 constexpr double kSparse = 3.0;          // a window reaches back at most so many times its length
 constexpr double kAlarm_log = 9.21;      // -log(1e-4)
-constexpr double kGap_s = 1.5;           // without motion for longer, dead reckoning begins anew
+// Prior log odds of a mistaken sign of a turn or an axis in a configuration: one in 55.
+constexpr double kMirrored = -4.0;
+constexpr double kGap_s = 1.5;  // without motion for longer, dead reckoning begins anew
 // Tyres reach 10 m/s2. Beyond this for 2 s more than not, turn rate or speed has another unit.
 constexpr double kMostAcross_mps2 = 15.0, kImpossible_s = 2.0, kRemembered_s = 10.0;
 
@@ -35,8 +38,14 @@ struct plane {
 
 plane mean_of(const double sum[2], double count) { return {sum[0] / count, sum[1] / count}; }
 
-// Sum of squares of what a turn and a shift of the way, or of its mirror image (side -1), leave of the first `n` slots.
-double left_over(const course &self, int n, double side) {
+// The way, or its mirror image (side -1), laid over the positions: by this turn about its middle, then the shift from
+// there to the positions' middle. `left_m2`: sum of squares of what remains.
+struct overlay {
+  double left_m2, turn_rad;
+  plane way, place;
+};
+
+overlay lay_over(const course &self, int n, double side) {
   plane place{}, way{};
   for (int i = 0; i < n; i++) {
     const slot &s = slot_at(self, i);
@@ -54,7 +63,7 @@ double left_over(const course &self, int n, double side) {
     across += a.y * b.x - a.x * b.y;
   }
   const double sum = squares - 2.0 * std::sqrt(square(along) + square(across));
-  return sum > 0.0 ? sum : 0.0;
+  return {sum > 0.0 ? sum : 0.0, atan2(across, along), way, place};
 }
 
 // How many of the newest slots a window of `slots` has.
@@ -67,19 +76,30 @@ int slots_of(const course &self, int slots) {
   return n;
 }
 
-bool is_mirrored(const course &self) {
+// Tests the last windows, and keeps the likelihood ratio of the longest one with its mirror image.
+void test_mirror(course *self) {
+  self->is_mirrored = 0;
   for (const int slots : kWindows) {
-    const int n = slots_of(self, slots);
-    if (n < kWindows[0]) return false;
+    const int n = slots_of(*self, slots);
+    if (n < kSlotsLeast) return;
     double stated = 0.0;
     for (int i = 0; i < n; i++) {
-      const slot &s = slot_at(self, i);
+      const slot &s = slot_at(*self, i);
       stated += s.variance / s.count;
     }
-    const double as_is = left_over(self, n, 1.0) + stated, mirrored = left_over(self, n, -1.0) + stated;
-    if (mirrored > 0.0 && as_is > mirrored && n * log(as_is / mirrored) > kAlarm_log) return true;
+    const overlay mirror = lay_over(*self, n, -1.0);
+    const double as_is = lay_over(*self, n, 1.0).left_m2 + stated, mirrored = mirror.left_m2 + stated;
+    if (!(mirrored > 0.0) || !(as_is > 0.0)) continue;
+    self->nats = n * log(as_is / mirrored);
+    if (self->nats < self->least_nats) self->least_nats = self->nats;
+    self->mirror_turn_rad = mirror.turn_rad;
+    const double middle[4] = {mirror.way.x, mirror.way.y, mirror.place.x, mirror.place.y};
+    for (int k = 0; k < 2; k++) {
+      self->mirror_way_m[k] = middle[k];
+      self->mirror_place_m[k] = middle[k + 2];
+    }
+    if (n >= kWindows[0] && self->nats > kAlarm_log) self->is_mirrored = 1;
   }
-  return false;
 }
 
 // The dead reckoning after `dt_s` more.
@@ -101,6 +121,7 @@ void note_turn(course *self, double across_mps2, double dt_s) {
 void course_begin(course *self) {
   *self = {};
   self->until_ns = WM_TIME_NONE;
+  self->nats = NAN;
 }
 
 void course_move(course *self, const wm_estimate &e) {
@@ -116,6 +137,7 @@ void course_move(course *self, const wm_estimate &e) {
   } else {
     self->opened = 0;
     self->is_mirrored = 0;
+    self->nats = NAN;
   }
   self->until_ns = e.t_ns;
   self->v_mps[0] = finite(e.v_mps[0]) ? e.v_mps[0] : 0.0;
@@ -129,7 +151,7 @@ void course_take(course *self, wm_time_ns t_ns, const wm_position &position) {
   if (!(std::fabs(ahead_s) < kGap_s) || !finite(position.p_m[0]) || !finite(position.p_m[1]) || !finite(sigma_m))
     return;
   if (self->opened == 0 || wm_seconds_between(slot_at(*self, 0).begin_ns, t_ns) >= kSlot_s) {
-    if (self->opened > 0) self->is_mirrored = is_mirrored(*self);
+    if (self->opened > 0) test_mirror(self);
     slot *next = &self->slots[self->opened++ % WM_MONITOR_COURSE_SLOTS];
     *next = {};
     next->begin_ns = t_ns;
@@ -141,6 +163,19 @@ void course_take(course *self, wm_time_ns t_ns, const wm_position &position) {
   now->way_m[0] += way.x;
   now->way_m[1] += way.y;
   for (int k = 0; k < 2; k++) now->place_m[k] += position.p_m[k];
+}
+
+// A sum of likelihood ratios of windows that overlap: what once spoke against the mirror image still does.
+double course_mirrored(const course &self) {
+  if (!finite(self.nats)) return 0.0;
+  return 1.0 / (1.0 + exp(-(kMirrored + self.least_nats + larger(self.nats, 0.0))));
+}
+
+wm_pose2 course_mirror_image(const course &self) {
+  const sin_cos turn = sincos(self.mirror_turn_rad);
+  const double x = self.way_m[0] - self.mirror_way_m[0], y = -(self.way_m[1] - self.mirror_way_m[1]);
+  return {self.mirror_place_m[0] + turn.cos * x - turn.sin * y, self.mirror_place_m[1] + turn.sin * x + turn.cos * y,
+          wrap(self.mirror_turn_rad - self.heading_rad)};
 }
 
 bool course_contradicts(const course &self) { return self.is_mirrored || self.is_impossible; }

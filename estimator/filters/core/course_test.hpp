@@ -13,6 +13,9 @@ void course_begin(wm_monitor_course *self);
 void course_move(wm_monitor_course *self, const wm_estimate &e);
 void course_take(wm_monitor_course *self, wm_time_ns t_ns, const wm_position &position);
 bool course_contradicts(const wm_monitor_course &self);
+// Probability that turn or positions are mirrored, and the pose that is right then.
+double course_mirrored(const wm_monitor_course &self);
+wm_pose2 course_mirror_image(const wm_monitor_course &self);
 
 }  // namespace wm
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Three tests of a source's recent innovations, each at kAlarm: the share that gates refuse (binomial), the mean square
+// Tests of a source's recent innovations, each at kAlarm: the share that gates refuse (binomial), the mean square
 // over the variance (chi-square), the mean over sigma (normal) [BarShalom2001, ch. 5.4]. Observations of one slot count
 // as one of each landmark, since their errors are correlated. An adapted noise hides what it explains: one at its limit
 // fails a test as well. Failed tests are time of doubt; observations that fit make up for it.
@@ -8,7 +8,10 @@
 #include <cmath>
 #include <cstring>
 
+#include "filters/core/chi_square.hpp"
 #include "filters/core/course_test.hpp"
+#include "filters/core/landmark_bias.hpp"
+#include "filters/core/lasting_error.hpp"
 #include "filters/core/noise_adaption.hpp"
 #include "filters/core/scale_test.hpp"
 #include "filters/core/turn_check.hpp"
@@ -20,7 +23,6 @@ namespace {
 // Probability that a test fails although the pose is right. Tests overlap: windows of 2, 5 and 10 s are about 2900
 // independent ones an hour and kind, so that a source raises less than one false alarm an hour; it lasts some 10 s.
 constexpr double kAlarm_log = 9.21;  // -log(1e-4)
-constexpr double kAlarm_z = 3.72;    // one-sided quantile of a normal variable
 constexpr double kAlarm_z2 = 3.89;   // two-sided
 // Correlation time of the errors of sightings (as in landmark_evidence.cpp) and of positions (multipath passes in 5 s).
 constexpr double kSlot_s = 0.3, kPositionSlot_s = 5.0;
@@ -50,6 +52,12 @@ constexpr double kFoundWrong = 0.08;  // probability that a contradicted or a fo
 // within kAgain_s, or if the one before did not fit for kProven_s more than it was contradicted. Each further one of
 // these is on probation for as much longer. What fitted more than kLongAgo_s ago does not count.
 constexpr double kProbation_s = 3.0, kAgain_s = 60.0, kProven_s = 5.0, kLongAgo_s = 60.0;
+// A start that is contradicted before the robot drove for kProof_s in agreement may be wrong; so may map, sensors and
+// motion. A pose that is found then is degraded until it has fitted for kProof_s of driving: wrong ones fit by chance,
+// at rest for as long as that lasts, and along a corridor for 28 s (corridor-a, plan mirrored).
+constexpr double kProof_s = 40.0, kDrives_mps = 0.05, kDrives_radps = 0.05;
+// Lost for so long, the filter's covariance is inflated, and what fits again is another pose (lifecycle.hpp).
+constexpr double kInflated_s = 3.0;
 constexpr double kAround_m = 5.0;   // sigma of a lost robot's distance from the map (landmark_ekf.cpp)
 constexpr double kOutside_m = 5.0;  // beyond the map's border and three sigma
 constexpr double kNear = 9.0;       // three sigma, squared
@@ -177,12 +185,6 @@ bool is_too_large_a_share(double sum, int n, double p) {
   return n * divergence > kAlarm_log;
 }
 
-// Wilson's and Hilferty's approximation of the chi-square quantile.
-double chi_square_limit(double dof) {
-  const double c = 2.0 / (9.0 * dof), root = 1.0 - c + kAlarm_z * std::sqrt(c);
-  return dof * root * root * root;
-}
-
 bool is_biased(const window &w) {
   for (int k = 0; k < WM_MONITOR_KINDS; k++) {
     if (w.of[k] == 0) continue;
@@ -223,6 +225,7 @@ verdict_of_source test(const source &s, wm_time_ns t_ns, bool is_suspect) {
 }
 
 void clear_windows(wm_monitor *self) {
+  landmark_bias_clear(&self->landmarks);
   for (source &s : self->sources) {
     s.opened = 0;
     s.cause = WM_CAUSE_NONE;
@@ -232,10 +235,11 @@ void clear_windows(wm_monitor *self) {
 void clear(wm_monitor *self) {
   clear_windows(self);
   self->is_noise_at_limit = 0;
-  self->doubt_s = self->fitted_s = self->since_found_s = self->contradicted_s = 0.0;
+  self->doubt_s = self->fitted_s = self->since_found_s = self->contradicted_s = self->proof_s = self->lost_s = 0.0;
   self->cause = WM_CAUSE_NONE;
   self->source = self->silent = -1;
-  self->found = self->is_unsupported = self->is_outside = self->was_lost = self->is_probation = 0;
+  self->found = self->is_unsupported = self->is_outside = self->was_lost = self->is_probation = self->is_found_early =
+      0;
   self->stepped_ns = WM_TIME_NONE;  // the next step takes the number of resets as it is
 }
 
@@ -249,15 +253,24 @@ void widen_box(wm_monitor *self, double x_m, double y_m) {
       square(kAround_m) + (square(self->high_m[0] - self->low_m[0]) + square(self->high_m[1] - self->low_m[1])) / 24.0;
 }
 
+// Of a pose that was found before any was proven.
+double least_doubt_s(const wm_monitor &self) {
+  return self.is_found_early && self.proof_s < kProof_s ? kProbation_s : 0.0;
+}
+
 // The search found another pose: what contradicted the former one does not count against it.
-void take_found(wm_monitor *self) {
+void take_found(wm_monitor *self, bool was_lost) {
   clear_windows(self);
-  if (!self->was_lost) return;
+  if (!was_lost) return;
+  if (self->proof_s < kProof_s) {
+    self->is_found_early = 1;
+    self->proof_s = 0.0;
+  }
   const bool again = self->found > 0 && self->since_found_s < kAgain_s;
   self->is_probation = again || self->fitted_s < kProven_s || self->contradicted_s > kExcused_s;
   if (!self->is_probation) self->found = 0;
   const double probation_s = kProbation_s * larger(self->found, 1.0) + 0.5 * self->contradicted_s;
-  self->doubt_s = !self->is_probation ? 0.0 : probation_s < kLostAfter_s ? probation_s : kLostAfter_s;
+  self->doubt_s = !self->is_probation ? least_doubt_s(*self) : probation_s < kLostAfter_s ? probation_s : kLostAfter_s;
   self->cause = self->doubt_s > 0.0 ? WM_CAUSE_LOST_AGAIN : WM_CAUSE_NONE;
   self->source = -1;
   self->found++;
@@ -292,11 +305,12 @@ int32_t silent_source(const wm_monitor &self, wm_time_ns t_ns) {
 
 // Sources in disagreement raise the noise of the motion, or of one of them, as far as it may grow. In 25 good drives,
 // real and simulated, the largest factor is 15.5 (plaza-1).
-// Or they bend a scale far from what the configuration states.
+// Or they bend a scale, or the lasting error of positions, far from what the configuration states.
 bool test_calibration(wm_monitor *self, const wm_calibration_value *values, size_t count) {
   self->is_noise_at_limit = 0;
   for (size_t i = 0; i < count; i++)
-    if (noise_adaption::is_at_limit(values[i]) || scale_contradicts(self->scale_sigma, values[i]))
+    if (noise_adaption::is_at_limit(values[i]) || scale_contradicts(self->scale_sigma, values[i]) ||
+        lasting_error_contradicts(values[i]))
       self->is_noise_at_limit = 1;
   if (!self->is_noise_at_limit) return false;
   self->cause = WM_CAUSE_INCONSISTENT;
@@ -310,6 +324,17 @@ bool test_turn(wm_monitor *self, const wm_calibration_value *values, size_t coun
   for (size_t i = 0; i < count; i++) contradicts = contradicts || turn_check::contradicts(values[i]);
   if (!contradicts) return false;
   self->cause = WM_CAUSE_TURN;
+  self->source = -1;
+  return true;
+}
+
+// Innovations of several landmarks that have a mean. Landmarks that a filter has placed itself are off for long where a
+// line of sight is all that it has.
+bool test_landmarks(wm_monitor *self, wm_time_ns t_ns) {
+  if (self->is_map_known != 1) return false;
+  landmark_bias_test(&self->landmarks, t_ns);
+  if (!landmark_bias_contradicts(self->landmarks)) return false;
+  self->cause = WM_CAUSE_BIASED;
   self->source = -1;
   return true;
 }
@@ -355,7 +380,30 @@ void count_doubt(wm_monitor *self, bool contradicts, bool fits, double dt_s) {
   if (!fits) return;
   const double weight = 1.0 / (1.0 + larger(self->contradicted_s - kExcused_s, 0.0) / kSuspect_s);
   self->fitted_s = self->fitted_s < kLongAgo_s ? self->fitted_s + dt_s : kLongAgo_s;
-  self->doubt_s = larger(self->doubt_s - (self->is_probation ? 1.0 : kFitRate) * weight * dt_s, 0.0);
+  const double left_s = self->doubt_s - (self->is_probation ? 1.0 : kFitRate) * weight * dt_s;
+  self->doubt_s = larger(left_s, least_doubt_s(*self));
+}
+
+// Time of driving in agreement with the observations. Contradictions before kProof_s begin it anew.
+void count_proof(wm_monitor *self, const wm_estimate &e, bool contradicts, bool fits, double dt_s) {
+  if (self->proof_s >= kProof_s) return;
+  const bool drives =
+      square(e.v_mps[0]) + square(e.v_mps[1]) > square(kDrives_mps) || std::fabs(e.w_radps[2]) > kDrives_radps;
+  if (contradicts)
+    self->proof_s = 0.0;
+  else if (fits && drives)
+    self->proof_s += dt_s;
+}
+
+// Turn or positions may be mirrored: the covariance of the mixture with the pose that is right then.
+void weigh_mirror_image(wm_monitor *self, const wm_estimate &e) {
+  const double chance = course_mirrored(self->course);
+  const wm_pose2 image = course_mirror_image(self->course);
+  self->mirrored_m2 = self->mirrored_rad2 = 0.0;
+  if (!(chance > 0.0)) return;
+  self->mirrored_m2 =
+      chance * (square(image.x_m - e.pose_map_base.p_m[0]) + square(image.y_m - e.pose_map_base.p_m[1]));
+  self->mirrored_rad2 = chance * square(wrap(image.heading_rad - e.heading_rad));
 }
 
 // The covariance of the mixture of this pose and one anywhere on the map; a filter that has widened its own keeps it.
@@ -403,6 +451,9 @@ int wm_monitor_take(wm_monitor *self, const wm_event *event, const wm_innovation
     wm_monitor_source *s = &self->sources[event->source];
     s->newest_ns = event->t_ns;
     wm::add_observation(s, *event, records, count);
+    for (size_t i = 0; i < count; i++)
+      if (records[i].verdict == WM_FUSED || records[i].verdict == WM_REJECTED_GATE)
+        wm::landmark_bias_take(&self->landmarks, records[i]);
     if (event->kind == WM_EVENT_POSITION) wm::course_take(&self->course, event->t_ns, event->as.position);
   }
   if (self->begun_ns == WM_TIME_NONE) self->begun_ns = event->t_ns;
@@ -413,6 +464,7 @@ int wm_monitor_take(wm_monitor *self, const wm_event *event, const wm_innovation
 
 void wm_monitor_step(wm_monitor *self, const wm_estimate *e, const wm_calibration_value *calibration, size_t count) {
   wm::course_move(&self->course, *e);
+  wm::weigh_mirror_image(self, *e);
   const bool is_first = self->stepped_ns == WM_TIME_NONE;
   double dt_s = is_first ? 0.0 : wm_seconds_between(self->stepped_ns, e->t_ns);
   if (!(dt_s < wm::kLongStep_s)) dt_s = wm::kLongStep_s;
@@ -423,16 +475,20 @@ void wm_monitor_step(wm_monitor *self, const wm_estimate *e, const wm_calibratio
     self->resets = e->resets;
     return;
   }
-  if (!is_first && e->resets != self->resets) wm::take_found(self);
+  const bool is_lost = e->state == WM_STATE_LOST, fits_again = !is_lost && self->lost_s > wm::kInflated_s;
+  if (!is_first && (e->resets != self->resets || fits_again)) wm::take_found(self, self->was_lost || is_lost);
   self->resets = e->resets;
   self->since_found_s += dt_s;
-  self->was_lost = e->state == WM_STATE_LOST;
+  self->was_lost = is_lost;
+  self->lost_s = is_lost ? self->lost_s + dt_s : 0.0;
   if (!self->is_map_known) wm::widen_box(self, e->pose_map_base.p_m[0], e->pose_map_base.p_m[1]);
   bool fits;
   const bool is_noisy = wm::test_calibration(self, calibration, count);
   const bool is_turned = wm::test_turn(self, calibration, count);
-  const bool contradicts = wm::test_sources(self, e->t_ns, &fits) || is_noisy || is_turned;
+  const bool are_biased = wm::test_landmarks(self, e->t_ns);
+  const bool contradicts = wm::test_sources(self, e->t_ns, &fits) || is_noisy || is_turned || are_biased;
   wm::count_contradicted(self, contradicts, fits && !self->was_lost, dt_s);
+  wm::count_proof(self, *e, contradicts, fits && !self->was_lost, dt_s);
   wm::count_doubt(self, contradicts, fits && !self->was_lost, dt_s);
   // Without a map every identity is unknown; that is a matter of the configuration.
   if (e->state != WM_STATE_DEAD_RECKONING || !self->is_map_known) self->is_unsupported = 0;
@@ -446,6 +502,9 @@ int wm_monitor_doubts(const wm_monitor *self) {
 
 void wm_monitor_judge(const wm_monitor *self, wm_estimate *e) {
   if (e->state == WM_STATE_SEARCHING) return;
+  e->covariance[wm_cov_index(0, 0)] += self->mirrored_m2;
+  e->covariance[wm_cov_index(1, 1)] += self->mirrored_m2;
+  e->covariance[wm_cov_index(5, 5)] += self->mirrored_rad2;
   const bool doubts = wm_monitor_doubts(self) != 0;
   if (doubts) {
     const bool is_known_why = self->doubt_s > 0.0 || self->is_unsupported;

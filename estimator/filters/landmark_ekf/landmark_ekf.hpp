@@ -60,6 +60,7 @@ class landmark_ekf {
   struct residual {
     planar_row row;
     double innovation, noise;
+    double least_noise = 0.0;  // at which it is fused
     wm_innovation record;
     noise_adaption::source source;
   };
@@ -87,6 +88,7 @@ class landmark_ekf {
   void finish_row(wm_residual kind, double observed, double expected, const wm_innovation &record, residual *r) const;
   void decay_tilt(wm_time_ns t_ns);
   void decay_gnss_error(wm_time_ns t_ns, double sigma_m);
+  double lasting_error() const;  // of the receiver, over its sigma; 0 where it is no state
 
   // Gates one or two components jointly, weakens or rejects, updates, writes the records. Returns the log Bayes factor
   // of "anywhere in clutter_volume" against "as expected". `usable` false: the source is known to be wrong.
@@ -138,7 +140,8 @@ class landmark_ekf {
   wm_landmark_ekf_params params_;
   mounted_sensor sensor_[kMaxSensors];
   sensor_slots slots_;
-  unsigned components_;  // of expect(): whether the angle scale is a state
+  int sensor_states_[2];  // the first one, and the one behind the last
+  unsigned components_;   // of expect(): whether the angle scale is a state
   int gnss_time_state_, gnss_error_state_;
   wm_time_ns gnss_error_ns_;
   double gnss_error_sigma_m_;  // of the receiver's lasting error, now

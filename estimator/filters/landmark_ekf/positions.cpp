@@ -37,6 +37,12 @@ void landmark_ekf::decay_gnss_error(wm_time_ns t_ns, double stated_m) {
   filter_.turn_test().fade_correlated(factor);
 }
 
+double landmark_ekf::lasting_error() const {
+  if (gnss_error_state_ < 0 || gnss_error_ns_ == WM_TIME_NONE) return 0.0;
+  const double x_m = filter_.value(gnss_error_state_), y_m = filter_.value(gnss_error_state_ + 1);
+  return std::sqrt(square(x_m) + square(y_m)) / gnss_error_sigma_m_;
+}
+
 wm_status landmark_ekf::fuse_position(const wm_event &event, record_list records) {
   const wm_position &p = event.as.position;
   wm_innovation record = record_of(event, WM_RESIDUAL_X);

@@ -19,27 +19,14 @@ constexpr int kRounds = 4;              // of the refinement; it stops earlier w
 constexpr double kTravelSigma_mpm = 0.05, kTurnSigma_radprad = 0.05;
 constexpr uint64_t kStream = 0x636f6e73;  // of random numbers: "cons"
 
-struct matches {
-  vec3 from[pose_consensus::kCapacity], to[pose_consensus::kCapacity];
-  double weight[pose_consensus::kCapacity];  // 1 / variance
-  int64_t id[pose_consensus::kCapacity];
-  int count = 0;
-};
-
-struct hypothesis {
-  pose3 map_odom;
-  double cost = 1e300;  // sum of chi2, each clipped at kInlierChi2
-  int inliers = 0;
-};
-
-double chi2_of(const matches &all, int i, const pose3 &at, const mat3 &r) {
+double chi2_of(const matched_points &all, int i, const pose3 &at, const mat3 &r) {
   const vec3 off = at.p + r * all.from[i] - all.to[i];
   return all.weight[i] * dot(off, off);
 }
 
-hypothesis judged(const matches &all, const pose3 &at) {
+agreed_pose judged(const matched_points &all, const pose3 &at) {
   const mat3 r = matrix_of(at.q);
-  hypothesis out = {at, 0.0, 0};
+  agreed_pose out = {at, 0.0, 0};
   for (int i = 0; i < all.count; i++) {
     const double chi2 = chi2_of(all, i, at, r);
     out.cost += chi2 < kInlierChi2 ? chi2 : kInlierChi2;
@@ -48,9 +35,9 @@ hypothesis judged(const matches &all, const pose3 &at) {
   return out;
 }
 
-int differing_points(const matches &all, const pose3 &at) {
+int differing_points(const matched_points &all, const pose3 &at) {
   const mat3 r = matrix_of(at.q);
-  int64_t ids[pose_consensus::kCapacity];
+  int64_t ids[matched_points::kCapacity];
   int count = 0;
   for (int i = 0; i < all.count; i++) {
     if (!(chi2_of(all, i, at, r) < kInlierChi2)) continue;
@@ -62,10 +49,10 @@ int differing_points(const matches &all, const pose3 &at) {
 }
 
 // The best of random triples.
-hypothesis best_of_triples(const matches &all, uint64_t seed) {
-  hypothesis best;
+agreed_pose best_of_triples(const matched_points &all, int hypotheses, uint64_t seed) {
+  agreed_pose best;
   uint64_t draw = 0;
-  for (int h = 0; h < kHypotheses; h++) {
+  for (int h = 0; h < hypotheses; h++) {
     vec3 from[3], to[3];
     const double weight[3] = {1, 1, 1};
     int64_t id[3];
@@ -78,21 +65,20 @@ hypothesis best_of_triples(const matches &all, uint64_t seed) {
     pose3 at;
     if (id[0] == id[1] || id[1] == id[2] || id[0] == id[2]) continue;
     if (!absolute_orientation(from, to, weight, 3, &at)) continue;
-    if (const hypothesis next = judged(all, at); next.cost < best.cost) best = next;
+    if (const agreed_pose next = judged(all, at); next.cost < best.cost) best = next;
   }
   return best;
 }
 
 // Least squares over the inliers, again and again while the cost falls.
-void refine(const matches &all, hypothesis *best) {
+void refine(const matched_points &all, agreed_pose *best) {
   for (int round = 0; round < kRounds && best->inliers >= 3; round++) {
-    const mat3 r = matrix_of(best->map_odom.q);
-    double weight[pose_consensus::kCapacity];
-    for (int i = 0; i < all.count; i++)
-      weight[i] = chi2_of(all, i, best->map_odom, r) < kInlierChi2 ? all.weight[i] : 0.0;
+    const mat3 r = matrix_of(best->at.q);
+    double weight[matched_points::kCapacity];
+    for (int i = 0; i < all.count; i++) weight[i] = chi2_of(all, i, best->at, r) < kInlierChi2 ? all.weight[i] : 0.0;
     pose3 at;
     if (!absolute_orientation(all.from, all.to, weight, all.count, &at)) return;
-    const hypothesis next = judged(all, at);
+    const agreed_pose next = judged(all, at);
     if (next.cost >= best->cost) return;
     *best = next;
   }
@@ -100,7 +86,7 @@ void refine(const matches &all, hypothesis *best) {
 
 // Of the pose (place and rotation, map axes) at `base`, by the information of the inliers: the derivative of a point's
 // displacement is [I, -skew(lever)].
-bool covariance_of(const matches &all, const pose3 &at, const vec3 &base, double out[6][6]) {
+bool covariance_of(const matched_points &all, const pose3 &at, const vec3 &base, double out[6][6]) {
   const mat3 r = matrix_of(at.q);
   matrix<6> information = matrix<6>::Zero(), covariance;
   for (int i = 0; i < all.count; i++) {
@@ -119,6 +105,18 @@ bool covariance_of(const matches &all, const pose3 &at, const vec3 &base, double
 
 }  // namespace
 
+agreed_pose pose_of_most(const matched_points &all, int hypotheses, uint64_t seed) {
+  agreed_pose best;
+  if (all.count < 3) return best;
+  best = best_of_triples(all, hypotheses, seed);
+  refine(all, &best);
+  return best;
+}
+
+bool agrees(const matched_points &all, int i, const pose3 &at) {
+  return chi2_of(all, i, at, matrix_of(at.q)) < kInlierChi2;
+}
+
 void pose_consensus::add(const point_observation &observation) {
   observation_[count_ % kCapacity] = observation;
   count_++;
@@ -128,7 +126,7 @@ void pose_consensus::add(const point_observation &observation) {
 pose_found pose_consensus::find(wm_time_ns since_ns, const travelled_pose &now, double sigma_m, double sigma_rad,
                                 uint64_t seed) const {
   pose_found out{};
-  matches all;
+  matched_points all;
   for (int i = count_ > kCapacity ? count_ - kCapacity : 0; i < count_; i++) {
     const point_observation &o = observation_[i % kCapacity];
     if (o.t_ns < since_ns) continue;
@@ -141,12 +139,11 @@ pose_found pose_consensus::find(wm_time_ns since_ns, const travelled_pose &now, 
   }
   if (all.count < kFewestInliers) return out;
   out.searched = true;
-  hypothesis best = best_of_triples(all, seed);
-  refine(all, &best);
+  const agreed_pose best = pose_of_most(all, kHypotheses, seed);
   if (best.inliers < kFewestInliers || best.inliers < kInlierShare * all.count ||
-      differing_points(all, best.map_odom) < kFewestPoints)
+      differing_points(all, best.at) < kFewestPoints)
     return out;
-  const pose3 &at = best.map_odom;
+  const pose3 &at = best.at;
   out.pose = {at.p + matrix_of(at.q) * now.pose.p, normalized(at.q * now.pose.q)};
   if (!covariance_of(all, at, out.pose.p, out.covariance)) return out;
   double place = 0.0, turn = 0.0;

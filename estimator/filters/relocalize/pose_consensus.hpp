@@ -25,6 +25,27 @@ struct point_observation {
   double travelled_m, turned_rad;
 };
 
+// Points seen and on a map, matched: some of the matches are wrong.
+struct matched_points {
+  static constexpr int kCapacity = 256;
+  vec3 from[kCapacity], to[kCapacity];
+  double weight[kCapacity];  // 1 / variance
+  int64_t id[kCapacity];
+  int count = 0;
+};
+
+// The motion from `from` to `to`, and how many matches agree with it.
+struct agreed_pose {
+  pose3 at;
+  double cost = 1e300;  // sum of chi2, each clipped at the limit of `agrees`
+  int inliers = 0;
+};
+
+// The best of so many random triples, refined by those that agree with it. Sources: [Horn1987] [Fischler1981].
+agreed_pose pose_of_most(const matched_points &all, int hypotheses, uint64_t seed);
+// Whether match i agrees with a motion: its chi2 is below the 99 % quantile of three degrees of freedom.
+bool agrees(const matched_points &all, int i, const pose3 &at);
+
 struct pose_found {
   bool searched;  // false: too few observations, which cost nothing
   bool found;

@@ -95,6 +95,7 @@ wm_status stereo_ekf::fuse_stereo(const wm_event &event, record_list records) {
   begin_picture(event.t_ns);
   const int known = index_.find(setup_->landmarks, s.id);
   if (known >= 0) return fuse_known_point(event, known, blank, records);
+  look(s);
   if (life_.searching()) return reject(records, blank, WM_REJECTED_SEARCHING);
   const int slot = find_slot(s.id);
   if (slot < 0) {
@@ -105,6 +106,7 @@ wm_status stereo_ekf::fuse_stereo(const wm_event &event, record_list records) {
   } else if (fuse_point(s, filter_.point(slot), 0.0, slot, blank, records).fused) {
     info_[(size_t)slot].seen_ns = event.t_ns;
     info_[(size_t)slot].unseen = 0;
+    note_appearance(slot, s);
   } else {
     contradict_point(slot, s, blank, records);
   }

@@ -99,6 +99,10 @@ static const wm_param kParams[] = {
         "Pictures in which a point of the state may be missing although it should be in view; then it is removed."),
     F64("slam.keep_outside_s", keep_outside_s, 600, 0, 1e6,
         "Time for which a point out of view is kept, to be found again, s. 0: it is removed at once, as in the paper."),
+    I32("slam.key_frames", frames_max, 0, 0, 200,
+        "Capacity of the own map: places to which the pose is related when their points are found again by their "
+        "appearance: after a loop, a restart, or when carried away. Each has up to 64 points and 9 states. A full map "
+        "gives up the place that was not seen for longest. 0: no map; points that leave the view are forgotten."),
     F64("dead_reckoning_after_s", dead_reckoning_after_s, 2, 0, 3600,
         "Time without a fused observation after which the state is dead reckoning, s."),
     BOOL("recover.on", recover, 1, "Relocalize by known points when the observations show that the pose is wrong."),

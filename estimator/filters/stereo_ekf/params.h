@@ -37,6 +37,7 @@ typedef struct wm_stereo_ekf_params {
   int32_t increments;  // motion between pictures by tracks that are no points of the state
   int32_t points_max, keep_unseen_steps;
   double keep_outside_s;
+  int32_t frames_max;  // of the own map; 0: none
   // finding the pose
   double dead_reckoning_after_s;
   int32_t recover;

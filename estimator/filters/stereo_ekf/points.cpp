@@ -23,6 +23,7 @@ int stereo_ekf::find_slot(int32_t id) const {
 void stereo_ekf::begin_picture(wm_time_ns t_ns) {
   if (picture_ns_ == t_ns) return;
   picture_ns_ = t_ns;
+  looked_count_ = 0;
   motion_.begin_picture();
 }
 
@@ -31,6 +32,7 @@ void stereo_ekf::begin_picture(wm_time_ns t_ns) {
 void stereo_ekf::end_picture() {
   if (picture_ns_ == WM_TIME_NONE) return;
   filter_.settle();
+  if (map_.capacity() > 0) find_again();
   if (filter_.point_count() > 0) {
     const past_pose past = state_at_picture();
     for (int slot = filter_.point_count() - 1; slot >= 0; slot--) {
@@ -38,17 +40,18 @@ void stereo_ekf::end_picture() {
       if (point.unseen == kOfMap) continue;
       const vec3 x = in_camera(filter_.point(slot), past);
       if (point.seen_ns == picture_ns_) {
-        if (grows_fast(x.z)) remove_point(slot);
+        if (grows_fast(x.z)) leave_point(slot);
         continue;
       }
       // A point whose observations are outliers has a wrong place, in view or not.
       if (point.misfit_ns == picture_ns_ || rig_.in_view(x, kInside_px)) {
-        if (++point.unseen > params_.keep_unseen_steps) remove_point(slot);
+        if (++point.unseen > params_.keep_unseen_steps) leave_point(slot);
       } else if (wm_seconds_between(point.seen_ns, picture_ns_) > params_.keep_outside_s) {
-        remove_point(slot);
+        leave_point(slot);
       }
     }
   }
+  if (map_.capacity() > 0) extend_map();
   if (params_.increments) fuse_increment();
   picture_ns_ = WM_TIME_NONE;
 }
@@ -57,6 +60,14 @@ void stereo_ekf::remove_point(int slot) {
   const int last = filter_.point_count() - 1;
   filter_.remove_point(slot);
   info_[(size_t)slot] = info_[(size_t)last];
+}
+
+// All but the corners of key frames.
+void stereo_ekf::forget_points() {
+  filter_.settle();
+  if (map_.frames() == 0) return filter_.remove_points();
+  for (int slot = filter_.point_count() - 1; slot >= 0; slot--)
+    if (info_[(size_t)slot].id >= 0) remove_point(slot);
 }
 
 // The found point that was not seen for longest, which may be removed; points of the present picture stay. -1: none.
@@ -69,10 +80,15 @@ int stereo_ekf::oldest_point() const {
   return oldest;
 }
 
-bool stereo_ekf::has_room() const { return filter_.point_count() < filter_.point_capacity() || oldest_point() >= 0; }
+// Points that the state may still take beside the corners of key frames.
+int stereo_ekf::free_slots() const {
+  return params_.points_max + own_map::kCorners * map_.frames() - filter_.point_count();
+}
+
+bool stereo_ekf::has_room() const { return free_slots() > 0 || oldest_point() >= 0; }
 
 bool stereo_ekf::make_room() {
-  if (filter_.point_count() < filter_.point_capacity()) return true;
+  if (free_slots() > 0) return true;
   const int oldest = oldest_point();
   if (oldest < 0) return false;
   remove_point(oldest);
@@ -89,7 +105,7 @@ int stereo_ekf::slot_of_known(int landmark) {
   if (!make_room()) return -1;
   const int slot = filter_.point_count();
   filter_.add_point(vec_of(known.p_m), sigma);
-  info_[(size_t)slot] = {now_ns_, now_ns_, WM_TIME_NONE, known.id, kOfMap};
+  info_[(size_t)slot] = {now_ns_, now_ns_, WM_TIME_NONE, known.id, kOfMap, kNoFrame, {}, {}};
   return slot;
 }
 
@@ -144,7 +160,8 @@ void stereo_ekf::add_point(const wm_stereo &seen, const wm_innovation &blank, re
   const point_view view = view_point(place, past);
   const int slot = filter_.point_count();
   filter_.add_point(place, view.by, view.A, noise);
-  info_[(size_t)slot] = {picture_ns_, picture_ns_, WM_TIME_NONE, seen.id, 0};
+  info_[(size_t)slot] = {picture_ns_, picture_ns_, WM_TIME_NONE, seen.id, 0, kNoFrame, {}, {}};
+  note_appearance(slot, seen);
   record.verdict = WM_FUSED;
   records.add(record);
 }
@@ -160,12 +177,16 @@ void stereo_ekf::contradict_point(int slot, const wm_stereo &seen, const wm_inno
 }
 
 size_t stereo_ekf::list_landmarks(wm_landmark *out, double (*covariance)[4], size_t capacity) const {
-  const auto count = (size_t)filter_.point_count();
-  for (size_t i = 0; i < count && i < capacity; i++) {
-    const int state = filter_.point_state((int)i);
-    const vec3 place = filter_.point((int)i) + filter_.pending(state);
+  const auto slots = (size_t)filter_.point_count();
+  size_t count = 0;
+  for (size_t slot = 0; slot < slots; slot++) {
+    if (info_[slot].id < 0) continue;
+    const size_t i = count++;
+    if (i >= capacity) continue;
+    const int state = filter_.point_state((int)slot);
+    const vec3 place = filter_.point((int)slot) + filter_.pending(state);
     std::memset(&out[i], 0, sizeof out[i]);
-    out[i].id = info_[(size_t)i].id;
+    out[i].id = info_[slot].id;
     for (int k = 0; k < 3; k++) out[i].p_m[k] = place[k];
     out[i].sigma_m =
         std::sqrt((filter_.variance(state) + filter_.variance(state + 1) + filter_.variance(state + 2)) / 3.0);

@@ -20,6 +20,7 @@ double given(double sigma) { return finite(sigma) ? sigma : kDefaultSigma; }
 }  // namespace
 
 void stereo_ekf::set_pose(const pose3 &pose, double sigma_m, double sigma_rad) {
+  forget_points();
   double covariance[6][6] = {};
   for (int i = 0; i < 3; i++) {
     covariance[i][i] = square(sigma_m);
@@ -50,7 +51,7 @@ void stereo_ekf::start_pose() {
   else if (turn)
     pose.q = turn_by({0, 0, start.heading_rad});
   const double sigma_m = given(start.sigma_xy_m), sigma_rad = given(start.sigma_heading_rad);
-  const bool findable = params_.recover && rig_.there && setup_->landmark_count >= 3;
+  const bool findable = params_.recover && rig_.there && (setup_->landmark_count >= 3 || map_.frames() > 0);
   const bool vague = findable && (sigma_m > kVague_m || sigma_rad > kVague_rad);
   set_pose(pose, place ? sigma_m : kUnknownPlace_m, turn ? sigma_rad : kUnknownTurn_rad);
   begin_pose(place && turn && !vague, kStartWrong);
@@ -63,6 +64,7 @@ wm_status stereo_ekf::take_pose(const wm_event &event) {
   if (const wm_status bad = check_time(event.t_ns); bad != WM_OK) return bad;
   move_to(event.t_ns);
   if (event.kind == WM_EVENT_RESET) {
+    forget_map();
     filter_.restart_head();
     start_pose();
     return WM_OK;
@@ -114,6 +116,7 @@ void stereo_ekf::search(wm_time_ns since_ns) {
   const pose_found found = observations_.find(since_ns, odometry_, kFoundSigma_m, kFoundSigma_rad, setup_->seed);
   if (found.searched) life_.searched(now_ns_);
   if (!found.found) return;
+  forget_points();
   filter_.set_pose(found.pose, found.covariance);
   remembered_.restore(&filter_);
   filter_.restart_transient();

@@ -118,6 +118,7 @@ bool space_filter::factorize_and_gate(const row_block &block, const gates &limit
       d -= square(f->l[k][m]) * f->d[m];
     }
     const double nis = square(left) / d;
+    out->innovation[k] = left;  // what the rows before it leave: its variance is that, too
     out->variance[k] = d;
     out->nis[k] = nis;
     if (!(d > 0.0) || !finite(nis)) return false;
@@ -322,7 +323,6 @@ void space_filter::remove_point(int slot) {
 
 void space_filter::set_pose(const pose3 &pose, const double covariance[6][6]) {
   settle();
-  remove_points();
   decorrelate(kPlace, kPose6, 0.0);
   pose_ = {pose.p, normalized(pose.q)};
   r_ = matrix_of(pose_.q);

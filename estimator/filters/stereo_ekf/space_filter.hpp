@@ -122,6 +122,7 @@ class space_filter {
   vec3 head3(int which) const;  // zero where it is off
   double head1(int which, double off) const;
   int at(int which) const { return at_[which]; }
+  double point_value(int state) const { return points()[state - first_point_]; }
   vec3 point(int slot) const { return vec_of(points() + 3 * slot); }
   int point_state(int slot) const { return first_point_ + 3 * slot; }
   int point_count() const { return (n_ - first_point_) / 3; }
@@ -135,7 +136,11 @@ class space_filter {
   // The last point takes the removed one's slot.
   void remove_point(int slot);
   void remove_points() { n_ = first_point_; }
+  // Of a kept state, behind the pose; nothing may be pending.
+  void set_head(int state, double value) { head_[state] = value; }
+  void set_covariance(int i, int j, double value) { p()[i < j ? i * stride_ + j : j * stride_ + i] = value; }
 
+  // Points stay as they are, without correlation with the pose.
   void set_pose(const pose3 &pose, const double covariance[6][6]);
   // Back to the start's value and variance, uncorrelated: all states behind the pose, or those alone of which a stored
   // value would be old: velocity, rates, and what is Gauss-Markov.

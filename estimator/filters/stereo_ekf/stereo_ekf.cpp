@@ -64,6 +64,7 @@ double lasting_error_of(const wm_stereo_ekf_params &p, const stereo_rig &rig) {
 wm_stereo_ekf_params usable(const wm_stereo_ekf_params &params, const stereo_rig &rig, const wm_setup &setup) {
   wm_stereo_ekf_params out = params;
   if (!rig.there) out.points_max = out.increments = 0;
+  if (out.points_max == 0) out.frames_max = 0;
   if (out.camera_rotation_sigma < 0.0) {
     out.camera_rotation_sigma = lasting_error_of(params, rig);
     if (!(out.camera_rotation_tau_s > 0.0)) out.camera_rotation_tau_s = kLasting_s;
@@ -94,6 +95,13 @@ const char *const kReads[] = {"!motion.twist",
 
 }  // namespace
 
+wm_stereo_ekf_params stereo_ekf::used_params(const wm_stereo_ekf_params &params, const wm_setup &setup) {
+  stereo_rig rig;
+  const char *why = "";
+  (void)rig.init(setup.rig, &why);
+  return usable(params, rig, setup);
+}
+
 size_t stereo_ekf::bytes(const wm_stereo_ekf_params &params, const wm_setup &setup, const char **why) {
   stereo_rig rig;
   if (!rig.init(setup.rig, why)) return 0;
@@ -109,9 +117,15 @@ size_t stereo_ekf::bytes(const wm_stereo_ekf_params &params, const wm_setup &set
 stereo_ekf::arrays stereo_ekf::place(memory_layout *layout, const wm_stereo_ekf_params &params, const wm_setup &setup) {
   head_model models[kHeadStates];
   models_of(params, models);
-  return {layout->take<int>(setup.landmark_count), layout->take<landmark_record>(setup.landmark_count),
-          layout->take<point_info>((size_t)params.points_max),
-          layout->take<double>(space_filter::doubles(models, params.points_max))};
+  const int slots = params.points_max + own_map::kCorners * params.frames_max;
+  arrays out{};
+  out.order = layout->take<int>(setup.landmark_count);
+  out.records = layout->take<landmark_record>(setup.landmark_count);
+  out.info = layout->take<point_info>((size_t)slots);
+  out.filter = layout->take<double>(space_filter::doubles(models, slots));
+  out.looked = layout->take<looked_point>(params.frames_max > 0 ? (size_t)kLookedMost : 0);
+  own_map::place(layout, params.frames_max, &out.frame, &out.map_point, &out.places);
+  return out;
 }
 
 void stereo_ekf::init(const wm_stereo_ekf_params &params, const wm_setup &setup) {
@@ -127,11 +141,14 @@ void stereo_ekf::init(const wm_stereo_ekf_params &params, const wm_setup &setup)
   gravity_.init(params.accelerometer_mps2);
   head_model models[kHeadStates];
   models_of(params_, models);
-  filter_.init(behind.filter, models, params_.points_max);
+  filter_.init(behind.filter, models, params_.points_max + own_map::kCorners * params_.frames_max);
   if (rig_.there) filter_.set_camera_axes(rig_.R_base_optical);
   index_.init(setup.landmarks, setup.landmark_count, behind.order);
   records_.set(behind.records);
   info_.set(behind.info);
+  looked_.set(behind.looked);
+  map_.init(params_.frames_max, behind.frame, behind.map_point, behind.places);
+  forget_map();
   now_ns_ = picture_ns_ = last_picture_ns_ = WM_TIME_NONE;
   life_ = lifecycle();
   start_ns_ = setup.start.t_ns;

@@ -10,6 +10,7 @@
 #include "filters/core/rollback.hpp"
 #include "filters/relocalize/pose_consensus.hpp"
 #include "filters/stereo_ekf/gravity.hpp"
+#include "filters/stereo_ekf/own_map.hpp"
 #include "filters/stereo_ekf/params.h"
 #include "filters/stereo_ekf/picture_motion.hpp"
 #include "filters/stereo_ekf/space_filter.hpp"
@@ -35,6 +36,15 @@ class stereo_ekf {
   wm_motion_calibration motion_calibration() const;
   uint32_t motion_health() const { return motion_.health(); }
 
+  // keep.cpp: wm_keeper's functions
+  static size_t kept_bytes_max(const wm_stereo_ekf_params &params, const wm_setup &setup);
+  size_t keep(void *out, size_t capacity) const;
+  static const char *why_not_kept(const wm_stereo_ekf_params &params, const wm_setup &setup, const void *image,
+                                  size_t bytes);
+  void take_kept(const void *image);
+  // The parameters with what the setup decides.
+  static wm_stereo_ekf_params used_params(const wm_stereo_ekf_params &params, const wm_setup &setup);
+
  private:
   static constexpr int32_t kOfMap = -1;  // point_info::unseen of a point of the map, which is not removed
   // Observations of the last seconds are used to find the pose; odometry relates them. Not swept.
@@ -53,9 +63,21 @@ class stereo_ekf {
   // A point of the state.
   struct point_info {
     wm_time_ns begun_ns, seen_ns, misfit_ns;  // first and last fused, last outlier
-    int32_t id;
-    int32_t unseen;  // kOfMap, or pictures in which it was missed or was an outlier
+    int32_t id;                               // below 0: a corner of a key frame
+    int32_t unseen;                           // kOfMap, or pictures in which it was missed or was an outlier
+    int64_t frame;  // of the own map, in which it will lie; kNoFrame: none yet; kFoundAgain: it lies there already
+    uint64_t seen_as[kAppearanceWords], kept_as[kAppearanceWords];  // by the newest picture, and by its frame's
   };
+  static constexpr int kFramesMost = 200;  // slam.key_frames' limit
+  static constexpr int64_t kNoFrame = -1, kFoundAgain = -2;
+  // A point of the present picture, for the own map.
+  struct looked_point {
+    wm_stereo seen;
+    vec3 in_body;
+    double sigma_m;
+    int64_t found;  // number of its point of the own map; -1: none
+  };
+  static constexpr int kLookedMost = matched_points::kCapacity;
   // The pose at the time of measurement, and the twist about then, in body axes.
   struct past_pose {
     pose3 at;
@@ -118,12 +140,40 @@ class stereo_ekf {
   void add_point(const wm_stereo &seen, const wm_innovation &blank, record_list records);
   void contradict_point(int slot, const wm_stereo &seen, const wm_innovation &blank, record_list records);
   int oldest_point() const;
+  int free_slots() const;
   bool has_room() const;
   bool make_room();
   bool is_landmark(const wm_stereo &seen) const;
   bool grows_fast(double depth_m) const;
   bool matches_itself(const wm_stereo &seen, wm_innovation *record) const;
   void remove_point(int slot);
+  void forget_points();
+
+  // find_again.cpp: the own map
+  static int32_t corner_id(int frame, int corner) { return -2 - own_map::kCorners * frame - corner; }
+  double corner_variance(double depth_m) const;
+  void look(const wm_stereo &seen);
+  void bound_reach(double *reach_m) const;
+  void note_appearance(int slot, const wm_stereo &seen);
+  frame_triangle triangle_of(int frame) const;
+  void triangle_block(int frame, const vec3 &coordinates, row_block *out) const;
+  mat3 covariance_by(const row_block &block) const;
+  bool map_point_of(int slot, own_point *out) const;
+  void leave_point(int slot);
+  void find_again();
+  bool take_filtered(const past_pose &past, looked_point *look) const;
+  double match(bool everywhere, matched_points *out);
+  int keep_agreeing(const matched_points &all, const pose3 &at);
+  bool fuse_match(const looked_point &looked, const gates &limits);
+  int fuse_matches(const gates &limits);
+  void begin_again(const pose3 &body_at_picture);
+  bool close_loop(bool everywhere);
+  void search_map();
+  void extend_map();
+  void begin_frame(int frame, double depth_m);
+  void forget_frame(int frame);
+  void forget_map();
+  int kept_state(int i, const int *frames) const;
 
   // increments.cpp
   pair_view pair() const;
@@ -153,6 +203,10 @@ class stereo_ekf {
     landmark_record *records;
     point_info *info;
     double *filter;
+    looked_point *looked;
+    own_frame *frame;
+    own_point *map_point;
+    vec3 *places;
   };
   static arrays place(memory_layout *layout, const wm_stereo_ekf_params &params, const wm_setup &setup);
   gates limits() const { return {params_.gate_soft, params_.gate_hard}; }
@@ -166,6 +220,13 @@ class stereo_ekf {
   landmark_index index_;
   relative_array<landmark_record> records_;  // by landmark
   relative_array<point_info> info_;          // by slot of the state
+  own_map map_;
+  relative_array<looked_point> looked_;
+  int64_t looked_count_;
+  pose3 frame_pose_;          // where the newest key frame was made, or the map was found again
+  wm_time_ns frame_ns_;       // then; NONE: never
+  wm_time_ns everywhere_ns_;  // newest search of the whole map; NONE: never
+  wm_time_ns elsewhere_ns_;   // when that search contradicted the pose; NONE: it does not
   double sigma_px_[4];
   wm_time_ns now_ns_, start_ns_;
   wm_time_ns last_picture_ns_;  // whose tracks `tracks_` has

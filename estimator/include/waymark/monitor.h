@@ -62,19 +62,45 @@ typedef struct wm_monitor_course {
   wm_time_ns until_ns;
   double impossible_s;  // time of turns that no vehicle can drive, less that of others
   int32_t is_mirrored, is_impossible;
+  // Log likelihood ratio of the mirror image (NAN: not known), the least so far, and where the image lies: turned about
+  // mirror_way_m, then shifted from there to mirror_place_m.
+  double nats, least_nats;
+  double mirror_turn_rad, mirror_way_m[2], mirror_place_m[2];
 } wm_monitor_course;
+
+#define WM_MONITOR_LANDMARKS 48
+
+// A residual of a landmark: its slots' mean innovations over sigma, summed up with forgetting.
+typedef struct wm_monitor_landmark {
+  int32_t id;
+  uint16_t source;
+  uint16_t residual;
+  wm_time_ns at_ns, slot_ns;  // of the sum; begin of the present slot
+  double sum, variance;
+  double slot_sum, slot_count;
+} wm_monitor_landmark;
+
+typedef struct wm_monitor_landmarks {
+  wm_monitor_landmark entries[WM_MONITOR_LANDMARKS];
+  uint32_t count;
+  int32_t contradicts;
+} wm_monitor_landmarks;
 
 typedef struct wm_monitor {
   wm_monitor_source sources[WM_MONITOR_SOURCES];
   uint64_t observers;  // bit for each source that may give observations
   wm_monitor_course course;
+  wm_monitor_landmarks landmarks;         // of a known map
   double scale_sigma[WM_MONITOR_SCALES];  // stated; 0: no state
+  double mirrored_m2, mirrored_rad2;      // what the chance of a mirror image adds to the covariance
   double spread_m2;                       // variance of a place anywhere on the map, each axis
   double low_m[2], high_m[2];             // the map, else the way so far
   double doubt_s;                         // time of contradiction that fitting observations have not made up for
   double fitted_s;                        // time of fitting observations since the pose was set or found
   double since_found_s;                   // since a search found a pose
   double contradicted_s;                  // lost or contradicted, less a share of the time without doubt
+  double proof_s;                         // of driving in agreement with the observations
+  double lost_s;                          // by the estimator, without a break
   wm_time_ns begun_ns, stepped_ns, next_ns;
   uint32_t resets;
   int32_t cause, source;        // of the present doubt; source -1: none
@@ -82,6 +108,7 @@ typedef struct wm_monitor {
   int32_t is_unsupported, is_outside;
   int32_t was_lost, silent;   // by the estimator; silent: source, -1: none
   int32_t is_probation;       // of a found pose, until it fits
+  int32_t is_found_early;     // a pose was found before one was proven
   int32_t is_noise_at_limit;  // an adapted noise
 } wm_monitor;
 

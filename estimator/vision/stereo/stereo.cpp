@@ -5,6 +5,7 @@
 #include "vision/detector.hpp"
 #include "vision/registry.h"
 #include "vision/stereo/corners.hpp"
+#include "vision/stereo/describe.hpp"
 #include "vision/stereo/rectify.hpp"
 #include "vision/stereo/track.hpp"
 #include "waymark/internal/memory/layout.hpp"
@@ -237,7 +238,8 @@ size_t emit(const stereo_state &self, wm_time_ns t_ns, wm_event *out, size_t cap
     std::memset(static_cast<void *>(&event), 0, WM_EVENT_SMALL_BYTES);
     event.t_ns = t_ns;
     event.kind = WM_EVENT_STEREO;
-    event.as.stereo = {one.id, {one.left.u, one.left.v}, {one.right.u, one.right.v}};
+    event.as.stereo = {one.id, {one.left.u, one.left.v}, {one.right.u, one.right.v}, {}};
+    describe(self.pictures[0], one.left, self.pair.fu / one.place.z, event.as.stereo.appearance);
   }
   return count;
 }

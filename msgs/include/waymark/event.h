@@ -134,6 +134,7 @@ typedef struct wm_stereo {
   int32_t id;
   double left_px[2];  // NaN where the point is not in that camera's picture
   double right_px[2];
+  uint64_t appearance[4];  // 256 bits of the patch about it; points alike differ in few. All 0: none
 } wm_stereo;
 
 // Edge points on the floor. The normal of an edge points from its bright to its dark side.

@@ -16,7 +16,7 @@
 extern "C" {
 #endif
 
-#define WM_EVENT_VERSION 5         // of the codec; the next one where a field comes
+#define WM_EVENT_VERSION 6         // of the codec; the next one where a field comes
 #define WM_EVENT_VERSION_OLDEST 3  // that is read
 
 // Numbers of a sighting.
@@ -31,14 +31,14 @@ extern "C" {
   NUMBER(elevation_rad, OPTIONAL, -1.5708, 1.5708, "not beyond the vertical", 4, 0, IN_MESSAGE)             \
   NUMBER(elevation_sigma_rad, OPTIONAL, DBL_MIN, 1e6, "above 0, and not above 1000000", 4, 4, IN_MESSAGE)
 
-typedef enum wm_field_type { WM_FIELD_F64, WM_FIELD_I64, WM_FIELD_I32, WM_FIELD_U16 } wm_field_type;
+typedef enum wm_field_type { WM_FIELD_F64, WM_FIELD_I64, WM_FIELD_U64, WM_FIELD_I32, WM_FIELD_U16 } wm_field_type;
 
 typedef struct wm_event_field {
   const char *name;    // as the member's
   uint16_t offset;     // in wm_event
   uint8_t type;        // wm_field_type
   uint8_t count;       // elements
-  uint8_t since;       // codec version it came with; older logs have none, and NaN is read. 0: always there
+  uint8_t since;       // codec version it came with; of older logs NaN, or 0 bits, is read. 0: always there
   uint8_t zero_until;  // last codec version in which 0 stands for absent; 0: none
 } wm_event_field;
 

@@ -372,7 +372,12 @@ static void too_many_points(void) {
 static void other_streams(void) {
   folder_write("motion6.csv", "t_ns,vx_mps,vy_mps,vz_mps,wx_radps,wy_radps,wz_radps\n1,1,2,3,4,5,6\n");
   folder_write("markers.csv", "t_ns,sensor,id,x_m,y_m,z_m,yaw_rad\n1,up,10,1,2,3,-3.2\n");
-  folder_write("stereo.csv", "t_ns,id,ul_px,vl_px,ur_px,vr_px\n1,4,1,2,,\n2,4,1,,3,4\n3,4,,,,\n4,4,1,2,3,4\n");
+#define DIGITS_48 "0000000000000001000000000000000000000000000000ff"
+  folder_write("stereo.csv",
+               "t_ns,id,ul_px,vl_px,ur_px,vr_px,appearance\n1,4,1,2,,,\n2,4,1,,3,4,\n3,4,,,,,\n"
+               "4,4,1,2,3,4," DIGITS_48 "8000000000000000\n5,4,1,2,3,4,0f\n6,4,1,2,3,4," DIGITS_48
+               "800000000000000G\n"
+               "7,4,1,2,3,4,\n");
   wm_event event = next(source("motion6"));
   TEST_ASSERT_EQUAL_DOUBLE(3, event.as.twist6.v_mps[2]);
   TEST_ASSERT_EQUAL_DOUBLE(4, event.as.twist6.w_radps[0]);
@@ -384,8 +389,14 @@ static void other_streams(void) {
   wm_source *stereo = source("stereo");
   event = next(stereo);
   TEST_ASSERT_TRUE(event.as.stereo.left_px[1] == 2 && isnan(event.as.stereo.right_px[0]));
-  TEST_ASSERT_EQUAL(4, next(stereo).t_ns);
-  TEST_ASSERT_EQUAL(2, stereo->counts.malformed);
+  static const uint64_t kAppearance[] = {1, 0, 0xff, UINT64_C(1) << 63}, kNone[4] = {0};
+  event = next(stereo);
+  TEST_ASSERT_EQUAL(4, event.t_ns);
+  TEST_ASSERT_EQUAL_MEMORY(kAppearance, event.as.stereo.appearance, sizeof kAppearance);
+  event = next(stereo);
+  TEST_ASSERT_EQUAL(7, event.t_ns);
+  TEST_ASSERT_EQUAL_MEMORY(kNone, event.as.stereo.appearance, sizeof kNone);
+  TEST_ASSERT_EQUAL(4, stereo->counts.malformed);
   static const char *const kOrder[] = {"motion", "motion6", "markers:up", "stereo"};
   size_t count;
   wm_source *const *sources = wm_recording_sources(recording, &count);

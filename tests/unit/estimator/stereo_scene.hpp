@@ -154,7 +154,7 @@ struct scene {
   }
   wm_event seen(const wm_landmark &l, const double px[4]) const {
     wm_event e = make::empty(t_s, WM_EVENT_STEREO);
-    e.as.stereo = {l.id, {px[0], px[1]}, {px[2], px[3]}};
+    e.as.stereo = {l.id, {px[0], px[1]}, {px[2], px[3]}, {}};
     return e;
   }
   // What the pair sees now; returns how many points.

@@ -59,7 +59,7 @@ struct street {
       }
       for (double &value : px) value += 0.2 * s.noise();
       wm_event e = make::empty(s.t_s, WM_EVENT_STEREO);
-      e.as.stereo = {id[i], {px[0], px[1]}, {px[2], px[3]}};
+      e.as.stereo = {id[i], {px[0], px[1]}, {px[2], px[3]}, {}};
       TEST_ASSERT_EQUAL(WM_OK, s.take(e));
     }
   }

@@ -86,7 +86,7 @@ void test_each_refused_datum_leaves_a_record(void) {
   std::vector<wm_event> bad;
   const auto stereo = [&](int32_t id, double u) {
     wm_event e = make::empty(s.t_s, WM_EVENT_STEREO);
-    e.as.stereo = {id, {u, 200}, {280, 200}};
+    e.as.stereo = {id, {u, 200}, {280, 200}, {}};
     bad.push_back(e);
   };
   stereo(-1, 300);

@@ -11,12 +11,15 @@
 
 #include "output/event_log.h"
 #include "tiny_estimator.h"
+#include "waymark/motion.h"
 
 static wm_sensor fixture_sensors[2] = {{.name = "left"}, {.name = "right"}};
 static wm_landmark fixture_landmarks[3] = {{.id = 1, .p_m = {1, 2, 0}, .sigma_m = 0.01, .yaw_rad = NAN},
                                            {.id = 2, .p_m = {3, 4, 0}, .sigma_m = 0.01, .yaw_rad = NAN},
                                            {.id = 9, .p_m = {5, 6, 0}, .sigma_m = 0.01, .yaw_rad = NAN}};
 static char fixture_config_text[] = "format: waymark-config/1\nestimator: tiny\n";
+
+static _Alignas(16) uint8_t fixture_motion[8192];  // the defaults
 
 static void fixture_assembly(wm_config *config, wm_assembly *assembly) {
   memset(config, 0, sizeof *config);
@@ -26,6 +29,9 @@ static void fixture_assembly(wm_config *config, wm_assembly *assembly) {
   config->text_length = strlen(fixture_config_text);
   config->estimator = &kTiny;
   assembly->config = config;
+  if (wm_motion_params_table.bytes > sizeof fixture_motion) abort();
+  wm_params_defaults(&wm_motion_params_table, fixture_motion);
+  assembly->setup.motion = (const wm_motion_params *)fixture_motion;
   assembly->setup.wheels.track_m = 0.5;
   assembly->setup.sensors = fixture_sensors;
   assembly->setup.sensor_count = 2;

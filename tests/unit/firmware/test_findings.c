@@ -194,7 +194,7 @@ static void the_cause_of_a_lost_or_degraded_drive_is_named(void) {
       {WM_STATE_DEGRADED, WM_CAUSE_OFF_MAP, -1, WM_FOUND_POSE_DOUBTFUL, "map", "does not reach the pose"},
       {WM_STATE_DEGRADED, WM_CAUSE_UNKNOWN, 0, WM_FOUND_POSE_DOUBTFUL, "eye", "has unknown identities"},
       {WM_STATE_DEGRADED, WM_CAUSE_LOST_AGAIN, -1, WM_FOUND_POSE_DOUBTFUL, "observations",
-       "contradicts poses soon after they are found"},
+       "contradicted the last pose; the one found since is on probation"},
       {WM_STATE_DEGRADED, WM_CAUSE_TURN, -1, WM_FOUND_POSE_DOUBTFUL, "observations", "turn to the other side"}};
   for (size_t i = 0; i < sizeof kDrives / sizeof kDrives[0]; i++) {
     drive_in(kDrives[i].state, kDrives[i].cause, kDrives[i].source, 1000);

@@ -31,7 +31,8 @@ static void fill_field(wm_event *e, const wm_event_field *field) {
     const int32_t edges[] = {INT32_MIN, -1, INT32_MAX, (int32_t)bits};
     switch ((wm_field_type)field->type) {
       case WM_FIELD_F64: memcpy(at + i * sizeof number, &number, sizeof number); break;
-      case WM_FIELD_I64: memcpy(at + i * sizeof bits, &bits, sizeof bits); break;
+      case WM_FIELD_I64:
+      case WM_FIELD_U64: memcpy(at + i * sizeof bits, &bits, sizeof bits); break;
       case WM_FIELD_I32: memcpy(at, &edges[bits % 4], sizeof edges[0]); break;
       case WM_FIELD_U16: memcpy(at, &bits, sizeof(uint16_t)); break;
     }
@@ -80,7 +81,7 @@ static void fields_cover_their_structs(void) {
       [WM_EVENT_MARKER] = sizeof none->as.marker,       [WM_EVENT_STEREO] = sizeof none->as.stereo,
       [WM_EVENT_LOOKED] = sizeof none->as.looked,       [WM_EVENT_SET_POSE] = sizeof none->as.set_pose};
   static const size_t kBytes[] = {
-      [WM_FIELD_F64] = sizeof(double), [WM_FIELD_I64] = 8, [WM_FIELD_I32] = 4, [WM_FIELD_U16] = 2};
+      [WM_FIELD_F64] = sizeof(double), [WM_FIELD_I64] = 8, [WM_FIELD_U64] = 8, [WM_FIELD_I32] = 4, [WM_FIELD_U16] = 2};
   for (unsigned kind = 1; kind < WM_EVENT_KIND_COUNT; kind++) {
     size_t count, covered = 0, widest = 1;
     const wm_event_field *fields = wm_event_fields(kind, &count);

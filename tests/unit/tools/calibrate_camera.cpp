@@ -35,8 +35,8 @@ std::unique_ptr<wm::render::Scene> board_scene() {
   for (int j = 0; j < kRows; j++)
     for (int i = 0; i < kColumns; i++)
       if ((i + j) % 2 == 0)
-        r::fill_rect((i + 1) * kPixels, (j + 1) * kPixels, (i + 2) * kPixels, (j + 2) * kPixels, r::Colour(0.04F),
-                     paint);
+        wm::images::fill_rect((i + 1) * kPixels, (j + 1) * kPixels, (i + 2) * kPixels, (j + 2) * kPixels,
+                              r::Colour(0.04F), paint);
   auto scene = std::make_unique<r::Scene>();
   const double width = (kColumns + 2) * kSquare_m, height = (kRows + 2) * kSquare_m;
   r::Material board;

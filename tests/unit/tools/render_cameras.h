@@ -6,7 +6,7 @@
 
 #include "images/camera.h"
 
-namespace wm::render {
+namespace wm::images {
 
 struct NamedCamera {
   const char *name;
@@ -40,4 +40,4 @@ inline std::vector<NamedCamera> all_cameras() {
   return out;
 }
 
-}  // namespace wm::render
+}  // namespace wm::images

@@ -14,6 +14,7 @@ void tearDown(void);
 void setUp(void) {}
 void tearDown(void) {}
 
+using namespace wm::images;
 using namespace wm::render;
 
 namespace {

@@ -17,6 +17,7 @@ void tearDown(void);
 void setUp(void) {}
 void tearDown(void) {}
 
+using namespace wm::images;
 using namespace wm::render;
 
 namespace {
