@@ -7,8 +7,8 @@ descriptors, threads and files are sampled meanwhile.
 
 The drive goes round the block of config/worlds/crossing-laps.yaml for H hours. Lateness that counts is X times longer, since the
 computer's delays are. Judged: nothing is dropped, memory in the second half grows by less than 2 %, descriptors and threads stay,
-the files stay below N MB and 5 % (they are
-put aside once a second, which is X s of driving), and the last pose is within 5 sigma or 0.5 m of the truth. Exit code 1 where one of these is missed."""
+the files stay below N MB and 5 % (they are put aside once a second, which is X s of driving), and the last pose is within 5 sigma
+or 0.5 m of the truth. Exit code 1 where one of these is missed."""
 import argparse
 import json
 import os
