@@ -7,7 +7,8 @@ descriptors, threads and files are sampled meanwhile.
 
 The drive goes round the block of config/worlds/crossing-laps.yaml for H hours. Lateness that counts is X times longer, since the
 computer's delays are. Judged: nothing is dropped, memory in the second half grows by less than 2 %, descriptors and threads stay,
-the files stay below N MB, and the last pose is within 5 sigma or 0.5 m of the truth. Exit code 1 where one of these is missed."""
+the files stay below N MB and 5 % (they are put aside once a second, which is X s of driving), and the last pose is within 5 sigma
+or 0.5 m of the truth. Exit code 1 where one of these is missed."""
 import argparse
 import json
 import os
@@ -112,7 +113,7 @@ def main():
         values = {s[name] for s in second}
         rows.append((name, "-".join(map(str, sorted({min(values), max(values)}))), len(values) <= 2 and max(values) - min(values) <= 1))
     most_mb = max(s["files_mb"] for s in samples)
-    rows += [("files at most, MB", f"{most_mb:.1f}", most_mb <= options.max_mb),
+    rows += [("files at most, MB", f"{most_mb:.1f}", most_mb <= 1.05 * options.max_mb),
              ("last pose", f"{error_m:.3f} m, {sigmas:.1f} sigma", error_m < 0.5 or sigmas < 5)]
     print(f"{options.hours} h of driving in {took_s / 60:.1f} min, {len(samples)} samples\n\n| what | figure | good |\n| --- | --- | --- |")
     for name, figure, good in rows:

@@ -101,7 +101,7 @@ def references():
 
 
 CODE = [ROOT / room for room in ("estimator", "msgs")]
-BELOW = [ROOT, ROOT / "estimator", ROOT / "estimator/filters"]
+BELOW = [ROOT, ROOT / "estimator", ROOT / "estimator/include", ROOT / "estimator/filters"]
 
 
 def glossary():

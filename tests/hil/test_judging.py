@@ -10,6 +10,7 @@ import sys
 import tempfile
 import types
 import unittest
+from unittest import mock
 
 import yaml
 
@@ -340,6 +341,19 @@ class Guests(unittest.TestCase):
             self.assertIn("was ended by the desk", log.read_text())
             self.assertTrue(guest.boot(["sh", "-c", "sleep 1.5; echo GUEST-RC 0"], log, 1))
             self.assertNotIn("was ended", log.read_text())
+
+    def test_what_is_missing(self):
+        """An image of an older kernel is there, and a newer one cannot be made."""
+        with tempfile.TemporaryDirectory() as folder, mock.patch.object(guest, "missing", lambda arch, has_image=False: [] if has_image else ["mmdebstrap"]), \
+                mock.patch.object(guest.subprocess, "run", lambda *_, **__: types.SimpleNamespace(returncode=1)):
+            (pathlib.Path(folder) / "image").mkdir()
+            (pathlib.Path(folder) / "image/made_of").write_text("6.1.0-1 0")
+            with self.assertRaisesRegex(HilError, "apt-get install mmdebstrap"):
+                guest.prepare("amd64", pathlib.Path(folder))
+
+    def test_programs_that_are_missing(self):
+        with mock.patch.object(targets.shutil, "which", lambda *_, **__: None), self.assertRaisesRegex(HilError, "openssh-client"):
+            targets.Host("pi@board", [], {}).prepare(None)
 
     def test_the_rate_is_stated(self):
         self.assertEqual(targets.Guest("amd64", None, None).name, "guest amd64")

@@ -421,6 +421,21 @@ void test_samples_that_agree_replace_the_trusted_ones(void) {
   TEST_ASSERT_EQUAL_DOUBLE(30.0, front.twist_at(make::at(0.1), calibration).v);
 }
 
+// A count is off by a step / sqrt(12): the mean of both wheels' differences over a period, and their difference over
+// the track.
+void test_noise_of_counts(void) {
+  const double each = 0.02 / kTick;
+  double speed_mps, turn_radps;
+  start(make::two_wheels());
+  front.count_noise(&speed_mps, &turn_radps);
+  TEST_ASSERT_EQUAL_DOUBLE(0.0, speed_mps);
+  for (int i = 0; i <= 50; i++) ticks(0.02 * i, each * i, each * i);
+  front.count_noise(&speed_mps, &turn_radps);
+  const double expected = kTick / (0.02 * std::sqrt(12.0));
+  TEST_ASSERT_DOUBLE_WITHIN(0.01 * expected, expected, speed_mps);
+  TEST_ASSERT_DOUBLE_WITHIN(0.02 * expected / 0.5, 2.0 * expected / 0.5, turn_radps);
+}
+
 // GIVEN counts each 20 ms WHEN one message's are 0.7 m off THEN they are refused with noise, and nothing of the way is
 // lost; so, too, with a gyro. A jump of one wheel refuses the message's other one.
 void test_a_wrong_count_is_refused(void) {
@@ -531,6 +546,7 @@ int main(void) {
   RUN_TEST(test_a_frozen_counter_is_doubt_not_standstill);
   RUN_TEST(test_a_speed_that_no_robot_reaches_is_refused);
   RUN_TEST(test_samples_that_agree_replace_the_trusted_ones);
+  RUN_TEST(test_noise_of_counts);
   RUN_TEST(test_a_wrong_count_is_refused);
   RUN_TEST(test_counts_that_go_on_from_elsewhere_are_a_new_start);
   RUN_TEST(test_a_counter_that_contradicts_the_stamp_is_doubt);

@@ -16,7 +16,6 @@ void setUp(void) {}
 void tearDown(void) {}
 
 using namespace wm::images;
-using namespace wm::render;
 
 namespace {
 

@@ -33,6 +33,9 @@ kernel=$(its_apt apt-cache depends "linux-image-rt-$machine" | awk '/Depends: li
 cd "$folder"
 made_of="$kernel $(cat "$here/prepare.sh" "$here/initramfs.sh" "$here/guest_second.c" | sha256sum)"
 if [ "$(cat made_of 2>/dev/null)" = "$made_of" ] && [ -f init.cpio.gz ]; then exit 0; fi
+for program in mmdebstrap cpio mke2fs make; do # before the image that is there is removed
+  PATH=$PATH:/usr/sbin:/sbin command -v "$program" >/dev/null || { echo "prepare.sh: $program is missing; the image is as it was"; exit 1; }
+done
 echo "preparing a guest with $kernel in $folder"
 rm -rf debs files root v4l2loopback vimc second made_of root.ext4 init.cpio.gz
 

@@ -79,6 +79,8 @@ def prepare(arch, folder, out=None):
     if packages := missing(arch, (image / "made_of").is_file()):
         raise HilError(f"a guest needs Debian packages that are missing: sudo apt-get install {' '.join(packages)}")
     done = subprocess.run(["bash", SCRIPTS / "prepare.sh", image, arch], stdout=out, stderr=subprocess.STDOUT if out else None, check=False)
+    if done.returncode and (packages := missing(arch)):  # there is an image, of an older kernel
+        raise HilError(f"a newer image takes Debian packages that are missing: sudo apt-get install {' '.join(packages)}")
     if done.returncode:
         raise HilError(f"the guest's image was not made (exit code {done.returncode}){f': {out.name}' if out else ''}")
     return image
