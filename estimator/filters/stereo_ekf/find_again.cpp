@@ -28,7 +28,7 @@ constexpr double kFollowed_s = 0.3;
 // open.
 constexpr double kReach = 3.5, kReach_m = 0.1;
 constexpr double kEverywhere_m = 1e9, kEverywhereEach_s = 0.5;
-// Points that are looked for in the whole map at a time: with 2560 points in it 1.5 ms on the desk's computer.
+// Points that are looked for in the whole map at a time. It bounds the time of a search; it was not swept.
 constexpr int kSearchedMost = 48;
 // With three of four matches wrong, one triple in 64 is right: of 300 triples one is, with a probability of 99 %.
 constexpr int kHypotheses = 300;

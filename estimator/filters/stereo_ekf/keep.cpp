@@ -114,6 +114,7 @@ size_t stereo_ekf::kept_bytes_max(const wm_stereo_ekf_params &params, const wm_s
   kept_frames_head head{};
   head.calibration = calibration_states(params, setup);
   head.frames = static_cast<uint32_t>(used_params(params, setup).frames_max);
+  if (head.frames == 0) return 0;
   head.points = head.frames * own_map::kPointsOfFrame;
   return kept_frames_layout(head).bytes;
 }

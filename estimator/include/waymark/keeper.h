@@ -11,7 +11,7 @@ extern "C" {
 #endif
 
 typedef struct wm_keeper {
-  // Bytes of the largest image: of a map with as many landmarks as the parameters allow.
+  // Bytes of the largest image: of a map with as many landmarks as the parameters allow. 0: with these nothing is kept.
   size_t (*bytes_max)(const void *params, const wm_setup *setup);
   // Writes an image of `state` and returns its bytes; 0 where the pose is in doubt or `capacity` is too small, which
   // bytes_max never is. One pass over the covariance: no more than a correction.

@@ -59,14 +59,21 @@ static void note_warning(void *context, const char *line) {
   wm_find(context, WM_FOUND_FILE_NOTE, WM_SEVERITY_NOTE, "config", "", "%s", line);
 }
 
+static int keeps_a_map(const wm_config *config) {
+  static wm_setup bare;  // of no sensor: whether anything is kept does not depend on them
+  const wm_keeper *keeper = wm_keeper_of(config->estimator);
+  wm_setup_init(&bare);
+  return keeper && keeper->bytes_max(config->estimator_params, &bare) > 0;
+}
+
 void check_config(const wm_config *config, wm_findings *out) {
   wm_config_each_warning(config, note_warning, out);
   messages(config, out);
   folder_of("start.saved_pose", config->saved_pose, "no pose would be kept", out);
   folder_of("commands.socket", config->commands, "no command could be sent", out);
   folder_of("start.saved_map", config->saved_map, "no map would be kept", out);
-  if (config->saved_map[0] && !wm_keeper_of(config->estimator))
-    wm_find(out, WM_FOUND_MAP_NOT_KEPT, WM_SEVERITY_NOTE, "start", "leave start.saved_map out",
+  if (config->saved_map[0] && !keeps_a_map(config))
+    wm_find(out, WM_FOUND_MAP_NOT_KEPT, WM_SEVERITY_NOTE, "start", "leave start.saved_map out, or set slam.key_frames",
             "start.saved_map: estimator %s makes no map to keep", config->estimator->name);
   if (config->saved_map[0] && !config->saved_pose[0])
     wm_find(out, WM_FOUND_MAP_NOT_KEPT, WM_SEVERITY_NOTE, "start", "start.saved_pose, beside it",
