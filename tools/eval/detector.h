@@ -31,9 +31,9 @@ struct DetectorMetric {
 
 // Over the frames that `truth` has and `detected` looked at (all of truth's where `detected` has no empty lists to tell
 // by: a frame that is absent there showed nothing). A polyline that is left out need not be found; a
-// detection on it counts neither as right nor as wrong. Figures: frames, true_polylines, left_out_short, left_out_of_view, detected_polylines,
-// detected_on_left_out, true_positives, false_positives, false_negatives, precision, recall, detected_length_px,
-// true_length_px, length_precision, length_recall.
+// detection on it counts neither as right nor as wrong. Figures: frames, true_polylines, left_out_short,
+// left_out_of_view, detected_polylines, detected_on_left_out, true_positives, false_positives, false_negatives,
+// precision, recall, detected_length_px, true_length_px, length_precision, length_recall.
 Figures detector_figures(const FramePolylines &truth, const FramePolylines &detected, const DetectorMetric &metric);
 
 // Whether any of `line` lies in the region of precision of `other`: the union of the rectangles along its links that
