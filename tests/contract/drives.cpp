@@ -341,7 +341,7 @@ void dive::add_picture(const placed &vehicle, double t_s, unsigned happens) {
     told++;
     const double bad = (happens & kOutliers) && (told + static_cast<int>(5 * t_s)) % 17 == 0 ? 9.0 : 0.0;
     wm_stereo &s = add(WM_EVENT_STEREO, t_s)->as.stereo;
-    s = {i, {u + 0.4 * normal() + bad, v + 0.4 * normal()}, {right + 0.4 * normal(), v + 0.4 * normal()}};
+    s = {i, {u + 0.4 * normal() + bad, v + 0.4 * normal()}, {right + 0.4 * normal(), v + 0.4 * normal()}, {}};
     if (told % 6 == 0) s.right_px[0] = s.right_px[1] = static_cast<double>(NAN);
   }
 }

@@ -6,6 +6,7 @@
 
 #include "cli/check/check.h"
 #include "waymark/keeper.h"
+#include "waymark/own_program.h"
 
 static void messages(const wm_config *config, wm_findings *out) {
   static const char *const kWays[] = {"udpm://", "tcpq://", "memq://", "file://"};
