@@ -113,7 +113,7 @@ uint32_t calibration_states(const wm_stereo_ekf_params &params, const wm_setup &
 size_t stereo_ekf::kept_bytes_max(const wm_stereo_ekf_params &params, const wm_setup &setup) {
   kept_frames_head head{};
   head.calibration = calibration_states(params, setup);
-  head.frames = static_cast<uint32_t>(used_params(params, setup).frames_max);
+  head.frames = static_cast<uint32_t>(params.frames_max);
   if (head.frames == 0) return 0;
   head.points = head.frames * own_map::kPointsOfFrame;
   return kept_frames_layout(head).bytes;

@@ -76,7 +76,8 @@ void check_config(const wm_config *config, wm_findings *out) {
   folder_of("commands.socket", config->commands, "no command could be sent", out);
   folder_of("start.saved_map", config->saved_map, "no map would be kept", out);
   if (config->saved_map[0] && !keeps_a_map(config))
-    wm_find(out, WM_FOUND_MAP_NOT_KEPT, WM_SEVERITY_NOTE, "start", "leave start.saved_map out (or set stereo_ekf.slam.key_frames)",
+    wm_find(out, WM_FOUND_MAP_NOT_KEPT, WM_SEVERITY_NOTE, "start",
+            "leave start.saved_map out (or set stereo_ekf.slam.key_frames)",
             "start.saved_map: estimator %s makes no map to keep", config->estimator->name);
   if (config->saved_map[0] && !config->saved_pose[0])
     wm_find(out, WM_FOUND_MAP_NOT_KEPT, WM_SEVERITY_NOTE, "start", "start.saved_pose, beside it",
