@@ -128,6 +128,22 @@ int stereo_ekf::kept_state(int i, const int *frames) const {
          axis;
 }
 
+// Points of a frame: those that left the view, and behind them those that are in it. Returns their number.
+int64_t stereo_ekf::put_points(int frame, uint8_t *bytes, size_t *at, size_t capacity) const {
+  int64_t count = 0;
+  const auto put = [&](const own_point &point) {
+    if (count == own_map::kPointsOfFrame || *at + sizeof point > capacity) return;
+    std::memcpy(bytes + *at, &point, sizeof point);
+    *at += sizeof point;
+    count++;
+  };
+  own_point in_view;
+  for (int i = 0; i < map_.points_of(frame); i++) put(map_.point(frame, i));
+  for (int slot = 0; slot < filter_.point_count(); slot++)
+    if (info_[(size_t)slot].frame == frame && map_point_of(slot, &in_view)) put(in_view);
+  return count;
+}
+
 size_t stereo_ekf::keep(void *out, size_t capacity) const {
   if (!life_.tracking() || map_.frames() == 0) return 0;
   kept_frames_head head{};
@@ -137,21 +153,11 @@ size_t stereo_ekf::keep(void *out, size_t capacity) const {
   int frames[kFramesMost], states[kFrameStates * kFramesMost + kHeadMax];
   for (int f = 0; f < map_.capacity(); f++)
     if (map_.is_used(f)) frames[head.frames++] = f;
-  // Points of each frame: those that left the view, and behind them those that are in it.
   auto *bytes = static_cast<uint8_t *>(out);
   size_t at = kept_frames_layout(head).points;
+  if (at > capacity) return 0;
   for (uint32_t k = 0; k < head.frames; k++) {
-    int64_t count = 0;
-    const auto put = [&](const own_point &point) {
-      if (count == own_map::kPointsOfFrame || at + sizeof point > capacity) return;
-      std::memcpy(bytes + at, &point, sizeof point);
-      at += sizeof point;
-      count++;
-    };
-    own_point in_view;
-    for (int i = 0; i < map_.points_of(frames[k]); i++) put(map_.point(frames[k], i));
-    for (int slot = 0; slot < filter_.point_count(); slot++)
-      if (info_[(size_t)slot].frame == frames[k] && map_point_of(slot, &in_view)) put(in_view);
+    const int64_t count = put_points(frames[k], bytes, &at, capacity);
     std::memcpy(bytes + kept_frames_layout(head).counts + k * sizeof count, &count, sizeof count);
     head.points += static_cast<uint32_t>(count);
   }

@@ -27,33 +27,36 @@ void stereo_ekf::begin_picture(wm_time_ns t_ns) {
   motion_.begin_picture();
 }
 
-// [BorisovND] removes a point out of view at once, and keeps one that was missed for some steps. Here a point out of
-// view is kept for a while, too: the vehicle may return.
 void stereo_ekf::end_picture() {
   if (picture_ns_ == WM_TIME_NONE) return;
   filter_.settle();
   if (map_.capacity() > 0) find_again();
-  if (filter_.point_count() > 0) {
-    const past_pose past = state_at_picture();
-    for (int slot = filter_.point_count() - 1; slot >= 0; slot--) {
-      point_info &point = info_[(size_t)slot];
-      if (point.unseen == kOfMap) continue;
-      const vec3 x = in_camera(filter_.point(slot), past);
-      if (point.seen_ns == picture_ns_) {
-        if (grows_fast(x.z)) leave_point(slot);
-        continue;
-      }
-      // A point whose observations are outliers has a wrong place, in view or not.
-      if (point.misfit_ns == picture_ns_ || rig_.in_view(x, kInside_px)) {
-        if (++point.unseen > params_.keep_unseen_steps) leave_point(slot);
-      } else if (wm_seconds_between(point.seen_ns, picture_ns_) > params_.keep_outside_s) {
-        leave_point(slot);
-      }
-    }
-  }
+  leave_points();
   if (map_.capacity() > 0) extend_map();
   if (params_.increments) fuse_increment();
   picture_ns_ = WM_TIME_NONE;
+}
+
+// [BorisovND] removes a point out of view at once, and keeps one that was missed for some steps. Here a point out of
+// view is kept for a while, too: the vehicle may return.
+void stereo_ekf::leave_points() {
+  if (filter_.point_count() == 0) return;
+  const past_pose past = state_at_picture();
+  for (int slot = filter_.point_count() - 1; slot >= 0; slot--) {
+    point_info &point = info_[(size_t)slot];
+    if (point.unseen == kOfMap) continue;
+    const vec3 x = in_camera(filter_.point(slot), past);
+    if (point.seen_ns == picture_ns_) {
+      if (grows_fast(x.z)) leave_point(slot);
+      continue;
+    }
+    // A point whose observations are outliers has a wrong place, in view or not.
+    if (point.misfit_ns == picture_ns_ || rig_.in_view(x, kInside_px)) {
+      if (++point.unseen > params_.keep_unseen_steps) leave_point(slot);
+    } else if (wm_seconds_between(point.seen_ns, picture_ns_) > params_.keep_outside_s) {
+      leave_point(slot);
+    }
+  }
 }
 
 void stereo_ekf::remove_point(int slot) {

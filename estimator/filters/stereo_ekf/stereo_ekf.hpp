@@ -159,6 +159,7 @@ class stereo_ekf {
   void triangle_block(int frame, const vec3 &coordinates, row_block *out) const;
   mat3 covariance_by(const row_block &block) const;
   bool map_point_of(int slot, own_point *out) const;
+  void leave_points();
   void leave_point(int slot);
   void find_again();
   bool take_filtered(const past_pose &past, looked_point *look) const;
@@ -174,6 +175,7 @@ class stereo_ekf {
   void forget_frame(int frame);
   void forget_map();
   int kept_state(int i, const int *frames) const;
+  int64_t put_points(int frame, uint8_t *bytes, size_t *at, size_t capacity) const;
 
   // increments.cpp
   pair_view pair() const;

@@ -34,7 +34,7 @@ struct floor_grain {
             return at[static_cast<size_t>((j + b) % cells) * static_cast<size_t>(cells) +
                       static_cast<size_t>((i + a) % cells)];
           };
-          grey[static_cast<size_t>(y * kGrain + x)] +=
+          grey[static_cast<size_t>(y) * kGrain + static_cast<size_t>(x)] +=
               static_cast<float>(size * ((value(0, 0) * (1 - fu) + value(1, 0) * fu) * (1 - fv) +
                                          (value(0, 1) * (1 - fu) + value(1, 1) * fu) * fv));
         }

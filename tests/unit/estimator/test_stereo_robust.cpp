@@ -60,7 +60,7 @@ void test_a_wrong_match_is_refused_and_one_picture_is_enough(void) {
   wm_innovation records[WM_INNOVATIONS_PER_EVENT_MAX];
   px[3] += 15;  // the rows disagree
   wm_event e = s.seen(*shown, px);
-  s.take(e, records);
+  TEST_ASSERT_EQUAL(WM_OK, s.take(e, records));
   for (int k = 0; k < 4; k++) TEST_ASSERT_EQUAL(WM_REJECTED_GATE, records[k].verdict);
   TEST_ASSERT_EQUAL_MEMORY(
       &before,

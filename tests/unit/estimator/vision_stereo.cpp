@@ -21,10 +21,11 @@ struct picture {
   std::vector<uint8_t> grey;
   wm::grey_plane plane;
   template <class Shade>
-  picture(int32_t width, int32_t height, Shade shade) : grey(static_cast<size_t>(width * height)) {
+  picture(int32_t width, int32_t height, Shade shade) : grey(static_cast<size_t>(width) * static_cast<size_t>(height)) {
     for (int32_t v = 0; v < height; v++)
       for (int32_t u = 0; u < width; u++)
-        grey[static_cast<size_t>(v * width + u)] = static_cast<uint8_t>(shade(1.0 * u, 1.0 * v) + 0.5);
+        grey[static_cast<size_t>(v) * static_cast<size_t>(width) + static_cast<size_t>(u)] =
+            static_cast<uint8_t>(shade(1.0 * u, 1.0 * v) + 0.5);
     plane = {grey.data(), width, height};
   }
 };
@@ -373,7 +374,7 @@ void a_point_looks_alike_from_another_pose() {
     const wm::mat3 turned = wm::matrix_of(wm::turn_by({0, 0, 0.35}));
     seen.map_base.R = turned * seen.map_base.R;
     seen.map_base.t = middle + wm::vec3{0.08, 0.0, 0.1 * middle.z};
-    again.render(seen, static_cast<uint64_t>(1000 + k), &left, &right);
+    again.render(seen, 1000 + static_cast<uint64_t>(k), &left, &right);
     again.look(left, right, 50 + 0.125 * k);
     if (k < 3) continue;
     for (size_t i = 0; i < again.count; i++) {
