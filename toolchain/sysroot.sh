@@ -37,7 +37,9 @@ bash toolchain/foreign-apt.sh "$arch" "$work" ||
   fail "the package lists of $arch could not be fetched (above). Is the mirror reachable? Run this again: it goes on where it stopped."
 
 # ── fetch, unpack ───────────────────────────────────────────────────────────────────────────────────────────────────
-apt --no-install-recommends -y --print-uris install "${packages[@]}" >"$work/uris" 2>"$work/install.log" ||
+# All of them: apt does not list packages that are in its archives, so it looks into an empty folder.
+mkdir -p "$work/empty/partial"
+apt -o Dir::Cache::Archives="$work/empty" --no-install-recommends -y --print-uris install "${packages[@]}" >"$work/uris" 2>"$work/install.log" ||
   { cat "$work/install.log" >&2; fail "the packages do not fit together (above)"; }
 total=$(grep -c "^'" "$work/uris")
 say "sysroot $arch: $total packages"
