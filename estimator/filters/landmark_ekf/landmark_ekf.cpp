@@ -70,11 +70,9 @@ void landmark_ekf::init(const wm_landmark_ekf_params &params, const wm_setup &se
   if (setup.motion->model != WM_MOTION_CONSTANT_VELOCITY) filter_.noise().init(setup.motion->noise_adapt_log_sigma);
   const auto add = [this](double value, double sigma) { return sigma > 0.0 ? filter_.add_state(value, sigma) : -1; };
   for (size_t i = 0; i < setup.sensor_count; i++) sensor_[i].init(setup.sensors[i]);
-  sensor_states_[0] = filter_.states();
   slots_.init(setup, true, [this](double value, double sigma, double walk, double low, double high) {
     return filter_.add_sensor_state(value, sigma, walk, low, high);
   });
-  sensor_states_[1] = filter_.states();
   components_ = sightings().states.sigma[WM_SENSOR_ROW_kAngleScale] > 0.0 ? kAngleScaled : 0u;
   gnss_time_state_ = add(0.0, params.gnss_time_offset_sigma_s);
   gnss_error_state_ = add(0.0, std::fabs(params.gnss_correlated_m));  // below 0: the first position sets its variance

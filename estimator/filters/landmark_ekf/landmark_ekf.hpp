@@ -60,7 +60,6 @@ class landmark_ekf {
   struct residual {
     planar_row row;
     double innovation, noise;
-    double least_noise = 0.0;  // at which it is fused
     wm_innovation record;
     noise_adaption::source source;
   };
@@ -140,8 +139,7 @@ class landmark_ekf {
   wm_landmark_ekf_params params_;
   mounted_sensor sensor_[kMaxSensors];
   sensor_slots slots_;
-  int sensor_states_[2];  // the first one, and the one behind the last
-  unsigned components_;   // of expect(): whether the angle scale is a state
+  unsigned components_;  // of expect(): whether the angle scale is a state
   int gnss_time_state_, gnss_error_state_;
   wm_time_ns gnss_error_ns_;
   double gnss_error_sigma_m_;  // of the receiver's lasting error, now

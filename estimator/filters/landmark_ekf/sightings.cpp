@@ -13,10 +13,7 @@ constexpr double kOnSensor_m = 0.05;      // nearer to the sensor, a landmark ha
 constexpr double kNear_m = 0.1;           // floor of a distance that an error across the line of sight is divided by
 constexpr double kBeyondRange = 1.5;      // times the sensor's range; beyond, no landmark is associated
 constexpr double kStepsMost = 0.2;        // share of the counts' steps in a row's noise; not swept
-// Of a sighting's variance by its sensor's states: the least noise at which it is fused. 0.1, 0.3, 0.5, 1 were tried
-// (docs/reports/2026-11-26-honest.md).
-constexpr double kStateShare = 0.3;
-constexpr double kClearlyBest = 0.5;  // of the soft gate: only a fit within this is associated
+constexpr double kClearlyBest = 0.5;      // of the soft gate: only a fit within this is associated
 
 // The second-order correction of a sighting for an uncertain position: bias and variance of its expectation
 // [Athans1968]. It matters after seconds of blind driving, with a position uncertain by metres.
@@ -218,9 +215,6 @@ void landmark_ekf::add_errors(const sighting_context &at, const lent_slots &lent
   const int sensor = at.s->sensor;
   add_past_pose(&r->row, by, at.past, slots_.at(sensor, kTimeOffset, at.reading.stated));
   slots_.add_to(&r->row, sensor, by, at.reading.stated);
-  // One sighting takes at most 77 % of the variance that its sensor's states have in it: an outlier that passes the
-  // gate by that variance must not decide them, and the next sightings outweigh it.
-  r->least_noise = kStateShare * filter_.variance_by(r->row, sensor_states_[0], sensor_states_[1]);
   // The steps' errors of successive rows are not independent: no evidence of the motion's noise.
   const double steps = filter_.count_variance(at.past.t_ns, by, at.past.pose.heading_rad);
   r->noise += steps;

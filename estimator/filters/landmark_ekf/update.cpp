@@ -59,11 +59,7 @@ double landmark_ekf::fuse(residual *r, int count, double clutter_volume, bool us
 wm_verdict landmark_ekf::update(const residual *r, int count, const gate_result &g, projection *first) {
   if (r[0].row.missing > 0 || (count == 2 && r[1].row.missing > 0)) return WM_REJECTED_NUMERIC;
   const int kept = g.soft && evidence_.doubtful() ? calibration_states_ : kPoseStates;
-  const auto noise_of = [&](const residual &of) {
-    const double noise = of.noise * g.noise_scale;
-    return noise > of.least_noise ? noise : of.least_noise;
-  };
-  const double noise = noise_of(r[0]);
+  const double noise = r[0].noise * g.noise_scale;
   const double left =
       count < 2 ? 0.0
                 : filter_.innovation_left(r[1].row, r[1].innovation, *first, r[0].innovation, noise, kPoseStates, kept);
@@ -74,7 +70,8 @@ wm_verdict landmark_ekf::update(const residual *r, int count, const gate_result 
   if (!filter_.update(*first, r[0].innovation, noise, kPoseStates, kept, source(r[0]))) return WM_REJECTED_NUMERIC;
   if (count == 2) {
     filter_.project(r[1].row, first);
-    if (!filter_.update(*first, left, noise_of(r[1]), kPoseStates, kept, source(r[1]))) return WM_REJECTED_NUMERIC;
+    if (!filter_.update(*first, left, r[1].noise * g.noise_scale, kPoseStates, kept, source(r[1])))
+      return WM_REJECTED_NUMERIC;
   }
   filter_.noise().forget(filter_.now_ns());
   life_.fused(filter_.now_ns());

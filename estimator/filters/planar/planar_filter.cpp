@@ -147,17 +147,6 @@ double planar_filter::project_onto(const planar_row &row, const projection &othe
   return sum;
 }
 
-double planar_filter::variance_by(const planar_row &row, int from, int to) const {
-  double sum = 0.0;
-  for (int i = 0; i < row.count; i++) {
-    if (row.index[i] < from || row.index[i] >= to) continue;
-    for (int j = 0; j < row.count; j++)
-      if (row.index[j] >= from && row.index[j] < to)
-        sum += row.by[i] * row.by[j] * covariance(row.index[i], row.index[j]);
-  }
-  return sum;
-}
-
 double planar_filter::innovation_left(const planar_row &second, double innovation, const projection &first,
                                       double first_innovation, double first_noise, int kept_from, int kept_to) const {
   double cross = 0.0;  // H_second P H_first' over the states that the first update corrects

@@ -55,8 +55,6 @@ class planar_filter : public planar_motion {
 
   void project(const planar_row &row, projection *out) const;
   double project_onto(const planar_row &row, const projection &other) const;  // H_row P H_other'
-  // Of H P H', what these states alone contribute.
-  double variance_by(const planar_row &row, int from, int to) const;
   // Scalar update with innovation `innovation` and measurement variance `noise`. Source: Joseph's form,
   // P = (I - KH) P (I - KH)' + K R K', written out for one row: P - K g' - g K' + s K K', g = P H', s = H g + R.
   // False: the innovation's variance is not positive and finite, and nothing changed.

@@ -314,22 +314,6 @@ void test_it_finds_every_error_of_its_sensors(void) {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.2, off());  // the share that is the offset's moves the pose along the way
 }
 
-// It is 6 degrees off and fits the prior; the robot stands, so that heading and yaw are not yet told apart.
-void test_a_first_sighting_that_is_an_outlier_does_not_decide_the_yaw(void) {
-  make::sightings.states.sigma[WM_SENSOR_ROW_kYaw] = 0.05;
-  setup.start.sigma_heading_rad = 0.005;
-  begin();
-  const wm_pose2 eye = wm::compose(truth, {0.3, 0, 0.2});
-  const double bearing = std::atan2(-eye.y_m, 6.0 - eye.x_m) - eye.heading_rad + 0.105;
-  const wm_event outlier = make::sighting(now_s, landmarks[0].id, bearing, kAbsent);
-  wm_innovation records[8];
-  size_t count;
-  TEST_ASSERT_EQUAL(WM_OK, ekf->correct(state, &outlier, records, 8, &count));
-  TEST_ASSERT_EQUAL(WM_FUSED, records[0].verdict);
-  TEST_ASSERT_GREATER_OR_EQUAL(27, drive(2, kBearings));  // of 30; 14 where it decides
-  TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.0, calibration("camera.yaw_rad"));
-}
-
 // A rotating laser whose angle encoder sits beside its axis.
 void test_an_eccentric_turntable_is_found(void) {
   make::sightings.states.sigma[WM_SENSOR_ROW_kEccentricX] = 0.05;
@@ -576,7 +560,6 @@ int main(void) {
   RUN_TEST(test_expected_bearing_is_the_papers);
   RUN_TEST(test_it_tracks_and_its_covariance_is_honest);
   RUN_TEST(test_it_finds_every_error_of_its_sensors);
-  RUN_TEST(test_a_first_sighting_that_is_an_outlier_does_not_decide_the_yaw);
   RUN_TEST(test_an_eccentric_turntable_is_found);
   RUN_TEST(test_gnss_and_its_delay);
   RUN_TEST(test_misread_codes_are_rejected_and_do_no_harm);
