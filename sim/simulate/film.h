@@ -18,7 +18,7 @@ namespace wm::sim {
 
 struct FilmCamera {
   std::string name;
-  images::Camera believed;  // as calibration.yaml says
+  images::Camera believed;  // as in calibration.yaml
   images::Camera truth;     // as it is: mounting and intrinsics off by what the seed drew
   double rate_hz = 10, exposure_s = 0.008;
   bool colour = false;

@@ -65,7 +65,7 @@ struct Motion {
 };
 
 struct Robot {
-  wm_wheels wheels = {};      // as calibration.yaml says; the true ones differ by what `errors` draws
+  wm_wheels wheels = {};      // as in calibration.yaml; the true ones differ by what `errors` draws
   bool sends_speeds = false;  // the bus gives the wheels' speeds, without sign, instead of rolling counts
   bool differential = false;  // two driven wheels, no steering
   bool commanded = false;     // motion.csv has commands; nothing measures the motion

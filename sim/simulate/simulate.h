@@ -97,7 +97,7 @@ struct Recording {
   std::vector<MarkerSeen> markers;
   std::vector<StereoSeen> stereo;
   std::vector<Fix> fixes;
-  std::vector<wm_sensor> sensors;      // as calibration.yaml says
+  std::vector<wm_sensor> sensors;      // as in calibration.yaml
   std::vector<wm_landmark> map;        // with its errors
   std::vector<wm_landmark> landmarks;  // true
   std::vector<int32_t> moved;          // those of the map that stand elsewhere by now

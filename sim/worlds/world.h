@@ -32,7 +32,7 @@ struct WorldRequest {
 
 struct WorldCamera {
   std::string name;
-  images::Camera camera;  // as calibration.yaml says; errors of the mounting are the sensors' matter
+  images::Camera camera;  // as in calibration.yaml; errors of the mounting are the sensors' matter
   double rate_hz = 10;
   double exposure_s = 0.008;
   bool colour = false;

@@ -51,6 +51,9 @@ def main():
         (clone / "left").write_text("")
         refused(clone, NEXT, "has changes")
         (clone / "left").unlink()
+        changelog = clone / "CHANGELOG.md"  # just after a release it has nothing unreleased
+        changelog.write_text(changelog.read_text().replace("## [Unreleased]\n", "## [Unreleased]\n\n### Tests\n\nNew:\n- A line.\n", 1))
+        ok("git", "commit", "-qam", "a change", cwd=clone)
         ok("python3", "toolchain/release.py", "prepare", NEXT, cwd=clone)
         assert ok("git", "tag", "--points-at", "HEAD", cwd=clone) == f"v{NEXT}\n"
         assert f"## [Unreleased]\n\n## [{NEXT}] - 2" in (clone / "CHANGELOG.md").read_text()

@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kSlot_s = 5.0;          // as the monitor's for positions: multipath passes
 constexpr int kWindows[] = {6, 16, 33};  // slots: 30, 80 and 165 s
-constexpr int kSlotsLeast = 3;           // of three places a mirror image can be told
+constexpr int kSlotsLeast = 3;           // a mirror image of fewer places fits as well
 constexpr double kSparse = 3.0;          // a window reaches back at most so many times its length
 constexpr double kAlarm_log = 9.21;      // -log(1e-4)
 // Prior log odds of a mistaken sign of a turn or an axis in a configuration: one in 55.

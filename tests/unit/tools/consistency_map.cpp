@@ -36,7 +36,7 @@ struct alignas(64) Block {
   char bytes[64];
 };
 
-// A drive and an estimator that is fed with it from where it is told.
+// A drive, and an estimator that takes its events from a given time on.
 class Drive {
  public:
   explicit Drive(uint64_t seed) : rig_(montecarlo::rig_of(scenario)) {
