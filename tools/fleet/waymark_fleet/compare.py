@@ -89,11 +89,12 @@ def compare(given, beside):
     """The result as JSON has it, and the pairs."""
     (folder_one, before), (folder_two, after) = comparison.load(given.before), comparison.load(given.after)
     pairs = comparison.pairs_of(before, after)
-    verdicts = comparison.judge(pairs, given.alpha, tolerances_of(given.tolerate))
+    is_apart = folder_one.resolve() != folder_two.resolve()
+    verdicts = comparison.judge(pairs, given.alpha, tolerances_of(given.tolerate), is_apart)
     figure, worst = worst_drives(given, (folder_one, folder_two), pairs, beside)
     failing = [{"name": comparison.name_of(two, after), "error": two.get("error", "")} for one, two in pairs
                if one["status"] == "done" and two["status"] != "done"]
-    return {"format": "waymark-comparison/1", "before": given.before, "after": given.after, "drives": len(pairs), "alpha": given.alpha,
+    return {"format": "waymark-comparison/1", "before": given.before, "after": given.after, "drives": len(pairs), "alpha": given.alpha, "is_apart": is_apart,
             "only_before": len(before) - len(pairs), "only_after": len(after) - len(pairs),
             "same_bits": sum(one.get("sum") is not None and one.get("sum") == two.get("sum") for one, two in pairs),
             "is_worse": bool(failing) or any(row["verdict"] == "worse" for row in verdicts), "verdicts": verdicts,

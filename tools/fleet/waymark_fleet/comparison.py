@@ -30,6 +30,7 @@ class Figure:
     is_ratio: bool  # differences are of logarithms: a change in per cent
     tolerance: float  # smaller changes are none, whatever their p: share, or the figure's unit
     is_count: bool = False  # large changes alone, by their signs
+    tolerance_apart: float | None = None  # in place of it, where the sides were not measured side by side
 
 
 def _number(key, least=0.0):
@@ -56,8 +57,9 @@ def _turned(row):
     return _number("heading_rmse_deg", _LEAST_DEG)(row) or _number("rotation_rmse_deg", _LEAST_DEG)(row)
 
 
-# Times: between 21 batches of one program (49 drives, two cores, six other processes) the change of latency was 3.5 % at most in 19 pairs
-# and 12 % in one; that of CPU time was 2.2 % at most.
+# Times of one program on one computer (40 to 49 drives, two cores): inside a batch, where the cells of a drive run one after the other, both
+# changed by at most 5 %. From batch to batch they changed by up to 12 %; a replay of 67 ms took 87 ms when the computer was idle before,
+# because its clock rate follows the load (+30 %).
 FIGURES = [
     Figure("position", "position error", "root mean square of a drive", _number("position_rmse_m", _LEAST_M), True, 0.01),
     Figure("position_large", "drives that changed much", f"position error changed by more than a factor of {LARGE_CHANGE}",
@@ -65,8 +67,9 @@ FIGURES = [
     Figure("heading", "heading error", "root mean square of a drive", _turned, True, 0.01),
     Figure("nees", "inconsistency", "|ln(NEES / degrees of freedom)|: 0 where the stated covariance is right", _inconsistency, False, 0.02),
     Figure("lost", "share of the time lost", "by truth, else by the run's own state", _share_lost, False, 0.0005),
-    Figure("latency", "time of an update", "90 of 100 are shorter, by the program's clock", _number("correct_p90_us"), True, 0.15),
-    Figure("cpu", "CPU time", "of a whole replay", _number("cpu_s"), True, 0.10),
+    Figure("latency", "time of an update", "90 of 100 are shorter, by the program's clock", _number("correct_p90_us"), True, 0.15,
+           tolerance_apart=0.30),
+    Figure("cpu", "CPU time", "of a whole replay", _number("cpu_s"), True, 0.10, tolerance_apart=0.30),
 ]
 
 
@@ -153,13 +156,13 @@ def _mean(values):
     return sum(values) / len(values)
 
 
-def judge(pairs, alpha=ALPHA, tolerances=None):
-    """A verdict for each figure: worse, better, or no difference found."""
+def judge(pairs, alpha=ALPHA, tolerances=None, is_apart=False):
+    """A verdict for each figure: worse, better, or no difference found. `is_apart`: the sides are of two batches."""
     out = []
     for figure in FIGURES:
         differences = [d for one, two in pairs if (d := difference(figure, one, two)) is not None]
         row = {"figure": figure.name, "title": figure.title, "about": figure.about, "is_ratio": figure.is_ratio, "drives": len(differences),
-               "tolerance": (tolerances or {}).get(figure.name, figure.tolerance)}
+               "tolerance": (tolerances or {}).get(figure.name, (is_apart and figure.tolerance_apart) or figure.tolerance)}
         if len(differences) >= PAIRS_MIN:
             row |= (_judge_large if figure.is_count else _judge_mean)(figure, differences)
             row["typical_before"], row["typical_after"] = (
