@@ -106,7 +106,8 @@ def text_of(result, page):
     lines = [f"{result['drives']} drives, {result['same_bits']} with the same bits"
              + (f"; {result['only_before']} only before, {result['only_after']} only after" if result["only_before"] or result["only_after"] else "")]
     for row in result["verdicts"]:
-        change = f"{compare_page.change_text(row, row['change'])}, p {row['p_holm']:.2g}".replace("&nbsp;", " ") if "p" in row else ""
+        change = compare_page.change_text(row, row["change"]).replace("&nbsp;", " ") if "p" in row else ""
+        change += f", p {row['p_holm']:.2g}" if "p_holm" in row else ", not judged: put both programs into one plan" if change else ""
         lines.append(f"  {row['title']:28} {row['verdict']:20} {change}")
     if result["now_failing"]:
         lines.append(f"  {len(result['now_failing'])} drives now fail: {result['now_failing'][0]['name']}: {result['now_failing'][0]['error']}")

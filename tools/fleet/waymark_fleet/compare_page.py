@@ -43,13 +43,13 @@ def _verdict_table(verdicts, alpha, is_apart):
             continue
         interval = "–" if row["low"] is None else f"{change_text(row, row['low'])} … {change_text(row, row['high'])}"
         rows.append([title, (row["verdict"] if row["verdict"] in ("worse", "better") else "", row["verdict"]), change_text(row, row["change"]),
-                     interval, f"{row['p_holm']:.2g}", change_text(row, row["tolerance"]).lstrip("+"), f"{row['worse']} / {row['better']}", str(row["drives"])])
+                     interval, f"{row['p_holm']:.2g}" if "p_holm" in row else "–", change_text(row, row["tolerance"]).lstrip("+"), f"{row['worse']} / {row['better']}", str(row["drives"])])
     how = (f"Each drive is compared with itself. The change is the mean over the drives without the fifth that changed most in each direction, "
            f"with its 95&nbsp;% bootstrap interval; p is of the signed-rank test and holds for all figures together (Holm). A change counts from "
            f"p&nbsp;&lt;&nbsp;{alpha:g} on, and where it exceeds the tolerance: what two runs of the same program differ by.")
     if is_apart:
-        how += (" The sides are of two batches, between which the computer's speed may change. So the tolerance of times is larger; "
-                "both programs in one plan are compared more precisely.")
+        how += (" The sides are of two batches, between which the computer's speed changes. So times have no verdict; "
+                "put both programs into one plan to have one.")
     head = ["figure", "verdict", "change", "95&nbsp;% interval", "p", "tolerance", "drives worse / better", "drives"]
     return html.section("Verdicts", how, html.table(head, rows))
 
