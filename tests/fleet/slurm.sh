@@ -71,7 +71,7 @@ sinfo -N -l
 
 cp -r "$root/tools/fleet/slurm" "$work/profile"
 begun=$(date +%s)
-snakemake -s "$root/tools/fleet/Snakefile" --profile "$work/profile" --latency-wait 10 --config plan="$plan" out="$work/cluster" parts="$parts" \
+snakemake --directory "$work" -s "$root/tools/fleet/Snakefile" --profile "$work/profile" --latency-wait 10 --config plan="$plan" out="$work/cluster" parts="$parts" \
   batch="python3 $bin/waymark-batch" > "$work/snakemake.out" 2>&1 || { tail -20 "$work/snakemake.out"; exit 1; }
 echo "$parts parts on two nodes: $(grep -c 'Submitted job' "$work/snakemake.out") jobs in $(($(date +%s) - begun)) s"
 grep -o 'NodeList=n[12]' "$work/slurmctld.log" | sort | uniq -c

@@ -493,10 +493,43 @@ void pose_search::add(const observation &seen) {
   if (count_ == 4 * kCapacity) count_ -= 2 * kCapacity;  // bounds the counter; the place in the ring stays
 }
 
+void pose_search::forget_before(wm_time_ns t_ns) {
+  observation recent[kCapacity];
+  const int count = count_since(t_ns), first = kept() - count;
+  for (int i = 0; i < count; i++) recent[i] = at(first + i);
+  for (int i = 0; i < count; i++) ring_[i] = recent[i];
+  count_ = count;
+}
+
 int pose_search::count_since(wm_time_ns since_ns) const {
   int count = 0;
   while (count < kept() && at(kept() - 1 - count).t_ns >= since_ns) count++;
   return count;
+}
+
+bool pose_search::contradicts(const observation &seen, wm_time_ns since_ns) const {
+  constexpr uint32_t kPlace = kObservedBearing | kObservedRange;
+  if ((seen.kind & kPlace) != kPlace) return false;
+  const sin_cos sight = sincos(seen.sensor.heading_rad + seen.bearing_rad);
+  int balance = 0;
+  for (int i = kept() - count_since(since_ns); i < kept(); i++) {
+    const observation &c = at(i);
+    if (c.key != seen.key || c.t_ns >= seen.t_ns || (c.kind & kPlace) != kPlace) continue;
+    const sin_cos other = sincos(c.sensor.heading_rad + c.bearing_rad);
+    const double dx = c.sensor.x_m + c.range_m * other.cos - seen.sensor.x_m - seen.range_m * sight.cos;
+    const double dy = c.sensor.y_m + c.range_m * other.sin - seen.sensor.y_m - seen.range_m * sight.sin;
+    const double along = sight.cos * dx + sight.sin * dy, across = sight.cos * dy - sight.sin * dx;
+    // The other's variances, along and across this line of sight.
+    const double cos2 = square(sight.cos * other.cos + sight.sin * other.sin);
+    const double length2 = square(c.sigma_length_m), width2 = square(c.range_m * c.sigma_angle_rad);
+    const double travel2 = square(kTravelSigma * (seen.travelled_m - c.travelled_m));
+    const double turn2 = square(seen.range_m * kTurnSigma * (seen.turned_rad - c.turned_rad));
+    const double along2 = square(seen.sigma_length_m) + cos2 * length2 + (1.0 - cos2) * width2 + travel2;
+    const double across2 =
+        square(seen.range_m * seen.sigma_angle_rad) + cos2 * width2 + (1.0 - cos2) * length2 + travel2 + turn2;
+    balance += square(along) < kOutlierChi2 * along2 && square(across) < kOutlierChi2 * across2 ? 1 : -1;
+  }
+  return balance < 0;
 }
 
 int pose_search::agreeing(wm_time_ns since_ns, const wm_pose2 &pose_now, const travelled_pose2 &odometry,

@@ -105,8 +105,9 @@ wm_status slam::fuse_marker(const wm_event &event, record_list records) {
   at.past = look_back(m.sensor);
   if (landmark >= 0 && map_is_held()) {
     note(landmark).level = !finite(m.yaw_sigma_rad);
-    keep_observation(landmark, at, observation_of(m, r));
+    const bool fits = keep_observation(landmark, at, observation_of(m, r));
     if (relocalize()) return reject(records, at.record, WM_REJECTED_SEARCHING);
+    if (!fits && life_.tracking()) return reject(records, at.record, WM_REJECTED_GATE);
   }
   if (life_.searching()) return reject(records, at.record, WM_REJECTED_SEARCHING);
   if (m.poses == 2) r = choose_pose(at, m, r, landmark);

@@ -19,6 +19,8 @@ constexpr int kByOneSeen = 3;
 constexpr double kDrift_rad = 0.005;
 constexpr double kSigmas = 3.0;     // by which the mirror image must be excluded
 constexpr double kWindow_s = 20.0;  // observations older than this are not searched, as in landmark_ekf
+constexpr double kRecent_s =
+    1.0;  // an outlier contradicts those of this time; longer, and a robot that was carried would
 constexpr double kFound_m = 0.5, kFound_rad = 0.15;  // a pose with larger sigmas is not taken
 constexpr double kLoose_m = 0.2, kLoose_rad = 0.05;  // added: errors of sensors and map that the search takes as white
 constexpr int kNumbers = 5;                          // must agree; two more than a pose has
@@ -31,7 +33,11 @@ constexpr double kOld_s = 60.0;                      // or on the map for so lon
 
 void slam::begin_evidence(double log_prior) {
   evidence_.begin(log_prior);
-  observations_.clear();
+  search_after_ns_ = joint_.now_ns();
+  if (search_after_ns_ == WM_TIME_NONE)
+    observations_.clear();
+  else
+    observations_.forget_before(search_after_ns_ - wm_ns_from_seconds(kRecent_s));
   fit_ns_ = WM_TIME_NONE;
   pattern_odds_.reset(kOwnFramePrior);
   pattern_ns_ = WM_TIME_NONE;
@@ -126,19 +132,23 @@ observation slam::observation_from(int landmark, const context &at, const planar
   return o;
 }
 
-// Keeps an observation for the search, while the map is held: a place that moves would be another landmark's.
-void slam::keep_observation(int landmark, const context &at, const planar_observation &seen) {
-  if (!params_.recover || !map_is_held() || !is_confirmed(note(landmark))) return;
+// Keeps an observation for the search, while the map is held: a place that moves would be another landmark's. False: it
+// is an outlier by what the sensor observed of this landmark just before. A pose that was just found has a covariance
+// within which such an outlier passes the gate.
+bool slam::keep_observation(int landmark, const context &at, const planar_observation &seen) {
+  if (!params_.recover || !map_is_held() || !is_confirmed(note(landmark))) return true;
   const int state = joint_.landmark_state(landmark);
   observation o = observation_from(landmark, at, seen);
+  const bool fits = !observations_.contradicts(o, joint_.now_ns() - wm_ns_from_seconds(kRecent_s));
   observations_.add(o);
-  if (!finite(seen.heading_rad) || joint_.variance(state + 2) > square(kFound_rad)) return;
+  if (!finite(seen.heading_rad) || joint_.variance(state + 2) > square(kFound_rad)) return fits;
   o.kind = kObservedHeading;
   o.key = -1 - at.id;
   o.sensor = compose(joint_.odom(), between(joint_.pose(), at.past.pose));
   o.bearing_rad = wrap(joint_.value(state + 2) - seen.heading_rad);  // of the robot, in map
   o.sigma_angle_rad = std::sqrt(square(seen.heading_sigma_rad) + joint_.variance(state + 2));
   observations_.add(o);
+  return fits;
 }
 
 // How many different landmarks of those observed since then a pose explains; *id: one of these.
@@ -190,7 +200,8 @@ bool slam::relocalize() {
       !life_.search_due(now))
     return false;
   life_.searched(now);
-  const wm_time_ns since = now - wm_ns_from_seconds(kWindow_s);
+  wm_time_ns since = now - wm_ns_from_seconds(kWindow_s);
+  if (search_after_ns_ >= since) since = search_after_ns_ + 1;
   search_result found = observations_.find(since, odometry(), nullptr, 0, {kFound_m, kFound_rad, kNumbers});
   int32_t id = -1;
   const bool by_one = found.found && landmarks_fitting(found.pose, since, &id) < 2;

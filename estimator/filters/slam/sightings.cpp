@@ -52,8 +52,9 @@ wm_status slam::fuse_sighting(const wm_event &event, record_list records) {
   const wm_verdict verdict = identify(s, r, &at, &landmark);
   if (verdict != WM_FUSED) return reject(records, at.record, verdict);
   if (landmark >= 0 && s.landmark_id >= 0 && map_is_held()) {
-    keep_observation(landmark, at, observation_of(s, r));
+    const bool fits = keep_observation(landmark, at, observation_of(s, r));
     if (relocalize()) return reject(records, at.record, WM_REJECTED_SEARCHING);
+    if (!fits && life_.tracking()) return reject(records, at.record, WM_REJECTED_GATE);
   }
   if (landmark < 0 && r.bearing && !r.range) take_lines();
   if (rejoins_ && r.bearing && !r.range) collect_bearing(s, at.past);

@@ -323,7 +323,7 @@ class slam {
   bool weigh(int landmark, bool passed, double log_bayes, double angle_rad, double normalised);
   void lose();
   observation observation_from(int landmark, const context &at, const planar_observation &seen) const;
-  void keep_observation(int landmark, const context &at, const planar_observation &seen);
+  bool keep_observation(int landmark, const context &at, const planar_observation &seen);
   int landmarks_fitting(const wm_pose2 &pose, wm_time_ns since_ns, int32_t *id) const;
   bool is_found_by_one(const search_result &found, wm_time_ns since_ns, int32_t id) const;
   bool relocalize();
@@ -378,7 +378,8 @@ class slam {
   lifecycle life_;
   rollback<kMaxCalibration> rollback_;
   landmark_evidence evidence_;
-  pose_search observations_;  // since the map is held
+  pose_search observations_;    // since the map is held
+  wm_time_ns search_after_ns_;  // younger ones are searched; those before led to the pose that was found last
   slip_search slips_;
   wm_time_ns fit_ns_;      // when a witness fitted last
   bearing_look bearings_;  // of the newest picture, where lines have no identity

@@ -91,6 +91,21 @@ void test_started_lost_it_finds_itself_by_the_places_of_two_markers_whose_turns_
   TEST_ASSERT_LESS_THAN_DOUBLE(0.05, off());
 }
 
+// The pose that was just found is vague enough for it to pass the gate.
+void test_an_outlier_just_after_the_pose_was_found_is_refused_by_the_marker_s_place_before(void) {
+  start_lost_before_markers();
+  see_from_start(1, 0, 0.2);
+  see_from_start(3, 0, -0.2);
+  now_s += 0.25;
+  see_from_start(3, 0, -0.2);
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, published_state());
+  TEST_ASSERT_EQUAL(WM_REJECTED_GATE, see_from_start(1, 0.4, 0.2));
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.05, off());
+  now_s += 0.1;
+  TEST_ASSERT_EQUAL(WM_FUSED, see_from_start(1, 0, 0.2));
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.05, off());
+}
+
 void test_started_lost_two_markers_are_not_believed_that_are_not_as_far_apart_as_on_the_map(void) {
   start_lost_before_markers();
   for (int i = 0; i < 8; i++, now_s += 0.3) {
@@ -227,6 +242,7 @@ int main(void) {
   RUN_TEST(test_a_saved_map_frozen_or_extended_needs_no_first_lap);
   RUN_TEST(test_started_lost_on_a_map_of_markers_it_finds_itself);
   RUN_TEST(test_started_lost_it_finds_itself_by_the_places_of_two_markers_whose_turns_disagree);
+  RUN_TEST(test_an_outlier_just_after_the_pose_was_found_is_refused_by_the_marker_s_place_before);
   RUN_TEST(test_started_lost_two_markers_are_not_believed_that_are_not_as_far_apart_as_on_the_map);
   RUN_TEST(test_started_lost_it_finds_itself_by_one_marker_that_it_drives_past);
   RUN_TEST(test_started_lost_a_mirror_image_of_one_marker_is_not_believed);
