@@ -180,8 +180,8 @@ void read_sensors(Reader &r, const wm_yaml_node &list, Scenario &out) {
 }
 
 void read_scatter(Reader &r, const wm_yaml_node &map, Scenario &out) {
-  static const char *const known[] = {"count",    "per_view", "first_id", "aside_m",
-                                      "height_m", "apart_m",  "ahead_m",  "seed", nullptr};
+  static const char *const known[] = {"count",   "per_view", "first_id", "aside_m", "height_m",
+                                      "apart_m", "ahead_m",  "seed",     nullptr};
   if (!r.ok() || !wm_yaml_there(&map)) return;
   r.keys(map, known);
   Scatter &s = out.scatter;

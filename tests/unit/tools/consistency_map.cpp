@@ -224,10 +224,10 @@ void test_restarted_anywhere_it_is_found(void) {
                     is_wrongly ? ", wrong" : "");
     }
   }
-  std::printf("%llu starts: %llu right within 5 s (latest %.1f s), then at most %.4f m and %.3f deg off, "
-              "%llu confidently wrong\n",
-              (unsigned long long)tried, (unsigned long long)right, latest_s, worst_m, worst_deg,
-              (unsigned long long)wrong);
+  std::printf(
+      "%llu starts: %llu right within 5 s (latest %.1f s), then at most %.4f m and %.3f deg off, "
+      "%llu confidently wrong\n",
+      (unsigned long long)tried, (unsigned long long)right, latest_s, worst_m, worst_deg, (unsigned long long)wrong);
   TEST_ASSERT_EQUAL_UINT64(tried, right);
   TEST_ASSERT_EQUAL_UINT64(0, wrong);
 }
