@@ -48,6 +48,9 @@ constexpr double kFound_m = 0.3, kFound_rad = 0.1, kWeak = 10.0;
 // Distance within which the points of a later picture lie from where a pose that was found expects them.
 constexpr double kConfirm_m = 0.3;
 constexpr double kNoGate = 1e300;
+// Matches of one picture that are fused: each costs as much as a point of the picture. The others' turn is the next
+// picture, in which they are found again.
+constexpr int kFusedMost = 12;
 
 void put_block(row_block *block, int column, const mat3 &m) {
   for (int i = 0; i < 3; i++)
@@ -244,9 +247,13 @@ bool stereo_ekf::fuse_match(const looked_point &looked, const gates &limits) {
 }
 
 int stereo_ekf::fuse_matches(const gates &limits) {
-  int fused = 0;
-  for (int64_t i = 0; i < looked_count_; i++)
-    if (looked_[(size_t)i].found >= 0 && fuse_match(looked_[(size_t)i], limits)) fused++;
+  int fused = 0, tried = 0;
+  for (int64_t i = 0; i < looked_count_; i++) {
+    looked_point &look = looked_[(size_t)i];
+    if (look.found < 0) continue;
+    if (tried++ == kFusedMost) break;
+    if (fuse_match(look, limits)) fused++;
+  }
   filter_.settle();
   if (fused > 0) life_.fused(now_ns_);
   return fused;
@@ -345,7 +352,7 @@ bool stereo_ekf::close_loop(const pose3 &body, const double *reach_m, bool elsew
   if (is_expected(best.at, frame, 3.0 / weight)) {
     const bool linear = length(turn_of(best.at.q * conjugate(state_at_picture().at.q))) < kLinear_rad;
     if (!linear) begin_again(best.at, frame);
-    if (!linear || 2 * fuse_matches(limits()) >= agreeing) {
+    if (!linear || 2 * fuse_matches(limits()) >= (agreeing < kFusedMost ? agreeing : kFusedMost)) {
       elsewhere_ns_ = WM_TIME_NONE;
       return true;
     }
