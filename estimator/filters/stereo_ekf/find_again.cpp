@@ -335,12 +335,16 @@ void stereo_ekf::begin_again(const pose3 &body_at_picture, int frame) {
   elsewhere_ns_ = WM_TIME_NONE;
 }
 
-// The pose by points of the map near where `body` expects them, and what follows of it. True: it was used.
+// The pose by points of the map near where `body` expects them, and what follows of it. `elsewhere`: the search of the
+// whole map found `body`; its agreement was not by chance, and most of this picture's points must confirm it. True: the
+// pose was used.
 bool stereo_ekf::close_loop(const pose3 &body, const double *reach_m, bool elsewhere) {
   matched_points all;
   const double share = match(body, reach_m, &all);
   const agreed_pose best = pose_of_most(all, kHypotheses, setup_->seed);
-  if (best.inliers < kFewest || !(log_by_chance(best.inliers, all.count, share) < kLogChance)) return false;
+  const bool is_real =
+      elsewhere ? 2 * best.inliers > all.count : log_by_chance(best.inliers, all.count, share) < kLogChance;
+  if (best.inliers < kFewest || !is_real) return false;
   const int agreeing = keep_agreeing(all, best.at), frame = agreeing_frame();
   if (!life_.tracking()) {
     begin_again(best.at, frame);

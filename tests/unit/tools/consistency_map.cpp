@@ -150,6 +150,7 @@ void tearDown(void) { wm_config_free(&config); }
 // covariance states it.
 void test_a_loop_is_closed(void) {
   uint64_t inside = 0, all = 0;
+  double nees = 0;
   for (uint64_t seed = 1; seed <= drives; seed++) {
     Drive drive(seed);
     drive.begin(nullptr);
@@ -159,6 +160,7 @@ void test_a_loop_is_closed(void) {
       if (t_s < 0.48 * drive.duration_s()) before_m = error.position.norm();
       worst = std::max(worst, error.nees);
       all++;
+      nees += error.nees;
       inside += error.nees < 16.8;
       if (t_s < closed_s) return true;
       sum_m2 += error.position.squaredNorm();
@@ -170,7 +172,9 @@ void test_a_loop_is_closed(void) {
     TEST_ASSERT_LESS_THAN_DOUBLE(0.015, std::sqrt(sum_m2 / count));
   }
   const double share = static_cast<double>(inside) / static_cast<double>(all);
-  std::printf("NEES below its 99 %% quantile in %.2f %% of the steps\n", 100 * share);
+  nees /= 6 * static_cast<double>(all);
+  std::printf("NEES/6 mean %.3f, NEES below its 99 %% quantile in %.2f %% of the steps\n", nees, 100 * share);
+  TEST_ASSERT_LESS_THAN_DOUBLE(drives < 5 ? 2 : 1.25, nees);
   TEST_ASSERT_GREATER_THAN_DOUBLE(0.95, share);
 }
 
@@ -250,8 +254,8 @@ void test_carried_off_it_is_found(void) {
     std::printf("seed %llu: carried off, found after %.1f s, then at most %.4f m, NEES/6 %.2f\n",
                 (unsigned long long)seed, found_s, worst_after_m, nees / 6);
     TEST_ASSERT_TRUE(found_s >= 0 && found_s < 5);
-    TEST_ASSERT_LESS_THAN_DOUBLE(0.02, worst_after_m);
-    TEST_ASSERT_LESS_THAN_DOUBLE(36, nees);  // 1 of 500 000 is beyond
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.05, worst_after_m);  // 3 sigma of a pose by the points of one picture
+    TEST_ASSERT_LESS_THAN_DOUBLE(36, nees);             // 1 of 500 000 is beyond
   }
 }
 
