@@ -187,7 +187,8 @@ double stereo_ekf::match(const pose3 &body, const double *reach_m, matched_point
     const auto number = (int)look.found;
     const int frame = own_map::frame_of(number), point = own_map::index_of(number);
     const double variance = square(look.sigma_m) + trace_of(map_.point(frame, point).noise) / 3.0;
-    share += square(kAgree_sigmas) * variance / square(reach_m[frame]);
+    const double by_chance = square(kAgree_sigmas) * variance / square(reach_m[frame]);
+    share += by_chance < kShareMost ? by_chance : kShareMost;
     out->from[out->count] = look.in_body;
     out->to[out->count] = map_.place_of(frame, point);
     out->weight[out->count] = 1.0 / variance;
