@@ -164,12 +164,14 @@ struct Begun {
 };
 
 // The bound: the estimator's own covariance on the same way without any error. Its points of linearisation are the
-// truth then, and nothing is refused or missed: the recursion of [Tichavsky1998] for the model and the noise of the
-// configuration.
+// truth then, and nothing is refused; missed points and outliers are missing: the recursion of [Tichavsky1998] for the
+// model and the noise of the configuration.
 wm_status add_bound(const sim::Scenario &scenario, const wm_config &config, uint64_t seed, const Options6 &options,
                     Statistics6 &out, wm_error *err) {
   sim::Scenario perfect = scenario;
   sim::make_perfect(perfect);
+  for (size_t i = 0; i < perfect.sensors.size(); i++)  // what says nothing is missing, as it is in the drives
+    perfect.sensors[i].missed_fraction = scenario.sensors[i].missed_fraction + scenario.sensors[i].outlier_fraction;
   sim::Recording recording, real;
   if (const wm_status s = sim::simulate(perfect, seed, SIZE_MAX, recording, err); s != WM_OK) return s;
   if (const wm_status s = sim::simulate(scenario, seed, SIZE_MAX, real, err); s != WM_OK) return s;
