@@ -36,7 +36,8 @@ constexpr int kHypotheses = 300;
 constexpr double kLogChance = -13.8;
 constexpr int kFewest = 8;
 // Two searches of the whole map within this time that contradict the pose: it was wrong.
-constexpr double kTwice_s = 3.0;
+// A search of 200 key frames may take some seconds.
+constexpr double kTwice_s = 10.0;
 // Of one pose: a corner of a key frame is so far from where the pose expects it, or nearer. The quantile of chi2 with
 // three degrees of freedom that is exceeded with a probability of 1e-6, as kLogChance.
 constexpr double kOtherPose = 30.66;

@@ -18,8 +18,9 @@ class map_search {
  public:
   // Points that are looked for. It bounds the time of a search; it was not swept.
   static constexpr int kPointsMost = 48;
-  // Pairs of a cycle: those of one key frame, and more frames while they are fewer. A pair takes 60 instructions.
-  static constexpr int kPairsEnough = 3072;
+  // Pairs of a cycle: those of a key frame, and of more while they are fewer. A pair takes 60 instructions, so a cycle
+  // less than the points of one picture. 200 full key frames take 50 cycles, a second.
+  static constexpr int kPairsEnough = 12288;
 
   void cancel() { stage_ = kIdle; }
   // For the points of a picture at this odometry; add() gives them.
