@@ -62,6 +62,8 @@ struct Step6 {
   uint64_t runs = 0;  // with a pose by then
   double position_sq_m2 = 0, rotation_sq_rad2 = 0;
   double nees = 0;  // 6 degrees of freedom
+  // Sums over the drives of which a bound was computed: of the position's and the rotation's variances.
+  double bound_position_sq_m2 = 0, bound_rotation_sq_rad2 = 0;
 };
 
 // One run: root mean square of the position's error from `settled_s` on, and the largest.
@@ -71,7 +73,7 @@ struct Run6 {
 };
 
 struct Statistics6 {
-  uint64_t runs = 0, fused = 0, rejected = 0, outliers = 0;
+  uint64_t runs = 0, fused = 0, rejected = 0, outliers = 0, bounds = 0;
   std::vector<Step6> steps;
   std::vector<Run6> each;
   // Points found on the way, each as it was when it was last in the state; wrong: off by more than 0.1 m, or by more
@@ -80,6 +82,8 @@ struct Statistics6 {
   double point_error_sum_m = 0;
   double nees_mean() const;             // divided by its degrees of freedom
   double nees_inside(Band band) const;  // share of the steps
+  // Root mean square over the drives and over the steps from `from_s` to `to_s`, divided by the bound; 0: no bound.
+  double position_over_bound(double from_s, double to_s) const, rotation_over_bound(double from_s, double to_s) const;
 };
 
 struct Options6 {
@@ -88,6 +92,7 @@ struct Options6 {
   double until_s = 1e9;                     // ... to here
   double blind_from_s = 0, blind_to_s = 0;  // no picture shows anything meanwhile
   size_t points_per_picture = SIZE_MAX;     // the first ones that are in both pictures; others are left out
+  uint64_t bounds = 0;                      // drives of which the bound is computed, the first ones
 };
 
 // As run(), for a scenario that swims.

@@ -133,28 +133,84 @@ void judge_points(const std::map<int32_t, Point> &points, const std::vector<wm_l
   }
 }
 
+// The estimator of the configuration for a drive, as it begins.
+struct Begun {
+  wm_rig rig;
+  wm_setup setup{};
+  std::unique_ptr<Block[]> memory;
+
+  wm_status begin(const sim::Scenario &scenario, const wm_config &config, const sim::Recording &recording,
+                  wm_error *err) {
+    rig = rig_of(scenario);
+    setup.motion = config.motion;
+    setup.sightings = config.sightings;
+    setup.wheels = scenario.robot.wheels;
+    setup.sensors = recording.sensors.data();
+    setup.sensor_count = recording.sensors.size();
+    setup.landmarks = recording.map.data();
+    setup.landmark_count = recording.map.size();
+    setup.rig = &rig;
+    setup.start = recording.start;
+    setup.seed = recording.seed;
+    const wm_estimator &ops = *config.estimator;
+    const char *why = "";
+    const size_t bytes = ops.state_bytes(config.estimator_params, &setup, &why);
+    if (bytes == 0) return wm_fail(err, WM_BAD_CONFIG, "%s: %s", ops.name, why);
+    memory = std::make_unique<Block[]>(bytes / sizeof(Block) + 1);
+    if (const wm_status s = ops.init(memory.get(), config.estimator_params, &setup); s != WM_OK)
+      return wm_fail(err, s, "%s: init: %s", ops.name, wm_status_text(s));
+    return WM_OK;
+  }
+};
+
+// The bound: the estimator's own covariance on the same way without any error. Its points of linearisation are the
+// truth then, and nothing is refused; missed points and outliers are missing: the recursion of [Tichavsky1998] for the
+// model and the noise of the configuration.
+wm_status add_bound(const sim::Scenario &scenario, const wm_config &config, uint64_t seed, const Options6 &options,
+                    Statistics6 &out, wm_error *err) {
+  sim::Scenario perfect = scenario;
+  sim::make_perfect(perfect);
+  for (size_t i = 0; i < perfect.sensors.size(); i++)  // what says nothing is missing, as it is in the drives
+    perfect.sensors[i].missed_fraction = scenario.sensors[i].missed_fraction + scenario.sensors[i].outlier_fraction;
+  sim::Recording recording, real;
+  if (const wm_status s = sim::simulate(perfect, seed, SIZE_MAX, recording, err); s != WM_OK) return s;
+  if (const wm_status s = sim::simulate(scenario, seed, SIZE_MAX, real, err); s != WM_OK) return s;
+  recording.start.sigma_xy_m = real.start.sigma_xy_m;
+  recording.start.sigma_heading_rad = real.start.sigma_heading_rad;
+  Begun begun;
+  if (const wm_status s = begun.begin(scenario, config, recording, err); s != WM_OK) return s;
+  const wm_estimator &ops = *config.estimator;
+  size_t next = 0;
+  for (const wm_event &e : events_of(recording)) {
+    const double event_s = static_cast<double>(e.t_ns - recording.clock_start_ns) * 1e-9;
+    if (e.kind == WM_EVENT_STEREO && event_s >= options.blind_from_s && event_s < options.blind_to_s) continue;
+    if (!wm_event_is_motion(&e)) {
+      wm_innovation innovations[WM_INNOVATIONS_PER_EVENT_MAX];
+      size_t count = 0;
+      (void)ops.correct(begun.memory.get(), &e, innovations, WM_INNOVATIONS_PER_EVENT_MAX, &count);
+      continue;
+    }
+    if (next < out.steps.size() && event_s > out.steps[next].t_s + 1e-6) {
+      wm_estimate estimate{};
+      ops.estimate(begun.memory.get(), &estimate);
+      Step6 &step = out.steps[next++];
+      for (int i = 0; i < 3; i++) {
+        step.bound_position_sq_m2 += estimate.covariance[wm_cov_index(i, i)];
+        step.bound_rotation_sq_rad2 += estimate.covariance[wm_cov_index(3 + i, 3 + i)];
+      }
+    }
+    (void)ops.predict(begun.memory.get(), &e);
+  }
+  out.bounds++;
+  return WM_OK;
+}
+
 wm_status run_one(const sim::Scenario &scenario, const wm_config &config, const sim::Recording &recording,
                   const Options6 &options, Statistics6 &out, wm_error *err) {
-  const wm_rig rig = rig_of(scenario);
-  wm_setup setup{};
-  setup.motion = config.motion;
-  setup.sightings = config.sightings;
-  setup.wheels = scenario.robot.wheels;
-  setup.sensors = recording.sensors.data();
-  setup.sensor_count = recording.sensors.size();
-  setup.landmarks = recording.map.data();
-  setup.landmark_count = recording.map.size();
-  setup.rig = &rig;
-  setup.start = recording.start;
-  setup.seed = recording.seed;
+  Begun begun;
+  if (const wm_status s = begun.begin(scenario, config, recording, err); s != WM_OK) return s;
   const wm_estimator &ops = *config.estimator;
-  const char *why = "";
-  const size_t bytes = ops.state_bytes(config.estimator_params, &setup, &why);
-  if (bytes == 0) return wm_fail(err, WM_BAD_CONFIG, "%s: %s", ops.name, why);
-  const auto memory = std::make_unique<Block[]>(bytes / sizeof(Block) + 1);
-  void *state = memory.get();
-  if (const wm_status s = ops.init(state, config.estimator_params, &setup); s != WM_OK)
-    return wm_fail(err, s, "%s: init: %s", ops.name, wm_status_text(s));
+  void *state = begun.memory.get();
 
   for (const sim::StereoSeen &s : recording.stereo) out.outliers += s.outlier;
   std::map<int32_t, Point> points;
@@ -241,6 +297,28 @@ double Statistics6::nees_inside(Band band) const {
   return all > 0 ? static_cast<double>(inside) / static_cast<double>(all) : 0;
 }
 
+namespace {
+
+double over_bound(const Statistics6 &all, double from_s, double to_s, double Step6::*squares, double Step6::*bound) {
+  double sum = 0, least = 0;
+  for (const Step6 &s : all.steps) {
+    if (s.t_s < from_s || s.t_s > to_s || s.runs == 0 || all.bounds == 0) continue;
+    sum += s.*squares / static_cast<double>(s.runs);
+    least += s.*bound / static_cast<double>(all.bounds);
+  }
+  return least > 0 ? std::sqrt(sum / least) : 0;
+}
+
+}  // namespace
+
+double Statistics6::position_over_bound(double from_s, double to_s) const {
+  return over_bound(*this, from_s, to_s, &Step6::position_sq_m2, &Step6::bound_position_sq_m2);
+}
+
+double Statistics6::rotation_over_bound(double from_s, double to_s) const {
+  return over_bound(*this, from_s, to_s, &Step6::rotation_sq_rad2, &Step6::bound_rotation_sq_rad2);
+}
+
 wm_status run_six(const sim::Scenario &scenario, const wm_config &config, const Options6 &options,
                   const std::function<void(uint64_t)> &progress, Statistics6 &out, wm_error *err) {
   if (!scenario.swims())
@@ -251,9 +329,12 @@ wm_status run_six(const sim::Scenario &scenario, const wm_config &config, const 
     if (const wm_status s = sim::simulate(scenario, options.first_seed + i, SIZE_MAX, recording, err); s != WM_OK)
       return s;
     if (out.steps.empty())
-      for (int k = 1; k * kStep_s < recording.duration_s; k++) out.steps.push_back({k * kStep_s, 0, 0, 0, 0});
+      for (int k = 1; k * kStep_s < recording.duration_s; k++) out.steps.push_back({k * kStep_s});
     if (const wm_status s = run_one(scenario, config, recording, options, out, err); s != WM_OK) return s;
     out.runs++;
+    if (i < options.bounds)
+      if (const wm_status s = add_bound(scenario, config, options.first_seed + i, options, out, err); s != WM_OK)
+        return s;
     if (progress) progress(i + 1);
   }
   return WM_OK;

@@ -121,7 +121,7 @@ void see_stereo(const Scenario &sc, size_t number, const Seen &seen, const doubl
     row.left_px[0] = s.size_px[0] * dice.anything(0);
     row.left_px[1] = s.size_px[1] * dice.anything(1);
   }
-  if (s.tracks) look_at_patch(s, out.seed, dice, seen.landmark, row.appearance);
+  if (s.tracks) look_at_patch(s, sc.scatter.seed ? sc.scatter.seed : out.seed, dice, seen.landmark, row.appearance);
   out.stereo.push_back(row);
 }
 

@@ -193,6 +193,7 @@ wm_status prepare(const Scenario &scenario, uint64_t seed, Film &out, wm_error *
   request.hard = scenario.world.hard;
   request.markers_on_walls = scenario.world.markers_on_walls;
   request.markers = scenario.world.markers;
+  request.rounds = scenario.world.rounds;
   request.seed = seed;
   if (!scenario.route.legs.empty()) request.route = scenario.route;
   request.footprint = scenario.robot.body;

@@ -22,10 +22,12 @@ wm_landmark landmark_at(const Scatter &s, size_t number, const Eigen::Vector3d &
 
 double between(const double range[2], double share) { return range[0] + share * (range[1] - range[0]); }
 
+uint64_t seed_of(const Scenario &sc, const Recording &r) { return sc.scatter.seed ? sc.scatter.seed : r.seed; }
+
 // Beside the way, not nearer to it anywhere than the least distance, and apart from one another.
 wm_status beside_the_way(const Scenario &sc, const Recording &r, std::vector<wm_landmark> &out, wm_error *err) {
   const Scatter &s = sc.scatter;
-  const Random random(r.seed);
+  const Random random(seed_of(sc, r));
   const bool turned = std::any_of(sc.sensors.begin(), sc.sensors.end(),
                                   [](const Sensor &sensor) { return sensor.kind == Sensor::Kind::markers; });
   std::vector<State> way;  // all of it: a recording that ends early is of the same world
@@ -62,9 +64,14 @@ wm_status beside_the_way(const Scenario &sc, const Recording &r, std::vector<wm_
 }
 
 // Anywhere in the left picture at some time of the swim: `count` of them at times spread over it, or each half second
-// as many as are missing to `per_view` in both pictures, thinned out to that mean in the end.
-wm_status before_the_pair(const Scenario &sc, const Recording &r, std::vector<wm_landmark> &out, wm_error *err) {
+// as many as are missing to `per_view` in both pictures, thinned out to that mean in the end. With a seed of their own
+// they are those of that seed's swim.
+wm_status before_the_pair(const Scenario &sc, const Recording &swim, std::vector<wm_landmark> &out, wm_error *err) {
   const Scatter &s = sc.scatter;
+  Recording r;
+  r.seed = seed_of(sc, swim);
+  r.path = r.seed == swim.seed || !sc.knots.empty() ? swim.path : swum_path(sc.rounds, r.seed);
+  r.duration_s = swim.duration_s;
   const Random random(r.seed);
   const auto sensor = std::find_if(sc.sensors.begin(), sc.sensors.end(),
                                    [](const Sensor &one) { return one.kind == Sensor::Kind::stereo; });

@@ -14,7 +14,7 @@ namespace {
 
 void read_world(Reader &r, const wm_yaml_node &world, Scenario &out) {
   static const char *const known[] = {"landmarks", "kind",      "variant",      "markers_on_walls", "scatter", "map",
-                                      "plan",      "ceiling_m", "resolution_m", "markers",          nullptr};
+                                      "plan",      "ceiling_m", "resolution_m", "markers",          "rounds",  nullptr};
   static const char *const maps[] = {"all", "listed", "none", nullptr};
   static const char *const kinds[] = {"features", "crossing", "corridor", "office", "hall", "seabed", nullptr};
   static const char *const variants[] = {"easy", "hard", nullptr};
@@ -29,6 +29,10 @@ void read_world(Reader &r, const wm_yaml_node &world, Scenario &out) {
   out.world.markers = static_cast<Markers>(family);
   out.world.hard = variant == 1;
   if (kind > 0) out.world.kind = kinds[kind];
+  r.number(world, "rounds", 0.1, 20, 1, out.world.rounds);
+  if (const wm_yaml_node rounds = r.child(world, "rounds", false);
+      r.ok() && out.world.kind != "seabed" && wm_yaml_there(&rounds))
+    return r.fail(rounds, "only seabed has rounds");
   r.text(world, "plan", out.world.plan);
   r.number(world, "ceiling_m", 0.5, 50, 1, out.world.ceiling_m);
   r.number(world, "resolution_m", 1e-4, 10, 1, out.world.resolution_m);

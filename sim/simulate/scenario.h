@@ -82,6 +82,7 @@ struct Scatter {
   double height_m[2] = {0, 0};     // wheels: z
   double apart_m = 0.5;            // wheels: from one another
   double ahead_m[2] = {1.5, 4.5};  // six degrees of freedom: distance from the stereo pair when it comes by
+  uint64_t seed = 0;               // draws places and appearances, for several drives past the same; 0: the drive's own
 };
 
 // Which of the landmarks landmarks.csv has; the others are SLAM's to find.
@@ -103,6 +104,7 @@ struct WorldKind {
   std::string kind;  // crossing, corridor, office, hall, seabed; empty: features only
   bool hard = false;
   bool markers_on_walls = false;    // office
+  double rounds = 1.05;             // seabed: of the vehicle's way
   Markers markers = Markers::tags;  // office
   std::string plan;         // corridor, office, hall: the file of a building of one's own; empty: drawn by the seed
   double ceiling_m = 2.6;   // of a ROS map or a picture

@@ -180,15 +180,17 @@ void read_sensors(Reader &r, const wm_yaml_node &list, Scenario &out) {
 }
 
 void read_scatter(Reader &r, const wm_yaml_node &map, Scenario &out) {
-  static const char *const known[] = {"count",    "per_view", "first_id", "aside_m",
-                                      "height_m", "apart_m",  "ahead_m",  nullptr};
+  static const char *const known[] = {"count",   "per_view", "first_id", "aside_m", "height_m",
+                                      "apart_m", "ahead_m",  "seed",     nullptr};
   if (!r.ok() || !wm_yaml_there(&map)) return;
   r.keys(map, known);
   Scatter &s = out.scatter;
-  int64_t count = 0, per_view = 0, first = 1;
+  int64_t count = 0, per_view = 0, first = 1, seed = 0;
   r.integer(map, "count", 1, 20000, count);
   r.integer(map, "per_view", 1, 500, per_view);
   r.integer(map, "first_id", 0, 1000000, first);
+  r.integer(map, "seed", 0, INT64_MAX, seed);
+  s.seed = static_cast<uint64_t>(seed);
   s.count = static_cast<int>(count);
   s.per_view = static_cast<int>(per_view);
   s.first_id = static_cast<int32_t>(first);

@@ -91,20 +91,20 @@ images::Picture bands(int id, uint64_t seed) {
   return p;
 }
 
-Path6 draw_path(uint64_t seed, const Bed &bed) {
+Path6 draw_path(uint64_t seed, double rounds, const Bed &bed) {
   // A closed round over the bed, heading along the way, at about 2.5 m above it; gentle roll and pitch.
   Dice dice(seed, Part::route);
   const double radius = dice.uniform(4.2, 5.5), flat = dice.uniform(0.7, 1.0), start = dice.uniform(-kPi, kPi),
                sense = dice.sign();
   const double wobble = dice.uniform(0.4, 1.0), lobes = dice.integer(2, 3), phase = dice.uniform(-kPi, kPi);
-  constexpr int kKnots = 25;
   constexpr double kStep_s = 2.5;
+  const int knots_of_it = 1 + static_cast<int>(std::lround(24 / 1.05 * rounds));  // a round takes 57 s
   std::vector<Knot6> knots;
   double before = 0;
-  for (int i = 0; i < kKnots; i++) {
+  for (int i = 0; i < knots_of_it; i++) {
     // The first and last knots are near each other: it starts and stops slowly.
-    const double u = static_cast<double>(i) / (kKnots - 1), eased = u + 0.35 * (u * u * (3 - 2 * u) - u);
-    const double turn = start + sense * 2.1 * kPi * eased;
+    const double u = static_cast<double>(i) / (knots_of_it - 1), eased = u + 0.35 * (u * u * (3 - 2 * u) - u);
+    const double turn = start + sense * 2 * rounds * kPi * eased;
     const auto place = [&](double a) {
       const double r = radius + wobble * wm::sin(lobes * a + phase);
       return std::pair{r * wm::cos(a), flat * r * wm::sin(a)};
@@ -144,7 +144,7 @@ wm_status make_seabed(const WorldRequest &request, World &world, wm_error *err) 
   world.about = "Underwater vehicle over a rocky bed, stereo pair that looks ahead and down, haze and particles.";
   world.vehicle = Vehicle::six;
   const Bed bed(request.seed);
-  world.path = draw_path(request.seed, bed);
+  world.path = draw_path(request.seed, request.rounds, bed);
 
   // Ripples under blotches of several sizes: what a feature detector lives on.
   images::Picture bottom = render::sand(request.seed, 1024, Colour(0.50f, 0.45f, 0.36f), 0.35);

@@ -23,6 +23,7 @@ struct WorldRequest {
   std::string name;  // crossing, corridor, office, hall, seabed
   bool hard = false;
   uint64_t seed = 1;
+  double rounds = 1.05;             // seabed: of the vehicle's way, each of about a minute
   bool markers_on_walls = false;    // office: markers on walls and a camera that looks ahead
   Markers markers = Markers::tags;  // office
   std::optional<Plan> plan;    // corridor, office, hall: this building instead of a drawn one; then give `route`, too

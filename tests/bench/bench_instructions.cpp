@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "drawn_map.h"
+#include "drawn_own_map.h"
 #include "drawn_picture.h"
 #include "drawn_search.h"
 #include "drawn_street.h"
@@ -75,6 +76,13 @@ int main(int argc, char **argv) {
     });
   } else if (!std::strcmp(what, "window_50x50")) {
     windows();
+  } else if (!std::strcmp(what, "own_map_cycle") || !std::strcmp(what, "own_map_search")) {
+    bench::own_map_at_work work(40);
+    const bool all = std::strcmp(what, "own_map_cycle") != 0;
+    count([&] {
+      work.begin();
+      while (!work.step() && all) continue;
+    });
   } else if (!std::strcmp(what, "picture_rays") || !std::strcmp(what, "picture_windows")) {
     bench::edges_at_work work(std::strcmp(what, "picture_rays") != 0);
     count([&] { (void)work.look(); });
@@ -104,7 +112,7 @@ int main(int argc, char **argv) {
                  "usage: wm_instructions "
                  "landmark_step|landmark_start|particles_200|particles_2000|particle_step_200|particle_step_2000|"
                  "window_50x50|picture_rays|picture_windows|picture_lines|picture_landmarks|picture_landmarks_lost|"
-                 "edge_scans_tracking|edge_scans_searching [TIMES]\n");
+                 "edge_scans_tracking|edge_scans_searching|own_map_cycle|own_map_search [TIMES]\n");
     return 2;
   }
   return 0;

@@ -27,28 +27,31 @@ constexpr double kFollowed_s = 0.3;
 // Distance from the expected place within which a point is looked for: so many sigmas, and what one picture leaves
 // open.
 constexpr double kReach = 3.5, kReach_m = 0.1;
-constexpr double kEverywhere_m = 1e9, kEverywhereEach_s = 0.5;
-// Points that are looked for in the whole map at a time. It bounds the time of a search; it was not swept.
-constexpr int kSearchedMost = 48;
+// Where the pose is less certain than this the whole map is searched, in cycles: near searches must stay cheap.
+constexpr double kNearMost_m = 1.0;
+constexpr double kEverywhereEach_s = 0.5;
 // With three of four matches wrong, one triple in 64 is right: of 300 triples one is, with a probability of 99 %.
 constexpr int kHypotheses = 300;
 // A pose is taken when fewer than 1e-6 such are expected by chance, and so many points agree on it.
 constexpr double kLogChance = -13.8;
 constexpr int kFewest = 8;
-// Share of wrong matches that agree with a wrong pose: the area of agreement over that of the search, within bounds.
-constexpr double kShareLeast = 0.02, kShareMost = 0.99, kAgree_sigmas = 3.4;
-// Two searches of the whole map within this time that contradict the pose and agree with each other: it was wrong.
-constexpr double kTwice_s = 3.0;
-// Sigmas of a pose that was found, before its points are fused: far above theirs, and small enough to be linear.
-constexpr double kFound_m = 0.3, kFound_rad = 0.1;
+// Two searches of the whole map within this time that contradict the pose: it was wrong.
+// A search of 200 key frames may take some seconds.
+constexpr double kTwice_s = 10.0;
+// Of one pose: a corner of a key frame is so far from where the pose expects it, or nearer. The quantile of chi2 with
+// three degrees of freedom that is exceeded with a probability of 1e-6, as kLogChance.
+constexpr double kOtherPose = 30.66;
+// A larger turn is not corrected linearly: half of its square is 5 mm at one metre, the error of one match.
+constexpr double kLinear_rad = 0.1;
+// Sigmas of a pose that was found, before its points are fused: far above theirs, and so many times the key frame's own
+// at least: what is known of the pose is then known from the frame alone, but for 1 %.
+constexpr double kFound_m = 0.3, kFound_rad = 0.1, kWeak = 10.0;
+// Distance within which the points of a later picture lie from where a pose that was found expects them.
+constexpr double kConfirm_m = 0.3;
 constexpr double kNoGate = 1e300;
-
-pose3 composed(const pose3 &a, const pose3 &b) { return {a.p + matrix_of(a.q) * b.p, normalized(a.q * b.q)}; }
-
-pose3 inverted(const pose3 &a) {
-  const quat q = conjugate(a.q);
-  return {-1.0 * (matrix_of(q) * a.p), q};
-}
+// Matches of one picture that are fused: each costs as much as a point of the picture. The others' turn is the next
+// picture, in which they are found again.
+constexpr int kFusedMost = 12;
 
 void put_block(row_block *block, int column, const mat3 &m) {
   for (int i = 0; i < 3; i++)
@@ -151,6 +154,7 @@ void stereo_ekf::bound_reach(double *reach_m) const {
     triangle_block(f, in_triangle(triangle_of(f), there), &block);
     put_block(&block, block.add_columns(filter_.point_state(reference), 3), -1.0 * kIdentity3);
     reach_m[f] = kReach * std::sqrt(trace(covariance_by(block))) + kReach_m;
+    if (reach_m[f] > kNearMost_m) reach_m[f] = 0.0;
   }
 }
 
@@ -168,44 +172,31 @@ bool stereo_ekf::take_filtered(const past_pose &past, looked_point *look) const 
   return true;
 }
 
-// Matches the points of this picture with the map's, near where they are expected or anywhere. Returns the sum of the
+// Matches the points of this picture with the map's that lie near where `body` expects them. Returns the mean of the
 // agreeing areas over the searched ones: the share of wrong matches that agree by chance.
-double stereo_ekf::match(bool everywhere, matched_points *out) {
-  double reach_m[kFramesMost];
+double stereo_ekf::match(const pose3 &body, const double *reach_m, matched_points *out) {
   const past_pose past = state_at_picture();
-  if (everywhere)
-    for (double &reach : reach_m) reach = kEverywhere_m;
-  else
-    bound_reach(reach_m);
+  const mat3 r = matrix_of(body.q);
   map_.place_points([this](int frame) { return triangle_of(frame); });
   double share = 0.0;
-  vec3 low = {kEverywhere_m, kEverywhere_m, kEverywhere_m}, high = -1.0 * low;
-  const int64_t each = everywhere ? 1 + (looked_count_ - 1) / kSearchedMost : 1;
   for (int64_t i = 0; i < looked_count_; i++) {
     looked_point &look = looked_[(size_t)i];
     look.found = -1;
-    if (i % each != 0) continue;
     if (life_.tracking() && !take_filtered(past, &look)) continue;
-    look.found = map_.find(look.seen.appearance, past.at.p + past.R * look.in_body, reach_m);
+    look.found = map_.find(look.seen.appearance, body.p + r * look.in_body, reach_m);
     if (look.found < 0) continue;
     const auto number = (int)look.found;
     const int frame = own_map::frame_of(number), point = own_map::index_of(number);
-    const vec3 &place = map_.place_of(frame, point);
-    const double variance = square(look.sigma_m) + trace(symmetric_of(map_.point(frame, point).noise)) / 3.0;
-    share += square(kAgree_sigmas) * variance / square(reach_m[frame]);
-    for (int k = 0; k < 3; k++) {
-      low[k] = place[k] < low[k] ? place[k] : low[k];
-      high[k] = place[k] > high[k] ? place[k] : high[k];
-    }
+    const double variance = square(look.sigma_m) + trace_of(map_.point(frame, point).noise) / 3.0;
+    const double by_chance = square(kAgree_sigmas) * variance / square(reach_m[frame]);
+    share += by_chance < kShareMost ? by_chance : kShareMost;
     out->from[out->count] = look.in_body;
-    out->to[out->count] = place;
+    out->to[out->count] = map_.place_of(frame, point);
     out->weight[out->count] = 1.0 / variance;
     out->id[out->count++] = look.found;
   }
   if (out->count == 0) return kShareMost;
   share /= out->count;
-  const vec3 spread = high - low;
-  if (everywhere) share *= square(kEverywhere_m) / (0.25 * dot(spread, spread) + square(kReach_m));
   return share < kShareLeast ? kShareLeast : share > kShareMost ? kShareMost : share;
 }
 
@@ -258,18 +249,83 @@ bool stereo_ekf::fuse_match(const looked_point &looked, const gates &limits) {
 }
 
 int stereo_ekf::fuse_matches(const gates &limits) {
-  int fused = 0;
-  for (int64_t i = 0; i < looked_count_; i++)
-    if (looked_[(size_t)i].found >= 0 && fuse_match(looked_[(size_t)i], limits)) fused++;
+  int fused = 0, tried = 0;
+  for (int64_t i = 0; i < looked_count_; i++) {
+    looked_point &look = looked_[(size_t)i];
+    if (look.found < 0) continue;
+    if (tried++ == kFusedMost) break;
+    if (fuse_match(look, limits)) fused++;
+  }
   filter_.settle();
   if (fused > 0) life_.fused(now_ns_);
   return fused;
 }
 
+// The frame to which most of the agreeing points belong; -1: none.
+int stereo_ekf::agreeing_frame() const {
+  int points[kFramesMost] = {}, most = -1;
+  for (int64_t i = 0; i < looked_count_; i++) {
+    if (looked_[(size_t)i].found < 0) continue;
+    const int frame = own_map::frame_of((int)looked_[(size_t)i].found);
+    points[frame]++;
+    if (most < 0 || points[frame] > points[most]) most = frame;
+  }
+  return most;
+}
+
+// Whether a pose that was found by points of `frame` is the state's own, as far as that is known: the corners of the
+// frame lie where the state expects them in the camera. `noise_m2`: of the found pose.
+bool stereo_ekf::is_expected(const pose3 &body_at_picture, int frame, double noise_m2) const {
+  const past_pose past = state_at_picture();
+  past_pose found = past;
+  found.at = body_at_picture;
+  found.R = matrix_of(body_at_picture.q);
+  for (int c = 0; c < own_map::kCorners; c++) {
+    const int slot = find_slot(corner_id(frame, c));
+    const vec3 corner = filter_.point(slot), off = in_camera(corner, found) - in_camera(corner, past);
+    point_view view = view_point(corner, past);
+    put_block(&view.by, view.by.add_columns(filter_.point_state(slot), 3), view.A);
+    mat3 covariance = covariance_by(view.by);
+    for (int i = 0; i < 3; i++) covariance.m[i][i] += noise_m2 + kClone_m2;
+    matrix<3> inverse;
+    if (!invert_positive<3>(map(covariance.m), &inverse)) return false;
+    double chi2 = 0.0;
+    for (int i = 0; i < 3; i++)
+      for (int j = 0; j < 3; j++) chi2 += off[i] * inverse(i, j) * off[j];
+    if (!(chi2 < kOtherPose)) return false;
+  }
+  return true;
+}
+
+// Sigmas of a pose before it is fused with points of `frame`: so weak that it adds nothing to them.
+void stereo_ekf::weak_prior(int frame, double *sigma_m, double *sigma_rad) const {
+  const frame_triangle at = triangle_of(frame);
+  double place_m2 = 0.0, turn_rad2 = 0.0;
+  const int first = filter_.point_state(find_slot(corner_id(frame, 0)));
+  for (int c = 0; c < own_map::kCorners; c++) {
+    const int state = filter_.point_state(find_slot(corner_id(frame, c)));
+    double own = 0.0, apart = 0.0;
+    for (int i = 0; i < 3; i++) {
+      own += filter_.variance(state + i);
+      apart +=
+          filter_.variance(state + i) + filter_.variance(first + i) - 2.0 * filter_.covariance(state + i, first + i);
+    }
+    const vec3 side = at.corner[c] - at.corner[0];
+    if (own > place_m2) place_m2 = own;
+    if (c > 0 && apart / dot(side, side) > turn_rad2) turn_rad2 = apart / dot(side, side);
+  }
+  *sigma_m = kWeak * std::sqrt(place_m2);
+  *sigma_rad = kWeak * std::sqrt(turn_rad2);
+  if (*sigma_m < kFound_m) *sigma_m = kFound_m;
+  if (*sigma_rad < kFound_rad) *sigma_rad = kFound_rad;
+}
+
 // The pose by points of the map alone: all points of the state begin anew at it.
-void stereo_ekf::begin_again(const pose3 &body_at_picture) {
+void stereo_ekf::begin_again(const pose3 &body_at_picture, int frame) {
   const pose3 since = composed(inverted(state_at_picture().at), filter_.nominal());
-  set_pose(composed(body_at_picture, since), kFound_m, kFound_rad);
+  double sigma_m, sigma_rad;
+  weak_prior(frame, &sigma_m, &sigma_rad);
+  set_pose(composed(body_at_picture, since), sigma_m, sigma_rad);
   for (int64_t i = 0; i < looked_count_; i++) {
     size_t none = 0;
     add_point(looked_[(size_t)i].seen, wm_innovation{}, record_list{nullptr, 0, &none});
@@ -281,41 +337,89 @@ void stereo_ekf::begin_again(const pose3 &body_at_picture) {
   elsewhere_ns_ = WM_TIME_NONE;
 }
 
-// True: points were found again, and agree with the pose as far as that is known.
-bool stereo_ekf::close_loop(bool everywhere) {
+// The pose by points of the map near where `body` expects them, and what follows of it. `elsewhere`: the search of the
+// whole map found `body`; its agreement was not by chance, and most of this picture's points must confirm it. True: the
+// pose was used.
+bool stereo_ekf::close_loop(const pose3 &body, const double *reach_m, bool elsewhere) {
   matched_points all;
-  const double share = match(everywhere, &all);
+  const double share = match(body, reach_m, &all);
   const agreed_pose best = pose_of_most(all, kHypotheses, setup_->seed);
-  if (best.inliers < kFewest || !(log_by_chance(best.inliers, all.count, share) < kLogChance)) return false;
-  const int agreeing = keep_agreeing(all, best.at);
-  if (2 * fuse_matches(limits()) >= agreeing) {
-    elsewhere_ns_ = WM_TIME_NONE;
+  const bool is_real =
+      elsewhere ? 2 * best.inliers > all.count : log_by_chance(best.inliers, all.count, share) < kLogChance;
+  if (best.inliers < kFewest || !is_real) return false;
+  const int agreeing = keep_agreeing(all, best.at), frame = agreeing_frame();
+  if (!life_.tracking()) {
+    begin_again(best.at, frame);
     return true;
   }
-  if (!everywhere) return false;
+  double weight = 0.0;
+  for (int i = 0; i < all.count; i++)
+    if (agrees(all, i, best.at)) weight += all.weight[i];
+  if (is_expected(best.at, frame, 3.0 / weight)) {
+    const bool linear = length(turn_of(best.at.q * conjugate(state_at_picture().at.q))) < kLinear_rad;
+    if (!linear) begin_again(best.at, frame);
+    if (!linear || 2 * fuse_matches(limits()) >= (agreeing < kFusedMost ? agreeing : kFusedMost)) {
+      elsewhere_ns_ = WM_TIME_NONE;
+      return true;
+    }
+  }
+  if (!elsewhere) return false;
   const bool twice = elsewhere_ns_ != WM_TIME_NONE && wm_seconds_between(elsewhere_ns_, now_ns_) < kTwice_s;
   elsewhere_ns_ = now_ns_;
-  if (twice) begin_again(best.at);
+  if (twice) begin_again(best.at, frame);
   return twice;
 }
 
-void stereo_ekf::search_map() {
-  if (!params_.recover || map_.frames() == 0 || !life_.search_due(now_ns_) || looked_count_ < kFewest) return;
-  life_.searched(now_ns_);
-  matched_points all;
-  const double share = match(true, &all);
-  const agreed_pose best = pose_of_most(all, kHypotheses, setup_->seed);
-  if (best.inliers < kFewest || !(log_by_chance(best.inliers, all.count, share) < kLogChance)) return;
-  (void)keep_agreeing(all, best.at);
-  begin_again(best.at);
+// For points of the present picture, spread over it.
+void stereo_ekf::begin_search() {
+  const past_pose past = state_at_picture();
+  map_search &search = search_[0];
+  const int64_t each = 1 + (looked_count_ - 1) / map_search::kPointsMost;
+  search.begin(odometry_.pose);
+  for (int64_t i = 0; i < looked_count_; i += each) {
+    looked_point &look = looked_[(size_t)i];
+    if (!life_.tracking() || take_filtered(past, &look)) search.add(look.seen.appearance, look.in_body, look.sigma_m);
+  }
+  if (search.points() < kFewest) search.cancel();
+  if (!life_.tracking()) life_.searched(now_ns_);
+  everywhere_ns_ = now_ns_;
 }
 
+// A cycle's share of a search; its end is a pose, or none.
+void stereo_ekf::search_on() {
+  map_search &search = search_[0];
+  if (search.is_idle() || !search.step(map_)) return;
+  matched_points all;
+  const auto place = [this](int frame, int point) {
+    return out_of_triangle(triangle_of(frame), map_.point(frame, point).at);
+  };
+  const double share = search.matches(map_, place, &all);
+  const agreed_pose best = pose_of_most(all, kHypotheses, setup_->seed);
+  if (best.inliers < kFewest || !(log_by_chance(best.inliers, all.count, share) < kLogChance))
+    search.cancel();
+  else
+    search.found(best.at);
+}
+
+// At the end of a picture.
 void stereo_ekf::find_again() {
-  if (!life_.tracking()) return search_map();
-  if (map_.frames() == 0 || looked_count_ == 0 || close_loop(false) || !params_.recover) return;
-  if (everywhere_ns_ != WM_TIME_NONE && wm_seconds_between(everywhere_ns_, now_ns_) < kEverywhereEach_s) return;
-  everywhere_ns_ = now_ns_;
-  (void)close_loop(true);
+  if (map_.frames() == 0 || looked_count_ == 0) return;
+  map_search &search = search_[0];
+  double reach_m[kFramesMost];
+  if (life_.tracking()) {
+    bound_reach(reach_m);
+    if (close_loop(state_at_picture().at, reach_m, false)) return search.cancel();
+  }
+  if (!params_.recover || looked_count_ < kFewest) return;
+  if (search.has_pose()) {
+    for (double &reach : reach_m) reach = kConfirm_m;
+    (void)close_loop(search.pose(odometry_.pose), reach_m, true);
+    return search.cancel();
+  }
+  const bool due = life_.tracking() ? everywhere_ns_ == WM_TIME_NONE ||
+                                          wm_seconds_between(everywhere_ns_, now_ns_) >= kEverywhereEach_s
+                                    : life_.search_due(now_ns_);
+  if (search.is_idle() && due) begin_search();
 }
 
 // A key frame where the view is new.
@@ -378,6 +482,7 @@ void stereo_ekf::forget_map() {
   filter_.settle();
   for (int f = 0; f < map_.capacity(); f++) forget_frame(f);
   looked_count_ = 0;
+  if (map_.capacity() > 0) search_[0].cancel();
   frame_ns_ = everywhere_ns_ = elsewhere_ns_ = WM_TIME_NONE;
 }
 

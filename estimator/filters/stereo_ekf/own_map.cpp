@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "filters/stereo_ekf/own_map.hpp"
 
+#include <cmath>
+
 #include "math/elementary.hpp"
 
 namespace wm {
@@ -11,6 +13,7 @@ namespace {
 constexpr int kAlikeMost_bits = 64;
 // The next best point must differ in more bits by this factor: of points that look alike none is taken [Lowe2004].
 constexpr double kRatio = 0.7;
+constexpr double kRounding_m = 1e-9;
 
 int ones(uint64_t x) {
   x -= x >> 1 & UINT64_C(0x5555555555555555);
@@ -19,7 +22,17 @@ int ones(uint64_t x) {
   return static_cast<int>(x * UINT64_C(0x0101010101010101) >> 56);
 }
 
+void note(int differ, int64_t number, alike_point *out) {
+  if (differ < out->best) {
+    *out = {differ, out->best, number};
+  } else if (differ < out->second) {
+    out->second = differ;
+  }
+}
+
 }  // namespace
+
+bool alike_point::is_clear() const { return number >= 0 && best <= kAlikeMost_bits && best < kRatio * second; }
 
 int bits_that_differ(const uint64_t a[kAppearanceWords], const uint64_t b[kAppearanceWords]) {
   int sum = 0;
@@ -74,12 +87,12 @@ int own_map::oldest() const {
 
 void own_map::begin(int frame, wm_time_ns t_ns) {
   frames_ += !is_used(frame);
-  frame_[static_cast<size_t>(frame)] = {0, 1, t_ns};
+  frame_[static_cast<size_t>(frame)] = {0, 1, t_ns, {0, 0, 0}, 0.0};
 }
 
 void own_map::remove(int frame) {
   frames_ -= is_used(frame);
-  frame_[static_cast<size_t>(frame)] = {0, 0, 0};
+  frame_[static_cast<size_t>(frame)] = {0, 0, 0, {0, 0, 0}, 0.0};
 }
 
 bool own_map::add(int frame, const own_point &point) {
@@ -89,25 +102,39 @@ bool own_map::add(int frame, const own_point &point) {
   return true;
 }
 
+void own_map::enclose(int frame) {
+  own_frame &of = frame_[static_cast<size_t>(frame)];
+  vec3 sum = {0, 0, 0};
+  double most_m2 = 0.0;
+  for (int i = 0; i < points_of(frame); i++) sum = sum + place_of(frame, i);
+  of.centre = of.points > 0 ? 1.0 / static_cast<double>(of.points) * sum : sum;
+  for (int i = 0; i < points_of(frame); i++) {
+    const vec3 off = place_of(frame, i) - of.centre;
+    if (dot(off, off) > most_m2) most_m2 = dot(off, off);
+  }
+  of.radius_m = std::sqrt(most_m2);
+}
+
 int own_map::find(const uint64_t appearance[kAppearanceWords], const vec3 &near, const double *reach_m) const {
-  int best = kAppearanceBits, second = kAppearanceBits, found = -1;
+  alike_point out;
   for (int f = 0; f < capacity(); f++) {
     if (!is_used(f)) continue;
     const double reach2 = square(reach_m[f]);
+    const own_frame &of = frame_[static_cast<size_t>(f)];
+    const vec3 away = of.centre - near;
+    if (dot(away, away) > square(reach_m[f] + of.radius_m + kRounding_m)) continue;
     for (int i = 0; i < points_of(f); i++) {
       const vec3 off = place_of(f, i) - near;
       if (!(dot(off, off) < reach2)) continue;
-      const int differ = bits_that_differ(appearance, point(f, i).appearance);
-      if (differ < best) {
-        second = best;
-        best = differ;
-        found = static_cast<int>(at(f, i));
-      } else if (differ < second) {
-        second = differ;
-      }
+      note(bits_that_differ(appearance, point(f, i).appearance), static_cast<int64_t>(at(f, i)), &out);
     }
   }
-  return best <= kAlikeMost_bits && best < kRatio * second ? found : -1;
+  return out.is_clear() ? static_cast<int>(out.number) : -1;
+}
+
+void own_map::compare(int frame, const uint64_t appearance[kAppearanceWords], alike_point *out) const {
+  for (int i = 0; i < points_of(frame); i++)
+    note(bits_that_differ(appearance, point(frame, i).appearance), static_cast<int64_t>(at(frame, i)), out);
 }
 
 double log_by_chance(int agreeing, int count, double share) {

@@ -42,6 +42,16 @@ struct own_frame {
   int64_t points;  // 0 to kPointsOfFrame; of 64 bits, as all here: no padding, so that states compare by bytes
   int64_t is_used;
   wm_time_ns used_ns;  // made, or its points found again
+  vec3 centre;         // of its points' places, and within this distance of it they lie: as last placed
+  double radius_m;
+};
+
+// The point of the map that looks most like one that is seen.
+struct alike_point {
+  int32_t best = kAppearanceBits, second = kAppearanceBits;  // bits in which it and the next best differ
+  int64_t number = -1;
+  // Not another one looks nearly as much like it.
+  bool is_clear() const;
 };
 
 class own_map {
@@ -73,6 +83,7 @@ class own_map {
       if (!is_used(f)) continue;
       const frame_triangle triangle = triangle_of(f);
       for (int i = 0; i < points_of(f); i++) places_[at(f, i)] = out_of_triangle(triangle, point(f, i).at);
+      enclose(f);
     }
   }
   const vec3 &place_of(int frame, int i) const { return places_[at(frame, i)]; }
@@ -80,10 +91,13 @@ class own_map {
   // The point that looks most like `appearance` among those within `reach_m[frame]` of `near`: its number, or -1 where
   // none is alike or two are.
   int find(const uint64_t appearance[kAppearanceWords], const vec3 &near, const double *reach_m) const;
+  // Compares with all points of a frame, wherever they are.
+  void compare(int frame, const uint64_t appearance[kAppearanceWords], alike_point *out) const;
   static int frame_of(int number) { return number / kPointsOfFrame; }
   static int index_of(int number) { return number % kPointsOfFrame; }
 
  private:
+  void enclose(int frame);
   static size_t at(int frame, int i) { return static_cast<size_t>(frame) * kPointsOfFrame + static_cast<size_t>(i); }
   relative_array<own_frame> frame_;
   relative_array<own_point> point_;

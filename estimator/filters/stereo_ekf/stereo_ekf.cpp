@@ -124,6 +124,7 @@ stereo_ekf::arrays stereo_ekf::place(memory_layout *layout, const wm_stereo_ekf_
   out.info = layout->take<point_info>((size_t)slots);
   out.filter = layout->take<double>(space_filter::doubles(models, slots));
   out.looked = layout->take<looked_point>(params.frames_max > 0 ? (size_t)kLookedMost : 0);
+  out.search = layout->take<map_search>(params.frames_max > 0 ? 1 : 0);
   own_map::place(layout, params.frames_max, &out.frame, &out.map_point, &out.places);
   return out;
 }
@@ -147,6 +148,7 @@ void stereo_ekf::init(const wm_stereo_ekf_params &params, const wm_setup &setup)
   records_.set(behind.records);
   info_.set(behind.info);
   looked_.set(behind.looked);
+  search_.set(behind.search);
   map_.init(params_.frames_max, behind.frame, behind.map_point, behind.places);
   forget_map();
   now_ns_ = picture_ns_ = last_picture_ns_ = WM_TIME_NONE;
@@ -161,6 +163,7 @@ wm_status stereo_ekf::check_time(wm_time_ns t_ns) const { return check_event_tim
 void stereo_ekf::move_to(wm_time_ns t_ns) {
   if (now_ns_ == WM_TIME_NONE) now_ns_ = t_ns;
   if (t_ns <= now_ns_) return;
+  const bool in_picture = picture_ns_ != WM_TIME_NONE;
   end_picture();
   const auto carry = [this](const body_stretch &s) {
     filter_.propagate(s);
@@ -182,6 +185,7 @@ void stereo_ekf::move_to(wm_time_ns t_ns) {
     motion_.walk(now_ns_, t_ns, carry);
   }
   now_ns_ = t_ns;
+  if (map_.frames() > 0 && !in_picture) search_on();  // not beside the end of a picture, which has work of its own
 }
 
 wm_status stereo_ekf::predict(const wm_event &motion) {

@@ -10,7 +10,7 @@
 #include "filters/core/rollback.hpp"
 #include "filters/relocalize/pose_consensus.hpp"
 #include "filters/stereo_ekf/gravity.hpp"
-#include "filters/stereo_ekf/own_map.hpp"
+#include "filters/stereo_ekf/map_search.hpp"
 #include "filters/stereo_ekf/params.h"
 #include "filters/stereo_ekf/picture_motion.hpp"
 #include "filters/stereo_ekf/space_filter.hpp"
@@ -163,13 +163,17 @@ class stereo_ekf {
   void leave_point(int slot);
   void find_again();
   bool take_filtered(const past_pose &past, looked_point *look) const;
-  double match(bool everywhere, matched_points *out);
+  double match(const pose3 &body, const double *reach_m, matched_points *out);
   int keep_agreeing(const matched_points &all, const pose3 &at);
   bool fuse_match(const looked_point &looked, const gates &limits);
   int fuse_matches(const gates &limits);
-  void begin_again(const pose3 &body_at_picture);
-  bool close_loop(bool everywhere);
-  void search_map();
+  int agreeing_frame() const;
+  bool is_expected(const pose3 &body_at_picture, int frame, double noise_m2) const;
+  void weak_prior(int frame, double *sigma_m, double *sigma_rad) const;
+  void begin_again(const pose3 &body_at_picture, int frame);
+  bool close_loop(const pose3 &body, const double *reach_m, bool elsewhere);
+  void begin_search();
+  void search_on();
   void extend_map();
   void begin_frame(int frame, double depth_m);
   void forget_frame(int frame);
@@ -206,6 +210,7 @@ class stereo_ekf {
     point_info *info;
     double *filter;
     looked_point *looked;
+    map_search *search;
     own_frame *frame;
     own_point *map_point;
     vec3 *places;
@@ -224,10 +229,11 @@ class stereo_ekf {
   relative_array<point_info> info_;          // by slot of the state
   own_map map_;
   relative_array<looked_point> looked_;
+  relative_array<map_search> search_;  // one, where there is a map
   int64_t looked_count_;
   pose3 frame_pose_;          // where the newest key frame was made, or the map was found again
   wm_time_ns frame_ns_;       // then; NONE: never
-  wm_time_ns everywhere_ns_;  // newest search of the whole map; NONE: never
+  wm_time_ns everywhere_ns_;  // when the newest search of the whole map began; NONE: never
   wm_time_ns elsewhere_ns_;   // when that search contradicted the pose; NONE: it does not
   double sigma_px_[4];
   wm_time_ns now_ns_, start_ns_;

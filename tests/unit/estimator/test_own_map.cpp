@@ -5,7 +5,7 @@
 #include <cstring>
 #include <vector>
 
-#include "filters/stereo_ekf/own_map.hpp"
+#include "filters/stereo_ekf/map_search.hpp"
 #include "unity.h"
 #include "waymark/random.h"
 
@@ -87,6 +87,80 @@ static void a_point_is_found_by_its_looks_within_reach() {
   TEST_ASSERT_GREATER_OR_EQUAL(0, m.map.find(seen, there, near));
 }
 
+// Frames that are out of reach are left out as a whole: what is found is what comparing all points finds.
+static void near_points_are_those_of_all_frames() {
+  constexpr int kFrames = 12, kPoints = 8;
+  memory m(kFrames);
+  const auto draw = [](uint64_t stream, uint64_t i) { return 10.0 * wm_random_uniform(5, stream, i) - 5.0; };
+  for (int f = 0; f < kFrames; f++) {
+    m.map.begin(f, f);
+    for (int i = 0; i < kPoints; i++) {
+      const auto k = static_cast<uint64_t>(f * kPoints + i);
+      m.add(f, k, {draw(1, k), draw(2, k), draw(3, k)});
+    }
+  }
+  m.map.place_points([](int) { return kTriangle; });
+  double reach[kFrames];
+  for (double &r : reach) r = 2.0;
+  int near = 0;
+  for (uint64_t k = 0; k < kFrames * kPoints; k++) {
+    uint64_t seen[kAppearanceWords];
+    fill(k, seen);
+    const vec3 at = {draw(4, k), draw(5, k), draw(6, k)};
+    const auto frame = static_cast<int>(k) / kPoints, point = static_cast<int>(k) % kPoints;
+    const bool is_near = length(m.map.place_of(frame, point) - at) < 2.0;
+    near += is_near;
+    TEST_ASSERT_EQUAL(is_near, m.map.find(seen, at, reach) >= 0);
+    TEST_ASSERT_GREATER_OR_EQUAL(0, m.map.find(seen, m.map.place_of(frame, point), reach));
+  }
+  TEST_ASSERT_GREATER_THAN(0, near);
+}
+
+// A search of the whole map ends with the pose at which its points were seen, and no cycle of it compares more pairs
+// than those of a frame beyond the bound.
+static void a_search_is_spread_over_cycles() {
+  constexpr int kFrames = 20;
+  memory m(kFrames);
+  uint64_t next = 0;
+  for (int f = 0; f < kFrames; f++) {
+    m.map.begin(f, f);
+    for (int i = 0; i < own_map::kPointsOfFrame; i++, next++)
+      m.add(f, next,
+            {3 * wm_random_uniform(9, 1, next), 3 * wm_random_uniform(9, 2, next), wm_random_uniform(9, 3, next)});
+  }
+  const auto place = [&](int frame, int i) { return out_of_triangle(kTriangle, m.map.point(frame, i).at); };
+  const pose3 body = {{0.4, -2.0, 1.0}, turn_by({0.1, -0.2, 2.0})};
+  map_search search{};
+  search.begin({{0, 0, 0}, kNoTurn});
+  for (uint64_t i = 0; i < map_search::kPointsMost; i++) {
+    const uint64_t number = 500 + 3 * i;
+    uint64_t seen[kAppearanceWords];
+    fill(i % 4 == 0 ? 100000 + i : number, seen);  // one in four is not in the map
+    const vec3 at =
+        place(static_cast<int>(number) / own_map::kPointsOfFrame, static_cast<int>(number) % own_map::kPointsOfFrame);
+    search.add(seen, matrix_of(conjugate(body.q)) * (at - body.p), 0.01);
+  }
+  int cycles = 0;
+  for (; !search.step(m.map); cycles++) TEST_ASSERT_LESS_THAN(100, cycles);
+  TEST_ASSERT_GREATER_OR_EQUAL(kFrames * own_map::kPointsOfFrame * map_search::kPointsMost /
+                                   (map_search::kPairsEnough + own_map::kPointsOfFrame * map_search::kPointsMost),
+                               cycles);
+  matched_points all, some;
+  const double share = search.matches(m.map, place, &all);
+  TEST_ASSERT_EQUAL(36, all.count);
+  TEST_ASSERT_TRUE(share >= kShareLeast && share <= kShareMost);
+  const agreed_pose best = pose_of_most(all, 300, 1);
+  TEST_ASSERT_EQUAL(36, best.inliers);
+  search.found(best.at);
+  const pose3 on = {{1.0, 0.5, 0.0}, turn_by({0, 0, 0.3})}, now = search.pose(on), wanted = composed(body, on);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.0, length(now.p - wanted.p));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.0, length(turn_of(now.q * conjugate(wanted.q))));
+  // Points of a frame that was given up meanwhile are none.
+  for (int f = 0; f < kFrames; f++) m.map.remove(f);
+  TEST_ASSERT_EQUAL_DOUBLE(kShareMost, search.matches(m.map, place, &some));
+  TEST_ASSERT_EQUAL(0, some.count);
+}
+
 static void the_ring_gives_up_what_was_not_seen_for_longest() {
   memory m(3);
   TEST_ASSERT_EQUAL(0, m.map.frames());
@@ -126,6 +200,8 @@ int main() {
   UNITY_BEGIN();
   RUN_TEST(coordinates_give_the_place_back_and_their_derivatives);
   RUN_TEST(a_point_is_found_by_its_looks_within_reach);
+  RUN_TEST(near_points_are_those_of_all_frames);
+  RUN_TEST(a_search_is_spread_over_cycles);
   RUN_TEST(the_ring_gives_up_what_was_not_seen_for_longest);
   RUN_TEST(agreement_by_chance_is_bounded);
   return UNITY_END();

@@ -113,6 +113,13 @@ struct pose3 {
   quat q;
 };
 
+inline pose3 composed(const pose3 &a, const pose3 &b) { return {a.p + matrix_of(a.q) * b.p, normalized(a.q * b.q)}; }
+
+inline pose3 inverted(const pose3 &a) {
+  const quat q = conjugate(a.q);
+  return {-1.0 * (matrix_of(q) * a.p), q};
+}
+
 // Exp: the rotation by the vector's length about its direction.
 inline quat turn_by(const vec3 &r) {
   const double q = dot(r, r);
