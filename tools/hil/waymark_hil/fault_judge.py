@@ -139,7 +139,19 @@ def _worst(values):
     return max(values, default=None)
 
 
-def _pose(checks, group, heard, fault, what):
+def recovery(fault, earlier):
+    """(s, s): since when the pose is not as usual, and when it has to be again. A fault that begins before the pose had to be well after an earlier
+    one shares that one's time: the pose is as good as before the first of them, by the latest of their times."""
+    begun_s, due_s = fault["from_s"], fault["until_s"] + fault["pose"]["within_s"]
+    for other in sorted(earlier, key=lambda one: -one["from_s"]):
+        within_s = (other.get("pose") or {}).get("within_s")
+        if within_s is None or other.get("until_s") is None or not other["from_s"] < begun_s < other["until_s"] + within_s:
+            continue
+        begun_s, due_s = other["from_s"], max(due_s, other["until_s"] + within_s)
+    return begun_s, due_s
+
+
+def _pose(checks, group, heard, fault, what, earlier):
     bound = fault["pose"]
     from_s, until_s = _span(fault, heard)
     end_s = min(until_s + (bound.get("within_s") or 0), heard.end_s)
@@ -167,12 +179,13 @@ def _pose(checks, group, heard, fault, what):
         grown = lcm_log.sigma_m(during[-1][1]) / max(lcm_log.sigma_m(during[0][1]), 1e-9) if during else 0.0
         checks.add(group, "pose sigma_grows", grown >= bound["sigma_grows"], f"sigma grows by a factor of {grown:.2f}, {bound['sigma_grows']:g} is needed", grown, bound["sigma_grows"])
     if bound.get("within_s") is not None and until_s < heard.end_s:
-        _recovers(checks, group, heard, from_s, until_s, bound["within_s"])
+        begun_s, due_s = recovery({**fault, "until_s": until_s}, earlier)
+        _recovers(checks, group, heard, begun_s, until_s, due_s - until_s)
 
 
-def _recovers(checks, group, heard, from_s, until_s, within_s):
+def _recovers(checks, group, heard, begun_s, until_s, within_s):
     """A pose as good as before: the same state or tracking, known motion, a sigma of at most three times that of before."""
-    before = heard.poses_between(from_s - 1, from_s)
+    before = heard.poses_between(begun_s - 1, begun_s)
     usual_m = _AS_BEFORE * lcm_log.sigma_m(before[-1][1]) if before else math.inf
     well_s = next((t - until_s for t, p in heard.poses_between(until_s, heard.end_s)
                    if not p.status_flags & FLAGS["motion_stale"] and lcm_log.sigma_m(p) <= usual_m and p.state in (1, before[-1][1].state if before else 1)), math.inf)
@@ -182,8 +195,8 @@ def _recovers(checks, group, heard, from_s, until_s, within_s):
     checks.at_most(group, "pose within_s", well_s, within_s, f"as good as before {well_s:.2f} s after its end (sigma below {usual_m:.3f} m), {within_s:g} s are allowed")
 
 
-def judge(checks, fault, heard, done, what):
-    """One fault. `done`: what the player or the target did of it: {"done": bool, "why": text}."""
+def judge(checks, fault, heard, done, what, earlier=()):
+    """One fault. `done`: what the player or the target did of it: {"done": bool, "why": text}. `earlier`: faults that happened, too."""
     group = f"fault: {fault['name']}"
     if not done.get("done"):
         checks.add(group, "it happened", None if done.get("absent") else False, done.get("why") or "neither the player nor the target did it")
@@ -199,4 +212,4 @@ def judge(checks, fault, heard, done, what):
         else:
             _holds(checks, group, name, heard, statement, fault)
     if fault.get("pose"):
-        _pose(checks, group, heard, fault, what)
+        _pose(checks, group, heard, fault, what, earlier)
