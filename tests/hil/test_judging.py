@@ -128,6 +128,14 @@ class Faults(unittest.TestCase):
             self.drive.poses = [(t, pose(t, t, 0.2) if 2 <= t < well_s else p) for t, p in usual]
             self.assertEqual(self.drive.failures((first,)), failures)
 
+    def test_a_process_that_is_killed_a_little_later(self):
+        """Poses between the fault's time and the kill are no recovery."""
+        self.drive.fault |= {"fault": "process_killed", "until_s": 10.0, "health": [], "pose": {"within_s": 2.0}}
+        self.drive.poses = [(t, p if t < 10.04 else pose(t, t, 0.4)) for t, p in self.drive.poses if not 10.04 < t < 11]
+        self.assertEqual(self.drive.failures(), [])
+        self.drive.done = {"done": True, "ended_s": 10.06}
+        self.assertEqual(self.drive.failures(), ["pose within_s"])
+
     def test_poses_that_stop(self):
         self.drive.fault["pose"] = {"gap_max_s": 0.5, "rate_hz": 40}
         self.drive.poses = [(t, p) for t, p in self.drive.poses if not 11 < t < 13]

@@ -151,7 +151,7 @@ def recovery(fault, earlier):
     return begun_s, due_s
 
 
-def _pose(checks, group, heard, fault, what, earlier):
+def _pose(checks, group, heard, fault, what, earlier, ended_s):
     bound = fault["pose"]
     from_s, until_s = _span(fault, heard)
     end_s = min(until_s + (bound.get("within_s") or 0), heard.end_s)
@@ -180,7 +180,9 @@ def _pose(checks, group, heard, fault, what, earlier):
         checks.add(group, "pose sigma_grows", grown >= bound["sigma_grows"], f"sigma grows by a factor of {grown:.2f}, {bound['sigma_grows']:g} is needed", grown, bound["sigma_grows"])
     if bound.get("within_s") is not None and until_s < heard.end_s:
         begun_s, due_s = recovery({**fault, "until_s": until_s}, earlier)
-        _recovers(checks, group, heard, begun_s, until_s, due_s - until_s)
+        # What happens to processes is over when the target has done its part: a killed one has poses until then.
+        over_s = max(until_s, ended_s or until_s)
+        _recovers(checks, group, heard, begun_s, over_s, due_s - until_s)
 
 
 def _recovers(checks, group, heard, begun_s, until_s, within_s):
@@ -196,7 +198,8 @@ def _recovers(checks, group, heard, begun_s, until_s, within_s):
 
 
 def judge(checks, fault, heard, done, what, earlier=()):
-    """One fault. `done`: what the player or the target did of it: {"done": bool, "why": text}. `earlier`: faults that happened, too."""
+    """One fault. `done`: what the player or the target did of it: {"done": bool, "why": text}, and "ended_s" where the
+    target noted when it was over. `earlier`: faults that happened, too."""
     group = f"fault: {fault['name']}"
     if not done.get("done"):
         checks.add(group, "it happened", None if done.get("absent") else False, done.get("why") or "neither the player nor the target did it")
@@ -212,4 +215,4 @@ def judge(checks, fault, heard, done, what, earlier=()):
         else:
             _holds(checks, group, name, heard, statement, fault)
     if fault.get("pose"):
-        _pose(checks, group, heard, fault, what, earlier)
+        _pose(checks, group, heard, fault, what, earlier, done.get("ended_s"))

@@ -279,11 +279,13 @@ class Judge:
             elif found and found.get("failure"):
                 done[number] = {"done": False, "why": f"the player could not do it: {found['failure']}"}
         for line in (self.out / "faults.txt").read_text().splitlines() if (self.out / "faults.txt").exists() else []:
-            number, event, _, *why = line.split(" ", 3)
+            number, event, at_s, *why = line.split(" ", 3)
             if event == "absent":
                 done[int(number)] = {"done": False, "absent": True, "why": "not on this target: " + " ".join(why)}
             elif event == "begin":
                 done[int(number)] = {"done": True}
+            elif event == "end" and int(number) in done:
+                done[int(number)]["ended_s"] = float(at_s)
         for number, fault in enumerate(self.faults):
             if not fault_judge.is_in(fault, self.facts["from_s"], self.facts["until_s"]):
                 done[number] = {"done": False, "absent": True, "why": "not in the part that was played"}
