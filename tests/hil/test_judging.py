@@ -16,7 +16,7 @@ import yaml
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "tools/hil"), str(ROOT / "tools/fleet")]
-from waymark_hil import HilError, compare, fault_judge, guest, judge, lcm_log, limits, poses, recording, samples, scenario, stamps, targets, verdict  # noqa: E402
+from waymark_hil import HilError, compare, fault_judge, guest, hil, judge, lcm_log, limits, poses, recording, samples, scenario, stamps, targets, verdict  # noqa: E402
 
 TYPES = lcm_log.types(sys.argv.pop(1))
 END_S, RATE_HZ = 30.0, 50
@@ -169,6 +169,15 @@ class Faults(unittest.TestCase):
         for fault, part, is_in in (((10, 15), (0, 30), True), ((10, 15), (15, 30), False), ((10, 15), (14, 30), True), ((10, 15), (0, 10), False),
                                    ((10, None), (20, 30), True), ((10, 10), (10, 30), True), ((10, 10), (11, 30), False)):
             self.assertEqual(fault_judge.is_in({"from_s": fault[0], "until_s": fault[1]}, *part), is_in, (fault, part))
+
+    def test_what_a_player_cannot_do_to_a_device(self):
+        """Pictures that a player leaves out have no number on the target; a played driver leaves out the number, too."""
+        self.drive.fault |= {"fault": "camera_dropped", "health": [{"what": "counter", "source": "edges:front", "value": "lost", "at_least": 9}]}
+        self.assertEqual(len(self.drive.failures()), 1)
+        played, on_target = (hil._as_the_target_has_them([self.drive.fault], is_played)[0] for is_played in (True, False))
+        self.assertEqual(played, self.drive.fault)
+        self.drive.fault = on_target
+        self.assertEqual((self.drive.failures(), self.drive.status("health 1: edges:front lost")), ([], "skipped"))
 
     def test_a_fault_that_did_not_happen(self):
         self.drive.done = {"done": False, "why": "EPERM"}

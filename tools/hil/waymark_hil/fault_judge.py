@@ -208,7 +208,9 @@ def judge(checks, fault, heard, done, what, earlier=()):
     checks.add(group, "it happened", True, f"{fault['fault']} from {from_s:.1f} to {until_s:.1f} s")
     for number, statement in enumerate(fault.get("health") or [], start=1):
         name = f"health {number}: {statement.get('source') or ''} {statement['value']}".replace("  ", " ")
-        if statement["what"] == "counter":
+        if statement.get("not_here"):
+            checks.add(group, name, None, f"not on this target: {statement['not_here']}")
+        elif statement["what"] == "counter":
             _counts(checks, group, name, heard, statement, fault)
         elif statement["what"] == "text":
             _said(checks, group, name, heard, statement)
