@@ -139,19 +139,20 @@ def _worst(values):
     return max(values, default=None)
 
 
-def recovery(fault, earlier):
-    """(s, s): since when the pose is not as usual, and when it has to be again. A fault that begins before the pose had to be well after an earlier
-    one shares that one's time: the pose is as good as before the first of them, by the latest of their times."""
+def recovery(fault, others):
+    """(s, s): since when the pose is not as usual, and when it has to be again. Faults whose times until then overlap share them: the pose is as
+    good as before the first, by the latest of their times."""
+    spans = [(one["from_s"], one["until_s"] + one["pose"]["within_s"]) for one in others
+             if one.get("until_s") is not None and (one.get("pose") or {}).get("within_s") is not None]
     begun_s, due_s = fault["from_s"], fault["until_s"] + fault["pose"]["within_s"]
-    for other in sorted(earlier, key=lambda one: -one["from_s"]):
-        within_s = (other.get("pose") or {}).get("within_s")
-        if within_s is None or other.get("until_s") is None or not other["from_s"] < begun_s < other["until_s"] + within_s:
-            continue
-        begun_s, due_s = other["from_s"], max(due_s, other["until_s"] + within_s)
+    for _ in spans:
+        for from_s, well_s in spans:
+            if from_s < due_s and begun_s < well_s:
+                begun_s, due_s = min(begun_s, from_s), max(due_s, well_s)
     return begun_s, due_s
 
 
-def _pose(checks, group, heard, fault, what, earlier, ended_s):
+def _pose(checks, group, heard, fault, what, others, ended_s):
     bound = fault["pose"]
     from_s, until_s = _span(fault, heard)
     end_s = min(until_s + (bound.get("within_s") or 0), heard.end_s)
@@ -179,7 +180,7 @@ def _pose(checks, group, heard, fault, what, earlier, ended_s):
         grown = lcm_log.sigma_m(during[-1][1]) / max(lcm_log.sigma_m(during[0][1]), 1e-9) if during else 0.0
         checks.add(group, "pose sigma_grows", grown >= bound["sigma_grows"], f"sigma grows by a factor of {grown:.2f}, {bound['sigma_grows']:g} is needed", grown, bound["sigma_grows"])
     if bound.get("within_s") is not None and until_s < heard.end_s:
-        begun_s, due_s = recovery({**fault, "until_s": until_s}, earlier)
+        begun_s, due_s = recovery({**fault, "until_s": until_s}, others)
         # What happens to processes is over when the target has done its part: a killed one has poses until then.
         over_s = max(until_s, ended_s or until_s)
         _recovers(checks, group, heard, begun_s, over_s, due_s - until_s)
@@ -197,9 +198,9 @@ def _recovers(checks, group, heard, begun_s, until_s, within_s):
     checks.at_most(group, "pose within_s", well_s, within_s, f"as good as before {well_s:.2f} s after its end (sigma below {usual_m:.3f} m), {within_s:g} s are allowed")
 
 
-def judge(checks, fault, heard, done, what, earlier=()):
+def judge(checks, fault, heard, done, what, others=()):
     """One fault. `done`: what the player or the target did of it: {"done": bool, "why": text}, and "ended_s" where the
-    target noted when it was over. `earlier`: faults that happened, too."""
+    target noted when it was over. `others`: faults that happened, too."""
     group = f"fault: {fault['name']}"
     if not done.get("done"):
         checks.add(group, "it happened", None if done.get("absent") else False, done.get("why") or "neither the player nor the target did it")
@@ -217,4 +218,4 @@ def judge(checks, fault, heard, done, what, earlier=()):
         else:
             _holds(checks, group, name, heard, statement, fault)
     if fault.get("pose"):
-        _pose(checks, group, heard, fault, what, earlier, done.get("ended_s"))
+        _pose(checks, group, heard, fault, what, others, done.get("ended_s"))
