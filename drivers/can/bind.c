@@ -127,7 +127,7 @@ static wm_status bind_unit(maker *m, const dbc_signal *s, const char *name, doub
                   "`scale:` metres a second for one %s (for rpm of the wheel: 0.10472 times its radius in m)",
                   name, unit_shown.text, unit_shown.text);
   if (known && found != wanted)
-    return refuse(m, "%s is in '%s', which is no unit of this quantity (%s)", name, unit_shown.text,
+    return refuse(m, "%s is in '%s', which is not a unit of this quantity (%s)", name, unit_shown.text,
                   wm_dimension_units(wanted));
   if (!known && unit.length == 0)
     return refuse(m, "%s has no unit in %s:%d; write `unit:` (%s)", name, m->dbc->path, s->line,
@@ -310,7 +310,7 @@ static wm_status refuse_twice_bound(maker *m, const wm_can_binding *bindings, si
   for (size_t i = 0; i < count; i++) {
     m->binding = &bindings[i];
     if (bindings[i].quantity < 0 || bindings[i].quantity >= WM_CAN_COUNT)
-      return refuse(m, "%d is no quantity", bindings[i].quantity);
+      return refuse(m, "%d is not a quantity", bindings[i].quantity);
     for (size_t k = 0; k < i; k++)
       if (bindings[k].quantity == bindings[i].quantity)
         return refuse(m, "bound twice; the first time in line %d", bindings[k].line);

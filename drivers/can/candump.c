@@ -156,7 +156,7 @@ static wm_status parse_payload(cursor *in, wm_can_frame *out, wm_error *err) {
   if (peek(in) == '_') {
     in->at++;
     if (hex_value(peek(in)) < 9 || out->length != kClassicMax)
-      return wm_fail(err, WM_BAD_DATA, "id %X: a raw DLC _9 to _F stands behind 8 bytes only", out->id);
+      return wm_fail(err, WM_BAD_DATA, "id %X: a raw DLC _9 to _F is allowed after 8 bytes only", out->id);
     in->at++;
   }
   return WM_OK;

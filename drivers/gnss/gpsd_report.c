@@ -106,8 +106,8 @@ const char *gpsd_report_read(const char *line, size_t length, gpsd_report *out) 
   wm_yaml *document = NULL;
   wm_error ignored;
   memset(out, 0, sizeof *out);
-  if (length == 0 || line[0] != '{') return "is no object of JSON";
-  if (wm_yaml_parse(line, length, "gpsd", &document, &ignored) != WM_OK) return "is no valid JSON";
+  if (length == 0 || line[0] != '{') return "is not a JSON object";
+  if (wm_yaml_parse(line, length, "gpsd", &document, &ignored) != WM_OK) return "is not valid JSON";
   const wm_yaml_node report = wm_yaml_root(document);
   out->kind = class_of(&report);
   take_text(&report, out->kind == GPSD_DEVICE ? "path" : "device", out->device, sizeof out->device);

@@ -103,5 +103,5 @@ const char *iio_matrix_read(const char *text, double out[9]) {
     if (end == text) return "has fewer than nine numbers";
     text = end + strspn(end, " \t,;");
   }
-  return is_rotation(out) ? NULL : "is no rotation: three axes at right angles, and right-handed";
+  return is_rotation(out) ? NULL : "is not a rotation: three axes at right angles, and right-handed";
 }

@@ -252,8 +252,8 @@ static int skip_over(reader *r, const char *mark) {
 static wm_status begin_element(reader *r, slice tag) {
   size_t length = 0;
   while (length < tag.length && !is_blank(tag.at[length])) length++;
-  if (length == 0 || length >= NAME_MAX_BYTES) return fail(r, "this is no cascade: an element's name is too long");
-  if (r->depth == DEPTH_MAX) return fail(r, "this is no cascade: elements are nested too deep");
+  if (length == 0 || length >= NAME_MAX_BYTES) return fail(r, "this is not a cascade: an element's name is too long");
+  if (r->depth == DEPTH_MAX) return fail(r, "this is not a cascade: elements are nested too deep");
   char *name = r->names[r->depth++];
   memcpy(name, tag.at, length);
   name[length] = 0;
@@ -270,7 +270,7 @@ static wm_status close_element(reader *r, slice tag, slice text) {
   while (tag.length > 0 && is_blank(tag.at[tag.length - 1])) tag.length--;
   if (r->depth == 0 || strlen(r->names[r->depth - 1]) != tag.length ||
       memcmp(r->names[r->depth - 1], tag.at, tag.length) != 0)
-    return fail(r, "this is no XML: an element ends that hasn't begun");
+    return fail(r, "this is not XML: an element ends that hasn't begun");
   wm_status status = end_element(r, text);
   r->depth--;
   return status;
@@ -307,9 +307,10 @@ static wm_status read_elements(reader *r) {
 static wm_status check_whole(reader *r) {
   wm_cascade *c = r->out;
   if (c->stage_count == 0 || c->feature_count == 0)
-    return fail(r,
-                "this is no cascade: <opencv_storage><cascade type_id=\"opencv-cascade-classifier\"> with stages and "
-                "features is needed, as opencv_traincascade writes it");
+    return fail(
+        r,
+        "this is not a cascade: <opencv_storage><cascade type_id=\"opencv-cascade-classifier\"> with stages and "
+        "features is needed, as opencv_traincascade writes it");
   uint32_t trees = 0;
   for (size_t i = 0; i < c->stage_count; i++) {
     if (c->stages[i].trees == 0 || c->stages[i].first_tree != trees) return fail(r, "a stage is not complete");

@@ -69,8 +69,9 @@ static wm_status read_pgm(const uint8_t *bytes, size_t size, const char *path, w
   const size_t count = (size_t)width * height, depth = white > 255 ? 2 : 1;
   // A plain number takes two bytes at least, so memory is allocated only where the file is long enough.
   if ((size - t.at) < (plain ? 2 * count - 1 : depth * count))
-    return wm_fail(err, WM_BAD_DATA, "%s: the PGM is cut: %zu pixels of %zu bytes are promised, %zu bytes are left",
-                   path, count, depth, size - t.at);
+    return wm_fail(err, WM_BAD_DATA,
+                   "%s: the PGM is truncated: its head states %zu pixels of %zu bytes, but %zu bytes are left", path,
+                   count, depth, size - t.at);
   status = allocate(width, height, path, out, err);
   if (status != WM_OK) return status;
   for (size_t i = 0; i < count; i++) {

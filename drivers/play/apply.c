@@ -147,7 +147,7 @@ static wm_status add_load(wm_play *self, size_t fault, wm_error *err) {
   for (size_t i = 0; i < self->stream_count; i++) {
     if (!names_stream(wm_fault_kind_of(f->kind), &self->stream[i], f->of)) continue;
     if (self->load_count == PLAY_LOADS_MAX)
-      return wm_fail(err, WM_FULL, "%s: more than %d faults and buses with added frames", self->options.faults->path,
+      return wm_fail(err, WM_FULL, "%s: more than %d faults and buses with bus_load", self->options.faults->path,
                      PLAY_LOADS_MAX);
     const double before_s = (double)self->from_ns * 1e-9 - f->from_s;
     self->load[self->load_count++] =

@@ -49,13 +49,11 @@ static wm_status statement_kind(const wm_yaml_node *item, wm_yaml_node *value, w
     wm_yaml_node node = wm_yaml_get(item, kStatementKeys[i]);
     if (!wm_yaml_there(&node)) continue;
     if (found >= 0)
-      return wm_yaml_fail(&node, err, "'%s' stands beside it; a line of health has one of them: make two lines",
-                          kStatementKeys[found]);
+      return wm_yaml_fail(&node, err, "'%s' is given, too; write one entry of health for each", kStatementKeys[found]);
     found = i;
     *value = node;
   }
-  if (found < 0)
-    return wm_yaml_fail(item, err, "one of device, flag, state, cause, counter and text is needed: what is stated");
+  if (found < 0) return wm_yaml_fail(item, err, "one of device, flag, state, cause, counter and text is needed");
   out->kind = (wm_statement_kind)found;
   return WM_OK;
 }
@@ -96,7 +94,8 @@ static wm_status read_statement(const wm_yaml_node *item, wm_statement *out, wm_
   if (status != WM_OK) return status;
   const int has_source = out->kind == WM_STATES_DEVICE || out->kind == WM_STATES_COUNTER;
   if (has_source && !out->source[0])
-    return wm_yaml_fail(item, err, "source: is missing: whose %s? (a name of health.json, e.g. can or edges:front)",
+    return wm_yaml_fail(item, err,
+                        "source: is missing; %s is of a source (a name in health.json, e.g. can or edges:front)",
                         kStatementKeys[out->kind]);
   if (!has_source && out->source[0])
     return wm_yaml_fail(item, err, "source: a %s is of the whole run", kStatementKeys[out->kind]);
@@ -176,7 +175,7 @@ static wm_status read_times(const wm_yaml_node *item, const wm_fault_kind_row *r
   if (!wm_yaml_there(&from))
     return wm_yaml_fail(item, err, "from_s: is missing: seconds since the recording's first datum");
   if (wm_yaml_there(&until) && wm_yaml_there(&lasts))
-    return wm_yaml_fail(&lasts, err, "until_s is there, too; one of both is enough");
+    return wm_yaml_fail(&lasts, err, "until_s is given, too; give one of them");
   wm_status status = wm_yaml_f64(&from, 0, DURATION_MAX_S, &out->from_s, err);
   out->until_s = row->is_instant ? out->from_s : (double)INFINITY;
   if (status == WM_OK && wm_yaml_there(&until)) {

@@ -42,7 +42,7 @@ static wm_status read_picture(play_file *base, play_datum *out, wm_error *err) {
     out->stream = 0;
     status = wm_video_skip(self->video, err);
     if (status != WM_OK || out->picture.length <= PLAY_PICTURE_MAX) return status;
-    play_file_count(base, "a picture of more than 64 MB is left out");
+    play_file_count(base, "a picture of more than 64 MB is skipped");
   }
 }
 

@@ -115,7 +115,7 @@ static wm_status fill(play_file *self, wm_error *err) {
       self->has_now = 1;
       return WM_OK;
     }
-    play_file_count(self, "a stamp lies more than 10 s after the next one; the datum is left out");
+    play_file_count(self, "a stamp is more than 10 s after the next one; the datum is skipped");
   }
   self->ended = status == WM_END;
   return status == WM_END ? WM_OK : status;

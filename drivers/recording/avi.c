@@ -76,7 +76,8 @@ static wm_status read_format(container *self, const chunk *c, wm_error *err) {
   static const char *const kJpeg[] = {"MJPG", "mjpg", "JPEG", "jpeg", "AVI1", NULL};
   static const char *const kGrey[] = {"Y800", "Y8  ", "GREY", NULL};
   uint8_t format[40], shown[5] = {0};
-  if (c->length < sizeof format) return container_fail(self, err, WM_BAD_DATA, c->at, "the stream's format is cut");
+  if (c->length < sizeof format)
+    return container_fail(self, err, WM_BAD_DATA, c->at, "the stream's format is truncated");
   wm_status status = container_bytes(self, c->data, format, sizeof format, err);
   if (status != WM_OK) return status;
   self->width_px = u32(format + 4);

@@ -190,7 +190,7 @@ static wm_status make_corner_reader(wm_recording *self, const char *path, const 
   const wm_rig *rig = wm_site_rig(self->site);
   const int32_t camera = wm_rig_find_camera(rig, name);
   if (camera < 0)
-    return wm_fail(err, WM_BAD_CONFIG, "%s: the sensor '%s' is no camera of calibration.yaml; corners need its lens",
+    return wm_fail(err, WM_BAD_CONFIG, "%s: the sensor '%s' is not a camera of calibration.yaml; corners need its lens",
                    path, name);
   return wm_corner_reader_make(path, name, &rig->cameras[camera], rig->marker_size_m, out, err);
 }

@@ -101,7 +101,7 @@ static int find_alias(builder *b, const yaml_event_t *event) {
   size_t line = event->start_mark.line + 1;
   for (size_t i = b->anchor_count; i-- > 0;) {
     if (strcmp(b->anchors[i].name, (const char *)event->data.alias.anchor) != 0) continue;
-    if (b->anchors[i].id == 0) return fail_at(b, line, "an alias stands inside of its own anchor: it would never end");
+    if (b->anchors[i].id == 0) return fail_at(b, line, "an alias is inside its own anchor, which has no end");
     return b->anchors[i].id;
   }
   return fail_at(b, line, "an alias whose anchor (&NAME) doesn't stand before it");

@@ -391,7 +391,7 @@ static wm_status take_old(const reading *self, const wm_yaml_node *value, int li
     *known = 1;
     const char *about = old->about ? old->about : "";
     if (!old->new_key) {
-      (void)snprintf(text, sizeof text, "is no parameter any more and is ignored: %s", about);
+      (void)snprintf(text, sizeof text, "is not a parameter any more and is ignored: %s", about);
       warn(self->warnings, value, line, text);
       return WM_OK;
     }

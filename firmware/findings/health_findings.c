@@ -56,7 +56,7 @@ static void about_losses(const wm_source_health *s, wm_findings *out) {
                {WM_FOUND_ROWS_DISORDERED, s->duplicates, "were sent twice and fused once",
                 "look for two programs that send or record the same data"},
                {WM_FOUND_CLOCKS_APART, s->future, "had stamps from the future", NULL},
-               {WM_FOUND_VALUES_FROZEN, s->frozen, "came with a counter that stands still", NULL},
+               {WM_FOUND_VALUES_FROZEN, s->frozen, "came with a counter that does not change", NULL},
                {WM_FOUND_DATA_MISSING, s->overflows,
                 "were dropped by the kernel or the device because they were not read in time", NULL},
                {WM_FOUND_DEVICE_TROUBLE, s->bus_errors, "error frames on the bus",

@@ -14,7 +14,7 @@ static wm_status check_started(const waymark_session *self, const char *function
 
 static wm_status check_time(const char *name, wm_time_ns t_ns, wm_error *err) {
   if (t_ns >= -FARTHEST_NS && t_ns <= FARTHEST_NS) return WM_OK;
-  return wm_fail(err, WM_OUT_OF_RANGE, "%s: %lld ns is no time", name, (long long)t_ns);
+  return wm_fail(err, WM_OUT_OF_RANGE, "%s: %lld ns is not a time", name, (long long)t_ns);
 }
 
 // A detector waits for pictures as a device's source for data: with is_live the readers do not read ahead.
@@ -79,7 +79,7 @@ static wm_status find_source(waymark_session *self, const char *function, uint32
   wm_status status = check_started(self, function, err);
   if (status != WM_OK) return status;
   if (source >= self->source_count)
-    return wm_fail(err, WM_NOT_FOUND, "%s: %u is no source of this session, which has %zu", function, source,
+    return wm_fail(err, WM_NOT_FOUND, "%s: %u is not a source of this session, which has %zu", function, source,
                    self->source_count);
   *out = self->sources[source];
   return WM_OK;
@@ -158,7 +158,7 @@ wm_status waymark_push_picture(waymark_session *self, const char *camera, const 
   if (status != WM_OK) return status;
   const wm_rig *rig = wm_site_rig(wm_recording_site(self->robot));
   const int index = wm_rig_find_camera(rig, camera);
-  if (index < 0) return wm_fail(err, WM_NOT_FOUND, "'%.40s' is no camera of calibration.yaml", camera);
+  if (index < 0) return wm_fail(err, WM_NOT_FOUND, "'%.40s' is not a camera of calibration.yaml", camera);
   const wm_camera *is = &rig->cameras[index];
   if (!frame->grey || frame->width_px != is->width_px || frame->height_px != is->height_px ||
       frame->stride_bytes < frame->width_px)

@@ -65,7 +65,7 @@ static wm_status make_room(const struct sockaddr_un *at, wm_error *err) {
   struct stat file;
   if (lstat(at->sun_path, &file) != 0) return WM_OK;
   if (!S_ISSOCK(file.st_mode))
-    return wm_fail(err, WM_IO, "commands.socket: %s is there and is no socket", at->sun_path);
+    return wm_fail(err, WM_IO, "commands.socket: %s is there and is not a socket", at->sun_path);
   const int fd = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
   const int is_used = fd >= 0 && connect(fd, (const struct sockaddr *)at, sizeof *at) == 0;
   if (fd >= 0) (void)close(fd);

@@ -35,7 +35,7 @@ static void on_sightings(const lcm_recv_buf_t *message, const char *channel, voi
   uint16_t sensor = 0;
   while (sensor < self->sensor_count && strcmp(self->sensors[sensor].name, name) != 0) sensor++;
   if (sensor == self->sensor_count) {
-    (void)snprintf(text, sizeof text, "'%.40s' is no sensor of calibration.yaml", name);
+    (void)snprintf(text, sizeof text, "'%.40s' is not a sensor of calibration.yaml", name);
     self->said_count = 0;
     wm_source_refuse(&self->base.counts, channel, text);
     return;

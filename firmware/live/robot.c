@@ -50,7 +50,7 @@ static wm_status check_cameras(const wm_config *config, const wm_recording *robo
   for (size_t i = 0; i < devices->camera_count; i++) {
     int index = wm_rig_find_camera(wm_site_rig(wm_recording_site(robot)), devices->cameras[i].name);
     if (index < 0)
-      return wm_fail(err, WM_BAD_CONFIG, "%s:%d: devices.cameras[%zu].name: '%s' is no camera of the calibration",
+      return wm_fail(err, WM_BAD_CONFIG, "%s:%d: devices.cameras[%zu].name: '%s' is not a camera of the calibration",
                      config->path, devices->cameras[i].line, i, devices->cameras[i].name);
     if (wm_site_rig(wm_recording_site(robot))->cameras[index].width_px == 0)
       return wm_fail(err, WM_BAD_CONFIG, "%s:%d: devices.cameras[%zu]: the calibration of '%s' has no image_size",

@@ -89,7 +89,7 @@ static wm_status read_image(int fd, const char *path, const wm_map_identity *wan
   uint8_t head[HEAD_BYTES];
   char magic[sizeof MAGIC - 1];
   struct stat file;
-  if (fstat(fd, &file) != 0 || !read_all(fd, head, sizeof head)) return refuse(err, path, "it is cut");
+  if (fstat(fd, &file) != 0 || !read_all(fd, head, sizeof head)) return refuse(err, path, "it is truncated");
   wm_reader r = wm_reader_of(head, sizeof head);
   wm_get_bytes(&r, magic, sizeof magic);
   const uint64_t configuration = wm_get_u64(&r), calibration = wm_get_u64(&r);
@@ -97,14 +97,14 @@ static wm_status read_image(int fd, const char *path, const wm_map_identity *wan
   const uint64_t bytes = wm_get_u64(&r);
   const size_t before_crc = r.used;
   const uint32_t crc = wm_get_u32(&r);
-  if (memcmp(magic, MAGIC, 6) != 0) return refuse(err, path, "it is no saved map");
+  if (memcmp(magic, MAGIC, 6) != 0) return refuse(err, path, "it is not a saved map");
   if (memcmp(magic, MAGIC, sizeof magic) != 0) return refuse(err, path, "it was written by another version");
   if (bytes > WM_SAVED_MAP_BYTES_MAX || (uint64_t)file.st_size != bytes + HEAD_BYTES)
-    return refuse(err, path, "it is cut");
+    return refuse(err, path, "it is truncated");
   out->bytes = (size_t)bytes;
   out->image = malloc(out->bytes + 1);
   if (!out->image) return wm_fail(err, WM_IO, "%s: no memory for it", path);
-  if (!read_all(fd, out->image, out->bytes)) return refuse(err, path, "it is cut");
+  if (!read_all(fd, out->image, out->bytes)) return refuse(err, path, "it is truncated");
   if (crc32_of(crc32_of(0, head, before_crc), out->image, out->bytes) != crc)
     return refuse(err, path, "its checksum is wrong: it is damaged");
   if (configuration != wanted->configuration)

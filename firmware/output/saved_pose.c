@@ -70,7 +70,7 @@ static wm_status read_root(const wm_yaml_node *root, wm_saved_pose *out, wm_erro
                pose = wm_yaml_get(root, "pose"), speed = wm_yaml_get(root, "speed_mps"),
                rate = wm_yaml_get(root, "rate_radps"), known = wm_yaml_get(root, "state");
   if (!wm_yaml_is_map(root) || !wm_yaml_there(&version) || !wm_yaml_there(&utc) || !wm_yaml_there(&pose))
-    return wm_yaml_fail(root, err, "is no saved pose (format, utc_s, pose)");
+    return wm_yaml_fail(root, err, "is not a saved pose (format, utc_s, pose)");
   wm_status status = wm_yaml_string(&version, format, sizeof format, err);
   if (status == WM_OK && strcmp(format, "waymark-pose/1") != 0)
     return wm_yaml_fail(&version, err, "'%s' is not a format that this program reads; it reads waymark-pose/1", format);

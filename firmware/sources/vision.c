@@ -134,7 +134,7 @@ static wm_status add_singles(wm_vision *self, const wm_config *config, const wm_
   const wm_rig *rig = wm_site_rig(wm_recording_site(recording));
   for (uint32_t i = 0; i < wanted->camera_count; i++)
     if (wm_rig_find_camera(rig, wanted->cameras[i]) < 0)
-      return wm_fail(err, WM_BAD_CONFIG, "%s:%d: vision.%s.cameras: '%s' is no camera of calibration.yaml",
+      return wm_fail(err, WM_BAD_CONFIG, "%s:%d: vision.%s.cameras: '%s' is not a camera of calibration.yaml",
                      config->path, wanted->line, wanted->detector->name, wanted->cameras[i]);
   size_t before = self->count;
   for (int32_t i = 0; i < (int32_t)rig->camera_count; i++) {

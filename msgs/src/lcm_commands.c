@@ -16,7 +16,7 @@ static void begin(wm_event *out, unsigned kind, wm_time_ns t_ns) {
 
 const char *wm_lcm_read_set_pose(const void *message, size_t length, wm_event *out) {
   waymark_set_pose_t m;
-  if (waymark_set_pose_t_decode(message, 0, room(length), &m) < 0) return "is no set_pose_t of this version";
+  if (waymark_set_pose_t_decode(message, 0, room(length), &m) < 0) return "is not a set_pose_t of this version";
   double norm = 0, farthest_m = 0;
   for (int i = 0; i < 4; i++) norm += m.orientation_xyzw[i] * m.orientation_xyzw[i];
   for (int i = 0; i < 3; i++)
@@ -26,7 +26,7 @@ const char *wm_lcm_read_set_pose(const void *message, size_t length, wm_event *o
   if (farthest_m > 1e9)
     why = "position_m is not finite, or farther than 1e9 m";
   else if (!(fabs(norm - 1) < 0.01))
-    why = "orientation_xyzw is no unit quaternion";
+    why = "orientation_xyzw is not a unit quaternion";
   else if (!(m.sigma_xy_m > 0 && m.sigma_xy_m < 1e6 && m.sigma_heading_rad > 0 && m.sigma_heading_rad < 10))
     why = "sigma_xy_m and sigma_heading_rad have to be above 0";
   if (!why) {
@@ -42,7 +42,7 @@ const char *wm_lcm_read_set_pose(const void *message, size_t length, wm_event *o
 
 const char *wm_lcm_read_reset(const void *message, size_t length, wm_event *out) {
   waymark_reset_t m;
-  if (waymark_reset_t_decode(message, 0, room(length), &m) < 0) return "is no reset_t of this version";
+  if (waymark_reset_t_decode(message, 0, room(length), &m) < 0) return "is not a reset_t of this version";
   begin(out, WM_EVENT_RESET, m.t_ns);
   return NULL;
 }

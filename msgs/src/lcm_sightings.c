@@ -51,7 +51,8 @@ const char *wm_lcm_read_sightings(const void *message, size_t length, char *sens
                                   size_t *count) {
   waymark_observations_t m;
   *count = 0;
-  if (waymark_observations_t_decode(message, 0, room(length), &m) < 0) return "is no observations_t of this version";
+  if (waymark_observations_t_decode(message, 0, room(length), &m) < 0)
+    return "is not an observations_t of this version";
   if (m.t_ns <= 0) return "t_ns is not above 0: when was it seen, on the robot's monotonic clock?";
   if (m.count < 0 || m.count > WM_LCM_OBSERVATIONS_MAX) return "count is not in 0 to 64";
   _Static_assert(sizeof m.sensor >= WM_NAME_MAX, "a name fits");

@@ -31,8 +31,9 @@ typedef struct stream_type {
   _Static_assert(offsetof(waymark_##name##_t, t_ns) == 0 &&                                                  \
                      sizeof(waymark_##name##_t) <= sizeof(int64_t) + WM_STREAM_NUMBERS_MAX * sizeof(double), \
                  "a stamp, and numbers behind it");
-#define TYPE(name) \
-  {#name, #name "_t", "is no " #name "_t of this version", sizeof(waymark_##name##_t), decode_##name, encode_##name},
+#define TYPE(name)                                                                                        \
+  {#name,         #name "_t",   "does not match " #name "_t of this version", sizeof(waymark_##name##_t), \
+   decode_##name, encode_##name},
 
 WM_STREAM_TYPES(FUNCTIONS)
 

@@ -88,6 +88,16 @@ class Verdicts(unittest.TestCase):
         self.assertAlmostEqual(verdict(pairs, "lost")["change"], 0.1 * 12 / 200)
         self.assertEqual(verdict(pairs, "lost", tolerances={"lost": 0.01})["verdict"], "no difference found")
 
+    def test_times_of_two_batches_have_a_verdict_only_with_a_tolerance(self):
+        first, second = fleet(random.Random(17), 200, spread=0)
+        for slower in second:
+            slower["cpu_s"] = 1.4
+        pairs = list(zip(first, second))
+        self.assertEqual(verdict(pairs, "cpu")["verdict"], "worse")
+        self.assertEqual(verdict(pairs, "cpu", is_apart=True)["verdict"], "two batches")
+        self.assertEqual(verdict(pairs, "cpu", is_apart=True, tolerances={"cpu": 0.3})["verdict"], "worse")
+        self.assertEqual(verdict(pairs, "cpu", is_apart=True, tolerances={"cpu": 0.5})["verdict"], "no difference found")
+
     def test_a_figure_that_is_not_there_is_not_measured(self):
         pairs = list(zip(*fleet(random.Random(15), 20, nees_mean=None, heading_rmse_deg=None)))
         self.assertEqual(verdict(pairs, "nees")["verdict"], "not measured")

@@ -81,7 +81,7 @@ class Mine(unittest.TestCase):
         (box / "lost-0003-now.wmlog").write_bytes(b"no log at all")
         code, text = call("mine", box, next(self.folder.glob("fleet/*/box/lost-0001-now.wmlog")), "--out", self.folder / "out2")
         self.assertEqual(code, 1, text)
-        self.assertIn("lost-0003-now.wmlog: is no event log", text)
+        self.assertIn("lost-0003-now.wmlog: is not an event log", text)
         self.assertIn("1 incidents in 2 logs", text)
         code, text = call("mine", self.folder / "out", "--out", self.folder / "out2")
         self.assertEqual((code, "no log of a loss or a death is there" in text), (2, True))

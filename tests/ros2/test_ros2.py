@@ -246,7 +246,7 @@ def check_second(given):
     fails(1, "no connection", "--url", "udpm://1.2.3.4:7667", "--domain", "1")
     fails(2, "not in range", "--domain", "233")
     fails(2, "ROS_DOMAIN_ID: 'x'", ROS_DOMAIN_ID="x")
-    fails(2, "is no topic", "--odom", "odom")
+    fails(2, "is not a topic", "--odom", "odom")
     fails(2, "--tf robot needs", "--tf", "robot")
     in_use = "<CycloneDDS><Domain><Discovery><ParticipantIndex>7</ParticipantIndex></Discovery></Domain></CycloneDDS>"
     holder = subprocess.Popen([given.bin / "waymark-ros2", "--domain", "9", "--prefix", "OTHER_"], stdout=subprocess.PIPE,

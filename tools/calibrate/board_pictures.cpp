@@ -111,7 +111,7 @@ class Search {
     const auto seen = std::count_if(markers_.begin(), markers_.end(), [](const auto &m) { return m.size() >= 6; });
     if (size.columns == 0 && seen >= 3)
       throw tools::Failure("markers were found in " + std::to_string(seen) + " of " + std::to_string(out_.pictures) +
-                           " pictures, but they are no ChArUco board of any size");
+                           " pictures, but they are not a ChArUco board of any size");
     if (size.columns == 0) return false;
     if (board_.columns > 0 && (size.columns != board_.columns || size.rows != board_.rows))
       throw tools::Failure("the board is not of " + size_text(board_.columns, board_.rows) +

@@ -214,7 +214,7 @@ std::function<int()> camera_command(wm::cli::App &app) {
       "cameras, with --floor also their mounting on the robot.");
   app.add_option("FROM", a->from, "a folder of pictures (JPEG, PNG, PGM), or a recording's folder")->required();
   app.add_option("--camera", a->camera, "of a recording: this camera; needed where it has several");
-  app.add_option("--chessboard", a->chessboard, "COLUMNSxROWS of inner corners: larger lattices are no board");
+  app.add_option("--chessboard", a->chessboard, "COLUMNSxROWS of inner corners: larger lattices are not a board");
   app.add_option("--aprilgrid", a->aprilgrid,
                  "COLUMNSxROWS of tags (tag36h11, counted as Kalibr does) in place of a chessboard");
   app.add_option("--charuco", a->charuco, "COLUMNSxROWS of squares of a ChArUco board in place of a chessboard");

@@ -104,7 +104,7 @@ std::vector<fs::path> picture_files(const fs::path &from) {
   } else if (is_picture(from)) {
     files.push_back(from);
   } else {
-    throw Failure(from.string() + ": is no picture; make a recording of a video first: waymark import " +
+    throw Failure(from.string() + ": is not a picture; make a recording of a video first: waymark import " +
                       from.string() + " --out REC",
                   kUsage);
   }

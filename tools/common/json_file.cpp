@@ -16,7 +16,7 @@ nlohmann::json load_json(const fs::path &file) {
   try {
     return nlohmann::json::parse(in);
   } catch (const nlohmann::json::parse_error &problem) {
-    throw Failure(file.string() + ": is no JSON (byte " + std::to_string(problem.byte) + ")");
+    throw Failure(file.string() + ": is not JSON (byte " + std::to_string(problem.byte) + ")");
   }
 }
 

@@ -15,7 +15,7 @@ namespace fs = std::filesystem;
 
 void need_folder(const fs::path &recording) {
   if (!fs::is_directory(recording))
-    throw Failure(recording.string() + ": is no folder; REC is a recording's folder", kUsage);
+    throw Failure(recording.string() + ": is not a folder; REC is a recording's folder", kUsage);
 }
 
 std::vector<Pose> load_positions(const fs::path &file, bool must_rise) {

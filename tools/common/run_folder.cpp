@@ -129,7 +129,7 @@ Trajectory load_tum(const fs::path &file) {
 
 Trajectory load_trajectory(const fs::path &run) {
   if (!fs::is_directory(run))
-    throw Failure(run.string() + ": is no folder; RUN is what `waymark replay --out RUN` wrote", kUsage);
+    throw Failure(run.string() + ": is not a folder; RUN is what `waymark replay --out RUN` wrote", kUsage);
   const bool csv = fs::exists(run / "trajectory.csv");
   const fs::path file = run / (csv ? "trajectory.csv" : "trajectory.tum");
   if (!fs::exists(file))
@@ -152,7 +152,7 @@ Trajectory load_reference(const fs::path &run) {
 
 Published load_published(const fs::path &run) {
   if (!fs::is_directory(run))
-    throw Failure(run.string() + ": is no folder; RUN is what `waymark replay --out RUN` wrote", kUsage);
+    throw Failure(run.string() + ": is not a folder; RUN is what `waymark replay --out RUN` wrote", kUsage);
   const Csv csv = Csv::load(run / "published.csv");
   const PoseColumns at = find_columns(csv);
   const Column older = csv.find("sent_ns");  // the name that made_ns had

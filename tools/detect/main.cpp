@@ -39,7 +39,7 @@ void parse(wm::cli::App *app, DetectWish *a) {
       ->capture_default_str();
   app->add_option("--camera", a->input.camera, "this camera of the recording or calibration; else all");
   app->add_option("--calibration", a->input.calibration,
-                  "the cameras' calibration.yaml, where FROM is no recording, or instead of the recording's");
+                  "the cameras' calibration.yaml, where FROM is not a recording, or instead of the recording's");
   app->add_option("--landmarks", a->input.landmarks, "landmarks.csv of a map with pictures of landmarks");
   app->add_option("--poses", a->poses,
                   "a run, or a recording with truth: its poses guide the detector of known landmarks; without, it "

@@ -23,7 +23,7 @@ std::optional<images::Pose> matrix(const calibrate::FlatFile &file, const std::s
   const double off = (out.linear() * out.linear().transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
   if (!last_row || !(off < kRotationOff) || !(out.linear().determinant() > 0))
     file.fail(key,
-              "is no rotation and translation: the rows of the left 3 x 3 must have length 1 and right angles, the "
+              "is not a rotation and translation: the rows of the left 3 x 3 must have length 1 and right angles, the "
               "last row is 0 0 0 1");
   if (!(out.translation().cwiseAbs().maxCoeff() < kFarthest_m)) file.fail(key, "is more than 100 m away: is it in mm?");
   out.linear() = Eigen::Quaterniond(out.linear()).normalized().toRotationMatrix();

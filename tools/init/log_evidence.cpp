@@ -137,7 +137,7 @@ class Weigher {
     if (facts_.frames == 0)
       throw tools::Failure(problem.empty() ? path.string() + ": has no frame; `candump -l any` records one" : problem);
     if (facts_.malformed > 0)
-      facts_.notes.push_back(problem + " (" + std::to_string(facts_.malformed) + " lines are no frames)");
+      facts_.notes.push_back(problem + " (" + std::to_string(facts_.malformed) + " lines are not frames)");
   }
 
   void take(const wm_can_frame &frame) {

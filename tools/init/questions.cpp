@@ -70,7 +70,7 @@ void ask_file(std::string &out, const std::string &question, const char *option,
     if (std::filesystem::is_regular_file(answer))
       out = answer;
     else
-      std::printf("'%s' is no file.\n", answer.c_str());
+      std::printf("'%s' is not a file.\n", answer.c_str());
   }
 }
 

@@ -146,7 +146,7 @@ Samples load_samples(const TrainCascade &a) {
   int first = 0;
   for (const std::string &recording : a.recordings) Reader(a, recording, &out).read(every, first++);
   if (out.low_m > out.high_m)
-    throw Failure("no landmark of this size stands in landmarks/appearance.csv of these recordings: --size", kUsage);
+    throw Failure("no landmark of this size is in landmarks/appearance.csv of these recordings: --size", kUsage);
   return out;
 }
 

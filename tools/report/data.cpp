@@ -83,7 +83,7 @@ std::map<std::string, Pose> load_mountings(const fs::path &recording) {
 
 void load_recording(const fs::path &recording, ReportData *out, Figures *figures) {
   if (!fs::is_directory(recording))
-    throw Failure(recording.string() + ": is no folder; REC is a recording's folder", kUsage);
+    throw Failure(recording.string() + ": is not a folder; REC is a recording's folder", kUsage);
   const Yaml about(recording / "recording.yaml");
   if (const std::string name = about.text("name"); !name.empty()) out->name = name;
   out->about = about.text("about");

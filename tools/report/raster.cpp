@@ -46,7 +46,7 @@ Raster pgm_to_png(const std::string &pgm, const fs::path &file, Raster raster) {
   const auto offset = static_cast<size_t>(in.tellg());
   if (magic != "P5" || width <= 0 || height <= 0 || width > 30000 || height > 30000 || white != 255 ||
       pgm.size() < offset + static_cast<size_t>(width) * static_cast<size_t>(height))
-    throw Failure(file.string() + ": is no binary PGM (P5) of 8 bits, or is cut short");
+    throw Failure(file.string() + ": is not a binary PGM (P5) of 8 bits, or is cut short");
   const int times = (std::max(width, height) + 1599) / 1600;
   const int w = (width + times - 1) / times;
   const int h = (height + times - 1) / times;

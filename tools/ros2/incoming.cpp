@@ -89,7 +89,7 @@ Fault position_of(const Fix &message, wm_can_gnss *gnss, wm_stream_row *out) {
   if (message.status.status < 0) return "";
   if (!finite({message.latitude, message.longitude}) || std::fabs(message.latitude) > 90 ||
       std::fabs(message.longitude) > 180)
-    return "latitude or longitude is no angle in degrees";
+    return "latitude or longitude is not an angle in degrees";
   const double *variance = message.position_covariance;
   const bool has_variance = message.position_covariance_type != 0 && finite({variance[0], variance[4], variance[8]});
   const bool has_altitude = std::isfinite(message.altitude);

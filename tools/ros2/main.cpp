@@ -42,7 +42,7 @@ int domain_of_environment() {
   char *end = nullptr;
   const long domain = std::strtol(text, &end, 10);
   if (*end != '\0' || domain < 0 || domain > kDomainMax)
-    throw Failure(std::string("ROS_DOMAIN_ID: '") + text + "' is no domain from 0 to " + std::to_string(kDomainMax),
+    throw Failure(std::string("ROS_DOMAIN_ID: '") + text + "' is not a domain from 0 to " + std::to_string(kDomainMax),
                   tools::kUsage);
   return static_cast<int>(domain);
 }
@@ -54,9 +54,9 @@ void check(const Options &options) {
   };
   for (const std::string *topic : {&b.initialpose, &b.odom, &b.imu, &b.fix})
     if (!topic->empty() && ((*topic)[0] != '/' || !is_topic(*topic)))
-      throw Failure("'" + *topic + "' is no topic: it has to begin with '/', as /odom", tools::kUsage);
+      throw Failure("'" + *topic + "' is not a topic: it has to begin with '/', as /odom", tools::kUsage);
   if (!b.name_space.empty() && (b.name_space[0] == '/' || !is_topic(b.name_space)))
-    throw Failure("--namespace: '" + b.name_space + "' is no namespace; write it as robot1", tools::kUsage);
+    throw Failure("--namespace: '" + b.name_space + "' is not a namespace; write it as robot1", tools::kUsage);
   if (b.tf == "robot" && b.odom.empty())
     throw Failure("--tf robot needs the robot's odometry: --odom TOPIC", tools::kUsage);
 }

@@ -112,7 +112,8 @@ ListenAt listen_at(const std::string &text) {
   AnyAddress made;
   if (error != std::errc() || stop != port.data() + port.size() || !read_address(out.address, out.port, &made))
     throw Failure(
-        "--listen: '" + text + "' is no PORT, ADDRESS or ADDRESS:PORT (127.0.0.1:8080 is this computer alone)", kUsage);
+        "--listen: '" + text + "' is not a PORT, ADDRESS or ADDRESS:PORT (127.0.0.1:8080 is this computer alone)",
+        kUsage);
   return out;
 }
 
@@ -168,7 +169,7 @@ struct WebServer::Glue {
 WebServer::WebServer(const ListenAt &at, Handler handler, std::chrono::milliseconds patience)
     : handler_(std::move(handler)), patience_(patience) {
   AnyAddress address;
-  if (!read_address(at.address, at.port, &address)) throw Failure("'" + at.address + "' is no address", kUsage);
+  if (!read_address(at.address, at.port, &address)) throw Failure("'" + at.address + "' is not an address", kUsage);
   is_local_ = is_loopback(address);
   const unsigned flags = MHD_USE_EPOLL_INTERNAL_THREAD | MHD_USE_ERROR_LOG |
                          (address.storage.ss_family == AF_INET6 ? static_cast<unsigned>(MHD_USE_IPv6) : 0U);

@@ -17,7 +17,7 @@ static const wm_param kParams[] = {
     F64("sigma_m", sigma_m, 0.05, 0.005, 0.5,
         "Sigma of the likelihood field besides the point's own, m: map, mounting, coarseness of a small set."),
     F64("false_points", false_points, 0.3, 0.0001, 0.9,
-        "Fraction of points that are no edge of the map: furniture, joints of the floor."),
+        "Fraction of points that are not an edge of the map: furniture, joints of the floor."),
     F64("resample_below", resample_below, 0.5, 0, 1,
         "Resampling when the effective number of particles is below this fraction of them. 1: after each scan."),
     F64("noise.way_rel", noise_way_rel, 0.0, 0, 2,

@@ -181,15 +181,15 @@ size_t slam::keep(void *out, size_t capacity) const {
 }
 
 const char *slam::why_not_kept(const wm_slam_params &params, const wm_setup &setup, const void *image, size_t bytes) {
-  if (bytes < sizeof(kept_head)) return "it is cut";
+  if (bytes < sizeof(kept_head)) return "it is truncated";
   const kept_head head = head_of(image);
-  if (std::memcmp(head.magic, kMagic, sizeof head.magic) != 0) return "it is no map of slam";
-  if (head.version != kVersion) return "it is of another version";
+  if (std::memcmp(head.magic, kMagic, sizeof head.magic) != 0) return "it is not a map of slam";
+  if (head.version != kVersion) return "it has another version";
   if (head.robot_states != static_cast<uint32_t>(lasting_states(params, setup)))
     return "it has other calibration states than the configuration";
   if (head.width < 2 || head.width > kWidthMax || head.landmarks > static_cast<uint32_t>(params.landmark_capacity))
     return "it has more landmarks than slam.landmarks.capacity";
-  if (kept_layout(head).bytes != bytes) return "it is cut";
+  if (kept_layout(head).bytes != bytes) return "it is truncated";
   return fault_in_numbers(kept_image(image));
 }
 

@@ -179,16 +179,16 @@ size_t stereo_ekf::keep(void *out, size_t capacity) const {
 
 const char *stereo_ekf::why_not_kept(const wm_stereo_ekf_params &params, const wm_setup &setup, const void *image,
                                      size_t bytes) {
-  if (bytes < sizeof(kept_frames_head)) return "it is cut";
+  if (bytes < sizeof(kept_frames_head)) return "it is truncated";
   const kept_frames_head head = kept_frames::read(image);
-  if (std::memcmp(head.magic, kFramesMagic, sizeof head.magic) != 0) return "it is no map of stereo_ekf";
-  if (head.version != kFramesVersion) return "it is of another version";
+  if (std::memcmp(head.magic, kFramesMagic, sizeof head.magic) != 0) return "it is not a map of stereo_ekf";
+  if (head.version != kFramesVersion) return "it has another version";
   if (head.calibration != calibration_states(params, setup))
     return "it has other calibration states than the configuration";
   if (head.frames > static_cast<uint32_t>(used_params(params, setup).frames_max))
     return "it has more key frames than slam.key_frames";
   if (head.points > head.frames * own_map::kPointsOfFrame) return "a key frame in it has more points than one may have";
-  if (kept_frames_layout(head).bytes != bytes) return "it is cut";
+  if (kept_frames_layout(head).bytes != bytes) return "it is truncated";
   return fault_in_frames(kept_frames(image));
 }
 

@@ -89,7 +89,7 @@ static const wm_param kParams[] = {
     F64("gate.hard", gate_hard, 20, 1, 1e6,
         "Normalised innovation squared of one row above which the whole observation is an outlier."),
     BOOL("increments.on", increments, 1,
-         "Use tracks that are no points of the state, as far ones, for the motion between two pictures (visual "
+         "Use tracks that are not points of the state, as far ones, for the motion between two pictures (visual "
          "odometry)."),
     I32("slam.points", points_max, 250, 0, 256,
         "Capacity of the state for points: points found by stereo, and points of the map, whose error on it (sigma_m) "

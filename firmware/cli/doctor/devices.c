@@ -56,7 +56,7 @@ static void can_interface(const char *root, const char *interface, wm_findings *
   }
   if (type != ARPHRD_OF_CAN) {
     wm_find(out, WM_FOUND_CAN_INTERFACE, WM_SEVERITY_BAD, about, "`ip -br link show type can` lists CAN interfaces",
-            "is no CAN interface");
+            "is not a CAN interface");
     return;
   }
   (void)number_of(root, interface, "flags", &flags);

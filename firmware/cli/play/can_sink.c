@@ -91,7 +91,8 @@ static int cause(play_sink *base, const wm_fault *fault, int begins) {
 static const char *lacks(play_sink *base, const wm_fault *fault, char *text, size_t room) {
   can_sink *self = (can_sink *)base;
   if (fault->kind == WM_FAULT_BUS_OFF && !self->is_virtual) {
-    (void)snprintf(text, room, "%s is no virtual interface, which alone takes error frames", self->interface);
+    (void)snprintf(text, room, "%s is not a virtual interface; error frames can be sent on virtual ones only",
+                   self->interface);
     return text;
   }
   if (fault->kind != WM_FAULT_BUS_DOWN) return NULL;
@@ -136,7 +137,8 @@ static wm_status open_socket(can_sink *self, wm_error *err) {
 wm_status can_sink_open(const char *interface, play_sink **out, wm_error *err) {
   *out = NULL;
   if (strlen(interface) >= IFNAMSIZ)
-    return wm_fail(err, WM_BAD_USAGE, "'%.40s' is no interface's name: more than %d letters", interface, IFNAMSIZ - 1);
+    return wm_fail(err, WM_BAD_USAGE, "'%.40s' is too long for an interface's name (at most %d letters)", interface,
+                   IFNAMSIZ - 1);
   can_sink *self = calloc(1, sizeof *self);
   if (!self) return wm_fail(err, WM_IO, "%s: no memory to open it", interface);
   self->base.ops = &kCan;

@@ -165,7 +165,7 @@ static wm_status place_messages(const places_wanted *wanted, player *self, size_
     return WM_OK;
   }
   if (!find_channel(wanted, s->of, behind)) {
-    places->why_not[i] = "the configuration takes none over LCM";
+    places->why_not[i] = "the configuration receives none over LCM";
     return WM_OK;
   }
   if (!prefix[0]) prefix = wanted->config ? wanted->config->channel_prefix : "WAYMARK_";

@@ -22,11 +22,11 @@ typedef struct video_sink {
 static wm_status check_device(const video_sink *self, wm_error *err) {
   struct v4l2_capability can = {0};
   if (ioctl(self->fd, VIDIOC_QUERYCAP, &can) != 0)
-    return wm_fail(err, WM_BAD_USAGE, "%s: is no video device", self->device);
+    return wm_fail(err, WM_BAD_USAGE, "%s: is not a video device", self->device);
   const uint32_t has = can.capabilities & V4L2_CAP_DEVICE_CAPS ? can.device_caps : can.capabilities;
   if (!(has & V4L2_CAP_VIDEO_OUTPUT))
     return wm_fail(err, WM_BAD_USAGE,
-                   "%s: is a camera, and takes no pictures; `modprobe v4l2loopback` makes devices that do",
+                   "%s: is a camera, not an output; `modprobe v4l2loopback` makes devices that take pictures",
                    self->device);
   return WM_OK;
 }

@@ -27,9 +27,9 @@ static void refused(const wm_can_binding *bindings, size_t count, const char *wo
 static void numbers_that_are_none(void) {
   wm_can_binding b = binding(WM_Q_VEHICLE_SPEED, "M", "A");
   b.quantity = -1;
-  refused(&b, 1, "-1 is no quantity");
+  refused(&b, 1, "-1 is not a quantity");
   b.quantity = WM_CAN_COUNT;
-  refused(&b, 1, "is no quantity");
+  refused(&b, 1, "is not a quantity");
   b = binding(WM_Q_VEHICLE_SPEED, "M", "A");
   b.signal_count = 0;
   refused(&b, 1, "0 signals; 1 to 4 can be summed");

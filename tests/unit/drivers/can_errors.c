@@ -65,7 +65,7 @@ static const bad_input kTable[] = {
     {"not hexadecimal", CANDUMP, "(1.5) can0 123#00XY", "id 123: unexpected 'XY' behind the data"},
     {"FD without flags", CANDUMP, "(1.5) can0 123##", "id 123: behind ## comes one hex digit of CAN FD flags"},
     {"raw DLC behind a short frame", CANDUMP, "(1.5) can0 123#0011_9",
-     "id 123: a raw DLC _9 to _F stands behind 8 bytes only"},
+     "id 123: a raw DLC _9 to _F is allowed after 8 bytes only"},
     {"CAN XL", CANDUMP, "(1.5) can0 45123#81:00:12345678#11223344", "id 45123: CAN XL frames are not taken"},
     {"something behind the data", CANDUMP, "(1.5) can0 123#0011 R 42", "id 123: unexpected '42' behind the data"},
 
@@ -125,7 +125,7 @@ static const bad_input kTable[] = {
      "can-signals.yaml:1: vehicle_speed: unit 'furlong/week' of WARP is not known; write `unit:` (m/s, km/h, mph, "
      "cm/s, mm/s)"},
     {"unit of something else", BINDING, "{quantity: yaw_rate, message: WHEELS, signal: SPEED_FL}",
-     "can-signals.yaml:1: yaw_rate: SPEED_FL is in 'km/h', which is no unit of this quantity (rad/s, deg/s, rpm)"},
+     "can-signals.yaml:1: yaw_rate: SPEED_FL is in 'km/h', which is not a unit of this quantity (rad/s, deg/s, rpm)"},
     {"rpm of a wheel", BINDING, "{quantity: wheel_speed_rear_left, message: WHEELS, signal: TURNS}",
      "can-signals.yaml:1: wheel_speed_rear_left: TURNS is in 'rpm', a rate of turning, and the wheel's radius is not "
      "known here; write `unit: m/s` and `scale:` metres a second for one rpm (for rpm of the wheel: 0.10472 times its "
@@ -146,7 +146,7 @@ static const bad_input kTable[] = {
     {"gear without names", BINDING, "{quantity: gear, message: GEARBOX, signal: GEAR}",
      "can-signals.yaml:1: gear: the DBC has no VAL_ names for this signal; write `values: {forward: [1], reverse: [2], "
      "neutral: [0]}` with the signal's raw values"},
-    {"names that are no gears", BINDING, "{quantity: gear, message: GEARBOX, signal: LEVER}",
+    {"names that are not gears", BINDING, "{quantity: gear, message: GEARBOX, signal: LEVER}",
      "can-signals.yaml:1: gear: none of the names in VAL_ (\"open\", \"closed\") is a gear; write `values: {forward: "
      "[1], reverse: [2], neutral: [0]}` with the signal's raw values"},
     {"gear in floating point", BINDING, "{quantity: gear, message: GEARBOX, signal: POWER}",

@@ -99,7 +99,7 @@ static void mistakes(void) {
   refused(HAAR, "<tilted>0", "<tilted>1", "tilted");
   TEST_ASSERT_EQUAL(WM_BAD_CONFIG, parse(""));
   TEST_ASSERT_EQUAL(WM_BAD_CONFIG, parse("id,x_m,y_m\n1,2,3\n"));
-  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(err.text, "this is no cascade"), err.text);
+  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(err.text, "this is not a cascade"), err.text);
   TEST_ASSERT_EQUAL(WM_NOT_FOUND, wm_cascade_load("not-there.xml", &cascade, &err));
   TEST_ASSERT_NOT_NULL(strstr(err.text, "not-there.xml"));
 }

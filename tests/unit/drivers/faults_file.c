@@ -89,7 +89,7 @@ static void a_wrong_file_is_refused_with_its_line(void) {
   refuse(HEAD "- name: a\n  fault: bus_off\n  from_s: 5\n  until_s: 4\n",
          "f.yaml:6: faults[0].until_s: 4 is not after from_s (5)");
   refuse(HEAD "- {name: a, fault: bus_off, from_s: 5, until_s: 6, for_s: 1}\n",
-         "f.yaml:3: faults[0].for_s: until_s is there, too; one of both is enough");
+         "f.yaml:3: faults[0].for_s: until_s is given, too; give one of them");
   refuse(HEAD "- {name: a, fault: bus_off, from_s: 5, camera: front}\n",
          "f.yaml:3: faults[0].camera: unknown key; known are: name, fault, from_s, until_s, for_s, health, pose, bus");
   refuse(HEAD "- {name: a, fault: camera_dropped, from_s: 5}\n",
@@ -103,16 +103,14 @@ static void a_wrong_file_is_refused_with_its_line(void) {
 static void statements_and_bounds_are_checked(void) {
 #define WITH(health) HEAD "- name: a\n  fault: bus_off\n  from_s: 5\n  health:\n  - " health "\n"
   refuse(WITH("{device: down}"),
-         "f.yaml:7: faults[0].health[0]: source: is missing: whose device? (a name of health.json, e.g. can or "
+         "f.yaml:7: faults[0].health[0]: source: is missing; device is of a source (a name in health.json, e.g. can or "
          "edges:front)");
   begins_with(WITH("{source: can, device: dwon}"),
               "f.yaml:7: faults[0].health[0].device: 'dwon' is unknown; did you mean 'down'?");
   refuse(WITH("{flag: jumped, state: lost}"),
-         "f.yaml:7: faults[0].health[0].state: 'flag' stands beside it; a line of health has one of them: make two "
-         "lines");
-  refuse(
-      WITH("{within_s: 1}"),
-      "f.yaml:7: faults[0].health[0]: one of device, flag, state, cause, counter and text is needed: what is stated");
+         "f.yaml:7: faults[0].health[0].state: 'flag' is given, too; write one entry of health for each");
+  refuse(WITH("{within_s: 1}"),
+         "f.yaml:7: faults[0].health[0]: one of device, flag, state, cause, counter and text is needed");
   refuse(WITH("{flag: jumped, at_least: 1}"),
          "f.yaml:7: faults[0].health[0]: at_least and at_most are of a counter or a text");
   refuse(WITH("{source: can, counter: lost}"),

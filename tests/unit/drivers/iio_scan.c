@@ -65,9 +65,9 @@ static void matrices_turn_and_never_mirror(void) {
   TEST_ASSERT_NULL(iio_matrix_read("0, 1, 0; -1, 0, 0; 0, 0, 1", m));
   TEST_ASSERT_EQUAL_DOUBLE(-1, m[3]);
   TEST_ASSERT_NULL(iio_matrix_read("0.707, 0.707, 0; -0.707, 0.707, 0; 0, 0, 1\n", m));
-  TEST_ASSERT_NOT_NULL(strstr(iio_matrix_read("1, 0, 0; 0, 1, 0; 0, 0, -1", m), "no rotation"));
-  TEST_ASSERT_NOT_NULL(strstr(iio_matrix_read("2, 0, 0; 0, 1, 0; 0, 0, 1", m), "no rotation"));
-  TEST_ASSERT_NOT_NULL(strstr(iio_matrix_read("nan, 0, 0; 0, 1, 0; 0, 0, 1", m), "no rotation"));
+  TEST_ASSERT_NOT_NULL(strstr(iio_matrix_read("1, 0, 0; 0, 1, 0; 0, 0, -1", m), "not a rotation"));
+  TEST_ASSERT_NOT_NULL(strstr(iio_matrix_read("2, 0, 0; 0, 1, 0; 0, 0, 1", m), "not a rotation"));
+  TEST_ASSERT_NOT_NULL(strstr(iio_matrix_read("nan, 0, 0; 0, 1, 0; 0, 0, 1", m), "not a rotation"));
   TEST_ASSERT_NOT_NULL(strstr(iio_matrix_read("1, 0, 0; 0, 1", m), "fewer"));
 }
 

@@ -447,7 +447,7 @@ static void corners_need_a_camera(void) {
                "t_ns,sensor,id,u0_px,v0_px,u1_px,v1_px,u2_px,v2_px,u3_px,v3_px\n"
                "1,front,7,1,1,2,1,2,2,1,2\n");
   TEST_ASSERT_EQUAL(WM_BAD_CONFIG, wm_recording_open(folder_path("."), NULL, keep_warning, NULL, &recording, &err));
-  TEST_ASSERT_NOT_NULL(strstr(err.text, "'front' is no camera"));
+  TEST_ASSERT_NOT_NULL(strstr(err.text, "'front' is not a camera"));
 }
 
 int main(void) {

@@ -162,7 +162,7 @@ static void bad_documents(void) {
           "that begins in line 1");
   refused("a: 1\n\n\xFF\n", "x.yaml:3: not valid YAML: invalid leading UTF-8 octet");
   refused("a: *b\n", "x.yaml:1: an alias whose anchor (&NAME) doesn't stand before it");
-  refused("a: &b [1, *b]\n", "x.yaml:1: an alias stands inside of its own anchor: it would never end");
+  refused("a: &b [1, *b]\n", "x.yaml:1: an alias is inside its own anchor, which has no end");
   refused("a: 1\n---\nb: 2\n", "x.yaml:2: a second document (---) in the file; one is needed");
   refused("? [1, 2]\n: 3\n", "x.yaml:1: a key must be plain text");
   refused("&a &b c: 1\n", "x.yaml:1: not valid YAML: did not find expected key, while parsing a block mapping");

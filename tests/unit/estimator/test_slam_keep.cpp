@@ -143,14 +143,14 @@ void test_an_image_that_is_wrong_is_refused_with_the_reason() {
   const std::vector<char> good = image;
   for (size_t bytes = 0; bytes < good.size(); bytes += 97) {
     image.assign(good.begin(), good.begin() + (long)bytes);
-    TEST_ASSERT_EQUAL_STRING("it is cut", why_not());
+    TEST_ASSERT_EQUAL_STRING("it is truncated", why_not());
   }
   image = good;
   image[0] ^= 1;
-  TEST_ASSERT_EQUAL_STRING("it is no map of slam", why_not());
+  TEST_ASSERT_EQUAL_STRING("it is not a map of slam", why_not());
   image = good;
   image[8] ^= 2;
-  TEST_ASSERT_EQUAL_STRING("it is of another version", why_not());
+  TEST_ASSERT_EQUAL_STRING("it has another version", why_not());
   const double nan = kAbsent, large = 1e6;
   for (const size_t from_end : {size_t{8}, size_t{512}, size_t{1024}}) {  // the last variance, two covariances
     image = good;

@@ -72,7 +72,8 @@ static void a_renamed_key_is_read_with_a_warning(void) {
 static void a_removed_key_is_ignored_with_a_warning(void) {
   parse(HEAD "pole_filter:\n  walls: {image_share: any}\n");
   TEST_ASSERT_EQUAL_STRING(
-      "dir/x.yaml:4: pole_filter.walls.image_share: is no parameter any more and is ignored: images are found by their "
+      "dir/x.yaml:4: pole_filter.walls.image_share: is not a parameter any more and is ignored: images are found by "
+      "their "
       "number.\n",
       config.warnings);
 }

@@ -119,7 +119,7 @@ static void can_interfaces_are_looked_at(void) {
   expect("can can0", WM_SEVERITY_BAD, "lost 7 frames");
   expect("can can1", WM_SEVERITY_BAD, "is down");
   expect("can can2", WM_SEVERITY_BAD, "no interface");
-  expect("can eth0", WM_SEVERITY_BAD, "is no CAN interface");
+  expect("can eth0", WM_SEVERITY_BAD, "is not a CAN interface");
 }
 
 static void interrupts_below_the_estimator_are_found(void) {

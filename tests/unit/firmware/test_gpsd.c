@@ -245,7 +245,7 @@ static void rubbish_is_counted(void) {
   }
   TEST_ASSERT_EQUAL_UINT64(1, source->counts.received);
   TEST_ASSERT_EQUAL_UINT64(3, source->counts.malformed);
-  TEST_ASSERT_NOT_NULL(strstr(source->counts.first_problem, "is no object of JSON"));
+  TEST_ASSERT_NOT_NULL(strstr(source->counts.first_problem, "is not a JSON object"));
 }
 
 static void an_accuracy_that_cannot_be_is_refused(void) {

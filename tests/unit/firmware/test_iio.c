@@ -212,7 +212,7 @@ static void without_stamps_it_is_not_used(void) {
 static void a_mirror_is_no_mounting(void) {
   plug_in();
   put("in_mount_matrix", "1, 0, 0; 0, 1, 0; 0, 0, -1");
-  expect_down("in_mount_matrix is no rotation", WM_DEVICE_DOWN);
+  expect_down("in_mount_matrix is not a rotation", WM_DEVICE_DOWN);
 }
 
 static void a_trigger_is_needed(void) {

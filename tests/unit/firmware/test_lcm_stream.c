@@ -223,7 +223,7 @@ static void numbers_that_cannot_be_are_refused(void) {
 static void rubbish_and_other_types_are_refused(void) {
   begin_motion();
   lcm_publish(lcm, "T_MOTION", "rubbish", 7);
-  assert_refused("T_MOTION: is no motion_t of this version");
+  assert_refused("T_MOTION: does not match motion_t of this version");
   send("imu", "T_MOTION", (wm_stream_row){.t_ns = 1});
   TEST_ASSERT_EQUAL(WM_AGAIN, next());
   TEST_ASSERT_EQUAL_UINT64(2, source->counts.malformed);

@@ -304,7 +304,7 @@ static void sightings_that_cannot_be_are_refused(void) {
     const char *sensor, *why;
     wm_event event;
   } wrong[] = {
-      {"nose", "'nose' is no sensor", {.t_ns = 1, .as.sighting = {.bearing_rad = 1, .range_m = 1}}},
+      {"nose", "'nose' is not a sensor", {.t_ns = 1, .as.sighting = {.bearing_rad = 1, .range_m = 1}}},
       {"left", "t_ns is not above 0", {.t_ns = 0, .as.sighting = {.bearing_rad = 1, .range_m = 1}}},
       {"left", "one of bearing_rad and range_m", {.t_ns = 1, .as.sighting = {.bearing_rad = NAN, .range_m = NAN}}},
       {"left",

@@ -286,12 +286,12 @@ static void a_map_is_there_again_and_a_damaged_one_is_refused(void) {
   fclose(f);
   for (size_t cut = 0; cut < length; cut += 1 + cut / 50) {
     write_file(whole, cut);
-    refused_as(&setup, "it is cut");
+    refused_as(&setup, "it is truncated");
   }
   for (size_t at = 8; at < length; at += 1 + at / 50) {
     whole[at] ^= 0x40;
     write_file(whole, length);
-    refused_as(&setup, at < 32 || at >= 40 ? "checksum is wrong" : "it is cut");
+    refused_as(&setup, at < 32 || at >= 40 ? "checksum is wrong" : "it is truncated");
     whole[at] ^= 0x40;
   }
   TEST_ASSERT_EQUAL(WM_FULL, wm_saved_map_write(path, &of, 1, image, WM_SAVED_MAP_BYTES_MAX + 1, &err));

@@ -265,7 +265,7 @@ static void refused(const char *section, const char *text) {
 }
 
 static void what_is_not_there(void) {
-  refused("vision: {edges: {cameras: [left]}}\n", "test.yaml:3: vision.edges.cameras: 'left' is no camera");
+  refused("vision: {edges: {cameras: [left]}}\n", "test.yaml:3: vision.edges.cameras: 'left' is not a camera");
   folder_write("calibration.yaml", "cameras:\n" CAMERA("side"));
   refused("vision: {edges: {}}\n", "has no pictures");
   folder_write("calibration.yaml",

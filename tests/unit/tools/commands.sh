@@ -38,7 +38,7 @@ expect 0 'waymark eval runs/corridor' "$bin/waymark-eval" --help
 expect 2 'REC is required' "$bin/waymark-eval" "$dir/run"
 expect 2 'se4' "$bin/waymark-eval" "$dir/run" "$dir/rec" --align se4
 expect 2 '--from must be before --to' "$bin/waymark-eval" "$dir/run" "$dir/rec" --from 3 --to 2
-expect 2 'is no folder' "$bin/waymark-eval" "$dir/nowhere" "$dir/rec"
+expect 2 'is not a folder' "$bin/waymark-eval" "$dir/nowhere" "$dir/rec"
 expect 1 'has neither trajectory.csv nor trajectory.tum' "$bin/waymark-eval" "$dir/empty" "$dir/rec"
 expect 1 'has no truth.csv' "$bin/waymark-eval" "$dir/run" "$dir/empty"
 expect 1 'gnss.csv: can' "$bin/waymark-eval" "$dir/run" "$dir/rec" --against gnss

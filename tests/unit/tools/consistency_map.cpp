@@ -280,7 +280,7 @@ void test_a_damaged_map_is_refused_or_harmless(void) {
     TEST_ASSERT_NOT_NULL(why_not({good.begin(), good.begin() + static_cast<long>(bytes)}));
   std::vector<char> longer = good;
   longer.push_back(0);
-  TEST_ASSERT_EQUAL_STRING("it is cut", why_not(longer));
+  TEST_ASSERT_EQUAL_STRING("it is truncated", why_not(longer));
   uint64_t refused = 0;
   constexpr uint64_t kMutants = 200;
   for (uint64_t k = 0; k < kMutants; k++) {

@@ -195,7 +195,8 @@ const BadInput kTable[] = {
      "cam0:\n  T_cam_imu: [[1, 1, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n  camera_model: pinhole\n"
      "  distortion_model: radtan\n  distortion_coeffs: [0, 0, 0, 0]\n  intrinsics: [450, 450, 320, 240]\n"
      "  resolution: [640, 480]\n",
-     "camchain.yaml:2: cam0.T_cam_imu: is no rotation and translation: the rows of the left 3 x 3 must have length 1 "
+     "camchain.yaml:2: cam0.T_cam_imu: is not a rotation and translation: the rows of the left 3 x 3 must have length "
+     "1 "
      "and right angles, the last row is 0 0 0 1"},
     {"T_cam_imu of three rows", kCamchain,
      "cam0:\n  T_cam_imu: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]]\n  camera_model: pinhole\n"

@@ -189,7 +189,7 @@ void test_odd_files_are_survived_or_refused_with_words() {
     load_report_data(run.path(), recording.path());
     TEST_FAIL_MESSAGE("broken JSON was taken");
   } catch (const Failure &problem) {
-    TEST_ASSERT_TRUE(has(problem.what(), "health.json: is no JSON"));
+    TEST_ASSERT_TRUE(has(problem.what(), "health.json: is not JSON"));
   }
 }
 

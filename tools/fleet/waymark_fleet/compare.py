@@ -89,11 +89,12 @@ def compare(given, beside):
     """The result as JSON has it, and the pairs."""
     (folder_one, before), (folder_two, after) = comparison.load(given.before), comparison.load(given.after)
     pairs = comparison.pairs_of(before, after)
-    verdicts = comparison.judge(pairs, given.alpha, tolerances_of(given.tolerate))
+    is_apart = folder_one.resolve() != folder_two.resolve()
+    verdicts = comparison.judge(pairs, given.alpha, tolerances_of(given.tolerate), is_apart)
     figure, worst = worst_drives(given, (folder_one, folder_two), pairs, beside)
     failing = [{"name": comparison.name_of(two, after), "error": two.get("error", "")} for one, two in pairs
                if one["status"] == "done" and two["status"] != "done"]
-    return {"format": "waymark-comparison/1", "before": given.before, "after": given.after, "drives": len(pairs), "alpha": given.alpha,
+    return {"format": "waymark-comparison/1", "before": given.before, "after": given.after, "drives": len(pairs), "alpha": given.alpha, "is_apart": is_apart,
             "only_before": len(before) - len(pairs), "only_after": len(after) - len(pairs),
             "same_bits": sum(one.get("sum") is not None and one.get("sum") == two.get("sum") for one, two in pairs),
             "is_worse": bool(failing) or any(row["verdict"] == "worse" for row in verdicts), "verdicts": verdicts,
@@ -105,7 +106,8 @@ def text_of(result, page):
     lines = [f"{result['drives']} drives, {result['same_bits']} with the same bits"
              + (f"; {result['only_before']} only before, {result['only_after']} only after" if result["only_before"] or result["only_after"] else "")]
     for row in result["verdicts"]:
-        change = f"{compare_page.change_text(row, row['change'])}, p {row['p_holm']:.2g}".replace("&nbsp;", " ") if "p" in row else ""
+        change = compare_page.change_text(row, row["change"]).replace("&nbsp;", " ") if "p" in row else ""
+        change += f", p {row['p_holm']:.2g}" if "p_holm" in row else ", not judged: put both programs into one plan" if change else ""
         lines.append(f"  {row['title']:28} {row['verdict']:20} {change}")
     if result["now_failing"]:
         lines.append(f"  {len(result['now_failing'])} drives now fail: {result['now_failing'][0]['name']}: {result['now_failing'][0]['error']}")

@@ -34,20 +34,23 @@ def _headline(verdicts, names):
     return f'<p class="headline">{text}</p>'
 
 
-def _verdict_table(verdicts, alpha):
+def _verdict_table(verdicts, alpha, is_apart):
     rows = []
     for row in verdicts:
         title = f"{html.escape(row['title'])}<small>{html.escape(row['about'])}</small>"
         if row["verdict"] == "not measured":
-            rows.append([title, "not measured", "–", "–", "–", "–", str(row["drives"])])
+            rows.append([title, "not measured", "–", "–", "–", "–", "–", str(row["drives"])])
             continue
         interval = "–" if row["low"] is None else f"{change_text(row, row['low'])} … {change_text(row, row['high'])}"
         rows.append([title, (row["verdict"] if row["verdict"] in ("worse", "better") else "", row["verdict"]), change_text(row, row["change"]),
-                     interval, f"{row['p_holm']:.2g}", f"{row['worse']} / {row['better']}", str(row["drives"])])
+                     interval, f"{row['p_holm']:.2g}" if "p_holm" in row else "–", change_text(row, row["tolerance"]).lstrip("+"), f"{row['worse']} / {row['better']}", str(row["drives"])])
     how = (f"Each drive is compared with itself. The change is the mean over the drives without the fifth that changed most in each direction, "
            f"with its 95&nbsp;% bootstrap interval; p is of the signed-rank test and holds for all figures together (Holm). A change counts from "
-           f"p&nbsp;&lt;&nbsp;{alpha:g} on, and where it exceeds what two runs of the same program differ by.")
-    head = ["figure", "verdict", "change", "95&nbsp;% interval", "p", "drives worse / better", "drives"]
+           f"p&nbsp;&lt;&nbsp;{alpha:g} on, and where it exceeds the tolerance: what two runs of the same program differ by.")
+    if is_apart:
+        how += (" The sides are of two batches, between which the computer's speed changes. So times have no verdict; "
+                "put both programs into one plan to have one.")
+    head = ["figure", "verdict", "change", "95&nbsp;% interval", "p", "tolerance", "drives worse / better", "drives"]
     return html.section("Verdicts", how, html.table(head, rows))
 
 
@@ -120,7 +123,7 @@ def make(sheet, result, pairs):
     position = next(figure for figure in comparison.FIGURES if figure.name == "position")
     body = (f"<header><h1>{html.escape(names[0])} and {html.escape(names[1])}</h1>"
             + _headline(result["verdicts"], {"pairs": len(pairs), "failing": len(result["now_failing"])}) + note + "</header>"
-            + _verdict_table(result["verdicts"], result["alpha"]) + _failures(result) + _scatter(pairs, position)
+            + _verdict_table(result["verdicts"], result["alpha"], result["is_apart"]) + _failures(result) + _scatter(pairs, position)
             + _worst_table(result["worst"], f"By the {result['worst_by']}") + _all_drives(pairs, [two for _, two in pairs]))
     return html.page("Comparison", sheet, body, "waymark compare")
 

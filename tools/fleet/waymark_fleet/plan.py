@@ -119,7 +119,7 @@ def _recordings(path, home, given):
         for data in found:
             truth = home / entry["truth"].replace("{name}", data.stem) if "truth" in entry else data if data.is_dir() else None
             if truth is not None and not (truth / "recording.yaml").is_file():
-                raise PlanError(f"{path}: recordings: {truth} is no recording; truth names the one that judges {data}")
+                raise PlanError(f"{path}: recordings: {truth} is not a recording; truth names the one that judges {data}")
             options = tuple(map(str, entry.get("eval", ())))
             known = truth is not None and ((truth / "truth.csv").is_file() or "gnss" in options)
             out.append((data, truth if known else None, options))

@@ -29,7 +29,7 @@ def read(path):
     """Reads a log up to where it was cut. ValueError where it is none."""
     data = path.read_bytes()
     if data[:8] != MAGIC:
-        raise ValueError(f"{path}: is no event log")
+        raise ValueError(f"{path}: is not an event log")
     log, at, hashes = Log(), len(MAGIC), {}
     while at + 9 <= len(data):
         length, _, tag = struct.unpack_from("<IIB", data, at)

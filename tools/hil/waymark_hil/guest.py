@@ -80,7 +80,7 @@ def prepare(arch, folder, out=None):
         raise HilError(f"a guest needs Debian packages that are missing: sudo apt-get install {' '.join(packages)}")
     done = subprocess.run(["bash", SCRIPTS / "prepare.sh", image, arch], stdout=out, stderr=subprocess.STDOUT if out else None, check=False)
     if done.returncode and (packages := missing(arch)):  # there is an image, of an older kernel
-        raise HilError(f"a newer image takes Debian packages that are missing: sudo apt-get install {' '.join(packages)}")
+        raise HilError(f"a new image needs packages that are not installed: sudo apt-get install {' '.join(packages)}")
     if done.returncode:
         raise HilError(f"the guest's image was not made (exit code {done.returncode}){f': {out.name}' if out else ''}")
     return image

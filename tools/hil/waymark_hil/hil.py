@@ -83,7 +83,7 @@ def _target(given, waymark):
     for name in ("program", "package", "played", "config", "faults", "limits"):
         path = getattr(given, name)
         if path and not os.path.isfile(path):
-            raise HilError(f"--{name} {path}: is no file")
+            raise HilError(f"--{name} {path}: is not a file")
     program = pathlib.Path((given.played if given.local else None) or given.program or waymark).resolve()
     if given.host:
         return targets.Host(given.host, shlex.split(given.ssh), pairs)
@@ -210,7 +210,7 @@ def _begin_later(config, folder, rec, from_s, waymark):
     done = subprocess.run([waymark, "replay", rec.path, "--config", folder / "robot.yaml", "--until", f"{from_s + 0.2:g}", "--out", before],
                           capture_output=True, text=True, check=False)
     if done.returncode or not scenario.begin_at(config, folder, before / "published.csv", rec.first_ns + round(from_s * 1e9)):
-        raise HilError(f"--from {from_s:g}: a replay until there gives no start pose: {(done.stderr.strip() or 'no pose').splitlines()[-1]}")
+        raise HilError(f"--from {from_s:g}: a replay up to there has no start pose: {(done.stderr.strip() or 'no pose').splitlines()[-1]}")
     shutil.rmtree(before)
 
 
@@ -288,7 +288,7 @@ def _two(given, beside, types):
     folders = []
     for side, path in zip(("before", "after"), given.compare):
         if not os.path.isfile(path):
-            raise HilError(f"--compare {path}: is no file; with REC it takes programs, packages (.deb) or configurations (.yaml)")
+            raise HilError(f"--compare {path}: is not a file; with REC give programs, packages (.deb) or configurations (.yaml)")
         words = argparse.Namespace(**vars(given))
         key = "config" if path.endswith((".yaml", ".yml")) else "package" if path.endswith(".deb") else "played" if given.played else "program"
         setattr(words, key, path)

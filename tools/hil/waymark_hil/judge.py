@@ -290,11 +290,11 @@ class Judge:
             if not fault_judge.is_in(fault, self.facts["from_s"], self.facts["until_s"]):
                 done[number] = {"done": False, "absent": True, "why": "not in the part that was played"}
             elif fault["name"] in self.facts["left_out"]:
-                done[number] = {"done": False, "absent": True, "why": "not on this target: its controllers cannot be told to do it"}
+                done[number] = {"done": False, "absent": True, "why": "not possible on this target's CAN controllers"}
             elif self.facts["played"] and fault.get("by_played_driver"):
                 done[number] = {"done": True}
             elif fault["by"] == "played driver":
-                done.setdefault(number, {"done": False, "absent": True, "why": "not on this target: a real driver cannot be made to do it"})
+                done.setdefault(number, {"done": False, "absent": True, "why": "not possible with a real driver"})
         return done
 
     def health(self):

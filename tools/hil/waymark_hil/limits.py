@@ -56,7 +56,7 @@ def _number(path, section, key, value):
     try:
         number = float(value)
     except (TypeError, ValueError):
-        raise HilError(f"{path}: {section}: {key}: '{value}' is no number (off: not judged)") from None
+        raise HilError(f"{path}: {section}: {key}: '{value}' is not a number (off: not judged)") from None
     if not number >= 0:
         raise HilError(f"{path}: {section}: {key}: {value} is below 0")
     return number

@@ -71,9 +71,9 @@ def read_yaml(path, loader=Scalars):
     except OSError as error:
         raise HilError(f"{path}: {error.strerror}") from None
     except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise HilError(f"{path}: is no YAML: {str(error).splitlines()[0]}") from None
+        raise HilError(f"{path}: is not YAML: {str(error).splitlines()[0]}") from None
     if not isinstance(found, dict):
-        raise HilError(f"{path}: is no mapping of keys and values")
+        raise HilError(f"{path}: is not a mapping of keys and values")
     return found
 
 
@@ -130,7 +130,7 @@ def read(path):
     """A recording's facts. HilError where it is none, or has nothing that can be played."""
     path = pathlib.Path(path)
     if not path.is_dir():
-        raise HilError(f"{path}: is no folder; a recording is one (docs/recording-format.md)")
+        raise HilError(f"{path}: is not a folder; a recording is a folder (docs/recording-format.md)")
     about = read_yaml(path / "recording.yaml") if (path / "recording.yaml").is_file() else {}
     buses, stamps = _buses(path / "can.log") if (path / "can.log").is_file() else ([], [])
     cameras, more = _cameras(path)

@@ -38,7 +38,7 @@ def _copy_named(home, name, folder, place):
     """Copies a file that a configuration names, with what belongs to it. Returns its path from the test's folder."""
     source = pathlib.Path(name) if pathlib.Path(name).is_absolute() else home / name
     if not source.is_file():
-        raise HilError(f"{home}: names {name}, which is not there")
+        raise HilError(f"{home}: names {name}, which does not exist")
     target = folder / "files" / place / source.name
     target.parent.mkdir(parents=True, exist_ok=True)
     shutil.copy(source, target)
@@ -123,7 +123,7 @@ def derive(path, recording, folder, single_core, survives):
     config, home = read_yaml(path), pathlib.Path(path).parent
     devices = config.get("devices") or {}
     if not isinstance(devices, dict):
-        raise HilError(f"{path}: devices: is no mapping")
+        raise HilError(f"{path}: devices: is not a mapping")
     _files(config, home, recording, folder)
     buses = _buses(devices.get("can") or [], recording)
     cameras = _cameras(devices.get("cameras") or [], recording, config)
@@ -131,7 +131,7 @@ def derive(path, recording, folder, single_core, survives):
         ("can", [entry for _, entry in buses]), ("cameras", cameras),
         ("lcm", [{"stream": name} for name in recording.streams]), ("sightings", "lcm" if recording.has_sightings else None)) if value}
     if not config["devices"]:
-        raise HilError(f"{path}: nothing that it uses is in {recording.path}: no CAN interface, camera or stream of it")
+        raise HilError(f"{path}: {recording.path} has no CAN interface, camera or stream that it uses")
     if "initial_pose" not in config and (start := _start(recording)):
         config["initial_pose"] = start
     config.setdefault("publish", {}).setdefault("lcm_url", URL)

@@ -70,7 +70,7 @@ def judge(judge, buses, cameras, settle_s):
     """Losses and skew of what the target recorded; checks and figures go to the judge."""
     recorded, facts = judge.out / "recorded", judge.facts
     if not (recorded / "can.log").is_file() and not (recorded / "video").is_dir():
-        judge.checks.add("stamps", "recorded", False, "the target recorded nothing (out/recorded)")
+        judge.checks.add("stamps", "recorded", False, "the target has no recording (out/recorded)")
         return
     first_ns = judge.start_ns - judge.played["offset_ns"]
     begin_ns = first_ns + int((facts["from_s"] + settle_s) * 1e9)

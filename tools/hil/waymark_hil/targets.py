@@ -78,11 +78,11 @@ class Local(Target):
         if os.geteuid() != 0:
             raise HilError("--local makes interfaces and a network of its own: run it as root (sudo), or use --guest amd64")
         if subprocess.run(["unshare", "-n", "-m", "-p", "--fork", "true"], capture_output=True, check=False).returncode:
-            raise HilError("--local: this computer gives no namespaces to programs (unshare -n -m -p fails)")
+            raise HilError("--local: namespaces can't be made on this computer (unshare -n -m -p fails)")
         if self.played:
             return
         if not shutil.which("modprobe", path=os.environ.get("PATH", "") + ":/usr/sbin:/sbin"):
-            raise HilError("--local takes modprobe, which is missing: sudo apt-get install kmod")
+            raise HilError("--local needs modprobe, which is not installed: sudo apt-get install kmod")
         for module in ("vcan", "v4l2loopback"):
             if not pathlib.Path(f"/sys/module/{module}").exists() and subprocess.run(["modprobe", "-n", module], capture_output=True, check=False).returncode:
                 raise HilError(f"--local: this kernel has no module {module}; --guest amd64 has one of its own")
@@ -166,7 +166,7 @@ class Host(Target):
 
     def prepare(self, progress):
         if not shutil.which("ssh"):
-            raise HilError("--host takes ssh, which is missing: sudo apt-get install openssh-client")
+            raise HilError("--host needs ssh, which is not installed: sudo apt-get install openssh-client")
         # Interfaces, modules and real-time priorities take root, as the service of the run has it.
         found = self._ask("command -v bash >/dev/null && waymark --version && nproc && id -u && { sudo -n true >/dev/null 2>&1 && echo sudo || echo alone; }")
         version, *_, processors, user, may = found.splitlines()

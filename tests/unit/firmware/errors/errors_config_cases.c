@@ -213,7 +213,7 @@ const error_case kErrorCases[] = {
      "rec/can-signals.yaml:2: [1]: vehicle_speed is bound twice (first in line 1)"},
     {REC, "Scale of zero", "can-signals.yaml", "- {quantity: vehicle_speed, message: SPEED, signal: SPEED, scale: 0}\n",
      "rec/can-signals.yaml:1: [0].scale: 0 would make everything 0; leave it out for 1"},
-    {REC, "Values for what is no gear", "can-signals.yaml",
+    {REC, "Values for what is not a gear", "can-signals.yaml",
      "- {quantity: vehicle_speed, message: SPEED, signal: SPEED, values: {forward: [1]}}\n",
      "rec/can-signals.yaml:1: [0].values: only the quantity gear has values"},
 

@@ -12,7 +12,7 @@ def read_jpegs(path: str | Path) -> Iterator[bytes]:
     """The pictures of an AVI file in their order. A file that was cut off ends with its last whole picture."""
     with Path(path).open("rb") as file:
         if file.read(4) != b"RIFF":
-            raise ValueError(f"{path}: this is no AVI file")
+            raise ValueError(f"{path}: this is not an AVI file")
         file.seek(12)
         while len(head := file.read(8)) == 8:
             name, length = _HEAD.unpack(head)

@@ -92,7 +92,7 @@ def read_floor_plan(path: str | Path) -> FloorPlan:
         free, occupied = float(about.get("free_thresh", _FREE_BELOW)), float(about.get("occupied_thresh", _OCCUPIED_ABOVE))
         x_m, y_m, yaw = (*given, 0.0)[:3]
     except (yaml.YAMLError, TypeError, KeyError, ValueError, AttributeError) as error:
-        raise ValueError(f"{file}: this is no map with image, resolution and origin: {type(error).__name__}: {error}") from None
+        raise ValueError(f"{file}: this is not a map with image, resolution and origin: {type(error).__name__}: {error}") from None
     cells = None
     if about.get("image") and (file.parent / str(about["image"])).is_file() or not layers:
         grey = _grey(file.parent / str(about.get("image", "")), file) / 255.0

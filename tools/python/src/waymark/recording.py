@@ -53,7 +53,7 @@ def _read_yaml(path: Path) -> dict[str, Any]:
     except yaml.YAMLError as error:
         raise ValueError(f"{path}: {error}") from None
     if not isinstance(content, dict):
-        raise ValueError(f"{path}: this is no mapping of keys")
+        raise ValueError(f"{path}: this is not a mapping of keys")
     return content
 
 
@@ -114,7 +114,7 @@ class Recording:
                     continue
                 match = _CAN_LINE.match(line)
                 if not match:
-                    raise ValueError(f"{path}:{number}: this is no line of `candump -l`")
+                    raise ValueError(f"{path}:{number}: this is not a line of `candump -l`")
                 seconds, micros, interface, identifier, flags, data = match.groups()
                 remote = data.startswith("R")
                 yield CanFrame(int(seconds) * 10**9 + int(micros) * 1000, interface, int(identifier, 16),
@@ -138,7 +138,7 @@ def jpeg_size(jpeg: bytes) -> tuple[int, int]:
         if 0xC0 <= marker <= 0xCF and marker not in (0xC4, 0xC8, 0xCC):
             return int.from_bytes(jpeg[at + 7 : at + 9], "big"), int.from_bytes(jpeg[at + 5 : at + 7], "big")
         at += 2 + int.from_bytes(jpeg[at + 2 : at + 4], "big")
-    raise ValueError("a picture is no JPEG")
+    raise ValueError("a picture is not JPEG")
 
 
 def jpeg_of(picture: Array) -> bytes:

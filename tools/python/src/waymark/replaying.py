@@ -150,7 +150,7 @@ class EventLog:
         whole = dtype("wm_event")
         data = bytes(self._raw.get(kind, b""))
         if kind not in (whole["as"].names or ()):
-            raise ValueError(f"'{kind}' is no kind of events with values; this log has {', '.join(self.kinds())}")
+            raise ValueError(f"'{kind}' is not a kind of events with values; this log has {', '.join(self.kinds())}")
         body, offset = whole["as"][kind], _offset(whole, "as")
         size = whole.itemsize if kind == "points" else offset + 96
         heads = ("t_ns", "arrival_ns", "seq", "source")
