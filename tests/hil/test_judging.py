@@ -16,7 +16,7 @@ import yaml
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "tools/hil"), str(ROOT / "tools/fleet")]
-from waymark_hil import HilError, compare, fault_judge, guest, lcm_log, limits, poses, recording, samples, scenario, stamps, targets, verdict  # noqa: E402
+from waymark_hil import HilError, compare, fault_judge, guest, hil, judge, lcm_log, limits, poses, recording, samples, scenario, stamps, targets, verdict  # noqa: E402
 
 TYPES = lcm_log.types(sys.argv.pop(1))
 END_S, RATE_HZ = 30.0, 50
@@ -54,11 +54,11 @@ class Drive:
             {"what": "device", "source": "edges:front", "value": "absent", "within_s": 1.0, "cleared_within_s": 2.0}], "pose": None}
         self.said, self.done = "", {"done": True}
 
-    def failures(self):
+    def failures(self, others=()):
         checks = verdict.Checks()
         reference = [(k * 0.1, k * 0.1, 0.0, 0.0, 0.0) for k in range(int(10 * END_S))]
         heard = fault_judge.Heard(self.poses, self.healths, reference, self.said, END_S)
-        fault_judge.judge(checks, self.fault, heard, self.done, "by the truth")
+        fault_judge.judge(checks, self.fault, heard, self.done, "by the truth", others)
         self.checks = checks
         return [check.name for check in checks.failed()]
 
@@ -113,6 +113,30 @@ class Faults(unittest.TestCase):
         self.drive.poses = [(t, pose(t, t, 0.4) if 15 < t < 28 else p) for t, p in usual]
         self.assertEqual([self.drive.failures(), self.drive.status("pose within_s")], [[], "passed"])
 
+    def test_recoveries_that_overlap(self):
+        """Faults that begin before the pose had to be well after another: it is as before the first of them, by the latest of their times."""
+        first = {"fault": "bus_down", "from_s": 2.0, "until_s": 3.0, "pose": {"within_s": 14.0}}
+        between = {"fault": "bus_silent", "from_s": 8.0, "until_s": 9.0, "pose": {"within_s": 2.0}}
+        after = {"fault": "bus_off", "from_s": 15.5, "until_s": 17.0, "pose": {"within_s": 3.0}}
+        self.drive.fault["pose"] = {"within_s": 1.0}
+        alone = (10.0, 16.0)
+        for others, found in (((), alone), ((between,), (8.0, 16.0)), ((first, between), (2.0, 17.0)), ((between, first), (2.0, 17.0)), ((after,), (10.0, 20.0)),
+                              ((between, after, first), (2.0, 20.0)), (({**first, "until_s": None},), alone), (({**first, "pose": None},), alone),
+                              (({**after, "from_s": 16.5},), alone), (({**first, "pose": {"within_s": 7.0}},), alone)):
+            self.assertEqual(fault_judge.recovery(self.drive.fault, others), found, others)
+        usual = list(self.drive.poses)
+        for well_s, failures in ((16.5, []), (17.5, ["pose within_s"])):  # 1 s is not enough, 2 s are; its sigma just before is no measure
+            self.drive.poses = [(t, pose(t, t, 0.2) if 2 <= t < well_s else p) for t, p in usual]
+            self.assertEqual(self.drive.failures((first,)), failures)
+
+    def test_a_process_that_is_killed_a_little_later(self):
+        """Poses between the fault's time and the kill are no recovery."""
+        self.drive.fault |= {"fault": "process_killed", "until_s": 10.0, "health": [], "pose": {"within_s": 2.0}}
+        self.drive.poses = [(t, p if t < 10.04 else pose(t, t, 0.4)) for t, p in self.drive.poses if not 10.04 < t < 11]
+        self.assertEqual(self.drive.failures(), [])
+        self.drive.done = {"done": True, "ended_s": 10.06}
+        self.assertEqual(self.drive.failures(), ["pose within_s"])
+
     def test_poses_that_stop(self):
         self.drive.fault["pose"] = {"gap_max_s": 0.5, "rate_hz": 40}
         self.drive.poses = [(t, p) for t, p in self.drive.poses if not 11 < t < 13]
@@ -146,6 +170,15 @@ class Faults(unittest.TestCase):
         for fault, part, is_in in (((10, 15), (0, 30), True), ((10, 15), (15, 30), False), ((10, 15), (14, 30), True), ((10, 15), (0, 10), False),
                                    ((10, None), (20, 30), True), ((10, 10), (10, 30), True), ((10, 10), (11, 30), False)):
             self.assertEqual(fault_judge.is_in({"from_s": fault[0], "until_s": fault[1]}, *part), is_in, (fault, part))
+
+    def test_what_a_player_cannot_do_to_a_device(self):
+        """Pictures that a player leaves out have no number on the target; a played driver leaves out the number, too."""
+        self.drive.fault |= {"fault": "camera_dropped", "health": [{"what": "counter", "source": "edges:front", "value": "lost", "at_least": 9}]}
+        self.assertEqual(len(self.drive.failures()), 1)
+        played, on_target = (hil._as_the_target_has_them([self.drive.fault], is_played)[0] for is_played in (True, False))
+        self.assertEqual(played, self.drive.fault)
+        self.drive.fault = on_target
+        self.assertEqual((self.drive.failures(), self.drive.status("health 1: edges:front lost")), ([], "skipped"))
 
     def test_a_fault_that_did_not_happen(self):
         self.drive.done = {"done": False, "why": "EPERM"}
@@ -296,7 +329,7 @@ class Stamps(InFolder):
             log("out/recorded/can.log", "can7", self.OFFSET_NS + int(frame_late_ms * 1e6), lost_frame)
             table("out/recorded/video/front.csv", self.OFFSET_NS + int(picture_late_ms * 1e6), lost_picture)
         facts = {"recording": self.folder / "rec", "from_s": 0.0, "until_s": 9.9, "faults": list(faults)}
-        one = types.SimpleNamespace(checks=verdict.Checks(), out=self.folder / "out", facts=facts, played={"offset_ns": self.OFFSET_NS}, figures={},
+        one = types.SimpleNamespace(checks=verdict.Checks(), out=self.folder / "out", facts=facts, played={"offset_ns": self.OFFSET_NS}, figures={}, is_broken=bool(faults),
                                     start_ns=self.OFFSET_NS, limits=limits.read(None, False)[0])
         stamps.judge(one, [("can0", "can7")], ["front"], self.SETTLE_S)
         return {check.name: check.status for check in one.checks}, one
@@ -321,6 +354,28 @@ class Stamps(InFolder):
 
     def test_with_faults(self):
         self.assertEqual(set(self.judged(lost_frame=(500,), picture_late_ms=30, faults=("one",))[0].values()), {"skipped"})
+
+
+class Timing(InFolder):
+    """10 of 1000 deadlines were missed, ten times what is allowed."""
+
+    def judged(self, faults=(), deadlines=None):
+        """Status of the check of deadlines, by a whole judge of a folder."""
+        self.write("out/drive/timing.json", json.dumps({"deadlines_missed": 10, "deadlines_total": 1000}))
+        run = limits.read(None, False)[0] | ({} if deadlines is None else {"deadlines_missed_share": deadlines})
+        one = judge.Judge(verdict.Checks(), self.folder, {"from_s": 0.0, "until_s": 9.0, "faults": list(faults)}, run, None, None)
+        one.timing()
+        found = next(check for check in one.checks if check.name == "deadlines")
+        return found.status, found.text, one.figures["deadlines_missed_share"]
+
+    def test_deadlines(self):
+        self.assertEqual(self.judged(), ("failed", "10 of 1000 missed", 0.01))
+        self.assertEqual(self.judged(deadlines=0.02)[0], "passed")
+
+    def test_with_faults_they_are_reported_alone(self):
+        fault = {"name": "hog", "fault": "cpu_hogged", "from_s": 2.0, "until_s": 3.0}
+        self.assertEqual(self.judged(faults=(fault,)), ("skipped", "10 of 1000 missed", 0.01))
+        self.assertEqual(self.judged(faults=({**fault, "from_s": 20.0, "until_s": 21.0},))[0], "failed")  # none in the part that was played
 
 
 class Guests(unittest.TestCase):

@@ -52,17 +52,19 @@ for deb in debs/*.deb; do dpkg -x "$deb" files; done
 cp "files/boot/vmlinuz-$kernel" vmlinuz
 
 include=iproute2,kmod,can-utils,v4l-utils,liblcm1,procps,udev,liblcm-bin,libyaml-0-2,libturbojpeg0,libpng16-16,libapriltag3,busybox-static
-# cyclictest, and a board that is reached over ssh.
-include=$include,rt-tests,openssh-server
+# A board that is reached over ssh; the library of cyclictest, whose package also has Python scripts and would bring Python.
+include=$include,openssh-server,libnuma1
+cyclictest='cd "$1/tmp" && APT_CONFIG=$MMDEBSTRAP_APT_CONFIG apt-get download -q rt-tests &&
+  dpkg-deb --fsys-tarfile rt-tests_*.deb | tar -C "$1" -x ./usr/bin/cyclictest && rm rt-tests_*.deb'
 # What the package's service runs under, and its dynamic user.
 include=$include,systemd,libnss-systemd,init-system-helpers
 if [ "$arch" = amd64 ]; then
-  mmdebstrap --quiet --variant=minbase --include="$include,libcamera0.0.3,libcamera-ipa" bookworm root
+  mmdebstrap --quiet --variant=minbase --include="$include,libcamera0.0.3,libcamera-ipa" --customize-hook="$cyclictest" bookworm root
 else
   # A mirror's security index of another architecture is sometimes in the middle of a change: the guest does without.
   mirror=$(apt-get indextargets --format '$(REPO_URI)' 'Created-By: Packages' | grep -v security | head -1)
   bash "$toolchain/foreign.sh" "$arch" mmdebstrap --quiet --mode=root --variant=minbase --architectures="$arch" --include="$include" \
-    bookworm root.tar "deb $mirror bookworm main" "deb $mirror bookworm-updates main"
+    --customize-hook="$cyclictest" bookworm root.tar "deb $mirror bookworm main" "deb $mirror bookworm-updates main"
   mkdir root
   tar -C root -xf root.tar --exclude='./dev/*'
   rm root.tar

@@ -139,7 +139,20 @@ def _worst(values):
     return max(values, default=None)
 
 
-def _pose(checks, group, heard, fault, what):
+def recovery(fault, others):
+    """(s, s): since when the pose is not as usual, and when it has to be again. Faults whose times until then overlap share them: the pose is as
+    good as before the first, by the latest of their times."""
+    spans = [(one["from_s"], one["until_s"] + one["pose"]["within_s"]) for one in others
+             if one.get("until_s") is not None and (one.get("pose") or {}).get("within_s") is not None]
+    begun_s, due_s = fault["from_s"], fault["until_s"] + fault["pose"]["within_s"]
+    for _ in spans:
+        for from_s, well_s in spans:
+            if from_s < due_s and begun_s < well_s:
+                begun_s, due_s = min(begun_s, from_s), max(due_s, well_s)
+    return begun_s, due_s
+
+
+def _pose(checks, group, heard, fault, what, others, ended_s):
     bound = fault["pose"]
     from_s, until_s = _span(fault, heard)
     end_s = min(until_s + (bound.get("within_s") or 0), heard.end_s)
@@ -167,12 +180,15 @@ def _pose(checks, group, heard, fault, what):
         grown = lcm_log.sigma_m(during[-1][1]) / max(lcm_log.sigma_m(during[0][1]), 1e-9) if during else 0.0
         checks.add(group, "pose sigma_grows", grown >= bound["sigma_grows"], f"sigma grows by a factor of {grown:.2f}, {bound['sigma_grows']:g} is needed", grown, bound["sigma_grows"])
     if bound.get("within_s") is not None and until_s < heard.end_s:
-        _recovers(checks, group, heard, from_s, until_s, bound["within_s"])
+        begun_s, due_s = recovery({**fault, "until_s": until_s}, others)
+        # What happens to processes is over when the target has done its part: a killed one has poses until then.
+        over_s = max(until_s, ended_s or until_s)
+        _recovers(checks, group, heard, begun_s, over_s, due_s - until_s)
 
 
-def _recovers(checks, group, heard, from_s, until_s, within_s):
+def _recovers(checks, group, heard, begun_s, until_s, within_s):
     """A pose as good as before: the same state or tracking, known motion, a sigma of at most three times that of before."""
-    before = heard.poses_between(from_s - 1, from_s)
+    before = heard.poses_between(begun_s - 1, begun_s)
     usual_m = _AS_BEFORE * lcm_log.sigma_m(before[-1][1]) if before else math.inf
     well_s = next((t - until_s for t, p in heard.poses_between(until_s, heard.end_s)
                    if not p.status_flags & FLAGS["motion_stale"] and lcm_log.sigma_m(p) <= usual_m and p.state in (1, before[-1][1].state if before else 1)), math.inf)
@@ -182,8 +198,9 @@ def _recovers(checks, group, heard, from_s, until_s, within_s):
     checks.at_most(group, "pose within_s", well_s, within_s, f"as good as before {well_s:.2f} s after its end (sigma below {usual_m:.3f} m), {within_s:g} s are allowed")
 
 
-def judge(checks, fault, heard, done, what):
-    """One fault. `done`: what the player or the target did of it: {"done": bool, "why": text}."""
+def judge(checks, fault, heard, done, what, others=()):
+    """One fault. `done`: what the player or the target did of it: {"done": bool, "why": text}, and "ended_s" where the
+    target noted when it was over. `others`: faults that happened, too."""
     group = f"fault: {fault['name']}"
     if not done.get("done"):
         checks.add(group, "it happened", None if done.get("absent") else False, done.get("why") or "neither the player nor the target did it")
@@ -192,11 +209,13 @@ def judge(checks, fault, heard, done, what):
     checks.add(group, "it happened", True, f"{fault['fault']} from {from_s:.1f} to {until_s:.1f} s")
     for number, statement in enumerate(fault.get("health") or [], start=1):
         name = f"health {number}: {statement.get('source') or ''} {statement['value']}".replace("  ", " ")
-        if statement["what"] == "counter":
+        if statement.get("not_here"):
+            checks.add(group, name, None, f"not on this target: {statement['not_here']}")
+        elif statement["what"] == "counter":
             _counts(checks, group, name, heard, statement, fault)
         elif statement["what"] == "text":
             _said(checks, group, name, heard, statement)
         else:
             _holds(checks, group, name, heard, statement, fault)
     if fault.get("pose"):
-        _pose(checks, group, heard, fault, what)
+        _pose(checks, group, heard, fault, what, others, done.get("ended_s"))

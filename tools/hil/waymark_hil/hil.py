@@ -125,13 +125,17 @@ _STALLED_AFTER_S = 2.5
 
 
 def _as_the_target_has_them(faults, played):
-    """The faults as they are on the target: a player cannot unplug a video device, it leaves it without a writer."""
+    """The faults as they are on the target: a player cannot unplug a video device, it leaves it without a writer; nor can it leave out a number
+    of the device's own count of pictures."""
     out = []
     for fault in faults:
         if fault["fault"] == "camera_unplugged" and not played:
             kept = [statement for statement in fault["health"] if statement["what"] != "text"]
             fault = {**fault, "health": [{**statement, "value": "stalled", "within_s": max(statement["within_s"] or 0, _STALLED_AFTER_S)}
                                          if statement["what"] == "device" and statement["value"] == "absent" else statement for statement in kept]}
+        if fault["fault"] == "camera_dropped" and not played:
+            fault = {**fault, "health": [{**statement, "not_here": "a video device of a player numbers the pictures that it gets: none is missing by its count"}
+                                         if statement["what"] == "counter" and statement["value"] == "lost" else statement for statement in fault["health"]]}
         out.append(fault)
     return out
 

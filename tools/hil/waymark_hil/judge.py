@@ -35,6 +35,7 @@ class Judge:
         self.start_ns = int(start) - round(facts["from_s"] * 1e9) if start.isdigit() else None
         self.faults = facts.get("faults") or []
         self.before_faults_s = min((fault["from_s"] for fault in self.faults if fault_judge.is_in(fault, facts["from_s"], facts["until_s"])), default=float("inf"))
+        self.is_broken = self.before_faults_s < float("inf")  # something is, in the part that was played
 
     def replay(self, *words):
         """`waymark replay`; its output. HilError with its last line."""
@@ -150,7 +151,7 @@ class Judge:
         judged_s = (until_ns - max(begun_ns, self.start_ns + int(self.facts["from_s"] * 1e9))) * 1e-9
         enough = len(apart) >= min(_MIN_RATE_HZ, 0.6 * self.facts["rate_hz"]) * max(judged_s - 1, 0.1)
         worst_m, worst_deg = max((m for _, m, _ in apart), default=None), max((d for *_, d in apart), default=None)
-        text = (f"{len(apart)} of {len(self.heard)} poses over LCM, in {judged_s:.0f} s" + (" before the first fault" if self.faults else "")
+        text = (f"{len(apart)} of {len(self.heard)} poses over LCM, in {judged_s:.0f} s" + (" before the first fault" if self.is_broken else "")
                 + ("" if worst_m is None else f": at most {worst_m:.4f} m and {worst_deg:.3f} degrees from the replay of what the run saw"))
         self.checks.add("poses", "enough to compare", enough, text)
         if worst_m is not None:
@@ -204,12 +205,12 @@ class Judge:
             worst = max(worst, share)
             text = f"{received} received, " + (", ".join(f"{n} {key}" for key, n in counted.items()) or "none lost, dropped or late")
             limit = self.limits["lost_share"]
-            self.checks.add("losses", name, None if self.faults or limit is None else share <= limit and received > 0, text, share, limit)
+            self.checks.add("losses", name, None if self.is_broken or limit is None else share <= limit and received > 0, text, share, limit)
         self.figures["lost_share"] = worst
         for line in (self.out / "buses.txt").read_text().splitlines() if (self.out / "buses.txt").exists() else []:
             name, errors, packets = line.split()
             sent = next((stream["sent"] for stream in self.played.get("streams", []) if stream["name"] == f"can:{name}"), None)
-            self.checks.add("losses", f"interface {name}", None if self.faults else errors == "0", f"{packets} frames received, {errors} errors of the controller"
+            self.checks.add("losses", f"interface {name}", None if self.is_broken else errors == "0", f"{packets} frames received, {errors} errors of the controller"
                             + ("" if sent is None else f", {sent} sent"), float(errors), 0.0)
 
     def timing(self):
@@ -222,7 +223,7 @@ class Judge:
             return
         missed, total = timing["deadlines_missed"], max(timing["deadlines_total"], 1)
         limit = self.limits["deadlines_missed_share"]
-        self.checks.add("timing", "deadlines", None if limit is None or self.faults else missed / total <= limit, f"{missed} of {total} missed", missed / total, limit)
+        self.checks.add("timing", "deadlines", None if limit is None or self.is_broken else missed / total <= limit, f"{missed} of {total} missed", missed / total, limit)
         self.figures |= {"deadlines_missed_share": missed / total}
         for stage in ("wake", "loop", "correct", "detect", "send", "predict"):
             if (timing.get(stage) or {}).get("count"):
@@ -278,11 +279,13 @@ class Judge:
             elif found and found.get("failure"):
                 done[number] = {"done": False, "why": f"the player could not do it: {found['failure']}"}
         for line in (self.out / "faults.txt").read_text().splitlines() if (self.out / "faults.txt").exists() else []:
-            number, event, _, *why = line.split(" ", 3)
+            number, event, at_s, *why = line.split(" ", 3)
             if event == "absent":
                 done[int(number)] = {"done": False, "absent": True, "why": "not on this target: " + " ".join(why)}
             elif event == "begin":
                 done[int(number)] = {"done": True}
+            elif event == "end" and int(number) in done:
+                done[int(number)]["ended_s"] = float(at_s)
         for number, fault in enumerate(self.faults):
             if not fault_judge.is_in(fault, self.facts["from_s"], self.facts["until_s"]):
                 done[number] = {"done": False, "absent": True, "why": "not in the part that was played"}
@@ -305,8 +308,9 @@ class Judge:
         heard = fault_judge.Heard([(at(p.t_ns), p) for p in self.heard], [(at(h.t_ns), h) for h in self.healths], self.reference, self.said,
                                   self.facts["until_s"])
         done = self._done()
+        happened = [fault for number, fault in enumerate(self.faults) if done.get(number, {}).get("done")]
         for number, fault in enumerate(self.faults):
-            fault_judge.judge(self.checks, fault, heard, done.get(number, {}), f"by the {self.reference_is}")
+            fault_judge.judge(self.checks, fault, heard, done.get(number, {}), f"by the {self.reference_is}", happened)
         self._devices(heard)
         others = max((h.other_runs_total for h in self.healths), default=0)
         self.checks.add("health", "alone on its channels", others == 0, f"{others} other runs were heard on {self.facts['prefix']}HEALTH")

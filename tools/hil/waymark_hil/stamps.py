@@ -82,10 +82,10 @@ def judge(judge, buses, cameras, settle_s):
         if differences:
             text += f", stamped {poses.quantile(differences, 0.5) / 1e6:.3f} ms (p50) and {poses.quantile(differences, 0.99) / 1e6:.3f} ms (p99) after their time"
         limit = judge.limits["lost_share"]
-        judge.checks.add("stamps", name, None if facts["faults"] or limit is None else count > 0 and missing / count <= limit, text, missing / max(count, 1), limit)
+        judge.checks.add("stamps", name, None if judge.is_broken or limit is None else count > 0 and missing / count <= limit, text, missing / max(count, 1), limit)
         if middle is not None and name.startswith("camera:") and differences:
             skew_ms = poses.quantile([abs(d - middle) for d in differences], 0.99) / 1e6
             judge.figures[f"skew_{name[7:]}_p99_ms"] = skew_ms
             bound = judge.limits["skew_ms"]
-            judge.checks.add("stamps", f"skew of {name[7:]} and CAN", None if bound is None or facts["faults"] else skew_ms <= bound,
+            judge.checks.add("stamps", f"skew of {name[7:]} and CAN", None if bound is None or judge.is_broken else skew_ms <= bound,
                              f"{skew_ms:.3f} ms (p99) between the stamps of pictures and of frames", skew_ms, bound)
