@@ -55,6 +55,14 @@ struct placement {
   bool is_better(const placement &o) const { return cost < o.cost; }
 };
 
+// The frame in which odometry `odom` is the pose.
+placement placed(const wm_pose2 &pose, const wm_pose2 &odom) {
+  const double turn = wrap(pose.heading_rad - odom.heading_rad);
+  const sin_cos by = sincos(turn);
+  return {pose.x_m - by.cos * odom.x_m + by.sin * odom.y_m, pose.y_m - by.sin * odom.x_m - by.cos * odom.y_m, turn,
+          0.0};
+}
+
 struct problem {
   struct item {
     const observation *seen;
@@ -493,21 +501,14 @@ void pose_search::add(const observation &seen) {
   if (count_ == 4 * kCapacity) count_ -= 2 * kCapacity;  // bounds the counter; the place in the ring stays
 }
 
-void pose_search::forget_before(wm_time_ns t_ns) {
-  observation recent[kCapacity];
-  const int count = count_since(t_ns), first = kept() - count;
-  for (int i = 0; i < count; i++) recent[i] = at(first + i);
-  for (int i = 0; i < count; i++) ring_[i] = recent[i];
-  count_ = count;
-}
-
 int pose_search::count_since(wm_time_ns since_ns) const {
   int count = 0;
   while (count < kept() && at(kept() - 1 - count).t_ns >= since_ns) count++;
   return count;
 }
 
-bool pose_search::contradicts(const observation &seen, wm_time_ns since_ns) const {
+bool pose_search::contradicts(const observation &seen, wm_time_ns since_ns, const wm_pose2 &pose_now,
+                              const travelled_pose2 &odometry) const {
   constexpr uint32_t kPlace = kObservedBearing | kObservedRange;
   if ((seen.kind & kPlace) != kPlace) return false;
   const sin_cos sight = sincos(seen.sensor.heading_rad + seen.bearing_rad);
@@ -515,6 +516,9 @@ bool pose_search::contradicts(const observation &seen, wm_time_ns since_ns) cons
   for (int i = kept() - count_since(since_ns); i < kept(); i++) {
     const observation &c = at(i);
     if (c.key != seen.key || c.t_ns >= seen.t_ns || (c.kind & kPlace) != kPlace) continue;
+    problem one;
+    one.add(c, odometry);
+    if (support_of(one, placed(pose_now, odometry.pose)).observations == 0) continue;
     const sin_cos other = sincos(c.sensor.heading_rad + c.bearing_rad);
     const double dx = c.sensor.x_m + c.range_m * other.cos - seen.sensor.x_m - seen.range_m * sight.cos;
     const double dy = c.sensor.y_m + c.range_m * other.sin - seen.sensor.y_m - seen.range_m * sight.sin;
@@ -541,12 +545,7 @@ int pose_search::agreeing(wm_time_ns since_ns, const wm_pose2 &pose_now, const t
     if (seen[n].key >= 0) seen[n].sensor = compose(seen[n].sensor, mounting[seen[n].key % kMaxSensors]);
     all.add(seen[n], odometry);
   }
-  const wm_pose2 &odom = odometry.pose;
-  const double turn = wrap(pose_now.heading_rad - odom.heading_rad);
-  const sin_cos by = sincos(turn);
-  return support_of(all, {pose_now.x_m - by.cos * odom.x_m + by.sin * odom.y_m,
-                          pose_now.y_m - by.sin * odom.x_m - by.cos * odom.y_m, turn, 0.0})
-      .observations;
+  return support_of(all, placed(pose_now, odometry.pose)).observations;
 }
 
 search_result pose_search::find(wm_time_ns since_ns, const travelled_pose2 &odometry, const observation *prior,

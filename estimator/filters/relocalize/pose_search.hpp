@@ -68,16 +68,17 @@ class pose_search {
   static constexpr int kCapacity = 64;  // observations: one landmark's of 19 s, or of ten in view 2 s. Not swept.
 
   void clear() { count_ = 0; }
-  void forget_before(wm_time_ns t_ns);
   // Keeps an observation; of one key at most one in 0.3 s, so that a fast sensor does not displace older ones.
   void add(const observation &seen);
   // Those still buffered, the oldest first.
   int kept() const { return count_ < kCapacity ? count_ : kCapacity; }
   const observation &at(int i) const { return ring_[(count_ - kept() + i) % kCapacity]; }
   int count_since(wm_time_ns since_ns) const;
-  // Whether a place of a landmark (bearing and range) contradicts more of those since `since_ns` that the same sensor
-  // observed of the same landmark than agree with it, as odometry relates them. It needs no pose.
-  bool contradicts(const observation &seen, wm_time_ns since_ns) const;
+  // Whether a place of a landmark (bearing and range) contradicts most of those since `since_ns` that the same sensor
+  // observed of the same landmark and that fit the pose now, as odometry relates them: the errors of pose and map
+  // cancel.
+  bool contradicts(const observation &seen, wm_time_ns since_ns, const wm_pose2 &pose_now,
+                   const travelled_pose2 &odometry) const;
   // How many observations since `since_ns` agree with the pose now. `mounting`: the correction of each sensor's
   // mounting since its observations were buffered.
   int agreeing(wm_time_ns since_ns, const wm_pose2 &pose_now, const travelled_pose2 &odometry,

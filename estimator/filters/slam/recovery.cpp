@@ -19,8 +19,7 @@ constexpr int kByOneSeen = 3;
 constexpr double kDrift_rad = 0.005;
 constexpr double kSigmas = 3.0;     // by which the mirror image must be excluded
 constexpr double kWindow_s = 20.0;  // observations older than this are not searched, as in landmark_ekf
-constexpr double kRecent_s =
-    1.0;  // an outlier contradicts those of this time; longer, and a robot that was carried would
+constexpr double kRecent_s = 1.0;   // what the pose was found by serves for so long; then its covariance is small
 constexpr double kFound_m = 0.5, kFound_rad = 0.15;  // a pose with larger sigmas is not taken
 constexpr double kLoose_m = 0.2, kLoose_rad = 0.05;  // added: errors of sensors and map that the search takes as white
 constexpr int kNumbers = 5;                          // must agree; two more than a pose has
@@ -33,11 +32,8 @@ constexpr double kOld_s = 60.0;                      // or on the map for so lon
 
 void slam::begin_evidence(double log_prior) {
   evidence_.begin(log_prior);
-  search_after_ns_ = joint_.now_ns();
-  if (search_after_ns_ == WM_TIME_NONE)
-    observations_.clear();
-  else
-    observations_.forget_before(search_after_ns_ - wm_ns_from_seconds(kRecent_s));
+  observations_.clear();
+  found_by_.clear();
   fit_ns_ = WM_TIME_NONE;
   pattern_odds_.reset(kOwnFramePrior);
   pattern_ns_ = WM_TIME_NONE;
@@ -133,13 +129,14 @@ observation slam::observation_from(int landmark, const context &at, const planar
 }
 
 // Keeps an observation for the search, while the map is held: a place that moves would be another landmark's. False: it
-// is an outlier by what the sensor observed of this landmark just before. A pose that was just found has a covariance
-// within which such an outlier passes the gate.
+// is an outlier by the observations of this landmark by which the pose was just found, whose covariance is so large
+// that the outlier would pass the gate.
 bool slam::keep_observation(int landmark, const context &at, const planar_observation &seen) {
   if (!params_.recover || !map_is_held() || !is_confirmed(note(landmark))) return true;
   const int state = joint_.landmark_state(landmark);
   observation o = observation_from(landmark, at, seen);
-  const bool fits = !observations_.contradicts(o, joint_.now_ns() - wm_ns_from_seconds(kRecent_s));
+  const wm_time_ns since = joint_.now_ns() - wm_ns_from_seconds(kRecent_s);
+  const bool fits = !found_by_.contradicts(o, since, joint_.pose(), odometry());
   observations_.add(o);
   if (!finite(seen.heading_rad) || joint_.variance(state + 2) > square(kFound_rad)) return fits;
   o.kind = kObservedHeading;
@@ -200,8 +197,7 @@ bool slam::relocalize() {
       !life_.search_due(now))
     return false;
   life_.searched(now);
-  wm_time_ns since = now - wm_ns_from_seconds(kWindow_s);
-  if (search_after_ns_ >= since) since = search_after_ns_ + 1;
+  const wm_time_ns since = now - wm_ns_from_seconds(kWindow_s);
   search_result found = observations_.find(since, odometry(), nullptr, 0, {kFound_m, kFound_rad, kNumbers});
   int32_t id = -1;
   const bool by_one = found.found && landmarks_fitting(found.pose, since, &id) < 2;
@@ -214,7 +210,9 @@ bool slam::relocalize() {
     if (const int yaw = slots_.at((int)i, kYaw); yaw >= 0) found.covariance[2][2] += joint_.variance(yaw);
   for (int k = 0; k < 3; k++) found.covariance[k][k] += square(k < 2 ? kLoose_m : kLoose_rad);
   joint_.set_pose(found.pose, found.covariance);
+  const pose_search used = observations_;
   take_found(by_one ? kByOnePrior : kFoundWrong);
+  found_by_ = used;
   by_one_ = by_one;
   return true;
 }

@@ -378,8 +378,8 @@ class slam {
   lifecycle life_;
   rollback<kMaxCalibration> rollback_;
   landmark_evidence evidence_;
-  pose_search observations_;    // since the map is held
-  wm_time_ns search_after_ns_;  // younger ones are searched; those before led to the pose that was found last
+  pose_search observations_;  // since the map is held
+  pose_search found_by_;      // those by which the pose was found last
   slip_search slips_;
   wm_time_ns fit_ns_;      // when a witness fitted last
   bearing_look bearings_;  // of the newest picture, where lines have no identity
