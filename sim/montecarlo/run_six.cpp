@@ -43,6 +43,18 @@ wm_rig rig_of(const sim::Scenario &scenario) {
   return rig;
 }
 
+wm_setup setup_of(const sim::Scenario &scenario, const wm_config &config, const sim::Recording &recording,
+                  const wm_rig *rig) {
+  wm_setup out{};
+  out.motion = config.motion;
+  out.sightings = config.sightings;
+  out.wheels = scenario.robot.wheels;
+  out.rig = rig;
+  out.start = recording.start;
+  out.seed = recording.seed;
+  return out;
+}
+
 std::vector<wm_event> events_of(const sim::Recording &recording) {
   std::vector<wm_event> out;
   const auto add = [&](const auto &seen, wm_event_kind kind, uint16_t source) -> wm_event & {
@@ -142,16 +154,11 @@ struct Begun {
   wm_status begin(const sim::Scenario &scenario, const wm_config &config, const sim::Recording &recording,
                   wm_error *err) {
     rig = rig_of(scenario);
-    setup.motion = config.motion;
-    setup.sightings = config.sightings;
-    setup.wheels = scenario.robot.wheels;
+    setup = setup_of(scenario, config, recording, &rig);
     setup.sensors = recording.sensors.data();
     setup.sensor_count = recording.sensors.size();
     setup.landmarks = recording.map.data();
     setup.landmark_count = recording.map.size();
-    setup.rig = &rig;
-    setup.start = recording.start;
-    setup.seed = recording.seed;
     const wm_estimator &ops = *config.estimator;
     const char *why = "";
     const size_t bytes = ops.state_bytes(config.estimator_params, &setup, &why);
@@ -170,7 +177,8 @@ wm_status add_bound(const sim::Scenario &scenario, const wm_config &config, uint
                     Statistics6 &out, wm_error *err) {
   sim::Scenario perfect = scenario;
   sim::make_perfect(perfect);
-  for (size_t i = 0; i < perfect.sensors.size(); i++)  // what says nothing is missing, as it is in the drives
+  // Points that are missed, and those that are outliers, are missing here.
+  for (size_t i = 0; i < perfect.sensors.size(); i++)
     perfect.sensors[i].missed_fraction = scenario.sensors[i].missed_fraction + scenario.sensors[i].outlier_fraction;
   sim::Recording recording, real;
   if (const wm_status s = sim::simulate(perfect, seed, SIZE_MAX, recording, err); s != WM_OK) return s;

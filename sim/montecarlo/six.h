@@ -12,6 +12,9 @@ namespace wm::montecarlo {
 
 // calibration.yaml's part that the estimator needs: the pair of the scenario's stereo sensor.
 wm_rig rig_of(const sim::Scenario &scenario);
+// What an estimator begins a drive with, without sensors and landmarks. `rig` has to outlive it.
+wm_setup setup_of(const sim::Scenario &scenario, const wm_config &config, const sim::Recording &recording,
+                  const wm_rig *rig);
 // By stamp, motion first, then as the sources stand.
 std::vector<wm_event> events_of(const sim::Recording &recording);
 

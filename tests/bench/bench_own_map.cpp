@@ -40,12 +40,7 @@ struct Bench {
     }
     rig = montecarlo::rig_of(scenario);
     events = montecarlo::events_of(recording);
-    setup.motion = config.motion;
-    setup.sightings = config.sightings;
-    setup.wheels = scenario.robot.wheels;
-    setup.rig = &rig;
-    setup.start = recording.start;
-    setup.seed = 1;
+    setup = montecarlo::setup_of(scenario, config, recording, &rig);
     return true;
   }
 

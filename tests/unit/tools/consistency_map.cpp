@@ -46,12 +46,7 @@ class Drive {
     past.scatter.seed = points_seed;
     TEST_ASSERT_EQUAL_MESSAGE(WM_OK, sim::simulate(past, seed, SIZE_MAX, recording_, &err), err.text);
     events_ = montecarlo::events_of(recording_);
-    setup_.motion = config.motion;
-    setup_.sightings = config.sightings;
-    setup_.wheels = scenario.robot.wheels;
-    setup_.rig = &rig_;
-    setup_.start = recording_.start;
-    setup_.seed = seed;
+    setup_ = montecarlo::setup_of(scenario, config, recording_, &rig_);
   }
 
   wm_setup &setup() { return setup_; }
