@@ -309,7 +309,7 @@ int32_t silent_source(const wm_monitor &self, wm_time_ns t_ns) {
 bool test_calibration(wm_monitor *self, const wm_calibration_value *values, size_t count) {
   self->is_noise_at_limit = 0;
   for (size_t i = 0; i < count; i++)
-    if (noise_adaption::is_at_limit(values[i]) || scale_contradicts(self->scale_sigma, values[i]) ||
+    if (noise_adaption::is_at_limit(values[i]) || scale_contradicts(self->scales, values[i]) ||
         lasting_error_contradicts(values[i]))
       self->is_noise_at_limit = 1;
   if (!self->is_noise_at_limit) return false;
@@ -440,7 +440,7 @@ void wm_monitor_init(wm_monitor *self, const wm_setup *setup, uint64_t observers
     self->is_map_known = setup->landmark_count > 0;
   }
   wm::course_begin(&self->course);
-  wm::scales_begin(*setup, self->scale_sigma);
+  wm::scales_begin(*setup, self->scales);
   wm::clear(self);
 }
 

@@ -5,7 +5,7 @@
 #include <cstring>
 
 #include "math/elementary.hpp"
-#include "motion/motion_params.h"
+#include "motion/motion_kind.hpp"
 #include "sensors/sighting_params.h"
 
 namespace wm {
@@ -41,20 +41,22 @@ int scale_of(const wm_calibration_value &value) {
 
 }  // namespace
 
-void scales_begin(const wm_setup &setup, double sigma[WM_MONITOR_SCALES]) {
+void scales_begin(const wm_setup &setup, wm_monitor_scale scales[WM_MONITOR_SCALES]) {
   for (int i = 0; i < WM_MONITOR_SCALES; i++) {
-    sigma[i] = 0.0;
-    if (kScales[i].term >= 0 && setup.motion) sigma[i] = std::fabs(setup.motion->states.sigma[kScales[i].term]);
-    if (kScales[i].term < 0 && setup.sightings)
-      sigma[i] = std::fabs(setup.sightings->states.sigma[WM_SENSOR_ROW_kRangeScale]);
+    const int term = kScales[i].term;
+    scales[i] = {1.0, 0.0};
+    if (term >= 0 && setup.motion)
+      scales[i] = {start_value(setup.motion->states, term), start_sigma(setup.motion->states, term)};
+    if (term < 0 && setup.sightings)
+      scales[i].sigma = std::fabs(setup.sightings->states.sigma[WM_SENSOR_ROW_kRangeScale]);
   }
 }
 
-bool scale_contradicts(const double sigma[WM_MONITOR_SCALES], const wm_calibration_value &value) {
+bool scale_contradicts(const wm_monitor_scale scales[WM_MONITOR_SCALES], const wm_calibration_value &value) {
   const int i = scale_of(value);
-  if (i == WM_MONITOR_SCALES || !(sigma[i] > 0.0)) return false;
-  const double off = std::fabs(value.value - 1.0);
-  return (value.value > kMost || value.value < 1.0 / kMost) && off > kSigmas * larger(sigma[i], value.sigma);
+  if (i == WM_MONITOR_SCALES || !(scales[i].sigma > 0.0)) return false;
+  const double ratio = value.value / scales[i].value, off = std::fabs(value.value - scales[i].value);
+  return (ratio > kMost || ratio < 1.0 / kMost) && off > kSigmas * larger(scales[i].sigma, value.sigma);
 }
 
 }  // namespace wm

@@ -86,12 +86,17 @@ typedef struct wm_monitor_landmarks {
   int32_t contradicts;
 } wm_monitor_landmarks;
 
+// Prior of a calibration's scale; a sigma of 0: it is not a state.
+typedef struct wm_monitor_scale {
+  double value, sigma;
+} wm_monitor_scale;
+
 typedef struct wm_monitor {
   wm_monitor_source sources[WM_MONITOR_SOURCES];
   uint64_t observers;  // bit for each source that may give observations
   wm_monitor_course course;
   wm_monitor_landmarks landmarks;         // of a known map
-  double scale_sigma[WM_MONITOR_SCALES];  // stated; 0: no state
+  wm_monitor_scale scales[WM_MONITOR_SCALES];
   double mirrored_m2, mirrored_rad2;      // what the chance of a mirror image adds to the covariance
   double spread_m2;                       // variance of a place anywhere on the map, each axis
   double low_m[2], high_m[2];             // the map, else the way so far
