@@ -12,17 +12,20 @@ namespace wm {
 namespace {
 
 constexpr double kMost = 1.2, kSigmas = 5.0;
+// Sigmas, of all lengths together. With default priors SLAM on 15 real recordings reaches 1.4.
+constexpr double kLengthSigmas = 3.5;
 // Names of calibration values, and whose sigma it is. The last one is of any sensor.
 constexpr struct {
   const char *name;
   int term;
-} kScales[WM_MONITOR_SCALES] = {{"motion.speed_scale", WM_SPEED_SCALE},
-                                {"motion.yaw_rate_scale", WM_YAW_RATE_SCALE},
-                                {"motion.left_scale", WM_LEFT_SCALE},
-                                {"motion.right_scale", WM_RIGHT_SCALE},
-                                {"motion.track_scale", WM_TRACK_SCALE},
-                                {"motion.side_scale", WM_SIDE_SCALE},
-                                {"range_scale", -1}};
+  bool is_length;
+} kScales[WM_MONITOR_SCALES] = {{"motion.speed_scale", WM_SPEED_SCALE, true},
+                                {"motion.yaw_rate_scale", WM_YAW_RATE_SCALE, false},
+                                {"motion.left_scale", WM_LEFT_SCALE, true},
+                                {"motion.right_scale", WM_RIGHT_SCALE, true},
+                                {"motion.track_scale", WM_TRACK_SCALE, false},
+                                {"motion.side_scale", WM_SIDE_SCALE, true},
+                                {"range_scale", -1, true}};
 
 // What stands behind the last dot of a name.
 const char *last_part(const char *name) {
@@ -58,5 +61,13 @@ bool scale_contradicts(const wm_monitor_scale scales[WM_MONITOR_SCALES], const w
   const double ratio = value.value / scales[i].value, off = std::fabs(value.value - scales[i].value);
   return (ratio > kMost || ratio < 1.0 / kMost) && off > kSigmas * larger(scales[i].sigma, value.sigma);
 }
+
+double length_contradiction(const wm_monitor_scale scales[WM_MONITOR_SCALES], const wm_calibration_value &value) {
+  const int i = scale_of(value);
+  if (i == WM_MONITOR_SCALES || !kScales[i].is_length || !(scales[i].sigma > 0.0)) return 0.0;
+  return square((value.value - scales[i].value) / larger(scales[i].sigma, value.sigma));
+}
+
+bool lengths_contradict(double squares) { return squares > square(kLengthSigmas); }
 
 }  // namespace wm
