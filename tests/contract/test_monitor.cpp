@@ -216,6 +216,9 @@ wm_estimate drive_by_positions(double seconds, double side, double v_mps) {
     e.as.position.sigma_xy_m = 5.0;
     out = robot.estimate;
     out.t_ns = e.t_ns;
+    out.pose_map_base.p_m[0] = x_m;
+    out.pose_map_base.p_m[1] = y_m;
+    out.heading_rad = heading_rad;
     out.v_mps[0] = v_mps;
     out.w_radps[2] = w_radps;
     wm_innovation record{};  // the filter takes the contradiction for a lasting error of the positions
@@ -238,6 +241,22 @@ void positions_that_turn_to_the_other_side_are_degraded(void) {
   const wm_estimate mirrored = drive_by_positions(60, -1, 10);
   TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, mirrored.state);
   TEST_ASSERT_EQUAL(WM_CAUSE_TURN, mirrored.cause);
+}
+
+// Before it is certain that positions are mirrored, the covariance is that of the mixture with the mirror image of the
+// drive: about its first straight, the same x, the other side, the other heading. Place and heading have one chance.
+void positions_that_may_be_mirrored_widen_the_covariance(void) {
+  for (double seconds = 17.0; seconds < 25.0; seconds += 1.0) {
+    const wm_estimate out = drive_by_positions(seconds, -1, 10);
+    TEST_ASSERT_EQUAL(WM_STATE_TRACKING, out.state);
+    const double more_m2 = out.covariance[wm_cov_index(0, 0)] - 0.01;
+    const double more_rad2 = out.covariance[wm_cov_index(5, 5)] - 0.01;
+    const double apart_m = 2.0 * out.pose_map_base.p_m[1], apart_rad = 2.0 * out.heading_rad;
+    TEST_ASSERT_DOUBLE_WITHIN(0.1, 1.0, more_m2 / more_rad2 * std::pow(apart_rad / apart_m, 2));
+    const double chance = more_rad2 / (apart_rad * apart_rad);
+    TEST_ASSERT_GREATER_THAN_DOUBLE(0.05, chance);
+    TEST_ASSERT_LESS_THAN_DOUBLE(1.0, chance);
+  }
 }
 
 // 60 m/s at 0.3 rad/s are 19 m/s2.
@@ -287,6 +306,20 @@ void lengths_that_contradict_each_other_are_degraded(void) {
   TEST_ASSERT_EQUAL(WM_STATE_TRACKING, state_with(setup, {"motion.speed_scale", 1.19, 0.005}));
 }
 
+// On a known map a scale is off from a fifth on; one of 0.88 is five sigmas, and no other unit or size.
+void a_scale_that_is_off_by_less_than_a_fifth_is_no_contradiction(void) {
+  const parameters::values motion(wm_motion_params_table, {{"states.left_scale_sigma", 0.02}});
+  const wm_landmark post{};
+  wm_setup setup{};
+  setup.motion = static_cast<const wm_motion_params *>(static_cast<const void *>(motion.data()));
+  setup.landmarks = &post;
+  setup.landmark_count = 1;
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, state_with(setup, {"motion.left_scale", 0.88, 0.003}));
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, state_with(setup, {"motion.left_scale", 1.12, 0.003}));
+  TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, {"motion.left_scale", 0.82, 0.003}));
+  TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, {"motion.left_scale", 1.22, 0.003}));
+}
+
 // Its effective track is 1.5 +- 0.25 of the distance of its wheels. The third value of `drive` is skid_steer.
 void the_wide_track_of_skid_steer_is_its_prior(void) {
   const parameters::values plain(wm_motion_params_table, {}), skids(wm_motion_params_table, {{"drive", 2}});
@@ -296,6 +329,15 @@ void the_wide_track_of_skid_steer_is_its_prior(void) {
   setup.motion = static_cast<const wm_motion_params *>(static_cast<const void *>(skids.data()));
   TEST_ASSERT_EQUAL(WM_STATE_TRACKING, state_with(setup, {"motion.track_scale", 1.7, 0.01}));
   TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, {"motion.track_scale", 2.9, 0.01}));
+}
+
+// Contradicted for 10 s: any heading, whose variance is pi^2 / 3.
+void a_contradicted_pose_may_head_anywhere(void) {
+  lone robot(true);
+  (void)robot.drive(20, WM_FUSED);
+  const wm_estimate lost = robot.drive(30, WM_REJECTED_GATE);
+  TEST_ASSERT_EQUAL(WM_STATE_LOST, lost.state);
+  TEST_ASSERT_DOUBLE_WITHIN(0.02, M_PI * M_PI / 3.0, lost.covariance[wm_cov_index(5, 5)]);
 }
 
 // A map with a fault fits by chance now and then: after a minute of contradiction it does not count like a found pose.
@@ -430,9 +472,12 @@ int main(void) {
   RUN_TEST(stereo_ekf_is_degraded_then_lost);
   RUN_TEST(a_turn_with_the_wrong_sign_is_named);
   RUN_TEST(positions_that_turn_to_the_other_side_are_degraded);
+  RUN_TEST(positions_that_may_be_mirrored_widen_the_covariance);
   RUN_TEST(a_turn_that_no_vehicle_can_drive_is_degraded);
   RUN_TEST(values_far_from_what_is_stated_are_degraded);
   RUN_TEST(lengths_that_contradict_each_other_are_degraded);
+  RUN_TEST(a_scale_that_is_off_by_less_than_a_fifth_is_no_contradiction);
+  RUN_TEST(a_contradicted_pose_may_head_anywhere);
   RUN_TEST(the_wide_track_of_skid_steer_is_its_prior);
   RUN_TEST(a_run_that_was_contradicted_for_long_has_to_fit_for_longer);
   RUN_TEST(a_pose_off_the_map_is_degraded);

@@ -5,6 +5,7 @@
 #include <cstdlib>
 
 #include "events.hpp"
+#include "filters/core/noise_adaption.hpp"
 #include "math/cholesky.hpp"
 #include "math/elementary.hpp"
 #include "motion/motion_params.h"
@@ -148,6 +149,25 @@ void expect_consistent(const stated &by, bool has_landmarks, bool lasting = fals
   TEST_ASSERT_GREATER_OR_EQUAL_DOUBLE(0.85, share);
 }
 
+// GIVEN positions that are off by four stated sigmas WHEN nothing comes for three time constants of 1000 s THEN what
+// was found of their noise is forgotten by exp(-3).
+void test_what_was_found_is_forgotten(void) {
+  wm::noise_adaption adaption;
+  adaption.init(1.0);
+  adaption.forget(make::at(0.0));
+  for (int i = 0; i < 60; i++) {
+    wm::noise_adaption::row row{};
+    row.innovation = i % 2 ? 4.0 : -4.0;
+    row.variance = row.own = 1.0;
+    row.kind = wm::noise_adaption::kPlace;
+    adaption.update(row);
+  }
+  const double found = std::log(adaption.scale(wm::noise_adaption::kPlace));
+  TEST_ASSERT_GREATER_THAN_DOUBLE(1.0, found);
+  for (int i = 1; i <= 3000; i++) adaption.forget(make::at(i));
+  TEST_ASSERT_DOUBLE_WITHIN(0.01 * found, found * std::exp(-3.0), std::log(adaption.scale(wm::noise_adaption::kPlace)));
+}
+
 void test_right_noise_stays_consistent() {
   expect_consistent({}, true);
   expect_consistent({}, false);
@@ -184,6 +204,7 @@ void tearDown(void) {}
 
 int main() {
   UNITY_BEGIN();
+  RUN_TEST(test_what_was_found_is_forgotten);
   RUN_TEST(test_right_noise_stays_consistent);
   RUN_TEST(test_noise_of_the_motion_stated_four_times_too_small);
   RUN_TEST(test_noise_of_the_motion_stated_four_times_too_large);
