@@ -149,6 +149,20 @@ void test_bearings_that_say_nothing_give_no_pose(void) {
 
 // ---- witnesses ----
 
+// GIVEN a landmark that contradicts WHEN it is seen again after 9 s, as likely here as anywhere THEN of the old
+// contradiction exp(-3) is left.
+void test_an_old_contradiction_is_forgotten(void) {
+  wm::landmark_evidence evidence;
+  const double prior = -3.0;
+  evidence.begin(prior);
+  wm::landmark_record record{};
+  for (int i = 0; i <= 20; i++) evidence.note(make::at(0.4 * i), 1, 1.6, 0.5, 5.0, &record);
+  TEST_ASSERT_GREATER_THAN_DOUBLE(prior + 2.5, evidence.log_odds());
+  evidence.note(make::at(17.0), 1, 0.0, 0.0, 0.0, &record);
+  TEST_ASSERT_LESS_THAN_DOUBLE(prior + 0.45, evidence.log_odds());
+  TEST_ASSERT_GREATER_THAN_DOUBLE(prior + 0.1, evidence.log_odds());
+}
+
 void test_one_that_contradicts_has_moved_and_many_mean_lost(void) {
   wm::landmark_record record[kLandmarks] = {};
   wm::landmark_evidence w;
@@ -427,6 +441,7 @@ int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_three_bearings_give_the_pose);
   RUN_TEST(test_bearings_that_say_nothing_give_no_pose);
+  RUN_TEST(test_an_old_contradiction_is_forgotten);
   RUN_TEST(test_one_that_contradicts_has_moved_and_many_mean_lost);
   RUN_TEST(test_one_against_one_is_doubt_not_lost);
   RUN_TEST(test_misfits_that_scatter_say_nothing_those_in_one_place_do);
