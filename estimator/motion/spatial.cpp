@@ -111,8 +111,8 @@ void spatial_motion::init(const wm_motion_params *params, const wm_wheels *wheel
   std::memset(static_cast<void *>(this), 0, sizeof *this);
   front_.init(params, wheels);
   const wm_motion_params &p = front_.params();
-  source_.init(p.hold_max_s, {p.standstill_speed_mps + length(noise.v_mps),
-                              p.standstill_yaw_rate_radps + length(noise.w_radps)});
+  source_.init(p.hold_max_s,
+               {p.standstill_speed_mps + length(noise.v_mps), p.standstill_yaw_rate_radps + length(noise.w_radps)});
   history_.init({kGapAfter_s, p.hold_max_s, true, p.limits_mps2, p.limits_radps2});
   noise_ = noise;
 }

@@ -41,7 +41,10 @@ bool spatial_source::are_alive(int first, wm_time_ns t_ns) const {
 bool spatial_source::may_stand(int axis, double value) const {
   if (axis < 3 && std::fabs(value) > rest_.w_radps) return false;
   if (twist_ns_ == WM_TIME_NONE) return stands_ != 0;
-  return length(mean_.v) < rest_.v_mps && length(mean_.w) < rest_.w_radps;
+  const auto rests = [this](const spatial_twist &t) {
+    return length(t.v) < rest_.v_mps && length(t.w) < rest_.w_radps;
+  };
+  return rests(twist_) || rests(mean_);  // the mean follows a stop late, and one sample may lie beside it
 }
 
 void spatial_source::watch_axis(int axis, wm_time_ns t_ns, double value) {
@@ -70,8 +73,7 @@ void spatial_source::watch_axis(int axis, wm_time_ns t_ns, double value) {
 
 bool spatial_source::is_stuck(int axis, wm_time_ns t_ns) const {
   const axis_watch &w = watch_[axis];
-  const bool improbable =
-      w.same_s() > kAlive_s && w.values >= kValuesLeast && w.in_motion > kTimesLongest * w.longest;
+  const bool improbable = w.same_s() > kAlive_s && w.values >= kValuesLeast && w.in_motion > kTimesLongest * w.longest;
   const int first = axis < 3 ? 0 : 3;
   bool others_move = false;
   for (int i = first; i < first + 3; i++)
@@ -85,8 +87,8 @@ bool spatial_source::is_stuck(int axis, wm_time_ns t_ns) const {
 void spatial_source::note_missed(int axis, wm_time_ns t_ns) {
   const axis_watch &w = watch_[axis];
   const double since_s = wm_seconds_between(w.since_ns, t_ns);
-  missed_rad2_[axis] += twist_has_rates_ ? square(w.apart_rad) + square(rest_.w_radps * since_s)
-                                         : square(kUnmeasured_radps) * since_s;
+  missed_rad2_[axis] +=
+      twist_has_rates_ ? square(w.apart_rad) + square(rest_.w_radps * since_s) : square(kUnmeasured_radps) * since_s;
   if (since_s > missed_since_s_) missed_since_s_ = since_s;
 }
 

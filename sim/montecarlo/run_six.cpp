@@ -275,7 +275,8 @@ wm_status run_one(const sim::Scenario &scenario, const wm_config &config, const 
         step.rotation_sq_rad2 += error.rotation.squaredNorm();
         step.nees += error.nees;
         add_variances(estimate, step.variance);
-        const Eigen::Vector3d ahead = Eigen::AngleAxisd(-estimate.heading_rad, Eigen::Vector3d::UnitZ()) * error.position;
+        const Eigen::Vector3d ahead =
+            Eigen::AngleAxisd(-estimate.heading_rad, Eigen::Vector3d::UnitZ()) * error.position;
         for (int k = 0; k < 3; k++) {
           step.error_sq[k] += ahead[k] * ahead[k];
           step.error_sq[3 + k] += error.rotation[k] * error.rotation[k];
