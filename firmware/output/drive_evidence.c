@@ -369,7 +369,9 @@ static void calibration(const wm_assembly *assembly, const wm_health *health, wm
       {"range_scale", 1, 0.97, 1.03, 1 / 1.8, 1.8,
        "ranges are too long (above 1) or too short: divide range_m by this"},
       // Tyres, ranges and gyros are off by some per cent; beyond a factor of 1.8 it is another radius, track or unit.
-      {"_scale", 1, 1 / 1.2, 1.2, 1 / 1.8, 1.8, "multiply the value that it scales by this factor"},
+      {"_scale", 1, 1 / 1.2, 1.2, 1 / 1.8, 1.8,
+       "multiply the value that it scales by this factor; where the robot makes its own map, markers or ranges of a "
+       "wrong size look the same"},
       {"noise.", 1, 0, FACTOR_BAD, 0, FACTOR_BAD, "the stated sigma is too small, or what is observed does not fit"},
       // A tenth of a second is more than cameras and lasers need; 0.17 rad of yaw are seen with the naked eye.
       {".time_offset_s", 0, -0.1, 0.1, -0.25, 0.25, "correct the stamps of this sensor by this time"},

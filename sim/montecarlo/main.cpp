@@ -5,17 +5,20 @@
 #include <algorithm>
 #include <cinttypes>
 #include <cstdio>
+#include <filesystem>
 #include <optional>
 
 #include "common/failure.h"
 #include "common/program.h"
 #include "montecarlo/montecarlo.h"
+#include "montecarlo/results.h"
 #include "simulate/angle.h"
 
 namespace {
 
 using wm::montecarlo::Band;
 using wm::montecarlo::band_of;
+using wm::montecarlo::Drives;
 using wm::montecarlo::Statistics;
 
 double degrees(double rad) { return rad * 180 / wm::sim::kPi; }
@@ -89,7 +92,7 @@ bool write_steps_six(const std::string &path, const wm::montecarlo::Statistics6 
 }
 
 struct Arguments {
-  std::string scenario, config, csv;
+  std::string scenario, config, csv, out;
   uint64_t seeds = 200, first = 1;
   wm::montecarlo::Options6 six;
   std::optional<int> laps;
@@ -117,10 +120,18 @@ void parse(wm::cli::App *app, Arguments *a) {
   app->add_option("--bounds", a->six.bounds,
                   "six degrees of freedom: compute the bound of so many drives, the first ones");
   app->add_option("--csv", a->csv, "writes the figures of each step of 0.1 s here");
+  app->add_option("--out", a->out, "writes each drive's figures into this folder, for waymark compare BEFORE AFTER");
   app->footer(
       "example: waymark-montecarlo config/worlds/crossing.yaml --config config/datasets/crossing-points.yaml --seeds "
       "200\n"
+      "         waymark-montecarlo WORLD --config F --out before; after a change: --out after; waymark compare before "
+      "after\n"
       "docs/consistency.md defines each figure. Exit code: 0 done, 1 failed, 2 usage or configuration.");
+}
+
+// The rows of --out, where it is given.
+wm_status write_drives(const Arguments &a, const std::vector<Drives> &all, wm_error *err) {
+  return a.out.empty() ? WM_OK : write_results(a.out, std::filesystem::path(a.config).stem(), all, err);
 }
 
 wm_status run_all(const Arguments &a, const wm::sim::Scenario &scenario, const wm_config &config, wm_error *err) {
@@ -145,7 +156,10 @@ wm_status run_all(const Arguments &a, const wm::sim::Scenario &scenario, const w
   }
   print_counts(all);
   if (!a.csv.empty() && !write_steps(a.csv, all)) return wm_fail(err, WM_IO, "%s: can't write", a.csv.c_str());
-  return WM_OK;
+  std::vector<Drives> drives;
+  for (const Statistics &s : all)
+    drives.push_back({scenario.name + ", " + std::to_string(s.landmarks) + " landmarks", s.each, 3});
+  return write_drives(a, drives, err);
 }
 
 // Six degrees of freedom: the bound where it is asked for, each run's own error, and the points found.
@@ -194,7 +208,7 @@ wm_status run_and_print_six(const Arguments &a, const wm::sim::Scenario &scenari
                 s.point_error_sum_m / static_cast<double>(s.points),
                 100 * static_cast<double>(s.wrong_points) / static_cast<double>(s.points));
   if (!a.csv.empty() && !write_steps_six(a.csv, s)) return wm_fail(err, WM_IO, "%s: can't write", a.csv.c_str());
-  return WM_OK;
+  return write_drives(a, {{scenario.name, s.each, 6}}, err);
 }
 
 wm_status load_and_run(const Arguments &a, wm_error *err) {

@@ -33,11 +33,21 @@ struct Step {
   double bound_position_sq_m2 = 0, bound_heading_sq_rad2 = 0;  // Cramér-Rao
 };
 
+// One drive: root mean squares of its errors over the steps, the largest, and the mean of its NEES, which is not
+// divided.
+struct Run {
+  uint64_t seed = 0;
+  double position_rms_m = 0, position_max_m = 0, rotation_rms_rad = 0;  // planar: of the heading
+  double nees_mean = 0;
+  double beyond_s = 0;  // longest time of tracking without a break beyond 5 sigma (NEES above kBeyond6), in six degrees
+};
+
 struct Statistics {
   size_t landmarks = 0;
   uint64_t runs = 0, lost = 0;  // lost: at the end off by more than 2 m or 15 degrees, or searching
   uint64_t fused = 0, rejected = 0, outliers = 0;
   std::vector<Step> steps;
+  std::vector<Run> each;
 
   // Root mean squares over the runs, at the end and over the whole drive.
   double position_end_m() const, position_rms_m() const, heading_end_rad() const, heading_rms_rad() const;
@@ -69,20 +79,13 @@ struct Step6 {
   double error_sq[6] = {}, variance[6] = {}, bound[6] = {};
 };
 
-// One run: root mean square of the position's error from `settled_s` on, and the largest; the longest time of tracking
-// without a break with the pose beyond 5 sigma (NEES beyond kBeyond6).
-struct Run6 {
-  uint64_t seed = 0;
-  double position_rms_m = 0, position_max_m = 0, rotation_rms_rad = 0, beyond_s = 0;
-};
-
 // Of six degrees of freedom, exceeded as seldom as 5 sigma of a normal distribution: 6e-7.
 inline constexpr double kBeyond6 = 39.5;
 
 struct Statistics6 {
   uint64_t runs = 0, fused = 0, rejected = 0, outliers = 0, bounds = 0;
   std::vector<Step6> steps;
-  std::vector<Run6> each;
+  std::vector<Run> each;  // from `settled_s` to `until_s` of the options
   // Points found on the way, each as it was when it was last in the state; wrong: off by more than 0.1 m, or by more
   // than 4 sigma on the map's plane.
   uint64_t points = 0, wrong_points = 0;

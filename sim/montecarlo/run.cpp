@@ -13,22 +13,36 @@
 namespace wm::montecarlo {
 namespace {
 
-void judge(const wm_estimate &estimate, const sim::State &truth, Step &step) {
+// Adds the error of a pose to its step, and to the sums of its drive.
+void judge(const wm_estimate &estimate, const sim::State &truth, Step &step, Run &run) {
   Eigen::Vector3d error(truth.x_m - estimate.pose_map_base.p_m[0], truth.y_m - estimate.pose_map_base.p_m[1],
                         sim::wrap(truth.heading_rad - estimate.heading_rad));
   const int axes[3] = {0, 1, 5};
   Eigen::Matrix3d cov;
   for (int i = 0; i < 3; i++)
     for (int j = 0; j < 3; j++) cov(i, j) = estimate.covariance[wm_cov_index(axes[i], axes[j])];
+  const double position_sq_m2 = error.head<2>().squaredNorm(), nees = error.dot(cov.ldlt().solve(error));
   step.runs++;
-  step.position_sq_m2 += error.head<2>().squaredNorm();
+  step.position_sq_m2 += position_sq_m2;
   step.heading_sq_rad2 += error[2] * error[2];
-  step.nees += error.dot(cov.ldlt().solve(error));
+  step.nees += nees;
+  run.position_rms_m += position_sq_m2;
+  run.position_max_m = std::fmax(run.position_max_m, std::sqrt(position_sq_m2));
+  run.rotation_rms_rad += error[2] * error[2];
+  run.nees_mean += nees;
+}
+
+// A drive's sums become its means.
+Run mean_of(Run sums, size_t steps) {
+  const double n = static_cast<double>(std::max<size_t>(steps, 1));
+  return {sums.seed, std::sqrt(sums.position_rms_m / n), sums.position_max_m, std::sqrt(sums.rotation_rms_rad / n),
+          sums.nees_mean / n};
 }
 
 void run_one(const std::vector<SmallEvent> &events, const sim::Recording &recording, SimulatedFilter &filter,
              Statistics &out) {
   size_t next = 0;  // step to be taken
+  Run run{.seed = recording.seed};
   wm_estimate estimate{};
   wm_event e{};
   for (const SmallEvent &small : events) {
@@ -39,7 +53,7 @@ void run_one(const std::vector<SmallEvent> &events, const sim::Recording &record
       if (next >= out.steps.size() || t_s < out.steps[next].t_s) continue;
       filter.ops().estimate(filter.state(), &estimate);
       const double at_s = static_cast<double>(estimate.t_ns - recording.clock_start_ns) * 1e-9;
-      judge(estimate, recording.drive.at(at_s), out.steps[next]);
+      judge(estimate, recording.drive.at(at_s), out.steps[next], run);
       next++;
     } else {
       for (const wm_innovation &innovation : innovations) {
@@ -52,6 +66,7 @@ void run_one(const std::vector<SmallEvent> &events, const sim::Recording &record
       }
     }
   }
+  out.each.push_back(mean_of(run, next));
   filter.ops().estimate(filter.state(), &estimate);
   const sim::State end = recording.drive.at(recording.drive.duration_s());
   const double dx = end.x_m - estimate.pose_map_base.p_m[0], dy = end.y_m - estimate.pose_map_base.p_m[1];

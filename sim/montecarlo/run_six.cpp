@@ -235,7 +235,7 @@ wm_status run_one(const sim::Scenario &scenario, const wm_config &config, const 
   std::vector<wm_landmark> listed(kPoints);
   std::vector<std::array<double, 4>> covs(kPoints);
   const auto is_judged = [&options](double t_s) { return t_s >= options.settled_s && t_s <= options.until_s; };
-  Run6 run{recording.seed};
+  Run run{.seed = recording.seed};
   uint64_t judged = 0;
   double beyond_since_s = -1;
   size_t next = 0, in_picture = 0;
@@ -291,6 +291,7 @@ wm_status run_one(const sim::Scenario &scenario, const wm_config &config, const 
           judged++;
           run.position_rms_m += error.position.squaredNorm();
           run.rotation_rms_rad += error.rotation.squaredNorm();
+          run.nees_mean += error.nees;
           run.position_max_m = std::max(run.position_max_m, error.position.norm());
         }
       } else if (is_judged(step.t_s)) {
@@ -302,6 +303,7 @@ wm_status run_one(const sim::Scenario &scenario, const wm_config &config, const 
   const double n = static_cast<double>(std::max<uint64_t>(judged, 1));
   run.position_rms_m = std::isinf(run.position_max_m) ? HUGE_VAL : std::sqrt(run.position_rms_m / n);
   run.rotation_rms_rad = std::sqrt(run.rotation_rms_rad / n);
+  run.nees_mean /= n;
   out.each.push_back(run);
   judge_points(points, recording.landmarks, out);
   return WM_OK;

@@ -3,19 +3,19 @@
 """What the shipped configurations reach on the real recordings, and on the same recordings with their calibration, clocks
 and scales disturbed: replayed by `waymark replay`, judged by `waymark eval`. Skips (77) where the recordings are not there.
 
-    accuracy.py BIN_DIR SOURCE_DIR DATA_DIR"""
-import json
+    accuracy.py BIN_DIR SOURCE_DIR DATA_DIR [--only WORDS] [--out FOLDER] [--jobs N]"""
+import concurrent.futures
 import pathlib
 import re
 import subprocess
 import sys
 import tempfile
 
+import bench
 import covariances
 import replays
 from replays import each_row, rows, scaled, shifted, turned
 
-BIN, SOURCE, DATA = (pathlib.Path(p).resolve() for p in sys.argv[1:4])
 failures = []
 
 
@@ -44,20 +44,18 @@ def config_path(config, folder):
     """A shipped configuration, or one with the estimator alone: "slam:"."""
     if not config.endswith(":"):
         return SOURCE / "config/datasets" / f"{config}.yaml"
-    path = pathlib.Path(folder) / "plain.yaml"
+    path = pathlib.Path(folder) / f"{config[:-1]}.yaml"
     path.write_text(f"format: waymark-config/1\nestimator: {config[:-1]}\n")
     return path
 
 
-def run(recording, config, *eval_options, seed=1):
-    with tempfile.TemporaryDirectory() as out:
-        for command in ([BIN / "waymark", "replay", recording, "--config", config_path(config, out), "--out", out, "--seed", seed],
-                        [BIN / "waymark-eval", out, recording, "--json", *eval_options]):
-            done = subprocess.run([str(c) for c in command], capture_output=True, text=True)
-            if done.returncode != 0:
-                sys.exit(f"{' '.join(str(c) for c in command)}: {done.returncode}\n{done.stdout}{done.stderr}")
-        figures = json.loads(done.stdout)
-        figures["longest_beyond_s"] = None if "gnss" in eval_options else longest_beyond(rows(pathlib.Path(out) / "trajectory.csv"), rows(recording / "truth.csv"), 3.5)
+def run(recording, config, *eval_options, seed=1, replay=(), what=""):
+    """Figures of eval for one replay. `what` names a disturbed copy in the table of results."""
+    with tempfile.TemporaryDirectory() as scratch:
+        title = ", ".join(filter(None, [recording.name, what, " ".join(eval_options)]))
+        figures, folder = BENCH.judge(title, recording, config_path(config, scratch), eval_options, replay, seed)
+    figures["run"] = folder
+    figures["longest_beyond_s"] = None if "gnss" in eval_options else longest_beyond(rows(folder / "trajectory.csv"), rows(recording / "truth.csv"), 3.5)
     return figures
 
 
@@ -111,7 +109,7 @@ def starry():
         for what, change in changes.items():
             with disturbed(recording, change) as folder:
                 bar(f"{config}, {what}: RMSE over the undisturbed one's, after 60 s",
-                    run(folder, config, "--from", "60")["position_rmse_m"] / settled, most=1.15)
+                    run(folder, config, "--from", "60", what=what)["position_rmse_m"] / settled, most=1.15)
 
 
 def mrclam():
@@ -151,7 +149,7 @@ def slam():
     errors = []
     for i in range(1, 6):
         with disturbed(DATA / f"mrclam-d6-r{i}", {"sightings.csv": misread}) as folder:
-            r = run(folder, "mrclam-slam", "--align", "se2")
+            r = run(folder, "mrclam-slam", "--align", "se2", what="one code in fifty misread")
             errors.append(r["position_rmse_m"])
             bar(f"mrclam-slam, one code in fifty misread, robot {i}: NEES inside 95 %", r["nees_inside_95"], least=0.90)
     bar("mrclam-slam, one code in fifty misread: mean position RMSE, aligned", sum(errors) / 5, most=0.17)
@@ -191,29 +189,24 @@ def park():
                           ("40 % of the detections lost", {"sightings.csv": thinned}), ("12 % of them false", {"sightings.csv": cluttered}),
                           ("begun at 90 s", from_s(90)), ("begun at 220 s", from_s(220))):
         with disturbed(recording, changes) as folder:
-            bar(f"victoria-park, {what}: position RMSE", run(folder, "victoria-park", *against)["position_rmse_m"], most=4.2)
+            bar(f"victoria-park, {what}: position RMSE", run(folder, "victoria-park", *against, what=what)["position_rmse_m"], most=4.2)
 
 
 def lost_on_a_map():
     """Lap one makes a map; the rest is driven on it, frozen, begun without a pose: right within 3 s."""
     recording, begin_s = DATA / "office-a", 41
-    with tempfile.TemporaryDirectory() as out:
-        lap, rest = pathlib.Path(out) / "lap", pathlib.Path(out) / "rest"
-        for command in (["replay", recording, "--config", SOURCE / "config/datasets" / "office.yaml", "--until", begin_s, "--out", lap],
-                        ["replay", recording, "--config", SOURCE / "config/datasets" / "office-frozen.yaml", "--landmarks", lap / "map-estimate.csv",
-                         "--from", begin_s, "--lost", "--out", rest]):
-            subprocess.run([str(c) for c in [BIN / "waymark", *command]], check=True, capture_output=True)
-        figures = [json.loads(subprocess.run([str(BIN / "waymark-eval"), str(rest), str(recording), "--json", "--from", start],
-                                             check=True, capture_output=True, text=True).stdout) for start in ("0", "3")]
-        tracked = [r for r in rows(rest / "trajectory.csv") if r["state"] == "tracking"]
-        seen = rows(rest / "innovations.csv")
-        bar("office-frozen: time until it knows where it is, s", (int(tracked[0]["t_ns"]) - int(seen[0]["t_ns"])) * 1e-9, most=3.0)
-        bar("office-frozen: largest error of a pose given out", figures[0]["position_max_m"], most=0.1)
-        bar("office-frozen: largest error after 3 s", figures[1]["position_max_m"], most=0.03)
-        bar("office-frozen: position RMSE after 3 s", figures[1]["position_rmse_m"], most=0.02)
-        bar("office-frozen: heading RMSE after 3 s", figures[1]["heading_rmse_deg"], most=0.4)
-        surveyed = subprocess.run([str(BIN / "waymark-map"), "survey", str(lap)], capture_output=True, text=True)
-        bar("office: findings of the survey of lap one (0: none)", surveyed.returncode, most=0)
+    lap = run(recording, "office", replay=["--until", begin_s], what="lap one")["run"]
+    on_map = ["--landmarks", lap / "map-estimate.csv", "--from", begin_s, "--lost"]
+    whole, settled = (run(recording, "office-frozen", "--from", begin, replay=on_map, what="lost on the map of lap one") for begin in ("0", "3"))
+    tracked = [r for r in rows(whole["run"] / "trajectory.csv") if r["state"] == "tracking"]
+    seen = rows(whole["run"] / "innovations.csv")
+    bar("office-frozen: time until it knows where it is, s", (int(tracked[0]["t_ns"]) - int(seen[0]["t_ns"])) * 1e-9, most=3.0)
+    bar("office-frozen: largest error of a pose given out", whole["position_max_m"], most=0.1)
+    bar("office-frozen: largest error after 3 s", settled["position_max_m"], most=0.03)
+    bar("office-frozen: position RMSE after 3 s", settled["position_rmse_m"], most=0.02)
+    bar("office-frozen: heading RMSE after 3 s", settled["heading_rmse_deg"], most=0.4)
+    surveyed = subprocess.run([str(BIN / "waymark-map"), "survey", str(lap)], capture_output=True, text=True)
+    bar("office: findings of the survey of lap one (0: none)", surveyed.returncode, most=0)
 
 
 def office():
@@ -231,17 +224,6 @@ def office():
     bar("office: worst marker, aligned with scale", scaled_["landmark_max_m"], most=0.004)
 
 
-def detected(recording, config, detector):
-    """What the run's detector saw against the recording's labels."""
-    with tempfile.TemporaryDirectory() as out:
-        for command in ([BIN / "waymark", "replay", recording, "--config", SOURCE / "config/datasets" / f"{config}.yaml", "--out", out],
-                        [BIN / "waymark-eval", out, recording, "--json", "--detector", detector]):
-            done = subprocess.run([str(c) for c in command], capture_output=True, text=True)
-            if done.returncode != 0:
-                sys.exit(f"{' '.join(str(c) for c in command)}: {done.returncode}\n{done.stdout}{done.stderr}")
-    return json.loads(done.stdout)
-
-
 def hall():
     """Upright lines from pixels, and CAN; azimuths don't see scale. Then with the camera's stamps falsified."""
     recording = DATA / "hall-a"
@@ -253,7 +235,7 @@ def hall():
     scaled_ = run(recording, "hall", "--align", "sim2")
     bar("hall: position RMSE, aligned with scale", scaled_["position_rmse_m"], most=0.007)
     bar("hall: heading RMSE, aligned with scale", scaled_["heading_rmse_deg"], most=0.25)
-    lines = detected(recording, "hall", "lines")
+    lines = run(recording, "hall", "--detector", "lines")
     bar(f"hall: share found of {lines['with_contrast']} lines with contrast (of {lines['labelled']} labelled)", lines["recall"], least=0.80)
     bar("hall: false lines for each true one", lines["false_per_right"], most=0.2)
     bar("hall: azimuth error, degrees RMS", lines["azimuth_rms_deg"], most=0.15)
@@ -263,7 +245,7 @@ def hall():
             f["arrival_ns"] = str(max(int(f["arrival_ns"]), int(f["t_ns"]) + 1_000_000))
         with disturbed(recording, {"video/omni.csv": each_row(later)}) as folder:
             bar(f"hall, camera's stamps {seconds} s off: position RMSE, aligned with scale, after 20 s",
-                run(folder, "hall", "--align", "sim2", "--from", "20")["position_rmse_m"], most=0.02)
+                run(folder, "hall", "--align", "sim2", "--from", "20", what=f"stamps {seconds} s off")["position_rmse_m"], most=0.02)
 
 
 def mounted(pitch_deg, height_m):
@@ -294,7 +276,7 @@ def corridor():
         with disturbed(recording, {"calibration.yaml": mounted(0.5 * sign, 0.01 * sign),
                                    "video/front.csv": each_row(later)}) as folder:
             bar(f"corridor, {0.5 * sign} deg, {sign} cm, {30 * sign} ms: mean error over the undisturbed one's, after 30 s",
-                run(folder, "corridor", "--from", "30")["position_mean_m"] / settled, most=1.25)
+                run(folder, "corridor", "--from", "30", what=f"{0.5 * sign} deg, {sign} cm, {30 * sign} ms")["position_mean_m"] / settled, most=1.25)
 
 
 def comma():
@@ -311,7 +293,7 @@ def comma():
     for what, change in changes.items():
         with disturbed(recording, change) as folder:
             bar(f"comma2k19, {what}: RMSE over the undisturbed one's, after 20 s",
-                run(folder, "comma2k19", "--from", "20")["position_rmse_m"] / settled, most=1.15)
+                run(folder, "comma2k19", "--from", "20", what=what)["position_rmse_m"] / settled, most=1.15)
 
 
 def stereo():
@@ -366,7 +348,7 @@ def seabed():
             ("turn rates 0.3 degrees/s off", {"motion6.csv": each_row(
                 lambda f: f.update(wz_radps=repr(float(f["wz_radps"]) + 0.005)))})):
         with disturbed(recording, changes) as folder:
-            off = run(folder, "seabed")
+            off = run(folder, "seabed", what=what)
             bar(f"seabed, {what}: position RMSE", off["position_rmse_m"], most=0.06)
             bar(f"seabed, {what}: rotation RMSE", off["rotation_rmse_deg"], most=0.75)
             bar(f"seabed, {what}: NEES inside 95 %", off["nees_inside_95"], least=0.85)
@@ -386,17 +368,28 @@ def ranges_and_fixes():
                 f["x_m"], f["y_m"] = repr(float(f["x_m"]) + east), repr(float(f["y_m"]) + north)
         with disturbed(recording, {"gnss.csv": each_row(pulled)}) as folder:
             bar(f"smartloc, positions {east} m east and {north} m north off for 7 s from {begin} s on: RMSE",
-                run(folder, "smartloc")["position_rmse_m"], most=11.5)
+                run(folder, "smartloc", what=f"{east} m east, {north} m north from {begin} s on")["position_rmse_m"], most=11.5)
 
 
 def plane():
     bar("mecanum-1, odometry by its defaults: position RMSE", run(DATA / "mecanum-1", "odometry:")["position_rmse_m"], most=0.23)
     with tempfile.TemporaryDirectory() as folder:
-        covariances.copy(DATA / "dlr-a", pathlib.Path(folder))
-        r = run(pathlib.Path(folder), "slam:")
+        copy = pathlib.Path(folder) / "dlr-a"
+        covariances.copy(DATA / "dlr-a", copy)
+        r = run(copy, "slam:", what="with covariances")
         bar("dlr-a with its source's covariances, slam by its defaults: position RMSE", r["position_rmse_m"], most=0.75)
         bar("dlr-a with its source's covariances: landmarks, own fit", r["landmark_rmse_own_fit_m"], most=0.30)
         bar("dlr-a with its source's covariances: NEES inside 95 %", r["nees_inside_95"], least=0.90)
+
+
+PARTS = (starry, mrclam, slam, park, office, lost_on_a_map, hall, corridor, comma, stereo, seabed, ranges_and_fixes, plane)
+
+
+def options():
+    parser = replays.parser(__doc__, "parts with one of these names: " + ", ".join(part.__name__ for part in PARTS))
+    bench.out_option(parser)
+    parser.add_argument("--jobs", metavar="N", type=int, default=1, help="parts at once")
+    return parser.parse_args()
 
 
 def main():
@@ -406,22 +399,16 @@ def main():
     if missing:
         print(f"skipped: no recording {missing[0]} in {DATA}")
         return 77
-    starry()
-    mrclam()
-    slam()
-    park()
-    office()
-    lost_on_a_map()
-    hall()
-    corridor()
-    comma()
-    stereo()
-    seabed()
-    ranges_and_fixes()
-    plane()
+    with concurrent.futures.ThreadPoolExecutor(OPTIONS.jobs) as pool:
+        for part in [pool.submit(part) for part in PARTS if replays.is_chosen(OPTIONS, part.__name__)]:
+            part.result()
+    BENCH.write_results("accuracy.py")
     print(f"{len(failures)} bars missed")
     return 1 if failures else 0
 
 
 if __name__ == "__main__":
+    OPTIONS = options()
+    BIN, SOURCE, DATA = OPTIONS.bin_dir, OPTIONS.source_dir, OPTIONS.data_dir
+    BENCH = bench.Bench(BIN, OPTIONS.out)
     sys.exit(main())

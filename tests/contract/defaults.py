@@ -4,7 +4,7 @@
 recordings and on simulated worlds that need no pictures. A table, not a gate: rows that miss a bar name it. Skips (77)
 where the recordings are not there.
 
-    defaults.py BIN_DIR SOURCE_DIR DATA_DIR [--only WORD[,WORD]] [--set KEY=VALUE] [--json]
+    defaults.py BIN_DIR SOURCE_DIR DATA_DIR [--only WORD[,WORD]] [--set KEY=VALUE] [--json] [--out FOLDER]
 
 --set changes a key of the plain configurations, as `sightings.gate.hard=1000`: a trial of another default on all of them."""
 import json
@@ -12,6 +12,7 @@ import pathlib
 import sys
 import tempfile
 
+import bench
 import covariances
 import replays
 from replays import Refused, command, confidently_wrong, find, printed, rows
@@ -99,17 +100,17 @@ def first_stamp_ns(recording):
     return min(stamps)
 
 
-def outages(bin_dir, recording, text, folder):
+def outages(runs, case, recording, text, folder):
     """Largest error in % of the way after 60 s without GNSS, of three outages; None where there is no pose."""
     worst = 0
     for begin_s in OUTAGES_S:
-        config = folder / "outage.yaml"
+        config = folder / f"outage-{begin_s}.yaml"
         config.write_text(f"{text}\nsources: [{{name: gnss, until_s: {begin_s}}}]\n")
         try:
-            command(bin_dir / "waymark", "replay", recording, "--config", config, "--out", folder / "outage")
-            first_pose_s = (int(rows(folder / "outage/trajectory.csv")[0]["t_ns"]) - first_stamp_ns(recording)) * 1e-9
+            _, run = runs.judge(f"{case.title()}, whole", recording, config, GNSS)
+            first_pose_s = (int(rows(run / "trajectory.csv")[0]["t_ns"]) - first_stamp_ns(recording)) * 1e-9
             begin = max(begin_s - first_pose_s, 0)
-            judged = json.loads(command(bin_dir / "waymark-eval", folder / "outage", recording, "--json", *GNSS, "--from", begin, "--to", begin + 60))
+            judged, _ = runs.judge(f"{case.title()}, without GNSS", recording, config, (*GNSS, "--from", begin, "--to", begin + 60))
         except (Refused, IndexError):
             return None
         worst = max(worst, judged["position_end_percent"])
@@ -123,10 +124,10 @@ def found_after_s(trajectory, recording):
     return max(begun[0] - usable[0], 0) * 1e-9 if begun and usable else None
 
 
-def figures(bin_dir, case, recording, config, folder):
-    """One replay and its judgement."""
-    command(bin_dir / "waymark", "replay", recording, "--config", config, "--out", folder)
-    out = json.loads(command(bin_dir / "waymark-eval", folder, recording, "--json", *case.options))
+def figures(runs, case, recording, config, what=""):
+    """One replay and its judgement; `run` is its folder. `what` names a disturbed copy in the results."""
+    out, folder = runs.judge(", ".join(filter(None, [case.title(), what])), recording, config, case.options)
+    out["run"] = folder
     health = json.loads((folder / "health.json").read_text())
     out["landmarks_moved"] = (find(health, "landmarks_moved") or {"count": 0})["count"]
     out["velocity_scale"] = find(health, "motion.velocity_scale")
@@ -192,7 +193,7 @@ def misses(case, row, out):
     return found
 
 
-def judge(bin_dir, source, data, case, settings, scratch):
+def judge(runs, bin_dir, source, data, case, settings, scratch):
     """The row of a case: its defaults, its best rival and dead reckoning. What a program refuses has no figures."""
     folder = scratch / case.name
     folder.mkdir(exist_ok=True)
@@ -207,10 +208,10 @@ def judge(bin_dir, source, data, case, settings, scratch):
     def run(name, text=None):
         config = source / "config" / ("robot.yaml" if name == "robot" else f"datasets/{name}.yaml")
         if text is not None:
-            config = folder / "config.yaml"
+            config = folder / f"{name}.yaml"
             config.write_text(text)
         try:
-            return figures(bin_dir, case, recording, config, folder / "run")
+            return figures(runs, case, recording, config)
         except Refused as why:
             refused[name] = str(why)
             return {}
@@ -218,7 +219,7 @@ def judge(bin_dir, source, data, case, settings, scratch):
     text = plain(case, settings)
     out = run("plain", text)
     if "gap_percent" in case.bars:
-        out["gap_percent"] = outages(bin_dir, recording, text, folder)
+        out["gap_percent"] = outages(runs, case, recording, text, folder)
     rivals = {name: run(name) for name in case.best}
     if case.by_hand:
         rivals["(by hand)"] = run("(by hand)", plain(case) + case.by_hand)
@@ -242,7 +243,9 @@ COLUMNS = (("position_rmse_m", 4, 8), ("best_position_rmse_m", 4, 8), ("ratio", 
 
 
 def main():
-    options = replays.parser(__doc__, "cases whose title contains one of these words").parse_args()
+    parser = replays.parser(__doc__, "cases whose title contains one of these words")
+    bench.out_option(parser)
+    options = parser.parse_args()
     if not options.data_dir.is_dir():
         print(f"{options.data_dir}: no recordings here")
         return 77
@@ -250,18 +253,19 @@ def main():
     if not options.json:
         print(f"{'recording or world, estimator':34} " + " ".join(f"{name:>{width}}" for name, (_, _, width) in zip(HEADINGS, COLUMNS))
               + "  best configuration; bars missed")
-    missed, results = 0, []
+    missed, results, runs = 0, [], bench.Bench(options.bin_dir, options.out)
     with tempfile.TemporaryDirectory() as scratch:
         for case in cases:
             if not case.world and not (options.data_dir / case.name).is_dir():
                 print(f"{case.title():34} no such recording", file=sys.stderr)
                 continue
-            row = judge(options.bin_dir, options.source_dir, options.data_dir, case, options.set, pathlib.Path(scratch))
+            row = judge(runs, options.bin_dir, options.source_dir, options.data_dir, case, options.set, pathlib.Path(scratch))
             missed += bool(row["misses"])
             results.append(row)
             if not options.json:
                 print(f"{row['case']:34} " + " ".join(f"{printed(row[key], digits):>{width}}" for key, digits, width in COLUMNS)
                       + f"  {row['best']}; {', '.join(row['misses']) or 'none'}", flush=True)
+    runs.write_results("defaults.py")
     if options.json:
         print(json.dumps(results, indent=1))
     else:

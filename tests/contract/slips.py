@@ -11,6 +11,7 @@ import pathlib
 import random
 import sys
 
+import bench
 import covariances
 import defaults
 import replays
@@ -134,12 +135,13 @@ def right_after(undisturbed, disturbed, second_ns):
 
 def replayed(options, recording, name, text, scratch, **tables):
     """A disturbed replay: its folder and its figures, against the original recording's truth."""
-    folder, run = scratch / f"{name}-recording", scratch / f"{name}-run"
+    folder = scratch / f"{name}-recording"
     recording.write(folder, **tables)
     config = scratch / f"{name}.yaml"
     config.write_text(text)
     case = defaults.Case(recording.folder.name, "slam", (), defaults.SE2)
-    return run, defaults.figures(options.bin_dir, case, folder, config, run)
+    out = defaults.figures(options.runs, case, folder, config, name)
+    return out["run"], out
 
 
 def row_of(name, out, **more):
@@ -184,13 +186,16 @@ def printed(row):
 def main():
     parser = replays.parser(__doc__, "recordings whose name contains one of these words")
     parser.add_argument("--seed", type=int, default=1, help="of the gaps, the slips' directions and the misread identities")
+    bench.out_option(parser)
     options = parser.parse_args()
+    options.runs = bench.Bench(options.bin_dir, options.out)
     if not options.data_dir.is_dir():
         print(f"{options.data_dir}: no recordings here")
         return 77
     names = [n for n in RECORDINGS if (options.data_dir / n).is_dir() and replays.is_chosen(options, n)]
     head = f"{'recording and disturbance':38} {'se2 m':>8} {'NEES':>5} {'map m':>8} {'moved':>5} {'wrong':>6} {'found s':>8} {'right':>6} {'map x':>6}"
     results = replays.table(options, head, names, judge, printed)
+    options.runs.write_results("slips.py")
     if not options.json:
         for what in ("slip", "misread"):
             judged = [r["good"] for r in results if what in r["case"]]

@@ -272,6 +272,32 @@ void values_far_from_what_is_stated_are_degraded(void) {
   TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, {"gnss.lasting_error", 5.0, NAN}));
 }
 
+// The speed's scale against its prior of 5 %. A known map decides which length is wrong; the robot's own does not.
+void lengths_that_contradict_each_other_are_degraded(void) {
+  const parameters::values motion(wm_motion_params_table, {});
+  wm_setup setup{};
+  setup.motion = static_cast<const wm_motion_params *>(static_cast<const void *>(motion.data()));
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, state_with(setup, {"motion.speed_scale", 1.16, 0.005}));
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, state_with(setup, {"motion.speed_scale", 1.19, 0.06}));
+  TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, {"motion.speed_scale", 1.19, 0.005}));
+  TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, {"motion.speed_scale", 0.81, 0.005}));
+  const wm_landmark post{};
+  setup.landmarks = &post;
+  setup.landmark_count = 1;
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, state_with(setup, {"motion.speed_scale", 1.19, 0.005}));
+}
+
+// Its effective track is 1.5 +- 0.25 of the distance of its wheels. The third value of `drive` is skid_steer.
+void the_wide_track_of_skid_steer_is_its_prior(void) {
+  const parameters::values plain(wm_motion_params_table, {}), skids(wm_motion_params_table, {{"drive", 2}});
+  wm_setup setup{};
+  setup.motion = static_cast<const wm_motion_params *>(static_cast<const void *>(plain.data()));
+  TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, {"motion.track_scale", 1.7, 0.01}));
+  setup.motion = static_cast<const wm_motion_params *>(static_cast<const void *>(skids.data()));
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, state_with(setup, {"motion.track_scale", 1.7, 0.01}));
+  TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, {"motion.track_scale", 2.9, 0.01}));
+}
+
 // A map with a fault fits by chance now and then: after a minute of contradiction it does not count like a found pose.
 void a_run_that_was_contradicted_for_long_has_to_fit_for_longer(void) {
   lone once(true), again(true);
@@ -406,6 +432,8 @@ int main(void) {
   RUN_TEST(positions_that_turn_to_the_other_side_are_degraded);
   RUN_TEST(a_turn_that_no_vehicle_can_drive_is_degraded);
   RUN_TEST(values_far_from_what_is_stated_are_degraded);
+  RUN_TEST(lengths_that_contradict_each_other_are_degraded);
+  RUN_TEST(the_wide_track_of_skid_steer_is_its_prior);
   RUN_TEST(a_run_that_was_contradicted_for_long_has_to_fit_for_longer);
   RUN_TEST(a_pose_off_the_map_is_degraded);
   RUN_TEST(identities_that_the_map_lacks_are_doubt);

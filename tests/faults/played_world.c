@@ -14,7 +14,8 @@ static char recording[600];
 static wm_faults faults;
 static wm_play_stream streams[WM_PLAY_STREAMS_MAX];
 static size_t stream_count;
-static _Atomic wm_time_ns begin_ns;  // 0: not yet
+static double part_from_s, part_until_s;  // of the recording; until 0: to its end
+static _Atomic wm_time_ns begin_ns;       // 0: not yet
 
 static void die(const wm_error *err) {
   (void)fprintf(stderr, "played world: %s\n", err->text);
@@ -39,6 +40,9 @@ static void read_world(void) {
   const wm_play_stream *all = wm_play_streams(play, &stream_count);
   memcpy(streams, all, stream_count * sizeof *all);
   wm_play_close(play);
+  FILE *part = fopen(path_of("part", path), "r");
+  if (part && fscanf(part, "%lf %lf", &part_from_s, &part_until_s) != 2) exit(3);
+  if (part) (void)fclose(part);
 }
 
 // 1: the world has begun.
@@ -89,7 +93,8 @@ wm_time_ns played_now_ns(void) {
 static void open_now(played_cursor *self) {
   wm_error err = {0};
   const double now_s = wm_seconds_between(begin_ns, played_now_ns());
-  const wm_play_options options = {.from_s = now_s > 0 ? now_s : 0, .faults = &faults};
+  const wm_play_options options = {
+      .from_s = now_s > part_from_s ? now_s : part_from_s, .until_s = part_until_s, .faults = &faults};
   size_t count;
   if (wm_play_open(recording, &options, &self->play, &err) != WM_OK) die(&err);
   const wm_play_stream *all = wm_play_streams(self->play, &count);

@@ -13,6 +13,9 @@ import unittest
 
 from common import BIN, ROOT, Fleet, call
 
+from bench import Bench
+from replays import Refused
+
 KILLS = int(sys.argv.pop(sys.argv.index("--kills") + 1)) if "--kills" in sys.argv else 3
 sys.argv = [word for word in sys.argv if word != "--kills"]
 
@@ -55,6 +58,26 @@ class Batch(unittest.TestCase):
         other = self.fleet.folder / "other"
         code, text = call("batch", self.fleet.plan(), "--out", other, "--jobs", 1)
         self.assertEqual((code, sum_of(text)), (0, sum_of(first)))
+
+    def test_tables_of_accuracy_are_batches(self):
+        """Judged runs of tests/contract: kept, named by their titles, compared."""
+        drive, config = self.fleet.folder / "drives/drive-1", self.fleet.folder / "plain.yaml"
+        runs = Bench(BIN, self.out)
+        figures, run = runs.judge("drive-1, from 3 s on", drive, config, ("--from", 3))
+        self.assertTrue((run / "trajectory.csv").is_file())
+        written = (run.parent / "cell.json").stat().st_mtime_ns
+        again = Bench(BIN, self.out)
+        self.assertEqual(again.judge("drive-1, from 3 s on", drive, config, ("--from", 3))[0], figures)
+        self.assertEqual((run.parent / "cell.json").stat().st_mtime_ns, written)
+        self.assertNotEqual(again.judge("drive-1", drive, config)[0]["duration_s"], figures["duration_s"])
+        (self.fleet.folder / "wrong.yaml").write_text("format: waymark-config/1\nestimator: none_such\n")
+        with self.assertRaisesRegex(Refused, "none_such"):
+            again.judge("refused", drive, self.fleet.folder / "wrong.yaml")
+        again.write_results("test")
+        self.assertEqual([(r["recording"], r["status"]) for r in self.rows()],
+                         [("drive-1", "done"), ("drive-1, from 3 s on", "done"), ("refused", "failed")])
+        code, text = call("compare", self.out, self.out, "--out", self.fleet.folder / "page.html", "--no-reports")
+        self.assertEqual((code, text.splitlines()[0]), (0, "3 drives, 2 with the same bits"))
 
     def test_only_what_changed_runs_again(self):
         self.batch()

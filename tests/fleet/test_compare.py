@@ -4,10 +4,11 @@ import json
 import math
 import pathlib
 import random
+import subprocess
 import tempfile
 import unittest
 
-from common import Fleet, call
+from common import BIN, ROOT, Fleet, call
 from waymark_fleet import comparison, statistics
 
 
@@ -130,6 +131,20 @@ class Page(unittest.TestCase):
             self.assertEqual((code, json.loads(text)["same_bits"]), (0, 1000))
             code, text = call("compare", f"{folder}/one:program=q", f"{folder}/two")
             self.assertEqual((code, "no run has the program 'q'; there are p" in text), (2, True))
+
+    def test_drives_of_a_monte_carlo_are_compared(self):
+        config = (ROOT / "config/datasets/crossing-points.yaml").read_text()
+        with tempfile.TemporaryDirectory() as folder:
+            for name, text in (("before", config), ("after", config.replace("map_slots: 8 ", "map_slots: 0 "))):
+                (pathlib.Path(folder) / "points.yaml").write_text(text)
+                subprocess.run([BIN / "waymark-montecarlo", ROOT / "config/worlds/crossing.yaml", "--config", f"{folder}/points.yaml", "--landmarks", "2",
+                                "--seeds", "30", "--out", f"{folder}/{name}"], check=True, stdout=subprocess.DEVNULL)
+            words = "--json", "--out", f"{folder}/page.html"
+            code, text = call("compare", f"{folder}/before", f"{folder}/before", *words)
+            self.assertEqual((code, json.loads(text)["drives"]), (0, 30))
+            code, text = call("compare", f"{folder}/before", f"{folder}/after", *words)
+            verdicts = {v["figure"]: v["verdict"] for v in json.loads(text)["verdicts"]}
+            self.assertEqual((code, verdicts["nees"], verdicts["cpu"]), (1, "worse", "not measured"))
 
     def test_the_worst_drives_have_reports_and_their_first_difference(self):
         made = Fleet(7)

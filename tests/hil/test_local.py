@@ -52,6 +52,8 @@ class Local(unittest.TestCase):
         for name, state, bound in (("right", "down", "4"), ("wrong", "bus-off", "0.0001")):
             (cls.folder / f"{name}.yaml").write_text(FAULTS.replace("STATE", state).replace("BOUND", bound))
 
+        (cls.folder / "full.yaml").write_text("format: waymark-faults/1\nfaults:\n  - {name: full, fault: disk_full, from_s: 4, until_s: 6}\n")
+
     @classmethod
     def tearDownClass(cls):
         cls.temporary.cleanup()
@@ -92,6 +94,16 @@ class Local(unittest.TestCase):
             self.assertEqual(done.returncode, code, done.stdout + done.stderr)
         self.assertIn("worse", (self.folder / "compared-slower/comparison.html").read_text())
 
+    def test_a_part_in_motion(self):
+        """With --from the run begins where the robot is then, and nothing of before or after the part comes."""
+        _, result = self.run_it("part", "--from", "4", "--until", "7")
+        failed = [row for row in result["checks"] if row["status"] == "failed"]
+        self.assertEqual(failed, [])
+        self.assertLess(result["figures"]["position_max_m"], 0.02)
+        received = json.loads((self.folder / "part/out/drive/health.json").read_text())["sources"]["can"]["received"]
+        whole = len((self.folder / "drive/can.log").read_text().splitlines())
+        self.assertLess(received, 1.05 * whole * 3 / SECONDS)
+
     def test_faults(self):
         _, result = self.run_it("right", "--faults", self.folder / "right.yaml")
         rows = [row for row in result["checks"] if row["group"].startswith("fault: ")]
@@ -119,7 +131,8 @@ class Local(unittest.TestCase):
 
     def test_errors(self):
         for words, code, text in ((["--from", "50"], 2, "has 9"), (["--can", "x"], 2, "RUN=PLAYER"), (["--faults", "none.yaml"], 2, "none.yaml"),
-                                  (["--limits", str(self.folder / "robot.yaml")], 2, "waymark-hil-limits/1")):
+                                  (["--limits", str(self.folder / "robot.yaml")], 2, "waymark-hil-limits/1"),
+                                  (["--faults", str(self.folder / "full.yaml"), "--from", "5"], 2, "the disk is full then (fault 'full', from 4 s to 6 s)")):
             done = subprocess.run(self.command("errors", *words), capture_output=True, text=True, check=False, cwd=self.folder)
             self.assertEqual((done.returncode, "Traceback" in done.stderr), (code, False), done.stderr)
             self.assertIn(text, done.stderr)

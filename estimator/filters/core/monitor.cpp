@@ -305,13 +305,18 @@ int32_t silent_source(const wm_monitor &self, wm_time_ns t_ns) {
 
 // Sources in disagreement raise the noise of the motion, or of one of them, as far as it may grow. In 25 good drives,
 // real and simulated, the largest factor is 15.5 (plaza-1).
-// Or they bend a scale, or the lasting error of positions, far from what the configuration states.
+// Or they bend a scale, or the lasting error of positions, far from what the configuration states. Where no map and no
+// position gives a length, less is enough: the map has the scale of either of two that contradict each other.
 bool test_calibration(wm_monitor *self, const wm_calibration_value *values, size_t count) {
   self->is_noise_at_limit = 0;
-  for (size_t i = 0; i < count; i++)
-    if (noise_adaption::is_at_limit(values[i]) || scale_contradicts(self->scale_sigma, values[i]) ||
+  double lengths = 0.0;
+  for (size_t i = 0; i < count; i++) {
+    lengths += length_contradiction(self->scales, values[i]);
+    if (noise_adaption::is_at_limit(values[i]) || scale_contradicts(self->scales, values[i]) ||
         lasting_error_contradicts(values[i]))
       self->is_noise_at_limit = 1;
+  }
+  if (!self->is_map_known && !self->has_positions && lengths_contradict(lengths)) self->is_noise_at_limit = 1;
   if (!self->is_noise_at_limit) return false;
   self->cause = WM_CAUSE_INCONSISTENT;
   self->source = -1;
@@ -440,7 +445,7 @@ void wm_monitor_init(wm_monitor *self, const wm_setup *setup, uint64_t observers
     self->is_map_known = setup->landmark_count > 0;
   }
   wm::course_begin(&self->course);
-  wm::scales_begin(*setup, self->scale_sigma);
+  wm::scales_begin(*setup, self->scales);
   wm::clear(self);
 }
 
@@ -454,6 +459,7 @@ int wm_monitor_take(wm_monitor *self, const wm_event *event, const wm_innovation
     for (size_t i = 0; i < count; i++)
       if (records[i].verdict == WM_FUSED || records[i].verdict == WM_REJECTED_GATE)
         wm::landmark_bias_take(&self->landmarks, records[i]);
+    self->has_positions = self->has_positions || event->kind == WM_EVENT_POSITION;
     if (event->kind == WM_EVENT_POSITION) wm::course_take(&self->course, event->t_ns, event->as.position);
   }
   if (self->begun_ns == WM_TIME_NONE) self->begun_ns = event->t_ns;

@@ -86,24 +86,30 @@ typedef struct wm_monitor_landmarks {
   int32_t contradicts;
 } wm_monitor_landmarks;
 
+// Prior of a calibration's scale; a sigma of 0: it is not a state.
+typedef struct wm_monitor_scale {
+  double value, sigma;
+} wm_monitor_scale;
+
 typedef struct wm_monitor {
   wm_monitor_source sources[WM_MONITOR_SOURCES];
   uint64_t observers;  // bit for each source that may give observations
   wm_monitor_course course;
-  wm_monitor_landmarks landmarks;         // of a known map
-  double scale_sigma[WM_MONITOR_SCALES];  // stated; 0: no state
-  double mirrored_m2, mirrored_rad2;      // what the chance of a mirror image adds to the covariance
-  double spread_m2;                       // variance of a place anywhere on the map, each axis
-  double low_m[2], high_m[2];             // the map, else the way so far
-  double doubt_s;                         // time of contradiction that fitting observations have not made up for
-  double fitted_s;                        // time of fitting observations since the pose was set or found
-  double since_found_s;                   // since a search found a pose
-  double contradicted_s;                  // lost or contradicted, less a share of the time without doubt
-  double proof_s;                         // of driving in agreement with the observations
-  double lost_s;                          // by the estimator, without a break
+  wm_monitor_landmarks landmarks;  // of a known map
+  wm_monitor_scale scales[WM_MONITOR_SCALES];
+  double mirrored_m2, mirrored_rad2;  // what the chance of a mirror image adds to the covariance
+  double spread_m2;                   // variance of a place anywhere on the map, each axis
+  double low_m[2], high_m[2];         // the map, else the way so far
+  double doubt_s;                     // time of contradiction that fitting observations have not made up for
+  double fitted_s;                    // time of fitting observations since the pose was set or found
+  double since_found_s;               // since a search found a pose
+  double contradicted_s;              // lost or contradicted, less a share of the time without doubt
+  double proof_s;                     // of driving in agreement with the observations
+  double lost_s;                      // by the estimator, without a break
   wm_time_ns begun_ns, stepped_ns, next_ns;
   uint32_t resets;
   int32_t cause, source;        // of the present doubt; source -1: none
+  int32_t has_positions;        // a source of positions was seen
   int32_t found, is_map_known;  // found: poses that a search found, one soon after the other
   int32_t is_unsupported, is_outside;
   int32_t was_lost, silent;   // by the estimator; silent: source, -1: none

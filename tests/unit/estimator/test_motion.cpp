@@ -402,6 +402,27 @@ void test_a_speed_that_no_robot_reaches_is_refused(void) {
   TEST_ASSERT_EQUAL_UINT32(0, front.health());
 }
 
+// GIVEN a speed that was refused WHEN it falls silent while the gyro goes on THEN it is silent, as without the refusal:
+// the noise of what the robot may have done since the last plausible sample has an end.
+void test_a_refused_speed_that_falls_silent_is_silent(void) {
+  double held[2], grown[2];
+  for (const bool wrong : {false, true}) {
+    start(make::no_wheels());
+    for (int i = 0; i <= 50; i++) feed(make::quantities(0.02 * i, {{WM_Q_VEHICLE_SPEED, 3.0}, {WM_Q_YAW_RATE, 0.1}}));
+    if (wrong) feed(make::quantities(1.01, {{WM_Q_VEHICLE_SPEED, 138.0}}));
+    double before = 0.0;
+    for (int i = 51; i <= 300; i++) {
+      feed(make::quantities(0.02 * i, {{WM_Q_YAW_RATE, 0.1}}));
+      if (i == 60) held[wrong] = way_var;
+      if (i == 200) before = way_var;
+    }
+    grown[wrong] = way_var - before;
+  }
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.01, held[0]);
+  TEST_ASSERT_GREATER_THAN_DOUBLE(0.5, held[1]);  // m2, after 0.2 s
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9 + 1e-6 * grown[0], grown[0], grown[1]);
+}
+
 // GIVEN a first sample that is wrong, or a sensor that stays at another level WHEN more samples agree THEN they are
 // taken; with the limit off, at once.
 void test_samples_that_agree_replace_the_trusted_ones(void) {
@@ -545,6 +566,7 @@ int main(void) {
   RUN_TEST(test_a_dead_encoder_is_noticed_and_not_taken_for_a_turn);
   RUN_TEST(test_a_frozen_counter_is_doubt_not_standstill);
   RUN_TEST(test_a_speed_that_no_robot_reaches_is_refused);
+  RUN_TEST(test_a_refused_speed_that_falls_silent_is_silent);
   RUN_TEST(test_samples_that_agree_replace_the_trusted_ones);
   RUN_TEST(test_noise_of_counts);
   RUN_TEST(test_a_wrong_count_is_refused);

@@ -149,6 +149,10 @@ void test_impossible_increments_are_refused(void) {
   TEST_ASSERT_EQUAL(WM_NOT_FINITE, filter.check_motion(make::increment(0.0, 1.0, {1, NAN, 0}, kCovariance)));
   const double wide[6] = {1, 2, 1, 0, 0, 1};  // a correlation of 2
   TEST_ASSERT_EQUAL(WM_OUT_OF_RANGE, filter.check_motion(make::increment(0.0, 1.0, {1, 0, 0}, wide)));
+  const double correlated[6] = {1e-4, 3e-5, 1e-4, 3e-5, -3e-5, 1e-4};
+  TEST_ASSERT_EQUAL(WM_OK, filter.check_motion(make::increment(0.0, 1.0, {1, 0, 0}, correlated)));
+  const double three[6] = {1, 0.9, 1, 0.9, -0.9, 1};  // each two of them may be, all three may not
+  TEST_ASSERT_EQUAL(WM_OUT_OF_RANGE, filter.check_motion(make::increment(0.0, 1.0, {1, 0, 0}, three)));
   const double none[6] = {NAN, NAN, NAN, NAN, NAN, NAN};
   TEST_ASSERT_EQUAL(WM_OK, filter.check_motion(make::increment(0.0, 1.0, {1, 0, 0}, none)));
   filter.move(make::increment(0.0, 1.0, {1, 0, 0}, none));

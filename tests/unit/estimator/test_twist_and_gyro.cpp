@@ -73,6 +73,17 @@ void test_a_twist_alone_is_as_ever(void) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.1 * 0.98, pose.heading_rad);
 }
 
+// A gyro of 5 Hz is overdue after three of its periods, not after the 0.25 s of quick ones.
+void test_a_slow_gyro_is_overdue_by_its_own_period(void) {
+  begin();
+  const auto slow = [](int i) { return i % 20 == 0 ? 0.25 + noise(i / 20) : kNone; };
+  drive(0, 2, 0.5, 0.0, 0.1, slow);
+  drive(2.0, 2.35, 0.5, 0.0, 0.1, [](int) { return kNone; });  // the newest is of 1.8 s
+  TEST_ASSERT_EQUAL(WM_MOTION_SPEED_YAW_RATE, front.model());
+  drive(2.35, 2.5, 0.5, 0.0, 0.1, [](int) { return kNone; });
+  TEST_ASSERT_EQUAL(WM_MOTION_TWIST, front.model());
+}
+
 // The learnt bias is the gyro's: the twist's turn rate has none.
 void test_a_silent_gyro_is_replaced_and_taken_up_again(void) {
   begin();
@@ -163,6 +174,7 @@ int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_the_turn_is_the_gyros_and_the_way_the_twists);
   RUN_TEST(test_a_twist_alone_is_as_ever);
+  RUN_TEST(test_a_slow_gyro_is_overdue_by_its_own_period);
   RUN_TEST(test_a_silent_gyro_is_replaced_and_taken_up_again);
   RUN_TEST(test_a_stuck_gyro_is_replaced);
   RUN_TEST(test_a_stop_does_not_mend_a_stuck_gyro);

@@ -102,8 +102,13 @@ def run_cells(store, keyed, jobs, progress=None):
                 shown.take(cell, results[key])
     if shown:
         shown.end()
-    return [{**results[key], **{name: getattr(cell, name) for name in ("recording", "configuration", "program", "seed")},
-             "data": str(cell.data), "truth": str(cell.truth) if cell.truth else None} for cell, key in keyed]
+    return [row_of(cell, results[key]) for cell, key in keyed]
+
+
+def row_of(cell, result):
+    """A result with the names of its cell: another cell of the same files may have made it."""
+    names = {name: getattr(cell, name) for name in ("recording", "configuration", "program", "seed")}
+    return {**result, **names, "data": str(cell.data), "truth": str(cell.truth) if cell.truth else None}
 
 
 def results_sum(results):

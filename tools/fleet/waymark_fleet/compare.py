@@ -51,7 +51,7 @@ def tolerances_of(words):
 def began(diff, one, two):
     """What differs first between two runs, by waymark diff."""
     if not (one / "trajectory.csv").is_file() or not (two / "trajectory.csv").is_file():
-        return "the plan's `keep` leaves the runs out"
+        return "the runs are not kept"
     done = subprocess.run([*diff, one, two], capture_output=True, text=True, check=False)
     found = re.search(r"^The first difference is at t = \S+ s \(t_ns (\d+)\) in (.*)", done.stdout, re.MULTILINE)
     if found:
@@ -76,7 +76,8 @@ def worst_drives(given, folders, pairs, beside):
                 continue
             place.mkdir(parents=True, exist_ok=True)
             file = place / f"{number:02d}-{side}.html"
-            recording = [row["truth"] or row["data"]] if os.path.isdir(row["truth"] or row["data"]) else []
+            judged_by = row["truth"] or row["data"]
+            recording = [judged_by] if os.path.isdir(judged_by) else []
             done = subprocess.run([*report, run, *recording, "--out", file], capture_output=True, text=True, check=False)
             if done.returncode == 0:
                 links[side] = f"{place.name}/{file.name}"

@@ -25,12 +25,12 @@ def _headline(verdicts, names):
     for rows, word in ((worse, "worse"), (better, "better")):
         if rows:
             parts.append(" and ".join(f"the {row['title']} ({change_text(row, row['change'])})" for row in rows)
-                         + f" became <em>{word}</em>")
+                         + f' became <em class="{word}">{word}</em>')
     if not parts:
         parts = ["<em>no difference</em> was found"]
     text = f"Of {names['pairs']} drives, " + "; ".join(parts) + "."
     if names["failing"]:
-        text += f" <em>{names['failing']}</em> drives that were replayed before now fail."
+        text += f" <em class='worse'>{names['failing']}</em> drives that were replayed before now fail."
     return f'<p class="headline">{text}</p>'
 
 

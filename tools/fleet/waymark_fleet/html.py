@@ -14,6 +14,7 @@ _MORE = """
 .chart .spot{stroke:var(--card);stroke-width:1.5}.chart .number{fill:var(--ink);font-weight:600}
 .lost-spot{fill:var(--orange)}.died-spot{fill:var(--ink)}.doubted-spot{fill:var(--amber)}
 td small{display:block;color:var(--soft);white-space:normal;min-width:12em;max-width:20em}td.worse{color:var(--orange);font-weight:600}td.better{color:var(--green);font-weight:600}td a,li a{color:var(--blue)}
+.headline em.worse{color:var(--orange)}.headline em.better{color:var(--green)}
 @media (max-width:620px){.chart text{font-size:27px}.chart circle{r:6}}
 """
 

@@ -73,6 +73,15 @@ def _faults(given, waymark):
     return json.loads(done.stdout)["faults"]
 
 
+def _has_a_disk(faults, from_s, until_s):
+    """HilError where the part begins on a full disk: nothing could be judged without the event log."""
+    for fault in faults:
+        if fault["fault"] == "disk_full" and fault["free_kb"] == 0 and fault["from_s"] <= from_s and fault_judge.is_in(fault, from_s, until_s):
+            ends_s = fault.get("until_s")
+            raise HilError(f"--from {from_s:g}: the disk is full then (fault '{fault['name']}', from {fault['from_s']:g} s"
+                           f"{'' if ends_s is None else f' to {ends_s:g} s'}), so the run would leave no log to judge; begin before it{'' if ends_s is None else ' or after it'}")
+
+
 def _target(given, waymark):
     pairs = {}
     for word in given.can:
@@ -144,6 +153,7 @@ def _played_world(folder, given, buses, cameras):
     """What drivers in the place of the kernel's read: tests/faults/played_world.h."""
     played = folder / "played"
     played.mkdir()
+    (played / "part").write_text(f"{given.from_s:g} {given.until_s or 0:g}\n")
     os.symlink("../recording", played / "recording")
     if given.faults:
         os.symlink("../faults.yaml", played / "faults.yaml")
@@ -235,6 +245,7 @@ def test(given, beside, types):
     target = _target(given, waymark)
     faults = _faults(given, waymark)
     _, until_s = _cut(given, rec)
+    _has_a_disk(faults, given.from_s, until_s)
     progress = Progress(until_s - given.from_s)
     run_limits, _ = limits.read(given.limits, target.where == "local")
     begun_s = time.monotonic()

@@ -104,7 +104,7 @@ class Judge:
             is_last = drive == self.drives[-1]
             whole = live if is_last else live[:live.rfind(b"\n") + 1]  # of a run that was killed, what its disk has
             same = live == again if is_last and "log_cut" not in self.facts else again.startswith(whole) or whole.startswith(again)
-            rows = whole.count(b"\n") - 1
+            rows = max(whole.count(b"\n") - 1, 0)
             may_gap = any(fault["fault"] == "disk_full" for fault in self.faults)
             self.checks.add("log", name, None if may_gap and not same else same, f"{rows} fused poses, {'each the same bits' if same else 'they differ'}")
             if drive == self.drives[0]:
@@ -120,6 +120,12 @@ class Judge:
         """Words for a replay of the part that was played, and a little more: the poses of its end lie between two."""
         words = ["--from", f"{self.facts['from_s']:g}"] if self.facts["from_s"] > 0 else []
         return words + (["--until", f"{self.facts['until_s'] + 1:g}"] if self.facts["is_cut"] else [])
+
+    def _short_log(self):
+        """Why the log may be too short to be compared, and what to do."""
+        full = next((fault for fault in self.faults if fault["fault"] == "disk_full" and fault_judge.is_in(fault, self.facts["from_s"], self.facts["until_s"])), None)
+        return "" if not full else (f" The log has what was written before the disk was full (fault '{full['name']}', {full['from_s'] - self.facts['from_s']:g} s "
+                                    "after the part's begin): begin earlier (--from)")
 
     def _reference(self, offset_ns):
         """Where the robot was, on the target's clock: truth where there is one, else the replay at the desk."""
@@ -139,7 +145,7 @@ class Judge:
             said = self.replay(recording, "--config", config, *self._part(), "--frames-of", log, "--out", self.folder / "same")
             self.replay(recording, "--config", config, *self._part(), "--out", self.folder / "desk")
         except HilError as error:
-            self.checks.add("poses", "replay at the desk", False, str(error))
+            self.checks.add("poses", "replay at the desk", False, f"{error}{self._short_log()}")
             return
         self.offset_ns = int(re.search(r"clock is (-?\d+) ns ahead", said).group(1))
         rows = poses.table(self.folder / "same/published.csv")
