@@ -19,12 +19,9 @@ constexpr double kRoadWheelMost_rad = 1.5;         // tan is finite; no wheel is
 
 // Sensors without a sign give zero errors of either; the largest seen is 0.05 m/s. Not swept.
 constexpr double kSignedBelow_mps = -0.1;
-// A stuck yaw rate: the same bits for so long and over so long a way, or sooner while another sensor measures a turn
-// that differs from it. A gyro's noise never repeats for seconds. Not swept.
-constexpr double kYawStuckAlone_s = 30.0, kYawStuckAlone_m = 15.0, kYawStuckAgainst_s = 3.0;
-// What the other sensor's errors make of a turn: a part of it (track, slip), an offset of the steering angle, and a
-// rest.
-constexpr double kYawStuckTurn_rad = 0.3, kOtherTurnScale = 0.2, kOtherSteeringOffset_rad = 0.02;
+// What the errors of a sensor beside the gyro make of a turn: a part of it (track, slip), an offset of the steering
+// angle.
+constexpr double kOtherTurnScale = 0.2, kOtherSteeringOffset_rad = 0.02;
 
 // The best first: increments have a covariance of their own; a gyro's turn is better than the wheels' difference, which
 // is then its second source (wheel_heading); steering knows less of the turn than the rear wheels' ticks.
@@ -362,7 +359,7 @@ bool motion_front_end::watch_standstill(wm_time_ns t_ns, bool still) {
     return false;
   }
   if (still_since_ns_ == WM_TIME_NONE) still_since_ns_ = t_ns;
-  return wm_seconds_between(still_since_ns_, t_ns) >= params_->standstill_after_s;
+  return stands(t_ns);
 }
 
 // `doubtful`: the input that holds from here on; `miscounted`: the counts of the segment that ends here.
@@ -384,8 +381,7 @@ void motion_front_end::push_input(wm_time_ns t_ns, double a, double b, bool doub
   note_samples(&input);
   input.sampling[1] += static_cast<float>(missed_turn_rad2_);
   missed_turn_rad2_ = 0.0;
-  input.standing = still_since_ns_ != WM_TIME_NONE && !doubtful && !input.refused &&
-                   wm_seconds_between(still_since_ns_, t_ns) >= params_->standstill_after_s;
+  input.standing = !doubtful && !input.refused && stands(t_ns);
   if (ticks_drive() && !counts_wrapped()) {
     // The segment that ends here gets the counted distance; from here on the last speed holds.
     const double dt = wm_seconds_between(now_ns_, t_ns);
@@ -494,24 +490,20 @@ void motion_front_end::watch_yaw_rate(wm_time_ns t_ns, double speed_mps, bool fr
   if (!is_still(speed_mps) || turns) w.moved_ns = t_ns;
   const bool moves = w.moved_ns != WM_TIME_NONE && wm_seconds_between(w.moved_ns, t_ns) < params_->standstill_after_s;
   const double yaw = value_[WM_Q_YAW_RATE];
-  const bool changed = yaw != w.rate_radps || w.since_ns == WM_TIME_NONE;
+  const bool changed = !w.repeats(yaw);
   if (changed || !moves) {
-    w = {yaw, t_ns, t_ns, w.moved_ns, 0.0, 0.0, 0.0};
+    w.begin(yaw, t_ns);
+    w.explained_rad = 0.0;
     if (changed) health_ &= ~WM_MOTION_HEALTH_YAW_RATE_STUCK;  // a stop alone shows nothing of it
     return;
   }
-  const double dt = wm_seconds_between(w.until_ns, t_ns), way = std::fabs(speed_mps) * dt;
-  w.until_ns = t_ns;
-  w.way_m += way;
+  const double dt = w.go_on(t_ns, speed_mps), way = std::fabs(speed_mps) * dt;
   if (compare) {
     w.apart_rad += (other - yaw) * dt;
-    w.allowed_rad += kOtherTurnScale * std::fabs(other) * dt;
-    if (finite(wheels_.wheelbase_m)) w.allowed_rad += kOtherSteeringOffset_rad * way / wheels_.wheelbase_m;
+    w.explained_rad += kOtherTurnScale * std::fabs(other) * dt;
+    if (finite(wheels_.wheelbase_m)) w.explained_rad += kOtherSteeringOffset_rad * way / wheels_.wheelbase_m;
   }
-  const double same_s = wm_seconds_between(w.since_ns, t_ns);
-  const bool alone = same_s > kYawStuckAlone_s && w.way_m > kYawStuckAlone_m;
-  const bool against = same_s > kYawStuckAgainst_s && std::fabs(w.apart_rad) > kYawStuckTurn_rad + w.allowed_rad;
-  if (!alone && !against) return;
+  if (!w.is_stuck_alone() && !w.is_stuck_against(w.explained_rad)) return;
   // Until now the heading lacks the turn that the other sensor measured.
   if (!(health_ & WM_MOTION_HEALTH_YAW_RATE_STUCK)) missed_turn_rad2_ = square(w.apart_rad);
   health_ |= WM_MOTION_HEALTH_YAW_RATE_STUCK;

@@ -8,6 +8,7 @@
 #include "motion/history.hpp"
 #include "motion/motion_kind.hpp"
 #include "motion/plausibility.hpp"
+#include "motion/repeated_value.hpp"
 #include "motion/step.hpp"
 #include "motion/wheel.hpp"
 #include "waymark/status.h"
@@ -124,6 +125,10 @@ class motion_front_end {
   bool counts_wrapped() const { return wrapped_ns_ != WM_TIME_NONE && wrapped_ns_ == fed_ns_; }
   // True once after the speed's source changed to another sensor, with another scale.
   bool speed_source_changed();
+  // No speed since standstill.after_s.
+  bool stands(wm_time_ns t_ns) const {
+    return still_since_ns_ != WM_TIME_NONE && wm_seconds_between(still_since_ns_, t_ns) >= params_->standstill_after_s;
+  }
   // The yaw rate of the last event at standstill, which is the gyro's bias. False: none.
   bool standstill_yaw_rate(double *yaw_rate_radps) const;
 
@@ -212,12 +217,9 @@ class motion_front_end {
   wm_time_ns sampled_ns_[2];    // newest sample of the speed and of the turn rate that the model uses
   wm_time_ns still_since_ns_;   // speed below the threshold since; WM_TIME_NONE while moving
   // While the gyro's value has the same bits.
-  struct yaw_watch {
-    double rate_radps;              // this value
-    wm_time_ns since_ns, until_ns;  // WM_TIME_NONE: none yet
-    wm_time_ns moved_ns;            // the newest sample at which the robot moved
-    double way_m;
-    double apart_rad, allowed_rad;  // the turn by the other sensor less the gyro's; what its errors explain of it
+  struct yaw_watch : repeated_value {
+    wm_time_ns moved_ns;   // the newest sample at which the robot moved
+    double explained_rad;  // of the turn by the other sensor less the gyro's, by that sensor's errors
   } yaw_watch_;
   double missed_turn_rad2_;  // variance of the heading for the next input: what a stuck gyro has missed
   uint64_t outliers_;

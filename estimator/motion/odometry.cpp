@@ -209,7 +209,7 @@ wm_status wm_odometry_init(wm_odometry *self, const wm_motion_params *params, co
   self->head.t_ns = self->spatial_ns = WM_TIME_NONE;
   // A twist in space holds as long as a planar one.
   const double after_s = wm::motion_history::kOverdueS;
-  self->source.init(params->hold_max_s);
+  self->source.init(params->hold_max_s, {params->standstill_speed_mps, params->standstill_yaw_rate_radps});
   self->spatial.init({after_s, params->hold_max_s, false, params->limits_mps2, params->limits_radps2});
   self->pose_odom_base = wm::kNoMotion;
   return WM_OK;

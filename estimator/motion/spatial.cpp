@@ -12,8 +12,6 @@ constexpr double kGapAfter_s = 0.2;
 // Random walks of the velocity and of the turn rates over a gap, per sqrt(s): accelerations of a vehicle in water or of
 // a head. Not swept.
 constexpr double kGapWalk_mps = 0.3, kGapWalk_radps = 0.3;
-// Turn rate of an axis that nothing measures, rad/s per sqrt(s): a vehicle on its way turns by 6 degrees in a second.
-constexpr double kUnmeasured_radps = 0.1;
 constexpr double kFirstPeriod_s = 0.02;  // of a sensor that has given one sample; 50 a second
 // Of the low-pass behind a time offset's derivative. Chosen on seabed-a (offset 15 ms); not swept.
 constexpr double kSmoothing_s = 0.3;
@@ -113,7 +111,8 @@ void spatial_motion::init(const wm_motion_params *params, const wm_wheels *wheel
   std::memset(static_cast<void *>(this), 0, sizeof *this);
   front_.init(params, wheels);
   const wm_motion_params &p = front_.params();
-  source_.init(p.hold_max_s);
+  source_.init(p.hold_max_s,
+               {p.standstill_speed_mps + length(noise.v_mps), p.standstill_yaw_rate_radps + length(noise.w_radps)});
   history_.init({kGapAfter_s, p.hold_max_s, true, p.limits_mps2, p.limits_radps2});
   noise_ = noise;
 }
@@ -133,6 +132,7 @@ void spatial_motion::feed(const wm_event &event) {
     now.v.x = twist.v;
     now.v.y = twist.u;
     now.w.z = twist.w;
+    source_.note_standing(front_.stands(event.t_ns));
   }
   if (!source_.take(event, &now)) return;
   const bool first = history_.samples() == 0;
@@ -142,6 +142,14 @@ void spatial_motion::feed(const wm_event &event) {
     smooth_v_[i].restart(now.v[i]);
     smooth_w_[i].restart(now.w[i]);
   }
+}
+
+uint32_t spatial_motion::health() const {
+  static constexpr uint32_t kOfAxis[3] = {WM_MOTION_HEALTH_ROLL_RATE_STUCK, WM_MOTION_HEALTH_PITCH_RATE_STUCK,
+                                          WM_MOTION_HEALTH_YAW_RATE_STUCK};
+  uint32_t out = front_.health() | (history_.refused_lately() ? WM_MOTION_HEALTH_IMPLAUSIBLE : 0u);
+  for (int i = 0; i < 3; i++) out |= source_.stuck_rates() & (1u << i) ? kOfAxis[i] : 0u;
+  return out | (source_.stuck_forces() ? WM_MOTION_HEALTH_ACCELEROMETER_STUCK : 0u);
 }
 
 void spatial_motion::sample_noise(vec3 *v_var, vec3 *w_var) const {
@@ -177,17 +185,41 @@ spatial_step spatial_motion::step_of(const spatial_piece &piece, wm_time_ns end_
     v_held_s2 = s.dt_s * (s.dt_s > source_.twist_period_s() ? s.dt_s : source_.twist_period_s());
     walk_s3 += source_.unmeasured_s3(s.dt_s, end_ns);
   }
+  const uint32_t by_twist = source_.is_held() ? source_.lost_rates() : 0u;  // rates that hold as the velocity does
+  const uint32_t unmeasured = source_.unmeasured_rates(end_ns);
   for (int i = 0; i < 3; i++) {
+    const bool held = (by_twist & (1u << i)) != 0;
+    if (held) changed.w[i] = source_.rate_change()[i];
     const double v_var =
         variance_of(noise_.v_mps[i], noise_.v_rel, speed) + held_variance(changed.v[i], noise_.v_mps[i]);
     const double w_var =
         variance_of(noise_.w_radps[i], noise_.w_rel, rate) + held_variance(changed.w[i], noise_.w_radps[i]);
     s.place_m2[i] = v_var * v_held_s2 + square(kGapWalk_mps) * walk_s3 + square(p.limits_mps2) * piece.refused_s4 / 3.0;
-    s.turn_rad2[i] =
-        w_var * held_s2 + square(kGapWalk_radps) * piece.walk_s3 + square(p.limits_radps2) * piece.refused_s4 / 3.0;
-    if (source_.is_unmeasured(i)) s.turn_rad2[i] += square(kUnmeasured_radps) * s.dt_s;
+    s.turn_rad2[i] = w_var * (held ? v_held_s2 : held_s2) + square(kGapWalk_radps) * piece.walk_s3 +
+                     square(p.limits_radps2) * piece.refused_s4 / 3.0;
+    if (unmeasured & (1u << i)) s.turn_rad2[i] += square(kUnmeasured_radps) * s.dt_s;
   }
   return s;
+}
+
+// A turn that was missed evenly over a way bends it: half of the way is displaced on average, with a third of its
+// square.
+void spatial_motion::add_missed(spatial_step *s) {
+  double turn_rad2[3], since_s;
+  if (!source_.take_missed(turn_rad2, &since_s)) return;
+  const double way2 = dot(s->v_mps, s->v_mps) * square(since_s);
+  for (int i = 0; i < 3; i++) {
+    s->turn_rad2[i] += turn_rad2[i];
+    for (int j = 0; j < 3; j++)
+      if (j != i) s->place_m2[j] += way2 * turn_rad2[i] / 3.0;
+  }
+}
+
+double spatial_motion::unmeasured_turn_rad2ps(wm_time_ns t_ns) const {
+  const uint32_t axes = source_.unmeasured_rates(t_ns);
+  double sum = 0.0;
+  for (int i = 0; i < 3; i++) sum += axes & (1u << i) ? square(kUnmeasured_radps) : 0.0;
+  return sum;
 }
 
 void spatial_motion::smooth(const spatial_piece &piece) {

@@ -107,7 +107,9 @@ class spatial_motion {
   void walk(wm_time_ns from_ns, wm_time_ns to_ns, Visit visit) {
     history_.advance(from_ns, to_ns, [&](const spatial_piece &piece, wm_time_ns end_ns) {
       smooth(piece);
-      visit(step_of(piece, end_ns));
+      spatial_step s = step_of(piece, end_ns);
+      add_missed(&s);
+      visit(s);
     });
   }
 
@@ -137,14 +139,14 @@ class spatial_motion {
   // Variances of one sample's components.
   void sample_noise(vec3 *v_var, vec3 *w_var) const;
   uint64_t outliers() const { return front_.outliers() + history_.outliers(); }
-  uint32_t health() const {
-    return front_.health() | (history_.refused_lately() ? WM_MOTION_HEALTH_IMPLAUSIBLE : 0u) |
-           (source_.is_stuck() ? WM_MOTION_HEALTH_YAW_RATE_STUCK : 0u);
-  }
+  uint32_t health() const;
   const spatial_source &source() const { return source_; }
+  // Density of turns that nothing measures, of all axes.
+  double unmeasured_turn_rad2ps(wm_time_ns t_ns) const;
 
  private:
   spatial_step step_of(const spatial_piece &piece, wm_time_ns end_ns) const;
+  void add_missed(spatial_step *s);
   void smooth(const spatial_piece &piece);
 
   motion_front_end front_;

@@ -114,7 +114,10 @@ static void about_motion(uint32_t bits, wm_findings *out) {
       "a message's counter stood still: its sender is stuck; its values were not used",
       "the yaw rate never changed (stuck sensor?)",
       "samples of the last seconds exceeded the plausible acceleration and were refused (motion.limits)",
-      "the vehicle rose, rolled or pitched for seconds, which an estimator in the plane does not model"};
+      "the vehicle rose, rolled or pitched for seconds, which an estimator in the plane does not model",
+      "the gyro's roll rate never changed (stuck sensor?); it is not used",
+      "the gyro's pitch rate never changed (stuck sensor?); it is not used",
+      "the accelerometer gave one and the same value (stuck sensor?); it is not used"};
   for (unsigned i = 0; i < sizeof kTexts / sizeof kTexts[0]; i++)
     if ((bits >> i) & 1u) wm_find(out, WM_FOUND_MOTION_SENSOR, WM_SEVERITY_BAD, "motion", NULL, "%s", kTexts[i]);
 }

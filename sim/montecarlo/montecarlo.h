@@ -39,6 +39,7 @@ struct Run {
   uint64_t seed = 0;
   double position_rms_m = 0, position_max_m = 0, rotation_rms_rad = 0;  // planar: of the heading
   double nees_mean = 0;
+  double beyond_s = 0;  // longest time of tracking without a break beyond 5 sigma (NEES above kBeyond6), in six degrees
 };
 
 struct Statistics {
@@ -73,7 +74,13 @@ struct Step6 {
   double nees = 0;  // 6 degrees of freedom
   // Sums over the drives of which a bound was computed: of the position's and the rotation's variances.
   double bound_position_sq_m2 = 0, bound_rotation_sq_rad2 = 0;
+  // The same by component: along, across and above the heading, m2; about the body's axes, rad2. Squares of the error,
+  // variances by the estimator, variances by the bound.
+  double error_sq[6] = {}, variance[6] = {}, bound[6] = {};
 };
+
+// Of six degrees of freedom, exceeded as seldom as 5 sigma of a normal distribution: 6e-7.
+inline constexpr double kBeyond6 = 39.5;
 
 struct Statistics6 {
   uint64_t runs = 0, fused = 0, rejected = 0, outliers = 0, bounds = 0;

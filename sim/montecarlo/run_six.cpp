@@ -170,6 +170,15 @@ struct Begun {
   }
 };
 
+// Variances of a pose by component (Step6).
+void add_variances(const wm_estimate &e, double sums[6]) {
+  const double c = std::cos(e.heading_rad), s = std::sin(e.heading_rad);
+  const auto v = [&e](int i, int j) { return e.covariance[wm_cov_index(i, j)]; };
+  sums[0] += c * c * v(0, 0) + 2 * c * s * v(0, 1) + s * s * v(1, 1);
+  sums[1] += s * s * v(0, 0) - 2 * c * s * v(0, 1) + c * c * v(1, 1);
+  for (int i = 2; i < 6; i++) sums[i] += v(i, i);
+}
+
 // The bound: the estimator's own covariance on the same way without any error. Its points of linearisation are the
 // truth then, and nothing is refused; missed points and outliers are missing: the recursion of [Tichavsky1998] for the
 // model and the noise of the configuration.
@@ -206,6 +215,7 @@ wm_status add_bound(const sim::Scenario &scenario, const wm_config &config, uint
         step.bound_position_sq_m2 += estimate.covariance[wm_cov_index(i, i)];
         step.bound_rotation_sq_rad2 += estimate.covariance[wm_cov_index(3 + i, 3 + i)];
       }
+      add_variances(estimate, step.bound);
     }
     (void)ops.predict(begun.memory.get(), &e);
   }
@@ -227,6 +237,7 @@ wm_status run_one(const sim::Scenario &scenario, const wm_config &config, const 
   const auto is_judged = [&options](double t_s) { return t_s >= options.settled_s && t_s <= options.until_s; };
   Run run{.seed = recording.seed};
   uint64_t judged = 0;
+  double beyond_since_s = -1;
   size_t next = 0, in_picture = 0;
   wm_time_ns picture_ns = WM_TIME_NONE;
   for (const wm_event &e : events_of(recording)) {
@@ -263,6 +274,19 @@ wm_status run_one(const sim::Scenario &scenario, const wm_config &config, const 
         step.position_sq_m2 += error.position.squaredNorm();
         step.rotation_sq_rad2 += error.rotation.squaredNorm();
         step.nees += error.nees;
+        add_variances(estimate, step.variance);
+        const Eigen::Vector3d ahead =
+            Eigen::AngleAxisd(-estimate.heading_rad, Eigen::Vector3d::UnitZ()) * error.position;
+        for (int k = 0; k < 3; k++) {
+          step.error_sq[k] += ahead[k] * ahead[k];
+          step.error_sq[3 + k] += error.rotation[k] * error.rotation[k];
+        }
+        if (error.nees <= kBeyond6 || estimate.state != WM_STATE_TRACKING)
+          beyond_since_s = -1;
+        else if (beyond_since_s < 0)
+          beyond_since_s = step.t_s;
+        else
+          run.beyond_s = std::max(run.beyond_s, step.t_s - beyond_since_s);
         if (is_judged(step.t_s)) {
           judged++;
           run.position_rms_m += error.position.squaredNorm();

@@ -167,7 +167,10 @@ void measure_imu(const Scenario &sc, const Random &random, Recording &out) {
       row.a_mps2[i] = now.f[axis] + offset[i] + shaken[axis] +
                       m.accelerometer_noise_mps2 * random.normal(Stream::accelerometer_noise, k, i);
       bias[i] += e.yaw_rate_bias_walk * std::sqrt(step_s) * random.normal(Stream::yaw_rate_walk, k, 8 + i);
-      if (sc.faults.gyro_stuck.holds(t_s) && !out.imu.empty()) row.w_radps[i] = out.imu.back().w_radps[i];
+      if (out.imu.empty()) continue;
+      const int stuck_axis = static_cast<int>(i);
+      if (sc.faults.gyro_stuck.holds(t_s, stuck_axis)) row.w_radps[i] = out.imu.back().w_radps[i];
+      if (sc.faults.accelerometer_stuck.holds(t_s, stuck_axis)) row.a_mps2[i] = out.imu.back().a_mps2[i];
     }
     out.imu.push_back(row);
   }

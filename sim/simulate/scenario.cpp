@@ -378,6 +378,13 @@ wm_yaml_node read_span(Reader &r, const wm_yaml_node &map, const char *key, cons
   return node;
 }
 
+void read_stuck(Reader &r, const wm_yaml_node &map, const char *key, Stuck &out) {
+  static const char *const known[] = {"from_s", "to_s", "axis", nullptr};
+  static const char *const axes[] = {"x", "y", "z", nullptr};
+  const wm_yaml_node node = read_span(r, map, key, known, out);
+  if (r.ok() && wm_yaml_there(&node)) r.word(node, "axis", axes, out.axis);
+}
+
 void read_faults(Reader &r, const wm_yaml_node &map, Faults &out) {
   static const char *const known[] = {"can_lost_percent",
                                       "can_duplicated_percent",
@@ -404,6 +411,7 @@ void read_faults(Reader &r, const wm_yaml_node &map, Faults &out) {
                                       "wheel_slip",
                                       "kidnap",
                                       "gyro_stuck",
+                                      "accelerometer_stuck",
                                       nullptr};
   static const char *const known_dead[] = {"wheel", "from_s", nullptr};
   static const char *const known_start[] = {"x_m", "y_m", "heading_deg", nullptr};
@@ -440,7 +448,8 @@ void read_faults(Reader &r, const wm_yaml_node &map, Faults &out) {
   static const char *const known_kidnap[] = {"at_s", "forward_s", nullptr};
   read_span(r, map, "camera_dropout", known_span, out.camera_dropout);
   read_span(r, map, "frozen_picture", known_span, out.frozen_picture);
-  read_span(r, map, "gyro_stuck", known_span, out.gyro_stuck);
+  read_stuck(r, map, "gyro_stuck", out.gyro_stuck);
+  read_stuck(r, map, "accelerometer_stuck", out.accelerometer_stuck);
   const wm_yaml_node lights = read_span(r, map, "lights_off", known_lights, out.lights_off);
   if (r.ok() && wm_yaml_there(&lights)) r.number(lights, "left_percent", 0, 100, kPercent, out.lights_left);
   const wm_yaml_node slip = read_span(r, map, "wheel_slip", known_slip, out.wheel_slip);

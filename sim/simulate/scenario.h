@@ -223,6 +223,12 @@ struct Span {
   bool holds(double t_s) const { return t_s >= from_s && t_s < to_s; }
 };
 
+// A sensor that repeats its last value: all axes, or one.
+struct Stuck : Span {
+  int axis = -1;  // 0 x, 1 y, 2 z; -1: all
+  bool holds(double t_s, int of_axis) const { return Span::holds(t_s) && (axis < 0 || axis == of_axis); }
+};
+
 // Things that go wrong on request; all off by default.
 struct Faults {
   double can_lost = 0, can_duplicated = 0, can_reordered = 0;  // fractions of the frames
@@ -248,7 +254,7 @@ struct Faults {
   int wheel_slip_wheel = 0;                      // 0 left, 1 right
   double wheel_slip_share = 0;                   // relative
   double kidnap_at_s = 0, kidnap_forward_s = 0;  // carried to where it would be so much later; 0: not
-  Span gyro_stuck;                               // imu.csv repeats the last rates
+  Stuck gyro_stuck, accelerometer_stuck;         // imu.csv repeats the last rates, the last specific force
 };
 
 struct Scenario {

@@ -149,13 +149,16 @@ std::vector<CalibrationState> calibration_of(const Json &health) {
 
 // What the run had to complain of beside its counts.
 std::string complaints(const Json &health) {
-  static constexpr std::array<std::pair<const char *, const char *>, 6> kMotion{{
+  static constexpr std::array<std::pair<const char *, const char *>, 9> kMotion{{
       {"encoder_left_dead", "The left wheel’s encoder stood still while the robot drove: it is taken for dead."},
       {"encoder_right_dead", "The right wheel’s encoder stood still while the robot drove: it is taken for dead."},
       {"counter_frozen", "A motion message kept coming with a counter that stood still: its sender hung."},
       {"yaw_rate_stuck", "The gyro gave one and the same value while the robot turned: it is taken for stuck."},
       {"implausible", "Motion samples were refused near the end: no robot accelerates as they claim."},
       {"not_planar", "The vehicle rose, rolled or pitched for seconds, which this estimator does not model."},
+      {"roll_rate_stuck", "The gyro gave one and the same roll rate: that axis is taken for stuck."},
+      {"pitch_rate_stuck", "The gyro gave one and the same pitch rate: that axis is taken for stuck."},
+      {"accelerometer_stuck", "The accelerometer gave one and the same value: it is taken for stuck."},
   }};
   std::string out;
   const auto each = [&health](const char *key, const auto &then) {

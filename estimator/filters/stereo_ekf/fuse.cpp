@@ -191,11 +191,35 @@ void stereo_ekf::fuse_twist(const wm_event &motion) {
   spatial_twist now, per_s;
   motion_.sample_noise(&v_var, &w_var);
   if (!motion_.sample_now(&now, &per_s)) return;
-  const bool planar = motion.kind == WM_EVENT_TWIST2, gyro = motion_.source().by_gyro();
-  if (motion.kind != WM_EVENT_QUANTITIES)
-    (void)filter_.fuse(twist_rows(kVelocity, now.v, per_s.v, v_var, planar), limits());
-  if (motion.kind == WM_EVENT_QUANTITIES || !gyro)
-    (void)filter_.fuse(twist_rows(kRates, now.w, per_s.w, w_var, planar && !gyro), limits());
+  const spatial_source &source = motion_.source();
+  const uint32_t all = spatial_source::kAxes, lost = source.lost_rates();
+  const bool planar = motion.kind == WM_EVENT_TWIST2, quantities = motion.kind == WM_EVENT_QUANTITIES;
+  if (!quantities) (void)filter_.fuse(twist_rows(kVelocity, now.v, per_s.v, v_var, planar ? 1u : all), limits());
+  // A twist beside a gyro gives the rates that the gyro has lost.
+  const uint32_t by_twist = (source.by_gyro() ? lost : planar ? 4u : all) & ~source.unmeasured_rates(motion.t_ns);
+  const uint32_t axes = quantities ? all & ~lost : by_twist;
+  if (axes != 0) (void)filter_.fuse(twist_rows(kRates, now.w, per_s.w, w_var, axes), limits());
+}
+
+// Rates of another source have another bias: its state begins anew, and has the gyro's again when the gyro is back.
+void stereo_ekf::follow_rates() {
+  const uint32_t lost = motion_.source().lost_rates(), changed = lost ^ lost_rates_;
+  if (changed == 0) return;
+  lost_rates_ = lost;
+  gravity_.restart();
+  const int first = filter_.at(kRateBias);
+  for (int i = 0; i < 3 && first >= 0; i++) {
+    if (!(changed & (1u << i))) continue;
+    filter_.settle();
+    kept_bias &kept = gyro_bias_[i];
+    if (lost & (1u << i)) {
+      kept = {now_ns_, filter_.value(first + i), filter_.variance(first + i)};
+      filter_.forget(first + i, 0.0, square(params_.rate_bias_sigma));
+    } else {
+      const double since_s = wm_seconds_between(kept.t_ns, now_ns_);
+      filter_.forget(first + i, kept.radps, kept.variance + square(params_.rate_bias_walk) * since_s);
+    }
+  }
 }
 
 // The direction of gravity, once a second: a second of specific force less the acceleration by the velocity.
@@ -207,7 +231,10 @@ void stereo_ekf::fuse_gravity() {
   double variance[3];
   motion_.sample_noise(&v_var, &w_var);
   const bool known = rates || motion_.source().velocity_is_known(now_ns_);
-  if (!gravity_.add(now_ns_, motion_.source().force_mps2(), v, w, known ? &v_var : nullptr, &force, variance)) return;
+  const double turn_rad2ps = motion_.unmeasured_turn_rad2ps(now_ns_);
+  if (!gravity_.add(now_ns_, motion_.source().force_mps2(), v, w, known ? &v_var : nullptr, turn_rad2ps, &force,
+                    variance))
+    return;
   if (life_.searching()) return;
   (void)filter_.fuse(gravity_rows(force, variance), limits());
 }

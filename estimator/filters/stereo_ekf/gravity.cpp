@@ -27,8 +27,8 @@ void gravity_window::begin(wm_time_ns t_ns, const vec3 &force, const vec3 &v) {
   for (int i = 0; i < 3; i++) squares_[i] = square(force[i]);
 }
 
-bool gravity_window::add(wm_time_ns t_ns, const vec3 &force, const vec3 &v, const vec3 &w, const vec3 *v_var, vec3 *out,
-                         double variance[3]) {
+bool gravity_window::add(wm_time_ns t_ns, const vec3 &force, const vec3 &v, const vec3 &w, const vec3 *v_var,
+                         double turn_rad2ps, vec3 *out, double variance[3]) {
   const double dt_s = count_ > 0 ? wm_seconds_between(last_ns_, t_ns) : 0.0;
   if (count_ == 0 || dt_s > kGap_s || !(dt_s > 0.0)) {
     begin(t_ns, force, v);
@@ -49,7 +49,9 @@ bool gravity_window::add(wm_time_ns t_ns, const vec3 &force, const vec3 &v, cons
   for (int i = 0; i < 3; i++) {
     const double scatter = squares_[i] / n - square(mean[i]);
     const double moved = v_var ? 2.0 * (*v_var)[i] / square(whole_s) : square(kUnmeasured_mps2);
-    variance[i] = square(sigma_mps2_) + (scatter > 0.0 ? kCorrelated * scatter / n : 0.0) + moved;
+    // The mean of a random walk of the direction differs from its end by a third of the end's variance.
+    const double turned = square(kGravity_mps2) * turn_rad2ps * whole_s / 3.0;
+    variance[i] = square(sigma_mps2_) + (scatter > 0.0 ? kCorrelated * scatter / n : 0.0) + moved + turned;
   }
   count_ = 0;
   return true;

@@ -19,10 +19,12 @@ class gravity_window {
   }
 
   // Takes one sample, with the velocity and the rates that hold until it (m/s, rad/s, body axes). `v_var`: variances
-  // of the velocity; nullptr: it is not measured. True once a second: *out is g towards the zenith, in body axes at
-  // `t_ns`, and `variance` those of its axes.
-  bool add(wm_time_ns t_ns, const vec3 &force, const vec3 &v, const vec3 &w, const vec3 *v_var, vec3 *out,
-           double variance[3]);
+  // of the velocity; nullptr: it is not measured. `turn_rad2ps`: density of turns that the rates do not have. True once
+  // a second: *out is g towards the zenith, in body axes at `t_ns`, and `variance` those of its axes.
+  bool add(wm_time_ns t_ns, const vec3 &force, const vec3 &v, const vec3 &w, const vec3 *v_var, double turn_rad2ps,
+           vec3 *out, double variance[3]);
+  // A window that is open has samples of a sensor that is none any more.
+  void restart() { count_ = 0; }
 
  private:
   void begin(wm_time_ns t_ns, const vec3 &force, const vec3 &v);

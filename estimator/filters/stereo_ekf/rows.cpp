@@ -215,7 +215,7 @@ void put_row(const double by[3], int row, int column, row_block *out) {
 // b, lag and r, the rotation of the twist's axes (and of the velocity's direction): a measured twist that is ahead of
 // the vehicle's had its present value a lag ago.
 row_block stereo_ekf::twist_rows(head_state which, const vec3 &measured, const vec3 &slope_per_s, const vec3 &variance,
-                                 bool planar) const {
+                                 uint32_t axes) const {
   const bool velocity = which == kVelocity;
   const int lag_state = velocity ? kVelocityLag : kRateLag, scale_state = velocity ? kVelocityScale : kRateScale;
   const vec3 now = measured - filter_.head1(lag_state, 0.0) * slope_per_s, state = filter_.head3(which);
@@ -232,7 +232,7 @@ row_block stereo_ekf::twist_rows(head_state which, const vec3 &measured, const v
   const vec3 seen = (1.0 / scale) * (state - cross(turned, state));
   const mat3 by_state = (1.0 / scale) * (kIdentity3 + -1.0 * skew(turned)), by_turn = (1.0 / scale) * skew(state);
   for (int i = 0; i < 3; i++) {
-    if (planar && i != (velocity ? 0 : 2)) continue;
+    if (!(axes & (1u << i))) continue;
     const int row = out.add_row(WM_RESIDUAL_X, now[i], now[i] - (seen[i] + bias[i]), variance[i]);
     put_row(by_state.m[i], row, first, &out);
     put_row(by_turn.m[i], row, by_axes, &out);

@@ -200,6 +200,7 @@ wm_status stereo_ekf::predict(const wm_event &motion) {
   }
   if (now_ns_ != WM_TIME_NONE && start_ns_ != WM_TIME_NONE && now_ns_ < start_ns_) now_ns_ = start_ns_;
   move_to(motion.t_ns);
+  follow_rates();
   if (constant_velocity() && (motion.kind != WM_EVENT_QUANTITIES || motion_.source().rates_are_fresh()))
     fuse_twist(motion);
   if (filter_.at(kForceBias) >= 0 && motion_.source().force_is_fresh()) fuse_gravity();

@@ -110,6 +110,7 @@ class stereo_ekf {
   wm_status fuse_heading(const wm_event &event, record_list records);
   void fuse_twist(const wm_event &motion);
   void fuse_gravity();
+  void follow_rates();
   row_verdict fuse_point(const wm_stereo &seen, const vec3 &place, double place_sigma_m, int slot,
                          const wm_innovation &blank, record_list records);
   row_verdict fuse_rows(const row_block &block, const wm_innovation &blank, record_list records);
@@ -126,7 +127,7 @@ class stereo_ekf {
   void position_rows(const wm_position &p, int first, int last, row_block *out) const;
   bool heading_rows(const wm_heading &h, row_block *out) const;
   row_block twist_rows(head_state which, const vec3 &measured, const vec3 &slope_per_s, const vec3 &variance,
-                       bool planar) const;
+                       uint32_t axes) const;
   row_block gravity_rows(const vec3 &force, const double variance[3]) const;
   void add_pose_columns(row_block *block, const past_pose &past, const vec3 &arm, const double (*by_end)[3],
                         const double (*by_turn)[3]) const;
@@ -221,6 +222,12 @@ class stereo_ekf {
   space_filter filter_;
   spatial_motion motion_;
   gravity_window gravity_;
+  // Of the gyro, as it was when an axis was lost.
+  struct kept_bias {
+    wm_time_ns t_ns;
+    double radps, variance;
+  } gyro_bias_[3];
+  uint32_t lost_rates_;  // axes, a bit each
   stereo_rig rig_;
   wm_stereo_ekf_params params_;
   const wm_setup *setup_;

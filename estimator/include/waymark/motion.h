@@ -54,6 +54,10 @@ void wm_motion_choose(wm_motion_params *params, uint32_t kinds);
 #define WM_MOTION_HEALTH_YAW_RATE_STUCK (1u << 3)
 #define WM_MOTION_HEALTH_IMPLAUSIBLE (1u << 4)  // a sample was refused within the last 5 s (motion.limits)
 #define WM_MOTION_HEALTH_NOT_PLANAR (1u << 5)  // motion6.csv: it rises, rolls or pitches, which the plane does not have
+// An IMU in space; its third axis is the yaw rate's.
+#define WM_MOTION_HEALTH_ROLL_RATE_STUCK (1u << 6)
+#define WM_MOTION_HEALTH_PITCH_RATE_STUCK (1u << 7)
+#define WM_MOTION_HEALTH_ACCELEROMETER_STUCK (1u << 8)
 
 // Calibration of the motion sensors, as an estimator has learnt it. Neutral: scales 1, the rest 0.
 typedef enum wm_motion_term {

@@ -119,6 +119,26 @@ void test_an_imu_in_space_without_pictures_for_20_s(void) {
   for (const auto &run : s.each) TEST_ASSERT_LESS_THAN_DOUBLE(0.1, run.position_rms_m);
 }
 
+// Sensors of the IMU that repeat their last values from 20 to 40 s, all axes or one, and come back: the pose is never
+// beyond 5 sigma for more than 2 s.
+void test_an_imu_in_space_that_sticks(void) {
+  const sim::Stuck none, all = {{20, 40}, -1}, yaw = {{20, 40}, 2};
+  const sim::Stuck kinds[][2] = {{all, none}, {yaw, none}, {none, all}};
+  for (const auto &[gyro, accelerometer] : kinds) {
+    sim::Scenario scenario = world("seabed-imu");
+    scenario.rounds.rounds *= 50 / scenario.rounds.duration_s;
+    scenario.rounds.duration_s = 50;
+    scenario.faults.gyro_stuck = gyro;
+    scenario.faults.accelerometer_stuck = accelerometer;
+    const Statistics6 s = dives(scenario, {1, six_seeds});
+    TEST_ASSERT_GREATER_OR_EQUAL_DOUBLE(0.9, s.nees_inside(montecarlo::band_of(s.runs)));
+    for (const auto &run : s.each) {
+      TEST_ASSERT_LESS_THAN_DOUBLE(2, run.beyond_s);
+      TEST_ASSERT_LESS_THAN_DOUBLE(0.05, run.position_max_m);
+    }
+  }
+}
+
 }  // namespace
 
 int main(int argc, char **argv) {
@@ -132,5 +152,6 @@ int main(int argc, char **argv) {
   RUN_TEST(test_a_gyro_that_sticks_beside_a_twist);
   RUN_TEST(test_an_imu_in_space);
   RUN_TEST(test_an_imu_in_space_without_pictures_for_20_s);
+  RUN_TEST(test_an_imu_in_space_that_sticks);
   return UNITY_END();
 }
