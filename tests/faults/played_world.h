@@ -5,9 +5,9 @@
 //   faults.yaml   what breaks; optional
 //   begin         CLOCK_MONOTONIC in ns at which its first datum is due (as `waymark play --start-at`); until it is
 //                 there, nothing comes. A run that was killed finds the world as far on as it is.
-//   part          "FROM UNTIL" in seconds since its first datum: nothing comes before and after; UNTIL 0: to its end;
-//   optional devices       lines "DEVICE STREAM": "can0 can:can2", "/dev/video0 camera:front"; without a line an
-//   interface has
+//   part          optional: "FROM UNTIL" in seconds since its first datum: nothing comes before and after; UNTIL 0: to
+//                 its end
+//   devices       lines "DEVICE STREAM": "can0 can:can2", "/dev/video0 camera:front"; without a line an interface has
 //                 the frames recorded by its name, else those of the first; a device has the first camera
 #ifndef WM_PLAYED_WORLD_H
 #define WM_PLAYED_WORLD_H
