@@ -464,6 +464,16 @@ class Compared(unittest.TestCase):
 
 
 class Poses(unittest.TestCase):
+    def test_a_run_in_the_plane_has_no_height(self):
+        """A road that climbs is no error of a planar estimator; in space the height counts."""
+        with tempfile.TemporaryDirectory() as folder:
+            for name, columns in (("plane", "cov_xx,cov_xy,cov_yy"), ("space", "cov_xx,cov_zz")):
+                run, truth = pathlib.Path(folder) / f"{name}.csv", pathlib.Path(folder) / "truth.csv"
+                run.write_text(f"t_ns,x_m,y_m,z_m,qx,qy,qz,qw,{columns}\n" + "".join(f"{t},0,0,0,0,0,0,1{',1' * columns.count('cov')}\n" for t in (0, 10)))
+                truth.write_text("t_ns,x_m,y_m,z_m\n0,3,0,4\n20,3,0,4\n")
+                rows = poses.table(truth, not poses.is_planar(run))
+                self.assertEqual(poses.rms(m for _, m, _ in poses.differences(poses.table(run), rows, 0)), 3.0 if name == "plane" else 5.0)
+
     def test_between_and_around(self):
         rows = [(k * 10**9, float(k), 0.0, 3.1 if k % 2 else -3.1, 0.0) for k in range(8)]
         times = [row[0] for row in rows]

@@ -130,7 +130,7 @@ class Judge:
     def _reference(self, offset_ns):
         """Where the robot was, on the target's clock: truth where there is one, else the replay at the desk."""
         truth = self.facts["recording"] / "truth.csv"
-        rows = poses.table(truth) if truth.is_file() else poses.table(self.folder / "desk/published.csv")
+        rows = self._truth_rows() if truth.is_file() else poses.table(self.folder / "desk/published.csv")
         return [((t + offset_ns - self.start_ns) * 1e-9, x, y, heading, z) for t, x, y, heading, z in rows], "truth" if truth.is_file() else "replay at the desk"
 
     def poses(self):
@@ -171,11 +171,15 @@ class Judge:
         self._truth(live)
         self.reference, self.reference_is = self._reference(self.offset_ns)
 
+    def _truth_rows(self):
+        """The truth; without its heights where the run is in the plane."""
+        return poses.table(self.facts["recording"] / "truth.csv", not poses.is_planar(self.folder / "desk/published.csv"))
+
     def _truth(self, live):
         truth = self.facts["recording"] / "truth.csv"
         if not truth.is_file():
             return
-        rows = poses.table(truth)
+        rows = self._truth_rows()
         live_rows = list(poses.differences(live, rows, self.offset_ns))
         until_ns = max((row[0] for row in live), default=0) - self.offset_ns
         desk = [row for row in poses.table(self.folder / "desk/published.csv") if row[0] <= until_ns]

@@ -14,12 +14,18 @@ def heading_of(x, y, z, w):
     return math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
 
 
-def table(path):
+def is_planar(path):
+    """Whether a run's table of poses is of an estimator in the plane, which has no height."""
+    with open(path, encoding="utf-8") as f:
+        return "cov_zz" not in f.readline().strip().split(",")
+
+
+def table(path, has_height=True):
     """Rows of trajectory.csv, published.csv or truth.csv; a row without an orientation has none."""
     def row(r):
         q = [r.get(name) for name in ("qx", "qy", "qz", "qw")]
         heading = heading_of(*map(float, q)) if all(q) else math.nan
-        return int(r["t_ns"]), float(r["x_m"]), float(r["y_m"]), heading, float(r.get("z_m") or 0)
+        return int(r["t_ns"]), float(r["x_m"]), float(r["y_m"]), heading, float(r.get("z_m") or 0) if has_height else math.nan
     with open(path, newline="", encoding="utf-8") as f:
         return [row(r) for r in csv.DictReader(f)]
 
@@ -48,8 +54,9 @@ def around(rows, times, t_ns):
 
 def away(pose, other):
     """(m, degrees) from one pose to another; of six degrees of freedom the height counts, too. Without a heading: 0 degrees."""
+    up = pose[4] - other[3]
     degrees = abs(math.degrees(math.remainder(pose[3] - other[2], 2 * math.pi))) if math.isfinite(pose[3] + other[2]) else 0.0
-    return math.hypot(pose[1] - other[0], pose[2] - other[1], pose[4] - other[3]), degrees
+    return math.hypot(pose[1] - other[0], pose[2] - other[1], up if math.isfinite(up) else 0.0), degrees
 
 
 def differences(poses, rows, offset_ns):
