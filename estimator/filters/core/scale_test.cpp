@@ -12,7 +12,7 @@ namespace wm {
 namespace {
 
 constexpr double kMost = 1.2, kSigmas = 5.0;
-// Sigmas, of all lengths together. With default priors SLAM on 15 real recordings reaches 1.4.
+// Sigmas, of all lengths together. With default priors SLAM on 16 real recordings reaches 1.4.
 constexpr double kLengthSigmas = 3.5;
 // Names of calibration values, and whose sigma it is. The last one is of any sensor.
 constexpr struct {

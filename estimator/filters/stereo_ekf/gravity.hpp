@@ -23,7 +23,7 @@ class gravity_window {
   // a second: *out is g towards the zenith, in body axes at `t_ns`, and `variance` those of its axes.
   bool add(wm_time_ns t_ns, const vec3 &force, const vec3 &v, const vec3 &w, const vec3 *v_var, double turn_rad2ps,
            vec3 *out, double variance[3]);
-  // A window that is open has samples of a sensor that is none any more.
+  // Drops the open window: rates before and after are of different sensors.
   void restart() { count_ = 0; }
 
  private:
