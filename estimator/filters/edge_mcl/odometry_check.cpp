@@ -22,16 +22,18 @@ void odometry_check::clear() {
   for (double &c : covariance_) c = 0.0;
 }
 
-// The difference d of both displacements is N(0, s2) where they agree and N(0, s2 + kWrong^2) where one is wrong. With
-// the latter's probability p the pose's second moment grows by p / 2 d d'. Odometry has the scale of `then`: a wrong
-// wall draws the scale after the pose, and by the later one they agree.
+// The difference d of both displacements is N(0, s2) where they agree and N(0, s2 + kWrong^2) where one is wrong. The
+// error is then the share g = kWrong^2 / (s2 + kWrong^2) of d in the mean: a pose that was open before, and is
+// corrected by as much, is not wrong by it. With the probability p of that the pose's second moment grows by p / 2 (g
+// d) (g d)'. Odometry has the scale of `then`: a wrong wall draws the scale after the pose, and by the later one they
+// agree.
 void odometry_check::compare(const odometry_anchor &then, const odometry_anchor &now) {
   wm_pose2 way = between(then.odom, now.odom);
   const double stretch = 2.0 * then.scale / (then.scale + now.scale);  // from the mean scale of the way
   way.x_m *= stretch;
   way.y_m *= stretch;
   const wm_pose2 by_odometry = compose(then.pose, way);
-  const double dx = now.pose.x_m - by_odometry.x_m, dy = now.pose.y_m - by_odometry.y_m;
+  double dx = now.pose.x_m - by_odometry.x_m, dy = now.pose.y_m - by_odometry.y_m;
   const double d2 = square(dx) + square(dy), way2 = square(now.way_m - then.way_m);
   const double agreed =
       then.position_m2 + now.position_m2 + (square(kOdometryError) + then.heading_rad2 + then.scale_variance) * way2;
@@ -40,8 +42,11 @@ void odometry_check::compare(const odometry_anchor &then, const odometry_anchor 
   const double log_odds = log(kWrongProbability / (1.0 - kWrongProbability)) - log(wrong / agreed) +
                           0.5 * d2 * (1.0 / agreed - 1.0 / wrong);
   const double share = kHalf / (1.0 + exp(-log_odds));
-  if (!(share * d2 > largest_m2_)) return;
-  largest_m2_ = share * d2;
+  const double gain = square(kWrong_m) / wrong;
+  if (!(share * square(gain) * d2 > largest_m2_)) return;
+  largest_m2_ = share * square(gain) * d2;
+  dx *= gain;
+  dy *= gain;
   covariance_[0] = share * dx * dx;
   covariance_[1] = share * dx * dy;
   covariance_[2] = share * dy * dy;

@@ -206,6 +206,24 @@ void odometry_is_compared_by_its_scale_before(void) {
   }
 }
 
+// GIVEN a pose with a sigma of 0.5 m WHEN it is corrected by 0.8 m, and is sure then THEN odometry, which disagrees by
+// that, leaves no doubt; the same of a pose that was sure before does.
+void a_correction_of_an_open_pose_is_no_disagreement(void) {
+  for (const double sigma_m : {0.5, 0.02}) {
+    wm::odometry_check check;
+    check.clear();
+    for (int k = 0; k <= 8; k++) {
+      const wm_pose2 odom{0.25 * k, 0, 0}, pose{0.25 * k, k < 4 ? 0.0 : 0.8, 0};
+      check.add({pose, odom, k < 4 ? sigma_m * sigma_m : 4e-4, 1e-6, 0.25 * k, 1.0, 1e-4});
+    }
+    const double doubt_m = std::sqrt(check.covariance()[2]);
+    if (sigma_m > 0.1)
+      TEST_ASSERT_LESS_THAN_DOUBLE(0.03, doubt_m);
+    else
+      TEST_ASSERT_GREATER_THAN_DOUBLE(0.3, doubt_m);
+  }
+}
+
 // GIVEN a map that has a corridor's end 0.3 m behind a row of cupboards WHEN the robot drives towards them THEN the
 // cupboards do not pull the pose, and it stays within 3 sigma; on the right map it is confident.
 void unmapped_cupboards_pull_no_confident_pose(void) {
@@ -509,6 +527,7 @@ int main(void) {
   RUN_TEST(a_camera_that_looks_lower_than_believed_is_found_out);
   RUN_TEST(the_far_face_of_a_thin_wall_is_not_aligned_with);
   RUN_TEST(odometry_is_compared_by_its_scale_before);
+  RUN_TEST(a_correction_of_an_open_pose_is_no_disagreement);
   RUN_TEST(unmapped_cupboards_pull_no_confident_pose);
   RUN_TEST(a_wall_that_was_drawn_elsewhere_pulls_no_confident_pose);
   RUN_TEST(late_pictures_and_skirtings_are_found_out);
