@@ -113,6 +113,14 @@ class Faults(unittest.TestCase):
         self.drive.poses = [(t, pose(t, t, 0.4) if 15 < t < 28 else p) for t, p in usual]
         self.assertEqual([self.drive.failures(), self.drive.status("pose within_s")], [[], "passed"])
 
+    def test_a_pose_that_is_good_for_a_moment(self):
+        """A search finds the place, the next picture doubts it: the pose is well when it stays so."""
+        self.drive.fault["pose"] = {"within_s": 3.0}
+        usual = list(self.drive.poses)
+        for doubted_s, failures in ((17.5, []), (19.5, ["pose within_s"])):
+            self.drive.poses = [(t, pose(t, t, 0.02 if 16 <= t < 16.2 else 0.4) if 15 <= t < doubted_s else p) for t, p in usual]
+            self.assertEqual(self.drive.failures(), failures)
+
     def test_recoveries_that_overlap(self):
         """Faults that begin before the pose had to be well after another: it is as before the first of them, by the latest of their times."""
         first = {"fault": "bus_down", "from_s": 2.0, "until_s": 3.0, "pose": {"within_s": 14.0}}
@@ -132,9 +140,9 @@ class Faults(unittest.TestCase):
     def test_a_process_that_is_killed_a_little_later(self):
         """Poses between the fault's time and the kill are no recovery."""
         self.drive.fault |= {"fault": "process_killed", "until_s": 10.0, "health": [], "pose": {"within_s": 2.0}}
-        self.drive.poses = [(t, p if t < 10.04 else pose(t, t, 0.4)) for t, p in self.drive.poses if not 10.04 < t < 11]
+        self.drive.poses = [(t, p if t < 11.04 else pose(t, t, 0.4)) for t, p in self.drive.poses if not 11.04 < t < 12]
         self.assertEqual(self.drive.failures(), [])
-        self.drive.done = {"done": True, "ended_s": 10.06}
+        self.drive.done = {"done": True, "ended_s": 11.06}
         self.assertEqual(self.drive.failures(), ["pose within_s"])
 
     def test_poses_that_stop(self):
