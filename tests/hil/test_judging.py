@@ -137,6 +137,14 @@ class Faults(unittest.TestCase):
             self.drive.poses = [(t, pose(t, t, 0.2) if 2 <= t < well_s else p) for t, p in usual]
             self.assertEqual(self.drive.failures((first,)), failures)
 
+    def test_the_file_leaves_each_its_time(self):
+        """config/faults/indoor.yaml: the next fault begins a second or more after the pose has to be well again."""
+        faults = yaml.safe_load((ROOT / "config/faults/indoor.yaml").read_text())["faults"]
+        spans = [(one["name"], one["from_s"], one["from_s"] + one.get("for_s", 0) + one.get("pose", {}).get("within_s", 0)) for one in faults]
+        self.assertEqual(len(faults), 20)
+        for (_, _, due_s), (name, from_s, _) in zip(spans, spans[1:]):
+            self.assertGreaterEqual(from_s, due_s + 1, name)
+
     def test_a_process_that_is_killed_a_little_later(self):
         """Poses between the fault's time and the kill are no recovery."""
         self.drive.fault |= {"fault": "process_killed", "until_s": 10.0, "health": [], "pose": {"within_s": 2.0}}

@@ -117,6 +117,17 @@ class Local(unittest.TestCase):
         self.assertIn("fault: bus silent: pose gap_max_s", failed)
         self.assertIn("fault: camera-like state: health 1: can bus-off, in time", failed)
 
+    def test_a_disk_that_is_soon_full(self):
+        """What the log has is judged, and where it ends is stated; with next to nothing in it, the faults are judged all the same."""
+        for begin_s, least_s in (("1", 2.0), ("3.8", 0.0)):
+            _, result = self.run_it("full", "--faults", self.folder / "full.yaml", "--from", begin_s)
+            self.assertEqual([row for row in result["checks"] if row["status"] == "failed"], [])
+            log = next(row for row in result["checks"] if row["group"] == "log")
+            ends = re.search(r"the log (ends (\d+\.\d) s after the part's begin|has none)", log["text"])
+            self.assertGreaterEqual(float(ends[2] or 0), least_s)
+            self.assertEqual(log["status"], "passed" if least_s else log["status"])
+            self.assertIn("passed", [row["status"] for row in result["checks"] if row["group"] == "fault: full"])
+
     def test_interrupted(self):
         process = subprocess.Popen(self.command("interrupted"), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=self.folder)
         end_s = time.monotonic() + 60

@@ -207,7 +207,7 @@ def _write_plan(folder, given, target, rec, faults, derived, waymark):
     played_streams = {f"can:{name}" for name, _ in buses} | {f"camera:{camera['name']}" for camera in cameras} | set(rec.streams)
     unused = [*rec.not_played, *(bus.name for bus in rec.buses if f"can:{bus.name}" not in played_streams),
               *(camera.name for camera in rec.cameras if f"camera:{camera.name}" not in played_streams)]
-    return {"recording": rec.path.resolve(), "seconds": seconds, "from_s": from_s, "until_s": until_s, "is_cut": until_s < rec.seconds, "where": target.where, "played": bool(target.played), "buses": buses, "faults": _as_the_target_has_them(faults, target.played),
+    return {"recording": rec.path.resolve(), "first_ns": rec.first_ns, "seconds": seconds, "from_s": from_s, "until_s": until_s, "is_cut": until_s < rec.seconds, "where": target.where, "played": bool(target.played), "buses": buses, "faults": _as_the_target_has_them(faults, target.played),
             "prefix": config["publish"].get("channel_prefix", "WAYMARK_"), "rate_hz": float(config["publish"].get("rate_hz", 50)), "unused": unused, "record": given.record, "cameras": [camera["name"] for camera in cameras], "left_out": left_out, "plays": plays,
             "map": str((folder / config["map"]).resolve()) if "map" in config else None}
 

@@ -36,6 +36,10 @@ class Judge:
         self.faults = facts.get("faults") or []
         self.before_faults_s = min((fault["from_s"] for fault in self.faults if fault_judge.is_in(fault, facts["from_s"], facts["until_s"])), default=float("inf"))
         self.is_broken = self.before_faults_s < float("inf")  # something is, in the part that was played
+        # The fault that cuts an event log short.
+        self.full_disk = next((fault for fault in self.faults if fault["fault"] == "disk_full" and fault.get("free_kb", 0) == 0
+                               and fault_judge.is_in(fault, facts["from_s"], facts["until_s"])), None)
+        self.log_ends_ns = None  # of a log that is cut short, on the target's clock
 
     def replay(self, *words):
         """`waymark replay`; its output. HilError with its last line."""
@@ -101,14 +105,24 @@ class Judge:
                 self.checks.add("log", name, False, str(error))
                 continue
             live, again = ((folder / "trajectory.csv").read_bytes() for folder in (drive, self.folder / f"again-{drive.name}"))
-            is_last = drive == self.drives[-1]
-            whole = live if is_last else live[:live.rfind(b"\n") + 1]  # of a run that was killed, what its disk has
-            same = live == again if is_last and "log_cut" not in self.facts else again.startswith(whole) or whole.startswith(again)
-            rows = max(whole.count(b"\n") - 1, 0)
-            may_gap = any(fault["fault"] == "disk_full" for fault in self.faults)
-            self.checks.add("log", name, None if may_gap and not same else same, f"{rows} fused poses, {'each the same bits' if same else 'they differ'}")
+            is_cut = drive != self.drives[-1] or self.full_disk is not None  # killed, or on a full disk: what its disk has is judged
+            whole = live[:live.rfind(b"\n") + 1] if is_cut else live
+            same = again.startswith(whole) or whole.startswith(again) if is_cut else live == again
+            rows = max(min(whole.count(b"\n"), again.count(b"\n")) - 1, 0)
+            text = f"{rows} fused poses, {'each the same bits' if same else 'they differ'}"
+            if is_cut and drive == self.drives[0]:
+                text += self._log_end(again)
+            self.checks.add("log", name, same if rows > 0 or not self.full_disk else None, text)
             if drive == self.drives[0]:
                 self.figures["same_bits"] = same
+
+    def _log_end(self, again):
+        """Notes where a log that is cut short ends: the last pose of its replay. In words."""
+        last = again.rstrip(b"\n").rpartition(b"\n")[2].split(b",")[0]
+        if not last.isdigit() or self.start_ns is None:
+            return "; the log has none"
+        self.log_ends_ns = int(last)
+        return f"; the log ends {(self.log_ends_ns - self.start_ns) * 1e-9 - self.facts['from_s']:.1f} s after the part's begin"
 
     def _hear(self):
         if not (self.out / "heard.lcm").exists() or self.start_ns is None:
@@ -120,12 +134,6 @@ class Judge:
         """Words for a replay of the part that was played, and a little more: the poses of its end lie between two."""
         words = ["--from", f"{self.facts['from_s']:g}"] if self.facts["from_s"] > 0 else []
         return words + (["--until", f"{self.facts['until_s'] + 1:g}"] if self.facts["is_cut"] else [])
-
-    def _short_log(self):
-        """Why the log may be too short to be compared, and what to do."""
-        full = next((fault for fault in self.faults if fault["fault"] == "disk_full" and fault_judge.is_in(fault, self.facts["from_s"], self.facts["until_s"])), None)
-        return "" if not full else (f" The log has what was written before the disk was full (fault '{full['name']}', {full['from_s'] - self.facts['from_s']:g} s "
-                                    "after the part's begin): begin earlier (--from)")
 
     def _reference(self, offset_ns):
         """Where the robot was, on the target's clock: truth where there is one, else the replay at the desk."""
@@ -142,24 +150,25 @@ class Judge:
             self.checks.add("poses", "heard", False, f"{len(self.heard)} poses were heard over LCM")
             return
         try:
-            said = self.replay(recording, "--config", config, *self._part(), "--frames-of", log, "--out", self.folder / "same")
             self.replay(recording, "--config", config, *self._part(), "--out", self.folder / "desk")
+            said = self.replay(recording, "--config", config, *self._part(), "--frames-of", log, "--out", self.folder / "same")
         except HilError as error:
-            self.checks.add("poses", "replay at the desk", False, f"{error}{self._short_log()}")
+            self._without_a_log(error)
             return
         self.offset_ns = int(re.search(r"clock is (-?\d+) ns ahead", said).group(1))
         rows = poses.table(self.folder / "same/published.csv")
         begun_ns = rows[0][0] + self.offset_ns + poses.BEGIN_NS if rows else 0
-        # The replay has data beyond --until.
+        # The replay has data beyond --until; a log that is cut short has none.
         until_ns = self.start_ns + int(min(self.before_faults_s, self.facts["until_s"] + (-0.3 if self.facts["is_cut"] else 0.5)) * 1e9)
+        until_ns = min(until_ns, self.log_ends_ns or until_ns)
         live = [row for row in lcm_log.rows(self.heard) if begun_ns < row[0] < until_ns]
         apart = list(poses.apart_of(live, rows, self.offset_ns))
         judged_s = (until_ns - max(begun_ns, self.start_ns + int(self.facts["from_s"] * 1e9))) * 1e-9
         enough = len(apart) >= min(_MIN_RATE_HZ, 0.6 * self.facts["rate_hz"]) * max(judged_s - 1, 0.1)
         worst_m, worst_deg = max((m for _, m, _ in apart), default=None), max((d for *_, d in apart), default=None)
-        text = (f"{len(apart)} of {len(self.heard)} poses over LCM, in {judged_s:.0f} s" + (" before the first fault" if self.is_broken else "")
+        text = (f"{len(apart)} of {len(self.heard)} poses over LCM, in {judged_s:.0f} s" + ("" if not self.is_broken else " before the first fault" if until_ns != self.log_ends_ns else " before the log ends")
                 + ("" if worst_m is None else f": at most {worst_m:.4f} m and {worst_deg:.3f} degrees from the replay of what the run saw"))
-        self.checks.add("poses", "enough to compare", enough, text)
+        self.checks.add("poses", "enough to compare", None if until_ns == self.log_ends_ns and judged_s < 1 else enough, text)
         if worst_m is not None:
             self.checks.at_most("poses", "distance from the replay", worst_m, self.limits["position_m"] or float("inf"), f"at most {worst_m:.4f} m")
             self.checks.at_most("poses", "heading from the replay", worst_deg, self.limits["heading_deg"] or float("inf"), f"at most {worst_deg:.3f} degrees")
@@ -169,6 +178,18 @@ class Judge:
         first = next((p for p in self.heard if p.state == 1), None)
         self.figures["first_pose_s"] = (first.t_ns - self.start_ns) * 1e-9 - self.facts["from_s"] if first else None
         self._truth(live)
+        self.reference, self.reference_is = self._reference(self.offset_ns)
+
+    def _without_a_log(self, error):
+        """No replay of what the run saw. On a full disk the log may have too little for it: faults are judged all the same, by the player's clock."""
+        has_desk = (self.folder / "desk/published.csv").is_file()
+        if not self.full_disk or not has_desk:
+            self.checks.add("poses", "replay at the desk", False, str(error))
+            return
+        full_s = self.full_disk["from_s"] - self.facts["from_s"]
+        self.checks.add("poses", "distance from the replay", None, f"the log has too little to be compared: the disk was full {full_s:g} s after the part's begin "
+                        f"(fault '{self.full_disk['name']}'); begin earlier (--from). {error}")
+        self.offset_ns = self.offset_ns if self.offset_ns is not None else self.start_ns - self.facts["first_ns"]
         self.reference, self.reference_is = self._reference(self.offset_ns)
 
     def _truth_rows(self):
