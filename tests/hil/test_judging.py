@@ -3,7 +3,9 @@
 
     test_judging.py TYPES      the folder with LCM's types for Python"""
 import json
+import lzma
 import math
+import os
 import pathlib
 import re
 import sys
@@ -402,6 +404,25 @@ class Guests(unittest.TestCase):
         self.assertEqual((machine["qemu"][-1], words), ("cortex-a57,cntfrq=3000000000", ""))
         for arch in guest.MACHINES:
             self.assertEqual(guest.at_rate(arch, 1000), (guest.MACHINES[arch], ""))
+
+    def test_an_unpacked_kernel(self):
+        """Of x86-64, once for each kernel; another architecture's is booted as it is."""
+        with tempfile.TemporaryDirectory() as folder:
+            image = pathlib.Path(folder)
+            for number, content in enumerate((b"\x7fELF kernel", b"\x7fELF of an update")):
+                payload = lzma.compress(content)
+                packed = bytearray(1024 + 0x300 + len(payload))
+                packed[0x1F1], packed[0x202:0x206] = 1, b"HdrS"
+                packed[0x248:0x250] = (0x300).to_bytes(4, "little") + len(payload).to_bytes(4, "little")
+                packed[1024 + 0x300:] = payload
+                (image / "vmlinuz").write_bytes(packed)
+                os.utime(image / "vmlinuz", ns=((2 + number) * 10**18,) * 2)
+                self.assertEqual(guest.kernel_of(image).read_bytes(), content)
+                os.utime(image / "vmlinux", ns=((2 + number) * 10**18,) * 2)
+            self.assertEqual(guest.kernel_of(image), image / "vmlinux")
+            (image / "vmlinuz").write_bytes(b"MZ" + bytes(0x300))
+            os.utime(image / "vmlinuz", ns=(4 * 10**18,) * 2)
+            self.assertEqual(guest.kernel_of(image), image / "vmlinuz")
 
     def test_an_end(self):
         """A guest that is done, one that works without an end, one that waits on a busy desk."""

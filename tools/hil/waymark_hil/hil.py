@@ -15,8 +15,9 @@ import time
 from waymark_fleet.plan import PlanError, desk_program
 
 from . import HilError, compare, fault_judge, guest, limits, page, recording, scenario, targets, verdict
-from .judge import Judge
+from .judge import Judge, begin_desk
 from .progress import Progress
+from .replays import Replays
 
 EXAMPLES = """examples:
   waymark hil drive --config robot.yaml --guest amd64
@@ -259,11 +260,16 @@ def test(given, beside, types):
         _played_world(folder, given, derived[1], derived[2])
     facts = _write_plan(folder, given, target, rec, faults, derived, waymark)
     progress.step(f"{target.name}: {rec.name}, {facts['seconds']:.0f} s")
-    is_good = target.run(folder, facts, progress)
-    progress.step("judging")
-    checks = verdict.Checks()
-    judge = Judge(checks, folder, facts, run_limits, waymark, types)
-    judge.all(is_good)
+    checks, replays = verdict.Checks(), Replays(waymark)
+    try:
+        if target.where != "local":  # beside the target, where that takes nothing from it
+            begin_desk(replays, folder, facts)
+        is_good = target.run(folder, facts, progress)
+        progress.step("judging")
+        judge = Judge(checks, folder, facts, run_limits, replays, types)
+        judge.all(is_good)
+    finally:
+        replays.end()
     progress.end()
     computer = (folder / "out/computer.txt").read_text(errors="replace").split("\n") if (folder / "out/computer.txt").exists() else []
     result = {"name": f"waymark hil {rec.name}", "recording": rec.name, "config": str(given.config), "target": target.name, "computer": [*(line for line in computer if line), *target.computer],

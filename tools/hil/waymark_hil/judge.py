@@ -2,7 +2,6 @@
 """Judges what came back from a target: out/ of a test's folder, against replays at the desk and the limits."""
 import json
 import re
-import subprocess
 
 from . import HilError, fault_judge, lcm_log, poses, samples, stamps
 
@@ -20,11 +19,22 @@ def load(path, default=None):
         return default
 
 
+def part(facts):
+    """Words for a replay of the part that was played, and a little more: the poses of its end lie between two."""
+    words = ["--from", f"{facts['from_s']:g}"] if facts["from_s"] > 0 else []
+    return words + (["--until", f"{facts['until_s'] + 1:g}"] if facts["is_cut"] else [])
+
+
+def begin_desk(replays, folder, facts):
+    """Begins the replay of the part: it needs nothing of the target."""
+    replays.begin(folder / "desk", facts["recording"], "--config", folder / "robot.yaml", *part(facts))
+
+
 class Judge:
     """One test. `facts` are the desk's data about it: see hil.py."""
 
-    def __init__(self, checks, folder, facts, limits, waymark, types):
-        self.checks, self.folder, self.out, self.facts, self.limits, self.waymark = checks, folder, folder / "out", facts, limits, waymark
+    def __init__(self, checks, folder, facts, limits, replays, types):
+        self.checks, self.folder, self.out, self.facts, self.limits, self.replays = checks, folder, folder / "out", facts, limits, replays
         self.figures, self.series, self.notes = {}, {}, []
         self.types = types
         self.drives = sorted((path for path in self.out.glob("drive*") if path.is_dir()), key=lambda path: (len(path.name), path.name))
@@ -41,12 +51,15 @@ class Judge:
                                and fault_judge.is_in(fault, facts["from_s"], facts["until_s"])), None)
         self.log_ends_ns = None  # of a log that is cut short, on the target's clock
 
-    def replay(self, *words):
-        """`waymark replay`; its output. HilError with its last line."""
-        done = subprocess.run([self.waymark, "replay", *map(str, words)], capture_output=True, text=True, check=False)
-        if done.returncode:
-            raise HilError((done.stderr.strip() or f"exit code {done.returncode}").splitlines()[-1])
-        return done.stdout
+    def begin_replays(self):
+        """Begins all replays; each judgement waits for its own."""
+        begin_desk(self.replays, self.folder, self.facts)
+        for drive in self.drives:
+            words = ["--map", self.facts["map"]] if self.facts.get("map") else []
+            self.replays.begin(self.folder / f"again-{drive.name}", drive / "events.wmlog", *words)
+        if self.drives:
+            self.replays.begin(self.folder / "same", self.facts["recording"], "--config", self.folder / "robot.yaml", *part(self.facts),
+                               "--frames-of", self.drives[0] / "events.wmlog")
 
     # ── the target and the player ───────────────────────────────────────────────────────────────────────────────────
 
@@ -98,9 +111,8 @@ class Judge:
             self.checks.add("log", "event log", False, "the run left no folder")
         for drive in self.drives:
             name = f"{drive.name}: the same bits at the desk"
-            words = ["--map", self.facts["map"]] if self.facts.get("map") else []
             try:
-                self.replay(drive / "events.wmlog", *words, "--out", self.folder / f"again-{drive.name}")
+                self.replays.result(self.folder / f"again-{drive.name}")
             except HilError as error:
                 self.checks.add("log", name, False, str(error))
                 continue
@@ -130,11 +142,6 @@ class Judge:
         heard_poses, healths = lcm_log.heard(self.types, self.out / "heard.lcm", self.facts["prefix"])
         return [p for _, p in heard_poses if p.t_ns > 0], [h for _, h in healths]
 
-    def _part(self):
-        """Words for a replay of the part that was played, and a little more: the poses of its end lie between two."""
-        words = ["--from", f"{self.facts['from_s']:g}"] if self.facts["from_s"] > 0 else []
-        return words + (["--until", f"{self.facts['until_s'] + 1:g}"] if self.facts["is_cut"] else [])
-
     def _reference(self, offset_ns):
         """Where the robot was, on the target's clock: truth where there is one, else the replay at the desk."""
         truth = self.facts["recording"] / "truth.csv"
@@ -144,14 +151,13 @@ class Judge:
     def poses(self):
         """Poses over LCM beside the replay of what the run saw, and beside the truth."""
         self.heard, self.healths = self._hear()
-        config, recording, log = self.folder / "robot.yaml", self.facts["recording"], self.drives[0] / "events.wmlog" if self.drives else None
         self.offset_ns = self.played.get("offset_ns")
-        if not self.heard or log is None:
+        if not self.heard or not self.drives:
             self.checks.add("poses", "heard", False, f"{len(self.heard)} poses were heard over LCM")
             return
         try:
-            self.replay(recording, "--config", config, *self._part(), "--out", self.folder / "desk")
-            said = self.replay(recording, "--config", config, *self._part(), "--frames-of", log, "--out", self.folder / "same")
+            self.replays.result(self.folder / "desk")
+            said = self.replays.result(self.folder / "same")
         except HilError as error:
             self._without_a_log(error)
             return
@@ -363,6 +369,7 @@ class Judge:
 
     def all(self, is_good):
         """Every judgement, in the report's order."""
+        self.begin_replays()
         self.target(is_good)
         self.player()
         self.logs()
