@@ -221,7 +221,8 @@ def _begin_later(config, folder, rec, from_s, waymark):
     done = subprocess.run([waymark, "replay", rec.path, "--config", folder / "robot.yaml", "--until", f"{from_s + 0.2:g}", "--out", before],
                           capture_output=True, text=True, check=False)
     if done.returncode or not scenario.begin_at(config, folder, before / "published.csv", rec.first_ns + round(from_s * 1e9)):
-        raise HilError(f"--from {from_s:g}: a replay up to there has no start pose: {(done.stderr.strip() or 'no pose').splitlines()[-1]}")
+        why = next((line for line in reversed(done.stderr.splitlines()) if line.startswith("waymark: ")), "it publishes no pose")
+        raise HilError(f"--from {from_s:g}: a replay up to there has no start pose: {why}")
     shutil.rmtree(before)
 
 

@@ -172,9 +172,10 @@ class Judge:
         judged_s = (until_ns - max(begun_ns, self.start_ns + int(self.facts["from_s"] * 1e9))) * 1e-9
         enough = len(apart) >= min(_MIN_RATE_HZ, 0.6 * self.facts["rate_hz"]) * max(judged_s - 1, 0.1)
         worst_m, worst_deg = max((m for _, m, _ in apart), default=None), max((d for *_, d in apart), default=None)
-        text = (f"{len(apart)} of {len(self.heard)} poses over LCM, in {judged_s:.0f} s" + ("" if not self.is_broken else " before the first fault" if until_ns != self.log_ends_ns else " before the log ends")
+        ends = "" if not self.is_broken else "before the log ends" if until_ns == self.log_ends_ns else "before the first fault"
+        text = (f"{len(apart)} of {len(self.heard)} poses over LCM, in {max(judged_s, 0):.0f} s {ends}".rstrip()
                 + ("" if worst_m is None else f": at most {worst_m:.4f} m and {worst_deg:.3f} degrees from the replay of what the run saw"))
-        self.checks.add("poses", "enough to compare", None if until_ns == self.log_ends_ns and judged_s < 1 else enough, text)
+        self.checks.add("poses", "enough to compare", None if self.is_broken and judged_s < 1 else enough, text)
         if worst_m is not None:
             self.checks.at_most("poses", "distance from the replay", worst_m, self.limits["position_m"] or float("inf"), f"at most {worst_m:.4f} m")
             self.checks.at_most("poses", "heading from the replay", worst_deg, self.limits["heading_deg"] or float("inf"), f"at most {worst_deg:.3f} degrees")
