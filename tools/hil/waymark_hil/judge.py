@@ -188,14 +188,15 @@ class Judge:
         self.reference, self.reference_is = self._reference(self.offset_ns)
 
     def _without_a_log(self, error):
-        """No replay of what the run saw. On a full disk the log may have too little for it: faults are judged all the same, by the player's clock."""
-        has_desk = (self.folder / "desk/published.csv").is_file()
-        if not self.full_disk or not has_desk:
+        """No replay of what the run saw. A log that a full disk or a kill cut short may have too little for it: faults are judged all the same, by the
+        player's clock."""
+        if not (self.full_disk or len(self.drives) > 1) or not (self.folder / "desk/published.csv").is_file():
             self.checks.add("poses", "replay at the desk", False, str(error))
             return
-        full_s = self.full_disk["from_s"] - self.facts["from_s"]
-        self.checks.add("poses", "distance from the replay", None, f"the log has too little to be compared: the disk was full {full_s:g} s after the part's begin "
-                        f"(fault '{self.full_disk['name']}'); begin earlier (--from). {error}")
+        first_s = min(fault["from_s"] for fault in self.faults if fault["fault"] in ("disk_full", "process_killed", "power_cut")
+                      and fault_judge.is_in(fault, self.facts["from_s"], self.facts["until_s"])) - self.facts["from_s"]
+        self.checks.add("poses", "distance from the replay", None, f"the log ends with a fault {first_s:g} s after the part's begin, and has too little to be compared; "
+                        f"begin earlier (--from). {error}")
         self.offset_ns = self.offset_ns if self.offset_ns is not None else self.start_ns - self.facts["first_ns"]
         self.reference, self.reference_is = self._reference(self.offset_ns)
 
