@@ -396,6 +396,27 @@ class Timing(InFolder):
         self.assertEqual(self.judged(faults=({**fault, "from_s": 20.0, "until_s": 21.0},))[0], "failed")  # none in the part that was played
 
 
+class Players(InFolder):
+    def judged(self, sent, faults=()):
+        """Status of a camera of which one picture was 8 ms late, and of a bus."""
+        stream = {"sent": sent, "p50_us": 10, "max_us": 8035}
+        streams = [{**stream, "name": "camera:front", "p99_us": 8035}, {**stream, "name": "can:can0", "p99_us": 8035}]
+        self.write("out/played.json", json.dumps({"streams": streams}))
+        facts = {"from_s": 0.0, "until_s": 9.0, "faults": list(faults), "plays": True, "played": False, "unused": []}
+        one = judge.Judge(verdict.Checks(), self.folder, facts, limits.read(None, False)[0], None, None)
+        one.player()
+        return [check.status for check in one.checks[:2]]
+
+    def test_a_device_that_is_opened_again(self):
+        """A camera that comes back has one late picture, of few."""
+        fault = {"name": "unplugged", "fault": "camera_unplugged", "camera": "front", "from_s": 2.0, "until_s": 3.0}
+        self.assertEqual(self.judged(60), ["failed", "failed"])
+        self.assertEqual(self.judged(60, [fault]), ["skipped", "failed"])
+        self.assertEqual(self.judged(600, [fault]), ["failed", "failed"])  # 99 of 100 have one to spare
+        for other in ({"camera": "rear"}, {"from_s": 20.0, "until_s": 21.0}, {"fault": "camera_frozen"}):
+            self.assertEqual(self.judged(60, [{**fault, **other}]), ["failed", "failed"])
+
+
 class Guests(unittest.TestCase):
     def test_rate_of_instructions(self):
         machine, words = guest.at_rate("amd64", 2000)
@@ -467,6 +488,15 @@ class Boards(unittest.TestCase):
         self.assertEqual((self.prepared("1", "1000", "sudo").as_root, self.prepared("1", "1000", "sudo").single_core), ("sudo -n ", True))
         with self.assertRaisesRegex(HilError, "NOPASSWD"):
             self.prepared("4", "1000", "alone")
+
+    def test_no_connection(self):
+        """ssh's own failure is stated without the command that was to run there."""
+        with tempfile.TemporaryDirectory() as folder, mock.patch.dict(os.environ, {"PATH": f"{folder}:{os.environ['PATH']}"}):
+            ssh = pathlib.Path(folder) / "ssh"
+            ssh.write_text("#!/bin/sh\necho 'ssh: Could not resolve hostname robot' >&2\nexit 255\n")
+            ssh.chmod(0o755)
+            with self.assertRaisesRegex(HilError, "^pi@robot: no connection: ssh: Could not resolve hostname robot; try `ssh pi@robot true`$"):
+                targets.Host("pi@robot", [], {}).prepare(None)
 
 
 class Compared(unittest.TestCase):
