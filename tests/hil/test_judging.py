@@ -3,7 +3,9 @@
 
     test_judging.py TYPES      the folder with LCM's types for Python"""
 import json
+import lzma
 import math
+import os
 import pathlib
 import re
 import sys
@@ -113,6 +115,14 @@ class Faults(unittest.TestCase):
         self.drive.poses = [(t, pose(t, t, 0.4) if 15 < t < 28 else p) for t, p in usual]
         self.assertEqual([self.drive.failures(), self.drive.status("pose within_s")], [[], "passed"])
 
+    def test_a_pose_that_is_good_for_a_moment(self):
+        """A search finds the place, the next picture doubts it: the pose is well when it stays so."""
+        self.drive.fault["pose"] = {"within_s": 3.0}
+        usual = list(self.drive.poses)
+        for doubted_s, failures in ((17.5, []), (19.5, ["pose within_s"])):
+            self.drive.poses = [(t, pose(t, t, 0.02 if 16 <= t < 16.2 else 0.4) if 15 <= t < doubted_s else p) for t, p in usual]
+            self.assertEqual(self.drive.failures(), failures)
+
     def test_recoveries_that_overlap(self):
         """Faults that begin before the pose had to be well after another: it is as before the first of them, by the latest of their times."""
         first = {"fault": "bus_down", "from_s": 2.0, "until_s": 3.0, "pose": {"within_s": 14.0}}
@@ -129,12 +139,20 @@ class Faults(unittest.TestCase):
             self.drive.poses = [(t, pose(t, t, 0.2) if 2 <= t < well_s else p) for t, p in usual]
             self.assertEqual(self.drive.failures((first,)), failures)
 
+    def test_the_file_leaves_each_its_time(self):
+        """config/faults/indoor.yaml: the next fault begins a second or more after the pose has to be well again."""
+        faults = yaml.safe_load((ROOT / "config/faults/indoor.yaml").read_text())["faults"]
+        spans = [(one["name"], one["from_s"], one["from_s"] + one.get("for_s", 0) + one.get("pose", {}).get("within_s", 0)) for one in faults]
+        self.assertEqual(len(faults), 20)
+        for (_, _, due_s), (name, from_s, _) in zip(spans, spans[1:]):
+            self.assertGreaterEqual(from_s, due_s + 1, name)
+
     def test_a_process_that_is_killed_a_little_later(self):
         """Poses between the fault's time and the kill are no recovery."""
         self.drive.fault |= {"fault": "process_killed", "until_s": 10.0, "health": [], "pose": {"within_s": 2.0}}
-        self.drive.poses = [(t, p if t < 10.04 else pose(t, t, 0.4)) for t, p in self.drive.poses if not 10.04 < t < 11]
+        self.drive.poses = [(t, p if t < 11.04 else pose(t, t, 0.4)) for t, p in self.drive.poses if not 11.04 < t < 12]
         self.assertEqual(self.drive.failures(), [])
-        self.drive.done = {"done": True, "ended_s": 10.06}
+        self.drive.done = {"done": True, "ended_s": 11.06}
         self.assertEqual(self.drive.failures(), ["pose within_s"])
 
     def test_poses_that_stop(self):
@@ -378,6 +396,27 @@ class Timing(InFolder):
         self.assertEqual(self.judged(faults=({**fault, "from_s": 20.0, "until_s": 21.0},))[0], "failed")  # none in the part that was played
 
 
+class Players(InFolder):
+    def judged(self, sent, faults=()):
+        """Status of a camera of which one picture was 8 ms late, and of a bus."""
+        stream = {"sent": sent, "p50_us": 10, "max_us": 8035}
+        streams = [{**stream, "name": "camera:front", "p99_us": 8035}, {**stream, "name": "can:can0", "p99_us": 8035}]
+        self.write("out/played.json", json.dumps({"streams": streams}))
+        facts = {"from_s": 0.0, "until_s": 9.0, "faults": list(faults), "plays": True, "played": False, "unused": []}
+        one = judge.Judge(verdict.Checks(), self.folder, facts, limits.read(None, False)[0], None, None)
+        one.player()
+        return [check.status for check in one.checks[:2]]
+
+    def test_a_device_that_is_opened_again(self):
+        """A camera that comes back has one late picture, of few."""
+        fault = {"name": "unplugged", "fault": "camera_unplugged", "camera": "front", "from_s": 2.0, "until_s": 3.0}
+        self.assertEqual(self.judged(60), ["failed", "failed"])
+        self.assertEqual(self.judged(60, [fault]), ["skipped", "failed"])
+        self.assertEqual(self.judged(600, [fault]), ["failed", "failed"])  # 99 of 100 have one to spare
+        for other in ({"camera": "rear"}, {"from_s": 20.0, "until_s": 21.0}, {"fault": "camera_frozen"}):
+            self.assertEqual(self.judged(60, [{**fault, **other}]), ["failed", "failed"])
+
+
 class Guests(unittest.TestCase):
     def test_rate_of_instructions(self):
         machine, words = guest.at_rate("amd64", 2000)
@@ -386,6 +425,25 @@ class Guests(unittest.TestCase):
         self.assertEqual((machine["qemu"][-1], words), ("cortex-a57,cntfrq=3000000000", ""))
         for arch in guest.MACHINES:
             self.assertEqual(guest.at_rate(arch, 1000), (guest.MACHINES[arch], ""))
+
+    def test_an_unpacked_kernel(self):
+        """Of x86-64, once for each kernel; another architecture's is booted as it is."""
+        with tempfile.TemporaryDirectory() as folder:
+            image = pathlib.Path(folder)
+            for number, content in enumerate((b"\x7fELF kernel", b"\x7fELF of an update")):
+                payload = lzma.compress(content)
+                packed = bytearray(1024 + 0x300 + len(payload))
+                packed[0x1F1], packed[0x202:0x206] = 1, b"HdrS"
+                packed[0x248:0x250] = (0x300).to_bytes(4, "little") + len(payload).to_bytes(4, "little")
+                packed[1024 + 0x300:] = payload
+                (image / "vmlinuz").write_bytes(packed)
+                os.utime(image / "vmlinuz", ns=((2 + number) * 10**18,) * 2)
+                self.assertEqual(guest.kernel_of(image).read_bytes(), content)
+                os.utime(image / "vmlinux", ns=((2 + number) * 10**18,) * 2)
+            self.assertEqual(guest.kernel_of(image), image / "vmlinux")
+            (image / "vmlinuz").write_bytes(b"MZ" + bytes(0x300))
+            os.utime(image / "vmlinuz", ns=(4 * 10**18,) * 2)
+            self.assertEqual(guest.kernel_of(image), image / "vmlinuz")
 
     def test_an_end(self):
         """A guest that is done, one that works without an end, one that waits on a busy desk."""
@@ -430,6 +488,15 @@ class Boards(unittest.TestCase):
         self.assertEqual((self.prepared("1", "1000", "sudo").as_root, self.prepared("1", "1000", "sudo").single_core), ("sudo -n ", True))
         with self.assertRaisesRegex(HilError, "NOPASSWD"):
             self.prepared("4", "1000", "alone")
+
+    def test_no_connection(self):
+        """ssh's own failure is stated without the command that was to run there."""
+        with tempfile.TemporaryDirectory() as folder, mock.patch.dict(os.environ, {"PATH": f"{folder}:{os.environ['PATH']}"}):
+            ssh = pathlib.Path(folder) / "ssh"
+            ssh.write_text("#!/bin/sh\necho 'ssh: Could not resolve hostname robot' >&2\nexit 255\n")
+            ssh.chmod(0o755)
+            with self.assertRaisesRegex(HilError, "^pi@robot: no connection: ssh: Could not resolve hostname robot; try `ssh pi@robot true`$"):
+                targets.Host("pi@robot", [], {}).prepare(None)
 
 
 class Compared(unittest.TestCase):

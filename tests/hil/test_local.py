@@ -52,7 +52,7 @@ class Local(unittest.TestCase):
         for name, state, bound in (("right", "down", "4"), ("wrong", "bus-off", "0.0001")):
             (cls.folder / f"{name}.yaml").write_text(FAULTS.replace("STATE", state).replace("BOUND", bound))
 
-        (cls.folder / "full.yaml").write_text("format: waymark-faults/1\nfaults:\n  - {name: full, fault: disk_full, from_s: 4, until_s: 6}\n")
+        (cls.folder / "full.yaml").write_text("format: waymark-faults/1\nfaults:\n  - {name: full, fault: disk_full, from_s: 7, until_s: 8}\n")
 
     @classmethod
     def tearDownClass(cls):
@@ -117,6 +117,17 @@ class Local(unittest.TestCase):
         self.assertIn("fault: bus silent: pose gap_max_s", failed)
         self.assertIn("fault: camera-like state: health 1: can bus-off, in time", failed)
 
+    def test_a_disk_that_is_soon_full(self):
+        """What the log has is judged, and where it ends is stated (data are fused 2 s later); with nothing in it, the faults are judged all the same."""
+        for begin_s, least_s in (("4", 0.5), ("6.7", 0.0)):
+            _, result = self.run_it("full", "--faults", self.folder / "full.yaml", "--from", begin_s)
+            self.assertEqual([row for row in result["checks"] if row["status"] == "failed"], [])
+            log = next(row for row in result["checks"] if row["group"] == "log")
+            ends = re.search(r"the log (ends (\d+\.\d) s after the part's begin|has none)", log["text"])
+            self.assertGreaterEqual(float(ends[2] or 0), least_s)
+            self.assertEqual(log["status"], "passed" if least_s else log["status"])
+            self.assertIn("passed", [row["status"] for row in result["checks"] if row["group"] == "fault: full"])
+
     def test_interrupted(self):
         process = subprocess.Popen(self.command("interrupted"), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=self.folder)
         end_s = time.monotonic() + 60
@@ -132,7 +143,7 @@ class Local(unittest.TestCase):
     def test_errors(self):
         for words, code, text in ((["--from", "50"], 2, "has 9"), (["--can", "x"], 2, "RUN=PLAYER"), (["--faults", "none.yaml"], 2, "none.yaml"),
                                   (["--limits", str(self.folder / "robot.yaml")], 2, "waymark-hil-limits/1"),
-                                  (["--faults", str(self.folder / "full.yaml"), "--from", "5"], 2, "the disk is full then (fault 'full', from 4 s to 6 s)")):
+                                  (["--faults", str(self.folder / "full.yaml"), "--from", "7.5"], 2, "the disk is full then (fault 'full', from 7 s to 8 s)")):
             done = subprocess.run(self.command("errors", *words), capture_output=True, text=True, check=False, cwd=self.folder)
             self.assertEqual((done.returncode, "Traceback" in done.stderr), (code, False), done.stderr)
             self.assertIn(text, done.stderr)

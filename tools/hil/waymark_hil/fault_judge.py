@@ -10,6 +10,7 @@ _HEALTH_PERIOD_S = 1.0  # health is sent once a second: a state is seen up to so
 # A pose is as good as before when its sigma is at most three times that of before: the filter narrows it further for seconds.
 _AS_BEFORE = 3
 _COUNTED_S = 0.2  # a gap is counted when the next datum comes
+_STAYS_S = 1.0  # a pose is well again when it stays so: one that the search has just found may be doubted by its next picture
 FLAGS = {"motion_stale": 1, "fusion_stale": 2, "jumped": 4}
 CAUSES = ["none", "contradicted", "refused", "inconsistent", "biased", "lost_again", "unknown_identities", "silent", "off_map", "turn"]
 
@@ -186,16 +187,30 @@ def _pose(checks, group, heard, fault, what, others, ended_s):
         _recovers(checks, group, heard, begun_s, over_s, due_s - until_s)
 
 
+def _well_again(poses, usual_m, states):
+    """When the poses become as good as before, and stay so: the same state or tracking, known motion, a small sigma. None: they do not."""
+    since_s = None
+    for t, p in poses:
+        if p.status_flags & FLAGS["motion_stale"] or lcm_log.sigma_m(p) > usual_m or p.state not in states:
+            since_s = None
+            continue
+        since_s = t if since_s is None else since_s
+        if t - since_s >= _STAYS_S:
+            return since_s
+    return None
+
+
 def _recovers(checks, group, heard, begun_s, until_s, within_s):
-    """A pose as good as before: the same state or tracking, known motion, a sigma of at most three times that of before."""
+    """A pose as good as before, with a sigma of at most three times that of before."""
     before = heard.poses_between(begun_s - 1, begun_s)
     usual_m = _AS_BEFORE * lcm_log.sigma_m(before[-1][1]) if before else math.inf
-    well_s = next((t - until_s for t, p in heard.poses_between(until_s, heard.end_s)
-                   if not p.status_flags & FLAGS["motion_stale"] and lcm_log.sigma_m(p) <= usual_m and p.state in (1, before[-1][1].state if before else 1)), math.inf)
-    if math.isinf(well_s) and until_s + within_s > heard.end_s:
+    since_s = _well_again(heard.poses_between(until_s, heard.end_s), usual_m, (1, before[-1][1].state if before else 1))
+    if since_s is None and until_s + within_s + _STAYS_S > heard.end_s:
         checks.add(group, "pose within_s", None, f"not as good as before when the drive ends, {heard.end_s - until_s:.1f} s after its end; {within_s:g} s are allowed")
         return
-    checks.at_most(group, "pose within_s", well_s, within_s, f"as good as before {well_s:.2f} s after its end (sigma below {usual_m:.3f} m), {within_s:g} s are allowed")
+    well_s = math.inf if since_s is None else since_s - until_s
+    found = "not as good as before until the drive ends" if since_s is None else f"as good as before {well_s:.2f} s after its end"
+    checks.at_most(group, "pose within_s", well_s, within_s, f"{found} (sigma below {usual_m:.3f} m), {within_s:g} s are allowed")
 
 
 def judge(checks, fault, heard, done, what, others=()):

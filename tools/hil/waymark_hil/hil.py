@@ -15,8 +15,9 @@ import time
 from waymark_fleet.plan import PlanError, desk_program
 
 from . import HilError, compare, fault_judge, guest, limits, page, recording, scenario, targets, verdict
-from .judge import Judge
+from .judge import Judge, begin_desk
 from .progress import Progress
+from .replays import Replays
 
 EXAMPLES = """examples:
   waymark hil drive --config robot.yaml --guest amd64
@@ -207,7 +208,7 @@ def _write_plan(folder, given, target, rec, faults, derived, waymark):
     played_streams = {f"can:{name}" for name, _ in buses} | {f"camera:{camera['name']}" for camera in cameras} | set(rec.streams)
     unused = [*rec.not_played, *(bus.name for bus in rec.buses if f"can:{bus.name}" not in played_streams),
               *(camera.name for camera in rec.cameras if f"camera:{camera.name}" not in played_streams)]
-    return {"recording": rec.path.resolve(), "seconds": seconds, "from_s": from_s, "until_s": until_s, "is_cut": until_s < rec.seconds, "where": target.where, "played": bool(target.played), "buses": buses, "faults": _as_the_target_has_them(faults, target.played),
+    return {"recording": rec.path.resolve(), "first_ns": rec.first_ns, "seconds": seconds, "from_s": from_s, "until_s": until_s, "is_cut": until_s < rec.seconds, "where": target.where, "played": bool(target.played), "buses": buses, "faults": _as_the_target_has_them(faults, target.played),
             "prefix": config["publish"].get("channel_prefix", "WAYMARK_"), "rate_hz": float(config["publish"].get("rate_hz", 50)), "unused": unused, "record": given.record, "cameras": [camera["name"] for camera in cameras], "left_out": left_out, "plays": plays,
             "map": str((folder / config["map"]).resolve()) if "map" in config else None}
 
@@ -220,7 +221,8 @@ def _begin_later(config, folder, rec, from_s, waymark):
     done = subprocess.run([waymark, "replay", rec.path, "--config", folder / "robot.yaml", "--until", f"{from_s + 0.2:g}", "--out", before],
                           capture_output=True, text=True, check=False)
     if done.returncode or not scenario.begin_at(config, folder, before / "published.csv", rec.first_ns + round(from_s * 1e9)):
-        raise HilError(f"--from {from_s:g}: a replay up to there has no start pose: {(done.stderr.strip() or 'no pose').splitlines()[-1]}")
+        why = next((line for line in reversed(done.stderr.splitlines()) if line.startswith("waymark: ")), "it publishes no pose")
+        raise HilError(f"--from {from_s:g}: a replay up to there has no start pose: {why}")
     shutil.rmtree(before)
 
 
@@ -259,11 +261,16 @@ def test(given, beside, types):
         _played_world(folder, given, derived[1], derived[2])
     facts = _write_plan(folder, given, target, rec, faults, derived, waymark)
     progress.step(f"{target.name}: {rec.name}, {facts['seconds']:.0f} s")
-    is_good = target.run(folder, facts, progress)
-    progress.step("judging")
-    checks = verdict.Checks()
-    judge = Judge(checks, folder, facts, run_limits, waymark, types)
-    judge.all(is_good)
+    checks, replays = verdict.Checks(), Replays(waymark)
+    try:
+        if target.where != "local":  # beside the target, where that takes nothing from it
+            begin_desk(replays, folder, facts)
+        is_good = target.run(folder, facts, progress)
+        progress.step("judging")
+        judge = Judge(checks, folder, facts, run_limits, replays, types)
+        judge.all(is_good)
+    finally:
+        replays.end()
     progress.end()
     computer = (folder / "out/computer.txt").read_text(errors="replace").split("\n") if (folder / "out/computer.txt").exists() else []
     result = {"name": f"waymark hil {rec.name}", "recording": rec.name, "config": str(given.config), "target": target.name, "computer": [*(line for line in computer if line), *target.computer],

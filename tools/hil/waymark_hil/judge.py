@@ -2,7 +2,6 @@
 """Judges what came back from a target: out/ of a test's folder, against replays at the desk and the limits."""
 import json
 import re
-import subprocess
 
 from . import HilError, fault_judge, lcm_log, poses, samples, stamps
 
@@ -20,11 +19,22 @@ def load(path, default=None):
         return default
 
 
+def part(facts):
+    """Words for a replay of the part that was played, and a little more: the poses of its end lie between two."""
+    words = ["--from", f"{facts['from_s']:g}"] if facts["from_s"] > 0 else []
+    return words + (["--until", f"{facts['until_s'] + 1:g}"] if facts["is_cut"] else [])
+
+
+def begin_desk(replays, folder, facts):
+    """Begins the replay of the part: it needs nothing of the target."""
+    replays.begin(folder / "desk", facts["recording"], "--config", folder / "robot.yaml", *part(facts))
+
+
 class Judge:
     """One test. `facts` are the desk's data about it: see hil.py."""
 
-    def __init__(self, checks, folder, facts, limits, waymark, types):
-        self.checks, self.folder, self.out, self.facts, self.limits, self.waymark = checks, folder, folder / "out", facts, limits, waymark
+    def __init__(self, checks, folder, facts, limits, replays, types):
+        self.checks, self.folder, self.out, self.facts, self.limits, self.replays = checks, folder, folder / "out", facts, limits, replays
         self.figures, self.series, self.notes = {}, {}, []
         self.types = types
         self.drives = sorted((path for path in self.out.glob("drive*") if path.is_dir()), key=lambda path: (len(path.name), path.name))
@@ -36,13 +46,20 @@ class Judge:
         self.faults = facts.get("faults") or []
         self.before_faults_s = min((fault["from_s"] for fault in self.faults if fault_judge.is_in(fault, facts["from_s"], facts["until_s"])), default=float("inf"))
         self.is_broken = self.before_faults_s < float("inf")  # something is, in the part that was played
+        # The fault that cuts an event log short.
+        self.full_disk = next((fault for fault in self.faults if fault["fault"] == "disk_full" and fault.get("free_kb", 0) == 0
+                               and fault_judge.is_in(fault, facts["from_s"], facts["until_s"])), None)
+        self.log_ends_ns = None  # of a log that is cut short, on the target's clock
 
-    def replay(self, *words):
-        """`waymark replay`; its output. HilError with its last line."""
-        done = subprocess.run([self.waymark, "replay", *map(str, words)], capture_output=True, text=True, check=False)
-        if done.returncode:
-            raise HilError((done.stderr.strip() or f"exit code {done.returncode}").splitlines()[-1])
-        return done.stdout
+    def begin_replays(self):
+        """Begins all replays; each judgement waits for its own."""
+        begin_desk(self.replays, self.folder, self.facts)
+        for drive in self.drives:
+            words = ["--map", self.facts["map"]] if self.facts.get("map") else []
+            self.replays.begin(self.folder / f"again-{drive.name}", drive / "events.wmlog", *words)
+        if self.drives:
+            self.replays.begin(self.folder / "same", self.facts["recording"], "--config", self.folder / "robot.yaml", *part(self.facts),
+                               "--frames-of", self.drives[0] / "events.wmlog")
 
     # ── the target and the player ───────────────────────────────────────────────────────────────────────────────────
 
@@ -64,6 +81,12 @@ class Judge:
         may_be_full = any(fault["fault"] == "disk_full" for fault in self.faults)
         self.checks.add("target", "waymark run", code == "0" or (code == "1" and may_be_full), f"exit code {code}")
 
+    def _opened_again(self, stream):
+        """How often a fault of the part had the player open a camera's device again."""
+        kind, _, name = stream.partition(":")
+        return sum(kind == "camera" and fault["fault"] == "camera_unplugged" and (fault.get("camera") or name) == name
+                   and fault_judge.is_in(fault, self.facts["from_s"], self.facts["until_s"]) for fault in self.faults)
+
     def player(self):
         """How late the player was, and what it could not place."""
         streams = self.played.get("streams", [])
@@ -76,8 +99,12 @@ class Judge:
         limit_ms = self.limits["play_late_ms"]
         for stream in streams:
             late_ms = stream["p99_us"] / 1e3
-            self.checks.at_most("player", stream["name"], late_ms, limit_ms if limit_ms is not None else float("inf"),
-                                f"{stream['sent']} sent, late by {stream['p50_us'] / 1e3:.3f} ms (p50), {late_ms:.3f} ms (p99), {stream['max_us'] / 1e3:.3f} ms (largest)")
+            text = f"{stream['sent']} sent, late by {stream['p50_us'] / 1e3:.3f} ms (p50), {late_ms:.3f} ms (p99), {stream['max_us'] / 1e3:.3f} ms (largest)"
+            opened = self._opened_again(stream["name"])
+            if 100 * opened > stream["sent"]:  # to open a device takes milliseconds: the datum after that is late, and 99 of 100 has none to spare
+                self.checks.add("player", stream["name"], None, f"{text}; its device was opened again {opened} times, by faults", late_ms, limit_ms)
+                continue
+            self.checks.at_most("player", stream["name"], late_ms, limit_ms if limit_ms is not None else float("inf"), text)
         self.figures["play_late_p99_ms"] = max(stream["p99_us"] for stream in streams) / 1e3
         self.figures["play_late_max_ms"] = max(stream["max_us"] for stream in streams) / 1e3
         left_out = [name for name in self.played.get("not_placed", []) if not self.facts["played"] or not name.startswith(("can:", "camera:"))]
@@ -94,38 +121,36 @@ class Judge:
             self.checks.add("log", "event log", False, "the run left no folder")
         for drive in self.drives:
             name = f"{drive.name}: the same bits at the desk"
-            words = ["--map", self.facts["map"]] if self.facts.get("map") else []
             try:
-                self.replay(drive / "events.wmlog", *words, "--out", self.folder / f"again-{drive.name}")
+                self.replays.result(self.folder / f"again-{drive.name}")
             except HilError as error:
                 self.checks.add("log", name, False, str(error))
                 continue
             live, again = ((folder / "trajectory.csv").read_bytes() for folder in (drive, self.folder / f"again-{drive.name}"))
-            is_last = drive == self.drives[-1]
-            whole = live if is_last else live[:live.rfind(b"\n") + 1]  # of a run that was killed, what its disk has
-            same = live == again if is_last and "log_cut" not in self.facts else again.startswith(whole) or whole.startswith(again)
-            rows = max(whole.count(b"\n") - 1, 0)
-            may_gap = any(fault["fault"] == "disk_full" for fault in self.faults)
-            self.checks.add("log", name, None if may_gap and not same else same, f"{rows} fused poses, {'each the same bits' if same else 'they differ'}")
+            is_cut = drive != self.drives[-1] or self.full_disk is not None  # killed, or on a full disk: what its disk has is judged
+            whole = live[:live.rfind(b"\n") + 1] if is_cut else live
+            same = again.startswith(whole) or whole.startswith(again) if is_cut else live == again
+            rows = max(min(whole.count(b"\n"), again.count(b"\n")) - 1, 0)
+            text = f"{rows} fused poses, {'each the same bits' if same else 'they differ'}"
+            if is_cut and drive == self.drives[0]:
+                text += self._log_end(again)
+            self.checks.add("log", name, same if rows > 0 or not self.full_disk else None, text)
             if drive == self.drives[0]:
                 self.figures["same_bits"] = same
+
+    def _log_end(self, again):
+        """Notes where a log that is cut short ends: the last pose of its replay. In words."""
+        last = again.rstrip(b"\n").rpartition(b"\n")[2].split(b",")[0]
+        if not last.isdigit() or self.start_ns is None:
+            return "; the log has none"
+        self.log_ends_ns = int(last)
+        return f"; the log ends {(self.log_ends_ns - self.start_ns) * 1e-9 - self.facts['from_s']:.1f} s after the part's begin"
 
     def _hear(self):
         if not (self.out / "heard.lcm").exists() or self.start_ns is None:
             return [], []
         heard_poses, healths = lcm_log.heard(self.types, self.out / "heard.lcm", self.facts["prefix"])
         return [p for _, p in heard_poses if p.t_ns > 0], [h for _, h in healths]
-
-    def _part(self):
-        """Words for a replay of the part that was played, and a little more: the poses of its end lie between two."""
-        words = ["--from", f"{self.facts['from_s']:g}"] if self.facts["from_s"] > 0 else []
-        return words + (["--until", f"{self.facts['until_s'] + 1:g}"] if self.facts["is_cut"] else [])
-
-    def _short_log(self):
-        """Why the log may be too short to be compared, and what to do."""
-        full = next((fault for fault in self.faults if fault["fault"] == "disk_full" and fault_judge.is_in(fault, self.facts["from_s"], self.facts["until_s"])), None)
-        return "" if not full else (f" The log has what was written before the disk was full (fault '{full['name']}', {full['from_s'] - self.facts['from_s']:g} s "
-                                    "after the part's begin): begin earlier (--from)")
 
     def _reference(self, offset_ns):
         """Where the robot was, on the target's clock: truth where there is one, else the replay at the desk."""
@@ -136,30 +161,31 @@ class Judge:
     def poses(self):
         """Poses over LCM beside the replay of what the run saw, and beside the truth."""
         self.heard, self.healths = self._hear()
-        config, recording, log = self.folder / "robot.yaml", self.facts["recording"], self.drives[0] / "events.wmlog" if self.drives else None
         self.offset_ns = self.played.get("offset_ns")
-        if not self.heard or log is None:
+        if not self.heard or not self.drives:
             self.checks.add("poses", "heard", False, f"{len(self.heard)} poses were heard over LCM")
             return
         try:
-            said = self.replay(recording, "--config", config, *self._part(), "--frames-of", log, "--out", self.folder / "same")
-            self.replay(recording, "--config", config, *self._part(), "--out", self.folder / "desk")
+            self.replays.result(self.folder / "desk")
+            said = self.replays.result(self.folder / "same")
         except HilError as error:
-            self.checks.add("poses", "replay at the desk", False, f"{error}{self._short_log()}")
+            self._without_a_log(error)
             return
         self.offset_ns = int(re.search(r"clock is (-?\d+) ns ahead", said).group(1))
         rows = poses.table(self.folder / "same/published.csv")
         begun_ns = rows[0][0] + self.offset_ns + poses.BEGIN_NS if rows else 0
-        # The replay has data beyond --until.
+        # The replay has data beyond --until; a log that is cut short has none.
         until_ns = self.start_ns + int(min(self.before_faults_s, self.facts["until_s"] + (-0.3 if self.facts["is_cut"] else 0.5)) * 1e9)
+        until_ns = min(until_ns, self.log_ends_ns or until_ns)
         live = [row for row in lcm_log.rows(self.heard) if begun_ns < row[0] < until_ns]
         apart = list(poses.apart_of(live, rows, self.offset_ns))
         judged_s = (until_ns - max(begun_ns, self.start_ns + int(self.facts["from_s"] * 1e9))) * 1e-9
         enough = len(apart) >= min(_MIN_RATE_HZ, 0.6 * self.facts["rate_hz"]) * max(judged_s - 1, 0.1)
         worst_m, worst_deg = max((m for _, m, _ in apart), default=None), max((d for *_, d in apart), default=None)
-        text = (f"{len(apart)} of {len(self.heard)} poses over LCM, in {judged_s:.0f} s" + (" before the first fault" if self.is_broken else "")
+        ends = "" if not self.is_broken else "before the log ends" if until_ns == self.log_ends_ns else "before the first fault"
+        text = (f"{len(apart)} of {len(self.heard)} poses over LCM, in {max(judged_s, 0):.0f} s {ends}".rstrip()
                 + ("" if worst_m is None else f": at most {worst_m:.4f} m and {worst_deg:.3f} degrees from the replay of what the run saw"))
-        self.checks.add("poses", "enough to compare", enough, text)
+        self.checks.add("poses", "enough to compare", None if self.is_broken and judged_s < 1 else enough, text)
         if worst_m is not None:
             self.checks.at_most("poses", "distance from the replay", worst_m, self.limits["position_m"] or float("inf"), f"at most {worst_m:.4f} m")
             self.checks.at_most("poses", "heading from the replay", worst_deg, self.limits["heading_deg"] or float("inf"), f"at most {worst_deg:.3f} degrees")
@@ -169,6 +195,19 @@ class Judge:
         first = next((p for p in self.heard if p.state == 1), None)
         self.figures["first_pose_s"] = (first.t_ns - self.start_ns) * 1e-9 - self.facts["from_s"] if first else None
         self._truth(live)
+        self.reference, self.reference_is = self._reference(self.offset_ns)
+
+    def _without_a_log(self, error):
+        """No replay of what the run saw. A log that a full disk or a kill cut short may have too little for it: faults are judged all the same, by the
+        player's clock."""
+        if not (self.full_disk or len(self.drives) > 1) or not (self.folder / "desk/published.csv").is_file():
+            self.checks.add("poses", "replay at the desk", False, str(error))
+            return
+        first_s = min(fault["from_s"] for fault in self.faults if fault["fault"] in ("disk_full", "process_killed", "power_cut")
+                      and fault_judge.is_in(fault, self.facts["from_s"], self.facts["until_s"])) - self.facts["from_s"]
+        self.checks.add("poses", "distance from the replay", None, f"the log ends with a fault {first_s:g} s after the part's begin, and has too little to be compared; "
+                        f"begin earlier (--from). {error}")
+        self.offset_ns = self.offset_ns if self.offset_ns is not None else self.start_ns - self.facts["first_ns"]
         self.reference, self.reference_is = self._reference(self.offset_ns)
 
     def _truth_rows(self):
@@ -342,6 +381,7 @@ class Judge:
 
     def all(self, is_good):
         """Every judgement, in the report's order."""
+        self.begin_replays()
         self.target(is_good)
         self.player()
         self.logs()

@@ -160,8 +160,10 @@ class Host(Target):
 
     def _ask(self, command):
         done = subprocess.run(self._ssh(command), capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL, timeout=120)
+        if done.returncode == 255:  # of ssh itself
+            raise HilError(f"{self.address}: no connection: {(done.stderr.strip() or 'ssh has no reason').splitlines()[-1]}; try `ssh {self.address} true`")
         if done.returncode:
-            raise HilError(f"{self.address}: `{command}`: {(done.stderr.strip() or done.stdout.strip() or 'no connection').splitlines()[-1]}")
+            raise HilError(f"{self.address}: `{command}`: {(done.stderr.strip() or done.stdout.strip() or 'no output').splitlines()[-1]}")
         return done.stdout.strip()
 
     def prepare(self, progress):
