@@ -87,17 +87,31 @@ macro(wm_timeout variable usual)
   endif()
 endmacro()
 
+# Of the slots that ctest -j has, a test that computes takes two, and one that mostly waits (WAITS: a daemon at real rate, a disk
+# that blocks) one. With two slots a processor (./dev) no more compute at once than there are processors, and waiting costs nobody.
+# COST: seconds of the longest, which ctest begins first; it learns others itself.
+macro(wm_slots name)
+  set(slots 2)
+  if(A_WAITS)
+    set(slots 1)
+  endif()
+  set_tests_properties(${name} PROPERTIES PROCESSORS ${slots})
+  if(A_COST)
+    set_tests_properties(${name} PROPERTIES COST ${A_COST})
+  endif()
+endmacro()
+
 # What each test finds in its environment. In an emulator, tests of many random trials take an eighth of them (tests/common/trials.h).
 set(WM_TEST_ENVIRONMENT "WM_SOURCE_DIR=${CMAKE_SOURCE_DIR};WM_BIN_DIR=${CMAKE_BINARY_DIR}/bin;WM_DATA_DIR=${CMAKE_SOURCE_DIR}/../shared/data")
 if(CMAKE_CROSSCOMPILING)
   list(APPEND WM_TEST_ENVIRONMENT WM_FEWER=8)
 endif()
 
-# wm_test(NAME SOURCES x.c USES lib ... [LABELS slow] [TIMEOUT s]): a Unity test program, run by ctest.
+# wm_test(NAME SOURCES x.c USES lib ... [LABELS slow] [TIMEOUT s] [COST s] [WAITS]): a Unity test program, run by ctest.
 # Label "slow" keeps it out of `./dev test` and in `./dev test --all`. A test gets the repository's root in WM_SOURCE_DIR and the
 # folder of the optional recordings in WM_DATA_DIR.
 function(wm_test name)
-  cmake_parse_arguments(A "" "TIMEOUT" "SOURCES;USES;LABELS;ARGS" ${ARGN})
+  cmake_parse_arguments(A "WAITS" "TIMEOUT;COST" "SOURCES;USES;LABELS;ARGS" ${ARGN})
   add_executable(${name} ${A_SOURCES})
   target_link_libraries(${name} PRIVATE ${A_USES} wm_unity wm_rules m)
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/tests)
@@ -108,15 +122,17 @@ function(wm_test name)
   endif()
   set_tests_properties(${name} PROPERTIES TIMEOUT ${A_TIMEOUT} LABELS "${A_LABELS}" SKIP_RETURN_CODE 77
     ENVIRONMENT "${WM_TEST_ENVIRONMENT}")
+  wm_slots(${name})
 endfunction()
 
-# wm_script_test(NAME COMMAND ... [LABELS slow] [TIMEOUT s]): a test that is a script; exit code 77 means skipped.
+# wm_script_test(NAME COMMAND ... [LABELS slow] [TIMEOUT s] [COST s] [WAITS]): a test that is a script; exit code 77 means skipped.
 function(wm_script_test name)
-  cmake_parse_arguments(A "" "TIMEOUT" "COMMAND;LABELS" ${ARGN})
+  cmake_parse_arguments(A "WAITS" "TIMEOUT;COST" "COMMAND;LABELS" ${ARGN})
   add_test(NAME ${name} COMMAND ${A_COMMAND} WORKING_DIRECTORY ${CMAKE_SOURCE_DIR})
   wm_timeout(A_TIMEOUT 300)
   set_tests_properties(${name} PROPERTIES TIMEOUT ${A_TIMEOUT} LABELS "${A_LABELS}" SKIP_RETURN_CODE 77
     ENVIRONMENT "${WM_TEST_ENVIRONMENT}")
+  wm_slots(${name})
 endfunction()
 
 # wm_fuzz(NAME SOURCES x.c USES lib ... [CORPUS dir]): a libFuzzer target; with WM_FUZZ only.

@@ -11,6 +11,7 @@
 #include "calibrate/lens.h"
 #include "calibrate/rig.h"
 #include "common/failure.h"
+#include "common/trials.h"
 #include "unity.h"
 #include "waymark/random.h"
 
@@ -224,6 +225,7 @@ void test_what_a_pair_lacks_is_said() {
 // calibrate_solver [TRIALS]
 int main(int argc, char **argv) {
   if (argc > 1) trials = std::atoi(argv[1]);
+  trials = static_cast<int>(wm_trials(static_cast<uint64_t>(trials), 8));
   UNITY_BEGIN();
   RUN_TEST(test_lens_functions_are_those_of_the_renderer);
   RUN_TEST(test_errors_are_as_large_as_their_sigmas);
