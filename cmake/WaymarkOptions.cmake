@@ -92,7 +92,7 @@ endmacro()
 # COST: seconds of the longest, which ctest begins first; it learns others itself.
 macro(wm_slots name)
   set(slots 2)
-  if(A_WAITS)
+  if(A_WAITS AND NOT CMAKE_CROSSCOMPILING) # an emulator computes all the time
     set(slots 1)
   endif()
   set_tests_properties(${name} PROPERTIES PROCESSORS ${slots})

@@ -200,8 +200,8 @@ void office_labels_are_what_apriltag_finds() {
   apriltag_detector_add_family(detector.get(), family.get());
   detector->quad_decimate = 1;
   const bool places[] = {true, false};
-  for (uint64_t k = 0; k < wm_trials(2, 1); k++) {
-    const bool on_walls = places[k];
+  for (uint64_t nth = 0; nth < wm_trials(2, 1); nth++) {
+    const bool on_walls = places[nth];
     const auto world = made("office", false, 4, on_walls);
     TEST_ASSERT_GREATER_OR_EQUAL(12, world->truth.size());
     const Motion motion(*world);
