@@ -75,14 +75,14 @@ endfunction()
 # What runs under the thread sanitizer: the tests with the label "threads".
 add_custom_target(wm_thread_tests)
 
-# Seconds in `variable`: as told, or the usual; ten times that where tests run in an emulator, five times where lines are counted.
+# Seconds in `variable`: as told, or the usual; ten times that where tests run in an emulator, five times where lines are counted or a sanitizer watches.
 macro(wm_timeout variable usual)
   if(NOT ${variable})
     set(${variable} ${usual})
   endif()
   if(CMAKE_CROSSCOMPILING)
     math(EXPR ${variable} "${${variable}} * 10")
-  elseif(CMAKE_CXX_FLAGS MATCHES "--coverage")
+  elseif(WM_SANITIZE OR CMAKE_CXX_FLAGS MATCHES "--coverage")
     math(EXPR ${variable} "${${variable}} * 5")
   endif()
 endmacro()

@@ -266,10 +266,17 @@ void a_turn_that_no_vehicle_can_drive_is_degraded(void) {
   TEST_ASSERT_EQUAL(WM_CAUSE_TURN, out.cause);
 }
 
-// State after five seconds with this value of the calibration.
-uint8_t state_with(const wm_setup &setup, const wm_calibration_value &value) {
+// State after five seconds with this value of the calibration; `position`: the verdict of one that came before, or -1.
+uint8_t state_with(const wm_setup &setup, const wm_calibration_value &value, int position = -1) {
   wm_monitor monitor;
   wm_monitor_init(&monitor, &setup, 1);
+  if (position >= 0) {
+    wm_event e{};
+    e.kind = WM_EVENT_POSITION;
+    wm_innovation record{};
+    record.verdict = (uint8_t)position;
+    wm_monitor_take(&monitor, &e, &record, 1);
+  }
   wm_estimate out{};
   out.state = WM_STATE_TRACKING;
   for (int i = 1; i < 5; i++) {
@@ -291,7 +298,8 @@ void values_far_from_what_is_stated_are_degraded(void) {
   TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, {"gnss.lasting_error", 5.0, NAN}));
 }
 
-// The speed's scale against its prior of 5 %. A known map decides which length is wrong; the robot's own does not.
+// The speed's scale against its prior of 5 %. A known map or fused positions decide which length is wrong; the robot's
+// own does not.
 void lengths_that_contradict_each_other_are_degraded(void) {
   const parameters::values motion(wm_motion_params_table, {});
   wm_setup setup{};
@@ -300,6 +308,8 @@ void lengths_that_contradict_each_other_are_degraded(void) {
   TEST_ASSERT_EQUAL(WM_STATE_TRACKING, state_with(setup, {"motion.speed_scale", 1.19, 0.06}));
   TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, {"motion.speed_scale", 1.19, 0.005}));
   TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, {"motion.speed_scale", 0.81, 0.005}));
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, state_with(setup, {"motion.speed_scale", 1.19, 0.005}, WM_FUSED));
+  TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, {"motion.speed_scale", 1.19, 0.005}, WM_REJECTED_GATE));
   const wm_landmark post{};
   setup.landmarks = &post;
   setup.landmark_count = 1;

@@ -234,7 +234,7 @@ void clear_windows(wm_monitor *self) {
 
 void clear(wm_monitor *self) {
   clear_windows(self);
-  self->is_noise_at_limit = 0;
+  self->is_calibration_contradicted = 0;
   self->doubt_s = self->fitted_s = self->since_found_s = self->contradicted_s = self->proof_s = self->lost_s = 0.0;
   self->cause = WM_CAUSE_NONE;
   self->source = self->silent = -1;
@@ -308,16 +308,16 @@ int32_t silent_source(const wm_monitor &self, wm_time_ns t_ns) {
 // Or they bend a scale, or the lasting error of positions, far from what the configuration states. Where no map and no
 // position gives a length, less is enough: the map has the scale of either of two that contradict each other.
 bool test_calibration(wm_monitor *self, const wm_calibration_value *values, size_t count) {
-  self->is_noise_at_limit = 0;
+  self->is_calibration_contradicted = 0;
   double lengths = 0.0;
   for (size_t i = 0; i < count; i++) {
     lengths += length_contradiction(self->scales, values[i]);
     if (noise_adaption::is_at_limit(values[i]) || scale_contradicts(self->scales, values[i]) ||
         lasting_error_contradicts(values[i]))
-      self->is_noise_at_limit = 1;
+      self->is_calibration_contradicted = 1;
   }
-  if (!self->is_map_known && !self->has_positions && lengths_contradict(lengths)) self->is_noise_at_limit = 1;
-  if (!self->is_noise_at_limit) return false;
+  if (!self->is_map_known && !self->has_positions && lengths_contradict(lengths)) self->is_calibration_contradicted = 1;
+  if (!self->is_calibration_contradicted) return false;
   self->cause = WM_CAUSE_INCONSISTENT;
   self->source = -1;
   return true;
@@ -459,7 +459,8 @@ int wm_monitor_take(wm_monitor *self, const wm_event *event, const wm_innovation
     for (size_t i = 0; i < count; i++)
       if (records[i].verdict == WM_FUSED || records[i].verdict == WM_REJECTED_GATE)
         wm::landmark_bias_take(&self->landmarks, records[i]);
-    self->has_positions = self->has_positions || event->kind == WM_EVENT_POSITION;
+    for (size_t i = 0; i < count && event->kind == WM_EVENT_POSITION; i++)
+      self->has_positions = self->has_positions || records[i].verdict == WM_FUSED;
     if (event->kind == WM_EVENT_POSITION) wm::course_take(&self->course, event->t_ns, event->as.position);
   }
   if (self->begun_ns == WM_TIME_NONE) self->begun_ns = event->t_ns;

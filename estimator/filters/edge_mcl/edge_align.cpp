@@ -263,20 +263,20 @@ align_vector edge_mcl::difference_of(const alignment &a, const alignment &b) {
   return d;
 }
 
-// Gauss-Newton from a.value on. Returns the cost of prediction and scan together where it ends; `e` is linearized
-// there.
-double edge_mcl::descend(const wm_points &points, const prediction &prior, double slack_m, alignment *a,
-                         normal_equations *e) const {
+// Gauss-Newton from a.value on. The coarse rounds take `part` of the prediction as the prior, the others the whole.
+// Returns the cost of prediction and scan together where it ends; `e` is linearized there.
+double edge_mcl::descend(const wm_points &points, const prediction &whole, const prediction &part, double slack_m,
+                         alignment *a, normal_equations *e) const {
   double mapped[WM_POINTS_MAX];
   for (int round = 0; round < kRounds; round++) {
     // The gate narrows from the uncertainty of pose and camera to that of a point.
     const bool coarse = round < kCoarseRounds;
+    const prediction &prior = coarse ? part : whole;
     const double gate = params_.gate_m + (coarse ? slack_m : 0.0);
     const descent_pass pass = round == 0             ? descent_pass::kFirst
                               : round + 1 == kRounds ? descent_pass::kLast
                                                      : descent_pass::kNext;
-    linearize(points, *a, gate > kCoarseGateMax_m ? kCoarseGateMax_m : gate, coarse ? &prior : nullptr, pass, mapped,
-              e);
+    linearize(points, *a, gate > kCoarseGateMax_m ? kCoarseGateMax_m : gate, coarse ? &part : nullptr, pass, mapped, e);
     if (pass == descent_pass::kLast) break;
     align_matrix total = prior.inverse + e->information;
     const align_vector right = e->gradient + prior.inverse * difference_of(prior.mean, *a);
@@ -287,8 +287,8 @@ double edge_mcl::descend(const wm_points &points, const prediction &prior, doubl
     for (int k = 0; k < kAlignStates; k++) a->value[k] += step[k];
     a->value[kAlignHeading] = wrap(a->value[kAlignHeading]);
   }
-  const align_vector off = difference_of(prior.mean, *a);
-  return e->cost + 0.5 * off.dot(prior.inverse * off);
+  const align_vector off = difference_of(whole.mean, *a);
+  return e->cost + 0.5 * off.dot(whole.inverse * off);
 }
 
 // Keeps the best first; minima that lie together are one.
@@ -312,8 +312,21 @@ void edge_mcl::minima::take(const alignment &a, double its_cost, const normal_eq
   cost[i] = its_cost;
 }
 
+// Leaves a prediction only `to` of its `variance` along an axis of the plane, as if its place there had been measured;
+// `shared`: the covariance of the unknowns with that place.
+void edge_mcl::narrow(const sin_cos &axis, const align_vector &shared, double variance, double to, prediction *part) {
+  part->covariance.noalias() -= (variance - to) / square(variance) * shared * shared.transpose();
+  const double information = 1.0 / to - 1.0 / variance;
+  part->inverse(kAlignX, kAlignX) += information * square(axis.cos);
+  part->inverse(kAlignY, kAlignY) += information * square(axis.sin);
+  part->inverse(kAlignX, kAlignY) += information * axis.cos * axis.sin;
+  part->inverse(kAlignY, kAlignX) = part->inverse(kAlignX, kAlignY);
+}
+
 // A scan has several local minima (doors, pillars). Descents start along the axis that the prediction leaves most open,
-// and, of a heading that is not sure, at three headings.
+// and, of a heading that is not sure, at three headings. Where starts are nearer to each other than a sigma, each
+// begins with the part of the prediction around it: the whole would pull each descent back to its mean before the gate
+// narrows.
 void edge_mcl::find_minima(const wm_points &points, const prediction &prior, minima *out) const {
   const double xx = filter_.variance(kX), yy = filter_.variance(kY), xy = filter_.covariance(kX, kY);
   const double half = 0.5 * (xx + yy), spread = std::sqrt(square(0.5 * (xx - yy)) + square(xy));
@@ -331,20 +344,24 @@ void edge_mcl::find_minima(const wm_points &points, const prediction &prior, min
   const bool placed = life_.tracking() || tentative_;
   const int turns = placed && turn > kSureHeading_rad ? 1 : 0;
   if (life_.searching() && !placed) sides = 0;  // the pose is arbitrary: no use in starts around it
+  // Covariance of the unknowns with the place along the axis; 0 of those that are off.
+  const align_vector shared = axis.cos * prior.covariance.col(kAlignX) + axis.sin * prior.covariance.col(kAlignY);
+  prediction part = prior;
+  // Of the way from the prior's mean to a start: where that start's part has its mean.
+  const double kept = sides > 0 && step < sigma ? 1.0 - square(step / sigma) : 0.0;
+  if (kept > 0.0) narrow(axis, shared, square(sigma), square(step), &part);
   out->count = 0;
   for (int k = -sides; k <= sides; k++)
     for (int m = -turns; m <= turns; m++) {
       // The prior's mean, conditioned on k steps along the axis; then turned.
       alignment a = prior.mean;
       for (int i = 0; i < kAlignStates; i++) {
-        if (a.state[i] < 0) continue;
-        const double shared =
-            axis.cos * filter_.covariance(a.state[i], kX) + axis.sin * filter_.covariance(a.state[i], kY);
-        a.value[i] += k * step * shared / square(sigma);
+        a.value[i] += k * step * shared[i] / square(sigma);
+        part.mean.value[i] = prior.mean.value[i] + kept * k * step * shared[i] / square(sigma);
       }
       a.value[kAlignHeading] = wrap(a.value[kAlignHeading] + m * turn);
       normal_equations e;
-      const double cost = descend(points, prior, slack, &a, &e);
+      const double cost = descend(points, prior, part, slack, &a, &e);
       out->take(a, cost, e);
     }
 }

@@ -107,8 +107,9 @@ class edge_mcl {
   void linearize(const wm_points &points, const alignment &a, double gate_m, const prediction *open, descent_pass pass,
                  double mapped[WM_POINTS_MAX], normal_equations *out) const;
   static align_vector difference_of(const alignment &a, const alignment &b);
-  double descend(const wm_points &points, const prediction &prior, double slack_m, alignment *a,
+  double descend(const wm_points &points, const prediction &whole, const prediction &part, double slack_m, alignment *a,
                  normal_equations *e) const;
+  static void narrow(const sin_cos &axis, const align_vector &shared, double variance, double to, prediction *part);
   void find_minima(const wm_points &points, const prediction &prior, minima *out) const;
   void compare_minima(const minima &found, const prediction &prior, double off[minima::kCapacity][kMaxEdgeStates],
                       double *probability) const;

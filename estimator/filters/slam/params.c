@@ -75,7 +75,7 @@ static const wm_param kParams[] = {
     F64("lines.parallax_rad", line_parallax_rad, 0.15, 0.001, 3,
         "Smallest angle at which the lines of sight must cross before a landmark joins, rad."),
     F64("lines.step_m", line_step_m, 0.15, 0.001, 100, "Distance between two poses that are kept, m."),
-    F64("lines.sigma_rel", line_sigma_rel, 0.25, 0.001, 1,
+    F64("lines.sigma_rel", line_sigma_rel, 0.15, 0.001, 1,
         "Largest sigma of a landmark's place before it joins, as a part of its distance."),
     ENUM("lines.rejoin", line_rejoin, WM_SLAM_REJOIN_AUTO, WM_SLAM_REJOIN_AUTO, kRejoin,
          "A line's number is its tracker's own and changes when it was lost. Two landmarks, one lost before the other "

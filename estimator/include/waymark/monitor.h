@@ -109,13 +109,13 @@ typedef struct wm_monitor {
   wm_time_ns begun_ns, stepped_ns, next_ns;
   uint32_t resets;
   int32_t cause, source;        // of the present doubt; source -1: none
-  int32_t has_positions;        // a source of positions was seen
+  int32_t has_positions;        // a position was fused
   int32_t found, is_map_known;  // found: poses that a search found, one soon after the other
   int32_t is_unsupported, is_outside;
-  int32_t was_lost, silent;   // by the estimator; silent: source, -1: none
-  int32_t is_probation;       // of a found pose, until it fits
-  int32_t is_found_early;     // a pose was found before one was proven
-  int32_t is_noise_at_limit;  // an adapted noise
+  int32_t was_lost, silent;             // by the estimator; silent: source, -1: none
+  int32_t is_probation;                 // of a found pose, until it fits
+  int32_t is_found_early;               // a pose was found before one was proven
+  int32_t is_calibration_contradicted;  // a scale, a lasting error or an adapted noise
 } wm_monitor;
 
 // `observers`: bit for each of the run's sources that may give observations. The setup is not kept.

@@ -129,6 +129,21 @@ void places_that_look_the_same_are_listed_beside_the_pose(void) {
   TEST_ASSERT_TRUE(sum > 0 && sum < 0.01);
 }
 
+// GIVEN a start pose that is 0.8 m off along a corridor, with a sigma of 0.5 m along it WHEN a corner comes into view
+// THEN the pose is corrected by it at once: a wide prediction does not hold the alignment at its mean.
+void a_corner_corrects_a_pose_that_was_open_along_the_corridor(void) {
+  for (const double off_m : {-0.8, 0.8}) {
+    setup.start = {WM_TIME_NONE, {13.5 + off_m, 1.95, 0}, {0, 0, 0, 1}, 0, 0.5, 0.05};
+    filter f;
+    drive d;
+    d.truth = {13.5, 1.95, 0};
+    d.go(f, 1.5, 0.5, 0.0);
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.05, d.error_of(f));
+    TEST_ASSERT_EQUAL(WM_STATE_TRACKING, f.estimate().state);
+    setUp();
+  }
+}
+
 // The robot is told to go on at 1 m/s, nobody hears for 3 s that it has stopped after one: it says that it doesn't know
 // where it is, and finds itself again.
 void motion_sensors_that_fall_silent_are_not_believed(void) {
@@ -489,6 +504,7 @@ int main(void) {
   RUN_TEST(the_first_scan_counts_for_the_time_since_the_motion_began);
   RUN_TEST(the_same_scan_twice_says_no_more);
   RUN_TEST(places_that_look_the_same_are_listed_beside_the_pose);
+  RUN_TEST(a_corner_corrects_a_pose_that_was_open_along_the_corridor);
   RUN_TEST(motion_sensors_that_fall_silent_are_not_believed);
   RUN_TEST(a_camera_that_looks_lower_than_believed_is_found_out);
   RUN_TEST(the_far_face_of_a_thin_wall_is_not_aligned_with);
