@@ -3,6 +3,7 @@
 option(WM_TESTS "Build the tests" ON)
 option(WM_FUZZ "Build the fuzz targets (clang)" OFF)
 option(WM_RENDER "Build what renders pictures of worlds (with Embree): waymark-simulate, its tests and benchmarks" ON)
+option(WM_UNITY "Compile the desk's sources in batches: half of their time is the same headers. OFF for editors that need each source's own command" ON)
 set(WM_SANITIZE "" CACHE STRING "Sanitizers, as for -fsanitize=")
 
 set(WM_WARNINGS -Wall -Wextra -Wshadow
@@ -53,6 +54,13 @@ if(WM_FUZZ)
   target_compile_options(wm_rules INTERFACE -fsanitize=fuzzer-no-link)
 endif()
 
+# Of the desk's rooms, which call it: several sources are one for the compiler. So names in their unnamed namespaces differ within a
+# library. The robot's rooms stay as they are: their objects are the same in every build.
+macro(wm_desk_room)
+  set(CMAKE_UNITY_BUILD ${WM_UNITY})
+  set(CMAKE_UNITY_BUILD_BATCH_SIZE 6) # larger ones take a compiler longer than any other file
+endmacro()
+
 # wm_library(NAME SOURCES a.c b.cpp [USES lib ...]): a library with the rules; USES is public, and is the whole list of what
 # it may include.
 function(wm_library name)
@@ -79,17 +87,31 @@ macro(wm_timeout variable usual)
   endif()
 endmacro()
 
+# Of the slots that ctest -j has, a test that computes takes two, and one that mostly waits (WAITS: a daemon at real rate, a disk
+# that blocks) one. With two slots a processor (./dev) no more compute at once than there are processors, and waiting costs nobody.
+# COST: seconds of the longest, which ctest begins first; it learns others itself.
+macro(wm_slots name)
+  set(slots 2)
+  if(A_WAITS AND NOT CMAKE_CROSSCOMPILING) # an emulator computes all the time
+    set(slots 1)
+  endif()
+  set_tests_properties(${name} PROPERTIES PROCESSORS ${slots})
+  if(A_COST)
+    set_tests_properties(${name} PROPERTIES COST ${A_COST})
+  endif()
+endmacro()
+
 # What each test finds in its environment. In an emulator, tests of many random trials take an eighth of them (tests/common/trials.h).
 set(WM_TEST_ENVIRONMENT "WM_SOURCE_DIR=${CMAKE_SOURCE_DIR};WM_BIN_DIR=${CMAKE_BINARY_DIR}/bin;WM_DATA_DIR=${CMAKE_SOURCE_DIR}/../shared/data")
 if(CMAKE_CROSSCOMPILING)
   list(APPEND WM_TEST_ENVIRONMENT WM_FEWER=8)
 endif()
 
-# wm_test(NAME SOURCES x.c USES lib ... [LABELS slow] [TIMEOUT s]): a Unity test program, run by ctest.
+# wm_test(NAME SOURCES x.c USES lib ... [LABELS slow] [TIMEOUT s] [COST s] [WAITS]): a Unity test program, run by ctest.
 # Label "slow" keeps it out of `./dev test` and in `./dev test --all`. A test gets the repository's root in WM_SOURCE_DIR and the
 # folder of the optional recordings in WM_DATA_DIR.
 function(wm_test name)
-  cmake_parse_arguments(A "" "TIMEOUT" "SOURCES;USES;LABELS;ARGS" ${ARGN})
+  cmake_parse_arguments(A "WAITS" "TIMEOUT;COST" "SOURCES;USES;LABELS;ARGS" ${ARGN})
   add_executable(${name} ${A_SOURCES})
   target_link_libraries(${name} PRIVATE ${A_USES} wm_unity wm_rules m)
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/tests)
@@ -100,15 +122,17 @@ function(wm_test name)
   endif()
   set_tests_properties(${name} PROPERTIES TIMEOUT ${A_TIMEOUT} LABELS "${A_LABELS}" SKIP_RETURN_CODE 77
     ENVIRONMENT "${WM_TEST_ENVIRONMENT}")
+  wm_slots(${name})
 endfunction()
 
-# wm_script_test(NAME COMMAND ... [LABELS slow] [TIMEOUT s]): a test that is a script; exit code 77 means skipped.
+# wm_script_test(NAME COMMAND ... [LABELS slow] [TIMEOUT s] [COST s] [WAITS]): a test that is a script; exit code 77 means skipped.
 function(wm_script_test name)
-  cmake_parse_arguments(A "" "TIMEOUT" "COMMAND;LABELS" ${ARGN})
+  cmake_parse_arguments(A "WAITS" "TIMEOUT;COST" "COMMAND;LABELS" ${ARGN})
   add_test(NAME ${name} COMMAND ${A_COMMAND} WORKING_DIRECTORY ${CMAKE_SOURCE_DIR})
   wm_timeout(A_TIMEOUT 300)
   set_tests_properties(${name} PROPERTIES TIMEOUT ${A_TIMEOUT} LABELS "${A_LABELS}" SKIP_RETURN_CODE 77
     ENVIRONMENT "${WM_TEST_ENVIRONMENT}")
+  wm_slots(${name})
 endfunction()
 
 # wm_fuzz(NAME SOURCES x.c USES lib ... [CORPUS dir]): a libFuzzer target; with WM_FUZZ only.

@@ -6,6 +6,7 @@
 namespace wm::sim {
 
 inline constexpr double kPi = 3.14159265358979323846;
+inline constexpr double kDeg = kPi / 180;  // radians in a degree
 
 // To (-pi, pi].
 inline double wrap(double rad) {

@@ -17,8 +17,6 @@
 namespace wm::sim {
 namespace {
 
-wm_time_ns to_ns(double s) { return static_cast<wm_time_ns>(std::llround(s * 1e9)); }
-
 class TextFile {
  public:
   explicit TextFile(const std::string &path) : path_(path), file_(std::fopen(path.c_str(), "w")) {}

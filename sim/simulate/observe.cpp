@@ -20,8 +20,6 @@ using Eigen::Isometry3d;
 using Eigen::Vector3d;
 using Kind = Sensor::Kind;
 
-wm_time_ns to_ns(double s) { return static_cast<wm_time_ns>(std::llround(s * 1e9)); }
-
 constexpr double kTiltStep_s = 0.1, kTiltLasts_s = 2;
 constexpr double kAnyElevation_rad = 0.3;  // of an outlier: so far round the horizon
 

@@ -10,7 +10,6 @@
 
 namespace wm::sim {
 
-inline constexpr double kDeg = kPi / 180;
 inline constexpr double kMilli = 1e-3, kPercent = 1e-2;
 inline constexpr double kFar_m = 1e5;
 

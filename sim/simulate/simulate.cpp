@@ -18,10 +18,8 @@
 namespace wm::sim {
 namespace {
 
-constexpr double kTruth_hz = 50;
 constexpr wm_time_ns kFrame_ns = 250000;  // what a frame takes on a bus of 500 kbit/s
 
-wm_time_ns to_ns(double s) { return static_cast<wm_time_ns>(std::llround(s * 1e9)); }
 // candump writes microseconds.
 wm_time_ns to_us(double s) { return static_cast<wm_time_ns>(std::llround(s * 1e6)) * WM_NS_PER_US; }
 

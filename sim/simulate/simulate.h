@@ -2,6 +2,7 @@
 // A scenario and a seed become what the robot's sensors said, and the truth. All in memory; write.h makes a recording.
 #pragma once
 
+#include <cmath>
 #include <limits>
 #include <string>
 #include <vector>
@@ -14,6 +15,10 @@
 #include "worlds/path6.h"
 
 namespace wm::sim {
+
+inline constexpr double kTruth_hz = 50;  // of truth.csv
+
+inline wm_time_ns to_ns(double s) { return static_cast<wm_time_ns>(std::llround(s * 1e9)); }
 
 // `sensor` is an index into Recording::sensors; `outlier` is for statistics only and not written.
 struct Sighting {

@@ -11,10 +11,6 @@
 namespace wm::sim {
 namespace {
 
-constexpr double kTruth_hz = 50;
-
-wm_time_ns to_ns(double s) { return static_cast<wm_time_ns>(std::llround(s * 1e9)); }
-
 // Rz(yaw) Ry(pitch) Rx(roll).
 void quaternion(const std::array<double, 3> &rpy, double q[4]) {
   const double cr = wm::cos(0.5 * rpy[0]), sr = wm::sin(0.5 * rpy[0]), cp = wm::cos(0.5 * rpy[1]),

@@ -6,14 +6,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "simulate/angle.h"
 #include "worlds/dice.h"
 #include "worlds/dress.h"
 #include "worlds/makers.h"
 
 namespace wm::sim {
 namespace {
-
-constexpr double kDeg = 3.14159265358979323846 / 180;
 
 std::vector<CeilingLamp> corridor_lamps(const CorridorDrawing &drawn, uint64_t seed, bool hard) {
   Dice dice(seed, Part::lamps);

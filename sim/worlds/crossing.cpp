@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "render/patterns.h"
+#include "simulate/angle.h"
 #include "simulate/route.h"
 #include "waymark/internal/math/elementary.hpp"
 #include "worlds/dice.h"
@@ -23,7 +24,6 @@ using render::Material;
 using render::Mesh;
 using render::Texture;
 
-constexpr double kDeg = kPi / 180;
 constexpr double kKerb_m = 0.12;
 
 // Two roads that cross: one along x, one along y. Each is given by its middle and the half widths of carriageway and of

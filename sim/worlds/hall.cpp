@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "render/patterns.h"
+#include "simulate/angle.h"
 #include "waymark/internal/math/elementary.hpp"
 #include "worlds/dice.h"
 #include "worlds/dress.h"
@@ -16,8 +17,6 @@ namespace {
 
 using images::Vec2;
 using images::Vec3;
-
-constexpr double kDeg = kPi / 180;
 
 // Upright edges of the plan's bodies and corners.
 void lines_of_plan(const Plan &plan, World &world) {

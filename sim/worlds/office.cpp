@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "simulate/angle.h"
 #include "simulate/route.h"
 #include "waymark/internal/math/elementary.hpp"
 #include "waymark/mr_code.h"
@@ -18,7 +19,7 @@ namespace {
 
 using images::Vec3;
 
-constexpr double kMarker_m = 0.198, kMr_m = 0.27, kDeg = kPi / 180, kReach_m = 12;
+constexpr double kMarker_m = 0.198, kMr_m = 0.27, kReach_m = 12;
 
 // A marker in its place.
 struct Print {

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "render/patterns.h"
+#include "simulate/angle.h"
 #include "waymark/internal/math/elementary.hpp"
 #include "worlds/dice.h"
 #include "worlds/makers.h"
@@ -17,7 +18,6 @@ using images::Vec3;
 using render::Material;
 using render::Texture;
 
-constexpr double kDeg = kPi / 180;
 constexpr double kHalf_m = 14, kCell_m = 0.12;
 
 // The bed's height: long waves, dunes, and rocks as bumps, each a sum with continuous slope.

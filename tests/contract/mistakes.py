@@ -338,10 +338,8 @@ def main():
                 sets.append((options.data_dir / name, config, list_of))
             else:
                 print(f"skipped: {options.data_dir / name} is not there", file=sys.stderr)
-        for recording, config, mistake in [(r, c, m) for r, c, list_of in sets for m in list_of]:
-            title = mistake[0] if recording == base else f"{recording.name}: {mistake[0]}"
-            if not replays.is_chosen(options, title):
-                continue
+        titled = [(r, c, m, m[0] if r == base else f"{r.name}: {m[0]}") for r, c, list_of in sets for m in list_of]
+        for recording, config, mistake, title in replays.fewer([row for row in titled if replays.is_chosen(options, row[3])]):
             with tempfile.TemporaryDirectory() as folder:
                 row = judge(options, recording, options.source_dir / "config" / config, mistake, pathlib.Path(folder))
             rows.append(row | {"mistake": title})

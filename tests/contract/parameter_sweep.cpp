@@ -9,6 +9,8 @@
 #include <ctime>
 #include <memory>
 
+#include "common/trials.h"
+
 namespace parameters {
 namespace {
 
@@ -63,20 +65,26 @@ std::string effect(const wm_param_table &table, const wm_param &param, const std
   for (const bool first : {true, false})
     for (const recorded_stage &s : stages)
       if (s.ran && made_for(*s.of, param) == first) order.push_back(&s);
+  // The nearest value on every stage before the next value on any: most parameters change something by it, on one
+  // stage.
+  std::vector<std::vector<double>> others;
+  size_t tries = 0;
   for (const recorded_stage *at : order) {
-    const recorded_stage &s = *at;
-    values set(table, s.of->settings);
-    const double from = set.get(param);
-    std::vector<double> others = moved(param, from);
-    if (others.size() > most) others.resize(most);
-    for (const double value : others) {
-      set.set(param, value);
+    others.push_back(moved(param, values(table, at->of->settings).get(param)));
+    if (others.back().size() > most) others.back().resize(most);
+    tries = std::max(tries, others.back().size());
+  }
+  for (size_t nth = 0; nth < tries; nth++)
+    for (size_t i = 0; i < order.size(); i++) {
+      if (nth >= others[i].size()) continue;
+      const recorded_stage &s = *order[i];
+      values set(table, s.of->settings);
+      set.set(param, others[i][nth]);
       trace output(&s.output);
       const bool ran = s.of->run(set, &output);
       if (ran ? output.differs() : refusal_counts)
-        return s.of->name + ": " + std::to_string(value) + (ran ? "" : " is refused");
+        return s.of->name + ": " + std::to_string(others[i][nth]) + (ran ? "" : " is refused");
     }
-  }
   return "";
 }
 
@@ -153,7 +161,9 @@ std::vector<std::string> sweep(const owner &of) {
     if (of.reads && !of.reads(table.params[i])) unread.push_back(&table.params[i]);
   const bool nothing_unread_is_read =
       change_nothing(table, unread, recorded, 0) && change_nothing(table, unread, recorded, 1);
-  for (size_t i = 0; i < table.count; i++) {
+  // In the gate a part of them, evenly from the whole table.
+  const size_t every = table.count > 0 ? table.count / wm_trials(table.count, 1) : 1;
+  for (size_t i = 0; i < table.count; i += every) {
     const std::string name = std::string(of.name) + "." + table.params[i].key;
     const bool is_read = !of.reads || of.reads(table.params[i]);
     if (!is_read && nothing_unread_is_read) continue;

@@ -3,9 +3,13 @@
 """What `./dev test` has to lint and to run under sanitizers, and what its tests skipped (docs/decisions/006-gate.md).
 
     gate.py base                    the commit that changes are counted from; nothing where everything counts
-    gate.py lint BUILD BASE         sources to lint, one a line; without BASE all
-    gate.py tests BUILD BASE LABEL  what to build for the sanitizer's tests, and which to run: two lines, or nothing;
-                                    of the tests with LABEL, or with - of all but those labelled slow or release-only
+    gate.py lint BUILD BASE [MOST]  sources to lint, one a line, by BUILD/lint/compile_commands.json; without BASE all. With MOST
+                                    those that changed, and as many at most of those that include what changed
+    gate.py tests BUILD BASE LABEL [MOST_S]
+                                    what to build for the sanitizer's tests, which to run, and which of those that changed
+                                    were left out: three lines, or nothing; of the tests with LABEL, or with - of all but
+                                    those labelled slow or release-only. With MOST_S objects of so many seconds at most:
+                                    tests that need the least beyond the others first
     gate.py skips RUN ...           the tests that were skipped, from tests.xml of each RUN's folder; fails where one
                                     needs a thing that WAYMARK_REQUIRE names
     gate.py passed                  after a run that checked everything: this commit is the base from now on (tests/gate/base)
@@ -24,6 +28,8 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 BASE_FILE = ROOT / "tests/gate/base"
 # Changes of these can change any object or any finding.
 RULES = re.compile(r"(cmake/.*|CMakeLists\.txt|CMakePresets\.json|\.clang-tidy|\.ci/.*|tests/gate/gate\.py)$")
+# Seconds of a processor that an object takes under the address sanitizer, about: of C, of C++, of a batch of C++ sources.
+OBJECT_S = {".c.o": 0.2, ".cpp.o": 2.0, ".cxx.o": 20.0}
 # What a test may lack, by the words of its last line.
 NEEDS = {
     "data": r"recording|data",
@@ -82,43 +88,62 @@ class Build:
         return subprocess.run(["ninja", "-C", self.folder, *arguments], capture_output=True, text=True,
                               check=True).stdout.splitlines()
 
-    def objects(self):
-        """Objects whose source or one of its headers changed."""
+    def objects(self, counts=lambda name: True):
+        """Objects whose source or one of its headers changed, of those names that count."""
         out, current = set(), None
         for line in self.ninja("-t", "deps"):
             if line and not line[0].isspace():
                 current = line.split(":")[0]
-            elif line.strip() and current and self.is_changed(self.place(line.strip())):
+            elif line.strip() and current and counts(line.strip()) and self.is_changed(self.place(line.strip())):
                 out.add(current)
         return out
 
-    def lint(self):
-        objects = set() if self.everything else self.objects()
-        out = set()
+    def sources(self):
+        """Compile commands, one a source: a batch (CMake's unity build) has those of its sources."""
         for entry in self.commands:
+            file = pathlib.Path(entry["file"])
+            parts = re.findall(r'^#include "([^"]+)"', file.read_text(), re.M) if re.match(r"unity_\d+_", file.name) else []
+            for part in parts or [entry["file"]]:
+                yield {**entry, "file": part, "command": entry["command"].replace(f"-c {entry['file']}", f"-c {part}")}
+
+    def lint(self, most=None):
+        """Sources whose own text changed, then those with a header that did. A batch counts whole where a header of it changed."""
+        objects = set() if self.everything else self.objects(lambda name: not name.endswith((".c", ".cpp")))
+        own, including, commands = set(), set(), []
+        for entry in self.sources():
             place = self.place(entry["file"])
             made = os.path.relpath(os.path.normpath(pathlib.Path(entry["directory"]) / output_of(entry)), self.folder)
             if place.startswith(("build", ".cache", "tests/", "..")):
                 continue
-            if self.everything or made in objects or self.is_changed(place):
-                out.add(place)
-        return sorted(out)
+            commands.append(entry)
+            if place in self.changed or most is None and not self.changed:
+                own.add(place)
+            elif self.is_changed(place) or made in objects:
+                including.add(place)
+        (self.folder / "lint").mkdir(exist_ok=True)
+        (self.folder / "lint/compile_commands.json").write_text(json.dumps(commands))
+        return sorted(own) + sorted(including)[:most]
 
-    def tests(self, label):
+    def tests(self, label, most_s=None):
+        """(outputs to build, tests, tests that were left out)"""
         listed = subprocess.run(["ctest", "--test-dir", self.folder, "--show-only=json-v1"], capture_output=True,
                                 text=True, check=True).stdout
         objects = set() if self.everything else self.objects()
         outputs = {line.split(":")[0] for line in self.ninja("-t", "targets", "all")}
         programs = sorted(name for name in outputs if re.fullmatch(r"bin/waymark(-[a-z]+)?", name))
-        known = {}
+        known, inputs = {}, {}
+
+        def inputs_of(output):
+            if output not in inputs:
+                inputs[output] = self.ninja("-t", "inputs", output)
+            return inputs[output]
 
         def is_touched(output):
             if output not in known:
-                known[output] = self.everything or any(
-                    name in objects or self.is_changed(self.place(name)) for name in self.ninja("-t", "inputs", output))
+                known[output] = self.everything or any(name in objects or self.is_changed(self.place(name)) for name in inputs_of(output))
             return known[output]
 
-        needed, names = set(), []
+        chosen = {}
         for test in json.loads(listed)["tests"]:
             labels = next((p["value"] for p in test.get("properties", []) if p["name"] == "LABELS"), [])
             if (label not in labels) if label != "-" else ({"slow", "release-only"} & set(labels)):
@@ -128,15 +153,49 @@ class Build:
             uses &= outputs
             is_script = not (command and os.path.relpath(command[0], self.folder) in outputs)
             if is_script:
-                uses |= set(programs)
+                uses |= set(programs_of([word for word in command if word.startswith(str(ROOT) + "/tests/")], programs))
             scripts = [os.path.relpath(word, ROOT) for word in command if word.startswith(str(ROOT) + "/tests/")]
             own = any(self.is_changed(name) or name.startswith("config/") for name in self.changed
                       if is_script and any(os.path.dirname(name) == os.path.dirname(s) for s in scripts)
                       or is_script and name.startswith("config/"))
             if self.everything or own or any(is_touched(name) for name in sorted(uses)):
-                needed |= uses
-                names.append(test["name"])
-        return sorted(needed), names
+                chosen[test["name"]] = uses
+        made = {name: {o for output in uses for o in inputs_of(output) if o.endswith(".o")} for name, uses in chosen.items()}
+        taken = within(made, most_s)
+        return sorted(set().union(*(chosen[name] for name in taken))), taken, sorted(set(chosen) - set(taken))
+
+
+def within(made, most_s):
+    """Tests by their objects: the cheapest beyond what is made already, until the seconds are spent. All without a bound."""
+    if most_s is None:
+        return sorted(made)
+    taken, have, spent_s, left = [], set(), 0.0, dict(made)
+    while left:
+        cost = {name: sum(next((s for end, s in OBJECT_S.items() if o.endswith(end)), 1.0) for o in objects - have) for name, objects in left.items()}
+        name = min(sorted(left), key=cost.get)
+        if spent_s + cost[name] > most_s:
+            break
+        spent_s += cost[name]
+        have |= left.pop(name)
+        taken.append(name)
+    return sorted(taken)
+
+
+def programs_of(scripts, programs):
+    """The programs that scripts and their modules beside them name, as `waymark-eval` or as `waymark eval`. All, where a name is put together."""
+    texts, todo = {}, [pathlib.Path(script) for script in scripts if pathlib.Path(script).is_file()]
+    while todo:
+        path = todo.pop()
+        texts[path] = path.read_text(errors="ignore")
+        beside = [path.with_name(f"{name}.py") for name in re.findall(r"^(?:import|from) (\w+)", texts[path], re.M)]
+        todo += [other for other in beside if other.is_file() and other not in texts]
+    text = "\n".join(texts.values())
+    if not texts or re.search(r"waymark-[{$%]", text):
+        return programs
+    words = {name: name.removeprefix("bin/waymark").removeprefix("-") for name in programs}
+    daemon = r"\"waymark\"|/waymark[\"'\s]|\$\{?waymark\b"
+    return [name for name, word in words.items()
+            if re.search(rf"waymark-{word}\b|waymark\S*[\"']?,?\s+[\"']?{word}\b" if word else daemon, text, re.I)]
 
 
 def output_of(entry):
@@ -174,13 +233,13 @@ def main():
     command, arguments = (sys.argv[1], sys.argv[2:]) if len(sys.argv) > 1 else ("", [])
     if command == "base" and not arguments:
         print(base())
-    elif command == "lint" and len(arguments) == 2:
-        for source in Build(*arguments).lint():
+    elif command == "lint" and len(arguments) in (2, 3):
+        for source in Build(*arguments[:2]).lint(*map(int, arguments[2:])):
             print(source)
-    elif command == "tests" and len(arguments) == 3:
-        outputs, names = Build(*arguments[:2]).tests(arguments[2])
-        if names:
-            print(" ".join(outputs), "^(" + "|".join(re.escape(name) for name in names) + ")$", sep="\n")
+    elif command == "tests" and len(arguments) in (3, 4):
+        outputs, names, left = Build(*arguments[:2]).tests(arguments[2], *map(float, arguments[3:]))
+        if names or left:
+            print(" ".join(outputs), "^(" + "|".join(re.escape(name) for name in names) + ")$" if names else "", " ".join(left), sep="\n")
     elif command == "skips" and arguments:
         skips(arguments)
     elif command == "passed" and not arguments:

@@ -16,14 +16,14 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
 import browser  # noqa: E402
 from lcm_tools import ROOT, ROUTE, URL, WAYMARK, end_all, skip  # noqa: E402
 
-SECONDS = 40
+DRIVE_S, WAIT_S = 24, 40
 
 
 def prepare(work):
     world = (ROOT / "config/worlds/corridor-easy.yaml").read_text().replace(
         "\npictures:", "\ncameras: [{name: front, size: [640, 360], rate_hz: 5, colour: false}]\n\npictures:")
     (work / "world.yaml").write_text(world)
-    subprocess.run([WAYMARK.with_name("waymark-simulate"), work / "world.yaml", "--out", work / "recording", "--duration", str(SECONDS)], check=True,
+    subprocess.run([WAYMARK.with_name("waymark-simulate"), work / "world.yaml", "--out", work / "recording", "--duration", str(DRIVE_S)], check=True,
                    stdout=subprocess.DEVNULL)
     (work / "robot.yaml").write_text((ROOT / "config/datasets/corridor.yaml").read_text().replace("realtime: {", "realtime: {lock_memory: false, ")
                                      + f"\npublish: {{lcm_url: '{URL}', picture_socket: pictures}}\n")
@@ -48,8 +48,8 @@ def inside(pictures):
         window.open(address)
         window.wait_for("window.waymark && window.waymark.state() && window.waymark.state().pose && true", 40)
         # In the picture: what was found, and the map where pose and mounting put it; on the map: its floor and edges, the way.
-        window.wait_for("window.waymark.drawn.picture_dots > 50 && window.waymark.drawn.map_dots > 50", SECONDS)
-        window.wait_for("window.waymark.drawn.trail > 200 && window.waymark.drawn.map === 2", SECONDS)
+        window.wait_for("window.waymark.drawn.picture_dots > 50 && window.waymark.drawn.map_dots > 50", WAIT_S)
+        window.wait_for("window.waymark.drawn.trail > 200 && window.waymark.drawn.map === 2", WAIT_S)
         assert window.value("window.waymark.state().state") in ("tracking", "degraded")
         drawn = window.value("JSON.stringify(window.waymark.drawn)")
         # Both kinds of dots are really on the canvas.

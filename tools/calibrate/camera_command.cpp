@@ -20,7 +20,7 @@ namespace {
 
 using images::Model;
 
-struct Arguments {
+struct CameraArguments {
   std::string from, camera, name = "camera", model = "auto", chessboard, aprilgrid, charuco, dictionary = "5x5", out,
                             picture;
   std::string second, second_name;
@@ -29,7 +29,7 @@ struct Arguments {
   int every = 1, most = 60;
 };
 
-Board board_of(const Arguments &a) {
+Board board_of(const CameraArguments &a) {
   Board out;
   if (!a.aprilgrid.empty()) out.kind = BoardKind::aprilgrid;
   if (!a.charuco.empty()) out.kind = BoardKind::charuco;
@@ -44,7 +44,7 @@ Board board_of(const Arguments &a) {
 }
 
 // "PICTURE,X,Y,YAW": m and degrees.
-std::vector<FloorBoard> floor_of(const Arguments &a) {
+std::vector<FloorBoard> floor_of(const CameraArguments &a) {
   std::vector<FloorBoard> out;
   for (const std::string &text : a.floor) {
     const size_t comma = text.find(',');
@@ -70,7 +70,7 @@ void say(const Calibration &c) {
 }
 
 // Of the models, the one that leaves the least; the first one where another is better by less than 2 %.
-Calibration best(const Arguments &a, const Calibration &first) {
+Calibration best(const CameraArguments &a, const Calibration &first) {
   Model wanted = Model::equidistant;
   const bool chosen = images::model_from_name(a.model, wanted);
   Calibration out = first;
@@ -102,7 +102,7 @@ void say_parameters(const Calibration &c) {
 }
 
 // One camera: its model, and what it rests on.
-Calibration calibrate(const Arguments &a, const std::string &name, const BoardPictures &seen) {
+Calibration calibrate(const CameraArguments &a, const std::string &name, const BoardPictures &seen) {
   std::fprintf(stderr, "%s: %zu pictures, a board in %zu of them\n", name.c_str(), seen.pictures, seen.boards);
   for (const std::string &note : seen.notes) std::fprintf(stderr, "  note: %s\n", note.c_str());
   const std::optional<Calibration> first = calibrate_camera(seen.views, seen.picture.width, seen.picture.height);
@@ -142,8 +142,8 @@ Entry entry_of(const std::string &name, const Calibration &c, const std::string 
 }
 
 // Pair and floor: the poses of the cameras, by one more solution of everything at once.
-void mount(const Arguments &a, const Board &board, const std::vector<BoardPictures> &seen, std::vector<Entry> &entries,
-           std::vector<Calibration> calibrations) {
+void mount(const CameraArguments &a, const Board &board, const std::vector<BoardPictures> &seen,
+           std::vector<Entry> &entries, std::vector<Calibration> calibrations) {
   constexpr double kDeg = 180 / images::kPi;
   std::vector<std::vector<size_t>> shots;
   for (size_t i = 0; i < seen.size(); i++) shots.push_back(shots_of(calibrations[i], seen[i]));
@@ -168,7 +168,7 @@ void mount(const Arguments &a, const Board &board, const std::vector<BoardPictur
   if (!rig.T_base_first) entries[1].remark += "; its mounting is relative to " + entries[0].name;
 }
 
-int run(const Arguments &a) {
+int run(const CameraArguments &a) {
   if (!a.chessboard.empty() + !a.aprilgrid.empty() + !a.charuco.empty() > 1)
     throw tools::Failure("give one of --chessboard, --aprilgrid and --charuco", tools::kUsage);
   const bool placed = !a.second.empty() || !a.floor.empty();
@@ -208,7 +208,7 @@ int run(const Arguments &a) {
 }  // namespace
 
 std::function<int()> camera_command(wm::cli::App &app) {
-  auto a = std::make_shared<Arguments>();
+  auto a = std::make_shared<CameraArguments>();
   app.description(
       "Estimates a camera's model from pictures of a board; lenses over 180 degrees, too. With --second a pair of\n"
       "cameras, with --floor also their mounting on the robot.");

@@ -11,7 +11,7 @@
 namespace wm::calibrate {
 namespace {
 
-struct Arguments {
+struct ImportArguments {
   std::string file, name, model = "auto", size, lens, out;
 };
 
@@ -23,7 +23,7 @@ void parse_size(const std::string &text, ImportHints &hints) {
     throw tools::Failure("--size: '" + text + "' is not WIDTHxHEIGHT, as in 1280x720", tools::kUsage);
 }
 
-int run(const Arguments &a) {
+int run(const ImportArguments &a) {
   ImportHints hints{.lens = a.lens};
   parse_size(a.size, hints);
   const std::vector<ForeignCamera> cameras = read_foreign(a.file, hints);
@@ -40,7 +40,7 @@ int run(const Arguments &a) {
 }  // namespace
 
 std::function<int()> import_command(wm::cli::App &app) {
-  auto a = std::make_shared<Arguments>();
+  auto a = std::make_shared<ImportArguments>();
   app.description("Turns a camera calibration of OpenCV, Kalibr, ROS or OCamCalib into entries of calibration.yaml.");
   app.add_option("FILE", a->file,
                  "YAML or XML of OpenCV, Kalibr's camchain, ROS camera_info, OCamCalib's calib_results.txt")

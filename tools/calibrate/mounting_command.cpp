@@ -31,7 +31,7 @@ namespace {
 namespace fs = std::filesystem;
 using tools::Failure;
 
-struct Arguments {
+struct MountingArguments {
   std::string recording, config, run, camera, map;
 };
 
@@ -54,7 +54,7 @@ constexpr Kind kKinds[kMountingErrors] = {
     {"yaw rate bias", "mrad/s", "a longer drive", 1e3, 1, false}};
 
 // `waymark replay` of the recording into `folder`.
-void replay(const Arguments &a, const std::string &folder) {
+void replay(const MountingArguments &a, const std::string &folder) {
   const std::string program = (fs::read_symlink("/proc/self/exe").parent_path() / "waymark").string();
   const pid_t child = fork();
   if (child == 0) {
@@ -72,7 +72,7 @@ void replay(const Arguments &a, const std::string &folder) {
     throw Failure("waymark replay " + a.recording + " failed; its messages are above");
 }
 
-int choose_camera(const Arguments &a, const wm_rig &rig) {
+int choose_camera(const MountingArguments &a, const wm_rig &rig) {
   if (rig.camera_count == 0) throw Failure(a.recording + ": calibration.yaml has no camera", tools::kUsage);
   if (a.camera.empty() && rig.camera_count == 1) return 0;
   const int found = a.camera.empty() ? -1 : wm_rig_find_camera(&rig, a.camera.c_str());
@@ -181,7 +181,7 @@ int report(const Mounting &found, const wm_camera &camera) {
   return fits && all_known ? tools::kDone : tools::kFailed;
 }
 
-int run(const Arguments &a) {
+int run(const MountingArguments &a) {
   std::optional<tools::ScratchFolder> replayed;
   if (a.run.empty()) {
     if (a.config.empty()) throw Failure("give --config FILE, or --run FOLDER of a replay", tools::kUsage);
@@ -204,7 +204,7 @@ int run(const Arguments &a) {
 }  // namespace
 
 std::function<int()> mounting_command(wm::cli::App &app) {
-  const auto a = std::make_shared<Arguments>();
+  const auto a = std::make_shared<MountingArguments>();
   app.add_option("REC", a->recording, "recording of a drive, with video, motion and a map")->required();
   app.add_option("--config", a->config, "configuration to localize with, such as config/datasets/corridor.yaml");
   app.add_option("--run", a->run, "a replay of it that there is already, instead of --config");

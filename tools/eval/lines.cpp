@@ -14,9 +14,9 @@
 namespace wm::tools {
 namespace {
 
-double apart(double a, double b) { return std::remainder(a - b, 2 * M_PI); }
+double turned(double a, double b) { return std::remainder(a - b, 2 * M_PI); }
 
-struct Counts {
+struct LineCounts {
   int64_t labelled = 0, contrast = 0, found = 0, seen = 0, right = 0;
   std::vector<double> off_deg, normalised;
   std::set<int32_t> tracks;
@@ -32,7 +32,7 @@ double common_turn(const std::vector<LinePicture> &pictures) {
     for (const LinePicture &picture : pictures)
       for (const LineSighting &s : picture.seen)
         for (const LabelledLine &label : picture.labels)
-          if (const double off = apart(s.azimuth_rad, label.azimuth_rad); std::fabs(off) < kMost) take(off);
+          if (const double off = turned(s.azimuth_rad, label.azimuth_rad); std::fabs(off) < kMost) take(off);
   };
   each([&](double off) { bins[static_cast<size_t>(std::lround(off / kBin)) + kHalf]++; });
   double most = 0;
@@ -51,18 +51,18 @@ double common_turn(const std::vector<LinePicture> &pictures) {
   return offs.empty() ? 0 : percentile(offs, 50);
 }
 
-void judge(const LinePicture &picture, double turn, double within_rad, Counts *n) {
+void judge(const LinePicture &picture, double turn, double within_rad, LineCounts *n) {
   for (const LabelledLine &label : picture.labels) {
     n->labelled++;
     n->contrast += label.contrast;
     n->found += label.contrast && std::any_of(picture.seen.begin(), picture.seen.end(), [&](const LineSighting &s) {
-                  return std::fabs(apart(s.azimuth_rad - turn, label.azimuth_rad)) <= within_rad;
+                  return std::fabs(turned(s.azimuth_rad - turn, label.azimuth_rad)) <= within_rad;
                 });
   }
   for (const LineSighting &s : picture.seen) {
     double off = 10;
     for (const LabelledLine &label : picture.labels)
-      if (const double here = apart(s.azimuth_rad - turn, label.azimuth_rad); std::fabs(here) < std::fabs(off))
+      if (const double here = turned(s.azimuth_rad - turn, label.azimuth_rad); std::fabs(here) < std::fabs(off))
         off = here;
     n->seen++;
     n->tracks.insert(s.track);
@@ -73,7 +73,7 @@ void judge(const LinePicture &picture, double turn, double within_rad, Counts *n
   }
 }
 
-nlohmann::ordered_json share(int64_t part, int64_t whole) {
+nlohmann::ordered_json share_of(int64_t part, int64_t whole) {
   if (whole == 0) return nullptr;
   return static_cast<double>(part) / static_cast<double>(whole);
 }
@@ -81,7 +81,7 @@ nlohmann::ordered_json share(int64_t part, int64_t whole) {
 }  // namespace
 
 Figures line_figures(const std::vector<LinePicture> &pictures, double within_rad) {
-  Counts n;
+  LineCounts n;
   const double turn = common_turn(pictures);
   for (const LinePicture &picture : pictures) judge(picture, turn, within_rad, &n);
   Figures f;
@@ -90,11 +90,11 @@ Figures line_figures(const std::vector<LinePicture> &pictures, double within_rad
   f["labelled"] = n.labelled;
   f["with_contrast"] = n.contrast;
   f["found"] = n.found;
-  f["recall"] = share(n.found, n.contrast);
+  f["recall"] = share_of(n.found, n.contrast);
   f["seen"] = n.seen;
   f["right"] = n.right;
   f["false"] = n.seen - n.right;
-  f["false_per_right"] = share(n.seen - n.right, n.right);
+  f["false_per_right"] = share_of(n.seen - n.right, n.right);
   f["tracks"] = n.tracks.size();
   for (const char *key :
        {"common_turn_deg", "azimuth_rms_deg", "azimuth_mean_deg", "azimuth_p95_deg", "normalised_rms"})

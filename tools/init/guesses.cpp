@@ -6,7 +6,7 @@
 namespace wm::init {
 namespace {
 
-std::string number(double value) {
+std::string plain_number(double value) {
   char text[32];
   std::snprintf(text, sizeof text, "%g", value);
   return text;
@@ -54,12 +54,12 @@ void name_cameras(Robot &robot) {
     }
     if (!camera.shift_s || *camera.shift_s == 0) continue;
     if (*camera.shift_s < 0)
-      robot.guesses.push_back("latency of camera " + camera.entry.name + ": " + number(-1000 * *camera.shift_s) +
+      robot.guesses.push_back("latency of camera " + camera.entry.name + ": " + plain_number(-1000 * *camera.shift_s) +
                               " ms, by Kalibr's timeshift_cam_imu; it holds for the driver that Kalibr's recording was "
                               "made with");
     else
       robot.unknown.push_back("time offset of camera " + camera.entry.name +
-                              ": Kalibr's timeshift_cam_imu has its stamps " + number(1000 * *camera.shift_s) +
+                              ": Kalibr's timeshift_cam_imu has its stamps " + plain_number(1000 * *camera.shift_s) +
                               " ms before the pictures; a latency can't be negative, and 0 is taken");
   }
 }
@@ -79,11 +79,11 @@ void name_defaults(Robot &robot) {
   }
   if (robot.tags)
     robot.guesses.push_back(
-        "sigma_m " + number(kMapSigma_m) +
+        "sigma_m " + plain_number(kMapSigma_m) +
         " of each tag in landmarks.csv: put up by a tape measure; `waymark map survey` measures it");
   for (const RobotSensor &sensor : robot.sensors)
-    robot.guesses.push_back("noise of sensor " + sensor.name + ": " + number(kBearingSigma_rad) + " rad, " +
-                            number(kRangeSigma_m) +
+    robot.guesses.push_back("noise of sensor " + sensor.name + ": " + plain_number(kBearingSigma_rad) + " rad, " +
+                            plain_number(kRangeSigma_m) +
                             " m, of a usual camera or laser; `waymark suggest` finds it in a drive");
 }
 

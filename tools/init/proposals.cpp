@@ -67,7 +67,7 @@ bool is_corner(const Words &words, const Corner &corner) {
   return end && side;
 }
 
-std::string number(double value) {
+std::string short_number(double value) {
   char text[32];
   std::snprintf(text, sizeof text, "%.4g", value);
   return text;
@@ -123,10 +123,10 @@ class Finder {
     const auto [low, high] = range_of(s);
     const auto [widest_low, widest_high] = std::pair(s.lowest, s.highest);
     if (dimension != INIT_NO_UNIT) {
-      out.reasons.push_back(number(low) + " to " + number(high));
+      out.reasons.push_back(short_number(low) + " to " + short_number(high));
       if (out.refused.empty() && (widest_high - widest_low) * s.si < widest_si)
-        out.refused =
-            "its range, " + number(widest_low) + " to " + number(widest_high) + " " + s.unit + ", is too small";
+        out.refused = "its range, " + short_number(widest_low) + " to " + short_number(widest_high) + " " + s.unit +
+                      ", is too small";
       if (both_signs && widest_low >= 0) out.score -= 1.5;
     }
     if (!s.is_usable) out.refused = "it does not fit into its message, or its multiplexer is not stated";
@@ -285,7 +285,7 @@ std::string can_signals_yaml(const Dbc &dbc, const std::vector<Candidate> &all, 
     out += "\n# line " + std::to_string(s.line) + ": " + one_line(joined(one.reasons)) +
            "\n- {quantity: " + wm_can_quantity_name(one.quantity) + ", message: " + s.message + ", signal: " + s.name;
     if (!one.unit.empty()) out += ", unit: " + one.unit;
-    if (one.scale != 1) out += ", scale: " + number(one.scale);
+    if (one.scale != 1) out += ", scale: " + short_number(one.scale);
     out += "}\n";
   }
   bool first = true;

@@ -25,7 +25,7 @@ const std::vector<Choice> kMotions{
     {"steering", "another program sends speed and steering angle over LCM"},
     {"none", "its motion is not measured"},
 };
-const std::vector<Choice> kSights{
+const std::vector<Choice> kSensors{
     {"tags", "AprilTags, ArUco or MR codes, by a camera"},
     {"sightings", "landmarks at known places, by a program or sensor of yours (bearing, range)"},
     {"signs", "flat signs whose pictures are on the map, by a camera"},
@@ -125,7 +125,7 @@ void ask_robot(Wish &wish) {
     ask_file(wish.urdf, "A URDF of the robot, for the places of its sensors", "--urdf", false);
   if (wish.sees.empty() && !wish.tag_layout.empty()) wish.sees = "tags";
   if (wish.sees.empty() && !may_ask) wish.sees = "nothing";
-  if (wish.sees.empty()) wish.sees = choose_one("What does the robot see?", kSights, "nothing", "--sees");
+  if (wish.sees.empty()) wish.sees = choose_one("What does the robot see?", kSensors, "nothing", "--sees");
   if (may_ask) {
     ask_cameras(wish);
     ask_maps(wish);

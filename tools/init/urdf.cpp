@@ -32,7 +32,7 @@ namespace {
 
 using tinyxml2::XMLElement;
 
-constexpr double kFarthest_m = 1000;  // of a part from its parent: beyond it the number is no length in m
+constexpr double kFarthestPart_m = 1000;  // of a part from its parent: beyond it the number is no length in m
 
 struct Joint {
   std::string name, parent, child;
@@ -41,9 +41,9 @@ struct Joint {
   int line = 0;
 };
 
-class Reader {
+class UrdfReader {
  public:
-  explicit Reader(std::string path) : path_(std::move(path)) {}
+  explicit UrdfReader(std::string path) : path_(std::move(path)) {}
 
   Urdf read(const std::string &text) {
     tinyxml2::XMLDocument doc;
@@ -79,7 +79,7 @@ class Reader {
     double value = 0;
     const auto [end, problem] = std::from_chars(word.data(), word.data() + word.size(), value);
     if (problem != std::errc{} || end != word.data() + word.size() || !std::isfinite(value) ||
-        std::abs(value) > kFarthest_m)
+        std::abs(value) > kFarthestPart_m)
       fail(e, std::string("<") + e->Name() + "> " + attribute + ": '" + word + "' is not a number from -1000 to 1000");
     return value;
   }
@@ -191,7 +191,7 @@ class Reader {
 }  // namespace
 
 bool can_read_urdf() { return true; }
-Urdf parse_urdf(const std::string &text, const std::string &path) { return Reader(path).read(text); }
+Urdf parse_urdf(const std::string &text, const std::string &path) { return UrdfReader(path).read(text); }
 
 #else
 

@@ -17,7 +17,7 @@ namespace wm::tools {
 namespace {
 
 constexpr double kTilt_rad = 0.021;  // as the detector's default has it
-constexpr int kFew = 150;            // so few windows left that are taken for it: trained enough
+constexpr int kFewWindows = 150;     // so few windows left that are taken for it: trained enough
 
 // The same numbers on every machine, which std's distributions don't promise.
 class Chance {
@@ -128,7 +128,7 @@ class Trainer {
       throw Failure("fewer than 200 windows show the class: more recordings, or a smaller --size-min are needed");
     for (int stage = 0; stage < a_.stages; stage++) {
       find_others();
-      if (static_cast<int>(others_.size()) < kFew) {
+      if (static_cast<int>(others_.size()) < kFewWindows) {
         std::printf("%zu windows are still taken for it in all pictures: enough\n", others_.size());
         break;
       }

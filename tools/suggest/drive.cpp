@@ -59,11 +59,11 @@ Eigen::Matrix3d covariance_of(const wm_estimate &e) {
   return out;
 }
 
-struct alignas(64) Line {
+}  // namespace
+
+struct alignas(64) CacheLine {
   char bytes[64];
 };
-
-}  // namespace
 
 // One drive: an estimator with its memory, and a second one that sees nothing during the gaps.
 class Pass {
@@ -88,7 +88,7 @@ class Pass {
     const char *why = nullptr;
     bytes_ = ops_.state_bytes(params, &setup_, &why);
     if (bytes_ == 0) return false;
-    const size_t lines = (bytes_ + sizeof(Line) - 1) / sizeof(Line);
+    const size_t lines = (bytes_ + sizeof(CacheLine) - 1) / sizeof(CacheLine);
     state_.resize(lines);
     blind_.resize(lines);
     if (ops_.init(state_.data(), params, &setup_) != WM_OK) return false;
@@ -187,7 +187,7 @@ class Pass {
   const wm_estimator &ops_;
   wm_setup setup_{};
   size_t bytes_ = 0;
-  std::vector<Line> state_, blind_;
+  std::vector<CacheLine> state_, blind_;
   int64_t blind_from_ns_ = WM_TIME_NONE;
   Innovations out_;
 };

@@ -11,7 +11,7 @@
 namespace wm::suggest {
 namespace {
 
-constexpr Splits kAll = {true, true, true}, kOnPromise = {false, false, true};
+constexpr Splits kAll = {true, true, true}, kPromiseAlone = {false, false, true};
 // A state is not observable where its sigma keeps so much of its prior's; its prior is wrong beyond so many sigmas.
 constexpr double kUnobserved = 0.95, kBeyondSigmas = 3;
 
@@ -167,7 +167,7 @@ std::string text_of(const Occasion &occasion, const Suggestion &suggestion) {
     if (suggestion.promise.has_gap)
       add_gain(out, "after a gap, predicted by motion alone", suggestion.promise.of[kAfterGap]);
   }
-  add_fits(out, occasion, suggestion.before, suggestion.after, suggestion.changes.empty() ? kAll : kOnPromise);
+  add_fits(out, occasion, suggestion.before, suggestion.after, suggestion.changes.empty() ? kAll : kPromiseAlone);
   if (!suggestion.changes.empty()) add_halves(out, suggestion.halves_before, suggestion.halves_after);
   if (!suggestion.changes.empty() && suggestion.share < 1)
     add(out, "%.0f %% of the way to the largest likelihood: with more of it the halves would contradict each other\n",
@@ -193,7 +193,7 @@ nlohmann::json json_of(const Occasion &occasion, const Suggestion &suggestion) {
   }
   out["promise"] = json_of(suggestion.promise);
   out["fits"] =
-      fits_json(occasion, suggestion.before, suggestion.after, suggestion.changes.empty() ? kAll : kOnPromise);
+      fits_json(occasion, suggestion.before, suggestion.after, suggestion.changes.empty() ? kAll : kPromiseAlone);
   out["notes"] = nlohmann::json::array();
   for (const Note &note : notes_of(suggestion.after))
     out["notes"].push_back({{"state", note.state}, {"text", note.text}});

@@ -12,6 +12,10 @@
 #include "waymark/status.h"
 #include "waymark/time.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define WM_HEALTH_SOURCES_MAX 32
 #define WM_HEALTH_CALIBRATION_MAX 128  // 8 sensors with all their states and the motion's
 #define WM_HEALTH_COUNTERS_MAX 16
@@ -92,5 +96,9 @@ static inline const wm_counter *wm_health_counter(const wm_health *health, wm_co
     if (health->counters[i].kind == (uint32_t)kind) return &health->counters[i];
   return 0;
 }
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -221,7 +221,7 @@ void tearDown() {}
 
 int main(int argc, char **argv) {
   if (argc > 1) views = std::strtoull(argv[1], nullptr, 10);
-  views = wm_trials(views, 6);
+  views = wm_trials(views, 12);
   UNITY_BEGIN();
   RUN_TEST(mr_codes_are_found_and_none_is_false);
   RUN_TEST(all_families_are_found);

@@ -11,6 +11,7 @@
 #include "calibrate/lens.h"
 #include "calibrate/rig.h"
 #include "common/failure.h"
+#include "common/trials.h"
 #include "unity.h"
 #include "waymark/random.h"
 
@@ -142,7 +143,10 @@ double errors_over_sigmas(Model model) {
 }
 
 void test_errors_are_as_large_as_their_sigmas() {
+  // The pixels of the double sphere's trials depend on each other: less than 40 are no statistic.
+  const bool all = trials >= 40;
   for (const Model model : {Model::equidistant, Model::pinhole_radtan, Model::double_sphere}) {
+    if (model == Model::double_sphere && !all) continue;
     const double ratio = errors_over_sigmas(model);
     TEST_ASSERT_GREATER_THAN_DOUBLE(0.8, ratio);
     TEST_ASSERT_LESS_THAN_DOUBLE(1.25, ratio);
@@ -224,6 +228,7 @@ void test_what_a_pair_lacks_is_said() {
 // calibrate_solver [TRIALS]
 int main(int argc, char **argv) {
   if (argc > 1) trials = std::atoi(argv[1]);
+  trials = static_cast<int>(wm_trials(static_cast<uint64_t>(trials), 10));
   UNITY_BEGIN();
   RUN_TEST(test_lens_functions_are_those_of_the_renderer);
   RUN_TEST(test_errors_are_as_large_as_their_sigmas);

@@ -12,6 +12,7 @@
 #include <random>
 
 #include "common/failure.h"
+#include "common/trials.h"
 #include "unity.h"
 #include "web/live.h"
 #include "web/pictures.h"
@@ -184,7 +185,7 @@ void whatever_comes_gives_valid_json() {
   Bytes cloud(WM_LCM_MESSAGE_MAX);
   cloud.resize(wm_lcm_places(places.data(), places.size(), 5000, 3, cloud.data(), cloud.size()));
   const std::vector<Bytes> seeds = {pose_bytes(1, 2, 3), health_bytes("can"), cloud, {}, Bytes(300, 0xff)};
-  for (int i = 0; i < 20000; i++) {
+  for (uint64_t i = wm_trials(20000, 5000); i > 0; i--) {
     Bytes bytes = seeds[draw() % seeds.size()];
     for (uint32_t k = draw() % 12; k > 0 && !bytes.empty(); k--)
       bytes[8 + draw() % (bytes.size() > 8 ? bytes.size() - 8 : 1) % bytes.size()] = static_cast<uint8_t>(draw());
@@ -263,7 +264,7 @@ void pictures_of_strangers_are_refused() {
   head = head_of(1, 1);
   std::memset(head.camera, 'a', sizeof head.camera);
   TEST_ASSERT_EQUAL(SIZE_MAX, wm_picture_body_bytes(&head));
-  for (int i = 0; i < 20000; i++) {
+  for (uint64_t i = wm_trials(20000, 5000); i > 0; i--) {
     head = head_of(4, 4);
     head.event_bytes = draw() % 100;
     head.event_count = draw() % 4;

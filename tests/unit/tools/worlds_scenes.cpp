@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "common/trials.h"
 #include "render/render.h"
 #include "simulate/route.h"
 #include "worlds/world.h"
@@ -143,7 +144,9 @@ void corridor_labels_lie_on_edges_of_the_picture() {
   const wm::images::Camera &camera = world->cameras[0].camera;
   std::vector<double> offsets;
   size_t points = 0;
-  for (const double share : {0.05, 0.17, 0.33, 0.52, 0.71, 0.9}) {
+  const double shares[] = {0.05, 0.52, 0.17, 0.71, 0.33, 0.9};
+  for (uint64_t k = 0; k < wm_trials(6, 2); k++) {
+    const double share = shares[k];
     const wm::render::Shot shot = motion.shot(share, 5);
     const Image image = picture(*world, camera, shot, 16);
     std::string text;
@@ -196,7 +199,9 @@ void office_labels_are_what_apriltag_finds() {
                                                                                       apriltag_detector_destroy);
   apriltag_detector_add_family(detector.get(), family.get());
   detector->quad_decimate = 1;
-  for (const bool on_walls : {false, true}) {
+  const bool places[] = {true, false};
+  for (uint64_t nth = 0; nth < wm_trials(2, 1); nth++) {
+    const bool on_walls = places[nth];
     const auto world = made("office", false, 4, on_walls);
     TEST_ASSERT_GREATER_OR_EQUAL(12, world->truth.size());
     const Motion motion(*world);
@@ -247,8 +252,9 @@ void office_prints_come_whole_into_view() {
     bool hard, on_walls;
     Markers markers;
   };
-  for (const Room room :
-       {Room{false, true, Markers::both}, Room{false, false, Markers::mr}, Room{true, true, Markers::mr}}) {
+  const Room rooms[] = {{false, true, Markers::both}, {false, false, Markers::mr}, {true, true, Markers::mr}};
+  for (uint64_t k = 0; k < wm_trials(3, 1); k++) {
+    const Room room = rooms[k];
     const auto world = made("office", room.hard, 1, room.on_walls, room.markers);
     const Motion motion(*world);
     std::map<int, int> whole;
@@ -343,7 +349,9 @@ void labels_of_signs_and_beacons_show_them() {
 
 void requests_repeat_and_differ() {
   wm::images::Camera small;
-  for (const char *name : {"corridor", "office", "hall", "seabed"}) {
+  const char *const names[] = {"corridor", "seabed", "office", "hall"};
+  for (uint64_t k = 0; k < wm_trials(4, 2); k++) {
+    const char *name = names[k];
     std::vector<std::vector<float>> pictures;
     std::vector<std::string> labels;
     const std::pair<bool, uint64_t> requests[] = {{false, 21}, {false, 21}, {true, 22}};
