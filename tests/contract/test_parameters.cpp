@@ -324,6 +324,7 @@ std::vector<scenario> scenarios() {
        25,
        {{"lines.clones", 16},
         {"lines.method", 0},
+        {"lines.sigma_rel", 0.25},
         {"sightings.correlated.slots", 6},
         {"sightings.correlated.bearing_rad", 0.004}}},
       {"slam",
