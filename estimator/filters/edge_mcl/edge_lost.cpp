@@ -30,6 +30,8 @@ constexpr double kAdoptProbability = 0.95, kAdoptExplained = 0.6, kAdoptMargin =
 // An aliased pose is offered as a searched one, too, at these odds, or, while suspicious, where it explains so much
 // more. Not swept.
 constexpr double kAliasOdds = 0.01, kAliasMargin = 0.4;
+// Sigma of a tracked place beyond which the descents along its most open axis need not reach the true one, m.
+constexpr double kSurePlace_m = 0.5;
 constexpr double kNotKidnapped =
     7.0;                          // log prior odds of the tracked pose: 1 kidnapping in 1100 windows of 6 m; not swept
 constexpr double kNoPose = -1e3;  // the same where there is no tracked pose
@@ -153,15 +155,16 @@ void edge_mcl::relocalize() {
   decide();
 }
 
-// Adopts the best hypothesis, or begins to trust the tracked pose again. While lost, not before the whole map has been
-// searched: the true pose may not be in the list yet.
+// Adopts the best hypothesis, or begins to trust the tracked pose again. While lost, or unsure of its place, not before the
+// whole map has been searched: the true pose may not be in the list yet.
 void edge_mcl::decide() {
   const int best = others_.best();
   const hypothesis &there = others_[best];
   if (!there.weighed || there.probability < kAdoptProbability || there.explained < kAdoptExplained) return;
   const bool tracking = life_.tracking();
   const double margin = life_.searching() ? 0.0 : kAdoptMargin;
-  if (best > 0 && (tracking || map_searched_) && there.explained >= others_[0].explained + margin) {
+  const bool sure = tracking && filter_.variance(kX) + filter_.variance(kY) < square(kSurePlace_m);
+  if (best > 0 && (sure || map_searched_) && there.explained >= others_[0].explained + margin) {
     adopt(best);
   } else if (best == 0 && !tracking && !tentative_) {
     fit_.set_log_odds(0.0);
