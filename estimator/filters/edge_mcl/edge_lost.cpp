@@ -155,8 +155,8 @@ void edge_mcl::relocalize() {
   decide();
 }
 
-// Adopts the best hypothesis, or begins to trust the tracked pose again. While lost, or unsure of its place, not before the
-// whole map has been searched: the true pose may not be in the list yet.
+// Adopts the best hypothesis, or begins to trust the tracked pose again. While lost, or unsure of its place, not before
+// the whole map has been searched: the true pose may not be in the list yet.
 void edge_mcl::decide() {
   const int best = others_.best();
   const hypothesis &there = others_[best];
