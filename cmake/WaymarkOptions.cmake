@@ -75,7 +75,8 @@ endfunction()
 # What runs under the thread sanitizer: the tests with the label "threads".
 add_custom_target(wm_thread_tests)
 
-# Seconds in `variable`: as told, or the usual; ten times that where tests run in an emulator, five times where lines are counted or a sanitizer watches.
+# Seconds in `variable`: as given, or the usual; ten times that where tests run in an emulator, five times where lines are counted
+# or under a sanitizer.
 macro(wm_timeout variable usual)
   if(NOT ${variable})
     set(${variable} ${usual})
@@ -88,7 +89,7 @@ macro(wm_timeout variable usual)
 endmacro()
 
 # Of the slots that ctest -j has, a test that computes takes two, and one that mostly waits (WAITS: a daemon at real rate, a disk
-# that blocks) one. With two slots a processor (./dev) no more compute at once than there are processors, and waiting costs nobody.
+# that blocks) one. With two slots a processor (./dev), as many tests compute at once as there are processors, and others wait beside them.
 # COST: seconds of the longest, which ctest begins first; it learns others itself.
 macro(wm_slots name)
   set(slots 2)

@@ -45,6 +45,14 @@ static void drop_socket(can_device *self) {
   self->queue_dropped = 0;
 }
 
+// An interface that was open is no longer there: found by its socket, or by looking.
+static void lose_it(can_device *self, int reason) {
+  char note[120];
+  drop_socket(self);
+  (void)snprintf(note, sizeof note, "is gone (%s); looking for it", strerror(reason));
+  set_state(self, WM_DEVICE_ABSENT, note);
+}
+
 static void refused(can_device *self, int reason) {
   char note[120];
   (void)snprintf(note, sizeof note, "can't be opened: %s; trying again", strerror(reason));
@@ -67,6 +75,10 @@ static void look_for_interface(can_device *self, wm_time_ns now_ns) {
   self->next_look_ns = now_ns + LOOK_EVERY_NS;
   int is_up = 0;
   unsigned index = self->io->find(self->io_context, self->interface, &is_up);
+  if (self->socket >= 0 && index == 0) {
+    lose_it(self, ENODEV);
+    return;
+  }
   if (self->socket >= 0 && index != self->interface_index) drop_socket(self);
   if (index == 0) {
     set_state(self, WM_DEVICE_ABSENT, "is not there (adapter unplugged, or its driver not loaded); looking for it");
@@ -83,14 +95,10 @@ static void look_for_interface(can_device *self, wm_time_ns now_ns) {
 }
 
 static void take_failure(can_device *self, int reason) {
-  if (reason == ENETDOWN) {  // the same socket receives again once it is up
+  if (reason == ENETDOWN)  // the same socket receives again once it is up
     set_state(self, WM_DEVICE_DOWN, "went down; waiting for it");
-    return;
-  }
-  drop_socket(self);
-  char note[120];
-  (void)snprintf(note, sizeof note, "is gone (%s); looking for it", strerror(reason));
-  set_state(self, WM_DEVICE_ABSENT, note);
+  else
+    lose_it(self, reason);
 }
 
 // ── frames ──────────────────────────────────────────────────────────────────────────────────────────────────────────

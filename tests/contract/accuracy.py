@@ -258,8 +258,21 @@ def mounted(pitch_deg, height_m):
     return change
 
 
+def bytes_swapped(begin_s, seconds=1.0):
+    """Change of a candump: pairs of data bytes swapped from so many seconds after the first frame on."""
+    def change(text):
+        lines = text.splitlines(keepends=True)
+        stamps = [float(line[1:line.index(")")]) for line in lines]
+        for i, stamp in enumerate(stamps):
+            if begin_s <= stamp - stamps[0] < begin_s + seconds:
+                head, data = lines[i].rstrip().rsplit("#", 1)
+                lines[i] = f"{head}#{''.join(data[k + 2:k + 4] + data[k:k + 2] for k in range(0, len(data), 4))}\n"
+        return "".join(lines)
+    return change
+
+
 def corridor():
-    """From raw pixels and CAN; then with pitch, height and stamps of the camera falsified."""
+    """From raw pixels and CAN; with pitch, height and stamps of the camera falsified; with a second of wrong speeds."""
     recording = DATA / "corridor-a"
     for seed in (1, 2, 3):
         r = run(recording, "corridor", seed=seed)
@@ -277,6 +290,12 @@ def corridor():
                                    "video/front.csv": each_row(later)}) as folder:
             bar(f"corridor, {0.5 * sign} deg, {sign} cm, {30 * sign} ms: mean error over the undisturbed one's, after 30 s",
                 run(folder, "corridor", "--from", "30", what=f"{0.5 * sign} deg, {sign} cm, {30 * sign} ms")["position_mean_m"] / settled, most=1.25)
+    for begin_s in (87.5, 88.0):  # a look-alike of the place is 36 m away
+        what = f"bytes of CAN swapped at {begin_s} s"
+        with disturbed(recording, {"can.log": bytes_swapped(begin_s)}) as folder:
+            r = run(folder, "corridor", what=what)
+        bar(f"corridor, {what}: share of the time confidently wrong", replays.confidently_wrong(r["run"], recording), most=0.02)
+        bar(f"corridor, {what}: largest position error", r["position_max_m"], most=5.0)
 
 
 def comma():

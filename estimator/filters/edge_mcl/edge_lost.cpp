@@ -30,7 +30,8 @@ constexpr double kAdoptProbability = 0.95, kAdoptExplained = 0.6, kAdoptMargin =
 // An aliased pose is offered as a searched one, too, at these odds, or, while suspicious, where it explains so much
 // more. Not swept.
 constexpr double kAliasOdds = 0.01, kAliasMargin = 0.4;
-// Sigma of a tracked place beyond which the descents along its most open axis need not reach the true one, m.
+// Sigma of a tracked place beyond which the descents along its most open axis need not reach the true one, m. By one
+// second of swapped bytes on corridor-a (tests/contract/accuracy.py); not swept.
 constexpr double kSurePlace_m = 0.5;
 constexpr double kNotKidnapped =
     7.0;                          // log prior odds of the tracked pose: 1 kidnapping in 1100 windows of 6 m; not swept

@@ -24,9 +24,9 @@ void odometry_check::clear() {
 
 // The difference d of both displacements is N(0, s2) where they agree and N(0, s2 + kWrong^2) where one is wrong. The
 // error is then the share g = kWrong^2 / (s2 + kWrong^2) of d in the mean: a pose that was open before, and is
-// corrected by as much, is not wrong by it. With the probability p of that the pose's second moment grows by p / 2 (g
-// d) (g d)'. Odometry has the scale of `then`: a wrong wall draws the scale after the pose, and by the later one they
-// agree.
+// corrected by as much, is not wrong by it. With the latter's probability p the pose's second moment grows by
+// p / 2 g^2 d d'. Odometry has the scale of `then`: a wrong wall draws the scale after the pose, and by the later one
+// they agree.
 void odometry_check::compare(const odometry_anchor &then, const odometry_anchor &now) {
   wm_pose2 way = between(then.odom, now.odom);
   const double stretch = 2.0 * then.scale / (then.scale + now.scale);  // from the mean scale of the way

@@ -123,6 +123,17 @@ static void an_adapter_that_was_changed_silently_is_noticed(void) {
   TEST_ASSERT_EQUAL(2, fake.opened);
 }
 
+// The interface is looked for before its socket fails: the same is stated.
+static void an_adapter_that_is_missed_before_its_socket_fails_is_gone(void) {
+  fake_step steps[] = {FRAME(3, 1500), STEP(20, FAKE_REMOVED), STEP(3000, FAKE_BACK), FRAME(4000, 1800), END};
+  make(steps);
+  expect_speed(1.5, WM_NS_PER_S);
+  while (source->counts.device != WM_DEVICE_ABSENT) expect_nothing_for(50 * WM_NS_PER_MS);
+  TEST_ASSERT_EQUAL_STRING("can0 is gone (No such device); looking for it", source->counts.device_note);
+  expect_speed(1.8, 4 * WM_NS_PER_S);
+  TEST_ASSERT_EQUAL(2, fake.opened);
+}
+
 static void an_interface_that_was_never_there_is_waited_for(void) {
   fake_step steps[] = {STEP(0, FAKE_REMOVED), STEP(5000, FAKE_BACK), FRAME(6000, 1500), END};
   make(steps);
@@ -261,6 +272,7 @@ int main(void) {
   RUN_TEST(an_interface_that_goes_down_keeps_its_socket_and_comes_up_again);
   RUN_TEST(an_adapter_that_is_unplugged_and_comes_back_is_opened_anew);
   RUN_TEST(an_adapter_that_was_changed_silently_is_noticed);
+  RUN_TEST(an_adapter_that_is_missed_before_its_socket_fails_is_gone);
   RUN_TEST(an_interface_that_was_never_there_is_waited_for);
   RUN_TEST(error_frames_say_how_the_controller_is);
   RUN_TEST(what_the_sockets_queue_lost_is_counted);
