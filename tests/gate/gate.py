@@ -4,30 +4,33 @@
 
     gate.py base                    the commit that changes are counted from; nothing where everything counts
     gate.py lint BUILD BASE [MOST]  sources to lint, one a line, by BUILD/lint/compile_commands.json; without BASE all. With MOST
-                                    those that changed, and as many at most of those that include what changed
-    gate.py tests BUILD BASE LABEL [MOST_S]
-                                    what to build for the sanitizer's tests, which to run, and which of those that changed
-                                    were left out: three lines, or nothing; of the tests with LABEL, or with - of all but
-                                    those labelled slow or release-only. With MOST_S objects of so many seconds at most:
-                                    tests that need the least beyond the others first
+                                    those that changed, and as many at most of those that include what changed; where a
+                                    batch has several of them, the batch. A last line that begins with # counts what was left
+    gate.py tests BUILD BASE RUN LABEL [MOST_S]
+                                    what to build in RUN, a sanitizer's build, which tests to run there, and which of those
+                                    that changed were left out: three lines, or nothing; of the tests with LABEL, or with - of
+                                    all but those labelled slow or release-only. With MOST_S objects of so many seconds at
+                                    most: tests that need the least beyond the others first
     gate.py skips RUN ...           the tests that were skipped, from tests.xml of each RUN's folder; fails where one
                                     needs a thing that WAYMARK_REQUIRE names
     gate.py passed                  after a run that checked everything: this commit is the base from now on (tests/gate/base)
 
-A source counts as changed where it, or a file that it includes, differs from BASE or is not committed. BUILD is a release
-build that is up to date: its compiler wrote down what each object includes."""
+A source counts as changed where it, or a file that it includes, differs from BASE or is not committed, or where the command
+that compiles it does. BUILD is a release build that is up to date: its compiler wrote down what each object includes. RUN is
+configured."""
 import json
 import os
 import pathlib
 import re
 import subprocess
 import sys
+import tempfile
 import xml.etree.ElementTree
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BASE_FILE = ROOT / "tests/gate/base"
-# Changes of these can change any object or any finding.
-RULES = re.compile(r"(cmake/.*|CMakeLists\.txt|CMakePresets\.json|\.clang-tidy|\.ci/.*|tests/gate/gate\.py)$")
+# A change of these may change commands: those of the base are made for comparison.
+RULES = re.compile(r"(cmake/.*|.*\bCMakeLists\.txt|.*\.cmake|CMakePresets\.json)$")
 # Seconds of a processor that an object takes under the address sanitizer, about: of C, of C++, of a batch of C++ sources.
 OBJECT_S = {".c.o": 0.2, ".cpp.o": 2.0, ".cxx.o": 20.0}
 # What a test may lack, by the words of its last line.
@@ -66,15 +69,47 @@ def changed_files(since):
     return set(names) | set(git("ls-files", "--others", "--exclude-standard").splitlines())
 
 
+def defined(folder, source):
+    """What a configured build runs, with `source` in place of its paths: commands by their output, and tests by their name."""
+    def plain(value):
+        return json.dumps(value, sort_keys=True).replace(str(folder), "BUILD").replace(str(source), "SOURCE")
+    made = subprocess.run(["ninja", "-C", folder, "-t", "compdb"], capture_output=True, text=True, check=True).stdout
+    tests = subprocess.run(["ctest", "--test-dir", folder, "--show-only=json-v1"], capture_output=True, text=True, check=True).stdout
+    return ({entry["output"]: plain(entry["command"]) for entry in json.loads(made)},
+            {test["name"]: plain([test.get("command"), [p["value"] for p in test.get("properties", []) if p["name"] == "ENVIRONMENT"]])
+             for test in json.loads(tests)["tests"]})
+
+
+def defined_by(since, preset):
+    """The same of the commit `since`, configured by itself; nothing where that fails."""
+    with tempfile.TemporaryDirectory() as place:
+        source = pathlib.Path(place).resolve() / "source"
+        source.mkdir()
+        with subprocess.Popen(["git", "archive", since], cwd=ROOT, stdout=subprocess.PIPE) as archive:
+            subprocess.run(["tar", "-x", "-C", source], stdin=archive.stdout, check=True)
+        done = subprocess.run(["cmake", "--preset", preset, "-B", source / "build", f"-DWM_UNITY_DIR={ROOT}/.cache/unity"], cwd=source,
+                              capture_output=True, text=True, check=False)
+        if done.returncode != 0:
+            print(f"gate.py: {since[:7]} can't be configured here, so everything counts as changed", file=sys.stderr)
+            return None
+        return defined(source / "build", source)
+
+
 class Build:
-    def __init__(self, folder, since):
+    def __init__(self, folder, since, run=None):
         self.folder = pathlib.Path(folder).resolve()
         self.everything = not since
         self.changed = changed_files(since) if since else set()
+        # Outputs whose command is another than at the base, and tests that are.
+        self.commands_changed, self.tests_changed = set(), set()
         if any(RULES.match(name) for name in self.changed):
-            self.everything = True
-        # A folder's list may have changed the options of all below it.
-        self.folders = tuple(name[:-len("CMakeLists.txt")] for name in self.changed if name.endswith("/CMakeLists.txt"))
+            run = pathlib.Path(run or folder).resolve()
+            before = defined_by(since, "release" if run == self.folder else run.name.removeprefix("build-"))
+            self.everything = before is None
+            if before:
+                now = defined(run, ROOT)
+                self.commands_changed, self.tests_changed = ({name for name in new if old.get(name) != new[name]}
+                                                             for old, new in zip(before, now))
         self.commands = json.loads((self.folder / "compile_commands.json").read_text())
 
     def place(self, name):
@@ -82,15 +117,15 @@ class Build:
         return os.path.relpath(os.path.normpath(self.folder / name), ROOT)
 
     def is_changed(self, place):
-        return self.everything or place in self.changed or place.startswith(self.folders)
+        return self.everything or place in self.changed
 
     def ninja(self, *arguments):
         return subprocess.run(["ninja", "-C", self.folder, *arguments], capture_output=True, text=True,
                               check=True).stdout.splitlines()
 
     def objects(self, counts=lambda name: True):
-        """Objects whose source or one of its headers changed, of those names that count."""
-        out, current = set(), None
+        """Objects whose command, or whose source or one of its headers changed, of those names that count."""
+        out, current = {name for name in self.commands_changed if name.endswith(".o")}, None
         for line in self.ninja("-t", "deps"):
             if line and not line[0].isspace():
                 current = line.split(":")[0]
@@ -104,25 +139,36 @@ class Build:
             file = pathlib.Path(entry["file"])
             parts = re.findall(r'^#include "([^"]+)"', file.read_text(), re.M) if re.match(r"unity_\d+_", file.name) else []
             for part in parts or [entry["file"]]:
-                yield {**entry, "file": part, "command": entry["command"].replace(f"-c {entry['file']}", f"-c {part}")}
+                yield {**entry, "file": part, "batch": entry["file"] if parts else "", "command": entry["command"].replace(f"-c {entry['file']}", f"-c {part}")}
 
     def lint(self, most=None):
-        """Sources whose own text changed, then those with a header that did. A batch counts whole where a header of it changed."""
-        objects = set() if self.everything else self.objects(lambda name: not name.endswith((".c", ".cpp")))
-        own, including, commands = set(), set(), []
-        for entry in self.sources():
+        """(sources and batches to lint, how many sources those are, how many were left): sources whose own text changed, then those
+        with a header or a command that did. All sources of a batch count where a header of it changed."""
+        all_of_them = self.everything or ".clang-tidy" in self.changed
+        objects = set() if all_of_them else self.objects(lambda name: not name.endswith((".c", ".cpp")))
+        own, including, commands, batch_of = [], [], [], {}
+        for entry in sorted(self.sources(), key=lambda entry: entry["file"]):
             place = self.place(entry["file"])
             made = os.path.relpath(os.path.normpath(pathlib.Path(entry["directory"]) / output_of(entry)), self.folder)
-            if place.startswith(("build", ".cache", "tests/", "..")):
+            if place.startswith(("build", ".cache", "tests/", "..")) or place in batch_of:
                 continue
             commands.append(entry)
-            if place in self.changed or most is None and not self.changed:
-                own.add(place)
-            elif self.is_changed(place) or made in objects:
-                including.add(place)
+            batch_of[place] = entry["batch"] and self.place(entry["batch"])
+            if self.is_changed(place):
+                own.append(place)
+            elif all_of_them or made in objects:
+                including.append(place)
+        batches = [entry for entry in self.commands if self.place(entry["file"]) in batch_of.values()]
         (self.folder / "lint").mkdir(exist_ok=True)
-        (self.folder / "lint/compile_commands.json").write_text(json.dumps(commands))
-        return sorted(own) + sorted(including)[:most]
+        (self.folder / "lint/compile_commands.json").write_text(json.dumps(commands + batches))
+        taken = own + including[:most]
+        if most is None:
+            return taken, len(taken), 0
+        parts = {}
+        for place in taken:
+            parts.setdefault(batch_of[place] or place, []).append(place)
+        return ([name if len(places) > 1 else places[0] for name, places in parts.items()], len(taken),
+                len(own) + len(including) - len(taken))
 
     def tests(self, label, most_s=None):
         """(outputs to build, tests, tests that were left out)"""
@@ -140,7 +186,8 @@ class Build:
 
         def is_touched(output):
             if output not in known:
-                known[output] = self.everything or any(name in objects or self.is_changed(self.place(name)) for name in inputs_of(output))
+                known[output] = self.everything or output in self.commands_changed or any(
+                    name in objects or name in self.commands_changed or self.is_changed(self.place(name)) for name in inputs_of(output))
             return known[output]
 
         chosen = {}
@@ -155,9 +202,9 @@ class Build:
             if is_script:
                 uses |= set(programs_of([word for word in command if word.startswith(str(ROOT) + "/tests/")], programs))
             scripts = [os.path.relpath(word, ROOT) for word in command if word.startswith(str(ROOT) + "/tests/")]
-            own = any(self.is_changed(name) or name.startswith("config/") for name in self.changed
-                      if is_script and any(os.path.dirname(name) == os.path.dirname(s) for s in scripts)
-                      or is_script and name.startswith("config/"))
+            own = test["name"] in self.tests_changed or is_script and any(
+                name.startswith("config/") or any(os.path.dirname(name) == os.path.dirname(s) for s in scripts)
+                for name in self.changed if not RULES.match(name))
             if self.everything or own or any(is_touched(name) for name in sorted(uses)):
                 chosen[test["name"]] = uses
         made = {name: {o for output in uses for o in inputs_of(output) if o.endswith(".o")} for name, uses in chosen.items()}
@@ -234,10 +281,10 @@ def main():
     if command == "base" and not arguments:
         print(base())
     elif command == "lint" and len(arguments) in (2, 3):
-        for source in Build(*arguments[:2]).lint(*map(int, arguments[2:])):
-            print(source)
-    elif command == "tests" and len(arguments) in (3, 4):
-        outputs, names, left = Build(*arguments[:2]).tests(arguments[2], *map(float, arguments[3:]))
+        parts, taken, left = Build(*arguments[:2]).lint(*map(int, arguments[2:]))
+        print(*parts, f"# {taken} {left}", sep="\n")
+    elif command == "tests" and len(arguments) in (4, 5):
+        outputs, names, left = Build(*arguments[:3]).tests(arguments[3], *map(float, arguments[4:]))
         if names or left:
             print(" ".join(outputs), "^(" + "|".join(re.escape(name) for name in names) + ")$" if names else "", " ".join(left), sep="\n")
     elif command == "skips" and arguments:
