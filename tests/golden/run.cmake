@@ -12,8 +12,8 @@ wm_script_test(web_page COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/web_page.py 
 wm_script_test(web_clients COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/web_clients.py LABELS release-only WAITS COST 23)
 wm_script_test(run_lcm_tools COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/lcm_tools.py LABELS release-only WAITS COST 18)
 wm_script_test(run_lcm_examples COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/lcm_examples.py LABELS release-only WAITS)
-wm_script_test(run_lcm_streams COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/lcm_streams.py LABELS release-only WAITS COST 17)
-wm_script_test(run_play COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/play.py LABELS release-only WAITS COST 10)
+wm_script_test(run_lcm_streams COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/lcm_streams.py LABELS release-only WAITS COST 22)
+wm_script_test(run_play COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/play.py LABELS release-only WAITS COST 13)
 # Real recordings played live and over LCM give the replay's poses: a quarter of an hour and more, where the recordings are.
 wm_script_test(run_played COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/played.py ${CMAKE_BINARY_DIR}/bin ${CMAKE_SOURCE_DIR}/../shared/data
     --all --lcm 60
@@ -39,7 +39,7 @@ add_library(slow_disk MODULE slow_disk.c)
 target_link_libraries(slow_disk PRIVATE wm_rules ${CMAKE_DL_LIBS})
 wm_script_test(run_slow_disk COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/slow_disk.py $<TARGET_FILE:slow_disk> LABELS release-only WAITS COST 12)
 wm_script_test(run_bad_disks COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/bad_disks.py $<TARGET_FILE:slow_disk> LABELS release-only WAITS COST 38)
-wm_script_test(run_restarts COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/restarts.py 4 LABELS release-only WAITS COST 18)
+wm_script_test(run_restarts COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/restarts.py 4 LABELS release-only WAITS COST 47)
 wm_script_test(run_restarts_20 COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/restarts.py 20 LABELS slow release-only)
 wm_script_test(run_power_cuts COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/power_cuts.py 400 LABELS release-only WAITS COST 17)
 wm_script_test(run_disk_full COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/disk_full.py LABELS release-only WAITS)
