@@ -195,6 +195,18 @@ static void a_wall_clock_that_is_set_between_stamp_and_reading_does_no_harm(void
   TEST_ASSERT_EQUAL_UINT64(0, clock.implausible);
 }
 
+// The two clocks are read one after the other.
+static void a_stamp_that_is_slightly_in_the_future_is_now(void) {
+  can_clock clock = {0};
+  can_received soon = fake_frame(AT(7) + WM_NS_PER_MS / 2, 0), later = fake_frame(AT(9), 0);
+  TEST_ASSERT_EQUAL_INT64(AT(7), can_clock_stamp(&clock, &soon, AT(7), AT(7) + FAKE_UTC_NS));
+  TEST_ASSERT_EQUAL_INT64(250 * WM_NS_PER_US, clock.uncertainty_ns);
+  TEST_ASSERT_EQUAL_UINT64(0, clock.implausible);
+  TEST_ASSERT_EQUAL_INT64(AT(8),
+                          can_clock_stamp(&clock, &later, AT(8), AT(8) + FAKE_UTC_NS));  // by a whole millisecond
+  TEST_ASSERT_EQUAL_UINT64(1, clock.implausible);
+}
+
 static void an_absurd_stamp_is_not_believed(void) {
   can_clock clock = {0};
   can_received absurd = {.software_ns = 12345};
@@ -278,6 +290,7 @@ int main(void) {
   RUN_TEST(what_the_sockets_queue_lost_is_counted);
   RUN_TEST(without_a_stamp_the_time_of_reading_is_taken);
   RUN_TEST(a_wall_clock_that_is_set_between_stamp_and_reading_does_no_harm);
+  RUN_TEST(a_stamp_that_is_slightly_in_the_future_is_now);
   RUN_TEST(an_absurd_stamp_is_not_believed);
   RUN_TEST(an_adapters_own_clock_is_followed);
   RUN_TEST(a_message_of_the_kernel_is_read_with_its_stamps);
