@@ -377,6 +377,28 @@ static void a_rig_comes_back_and_a_cut_one_is_refused(void) {
   TEST_ASSERT_EQUAL(WM_BAD_DATA, wm_rig_decode(bytes, count, &back, &used));
 }
 
+// Each model of a camera, none beside them, and names that fill their room.
+static void cameras_of_a_rig_have_a_model_and_a_name(void) {
+  wm_rig rig, back;
+  uint8_t bytes[WM_RIG_ENCODED_MAX];
+  size_t used;
+  wm_rig_init(&rig);
+  rig.camera_count = 2;
+  for (int model = -1; model <= WM_CAMERA_MODEL_COUNT; model++) {
+    rig.cameras[1].model = model;
+    const size_t count = wm_rig_encode(&rig, bytes, sizeof bytes);
+    const int is_one = model >= 0 && model < WM_CAMERA_MODEL_COUNT;
+    TEST_ASSERT_EQUAL(is_one ? WM_OK : WM_BAD_DATA, wm_rig_decode(bytes, count, &back, &used));
+    if (is_one) TEST_ASSERT_EQUAL(model, back.cameras[1].model);
+  }
+  rig.cameras[1].model = WM_CAMERA_OMNI;
+  memset(rig.cameras[0].name, 'n', WM_NAME_MAX);
+  memset(rig.marker_family, 'f', WM_NAME_MAX);
+  TEST_ASSERT_EQUAL(WM_OK, wm_rig_decode(bytes, wm_rig_encode(&rig, bytes, sizeof bytes), &back, &used));
+  TEST_ASSERT_EQUAL(WM_NAME_MAX - 1, strnlen(back.cameras[0].name, WM_NAME_MAX));
+  TEST_ASSERT_EQUAL(WM_NAME_MAX - 1, strnlen(back.marker_family, WM_NAME_MAX));
+}
+
 static void absent_numbers_of_a_landmark_are_nan_and_keep_the_hash_of_older_logs(void) {
   wm_landmark in = {
       .id = 3, .p_m = {1, 2, 3}, .sigma_m = NAN, .yaw_rad = NAN, .cov_m2 = {NAN, NAN, NAN}, .yaw_sigma_rad = NAN};
@@ -424,6 +446,7 @@ int main(void) {
   RUN_TEST(an_innovation_comes_back_and_unknown_verdicts_do_not);
   RUN_TEST(a_setup_comes_back);
   RUN_TEST(a_rig_comes_back_and_a_cut_one_is_refused);
+  RUN_TEST(cameras_of_a_rig_have_a_model_and_a_name);
   RUN_TEST(absent_numbers_of_a_landmark_are_nan_and_keep_the_hash_of_older_logs);
   RUN_TEST(the_hash_of_a_map_sees_every_number_and_the_order);
   return UNITY_END();
