@@ -175,6 +175,19 @@ static void what_the_sockets_queue_lost_is_counted(void) {
   TEST_ASSERT_EQUAL_UINT64(9, source->counts.overflows);
 }
 
+// The kernel counts with 32 bits.
+static void the_count_of_what_the_sockets_queue_lost_wraps(void) {
+  fake_step steps[] = {FRAME(1, 1500), FRAME(2, 1500), END};
+  for (int i = 0; i < 2; i++) steps[i].received.has_queue_dropped = 1;
+  steps[0].received.queue_dropped = UINT32_MAX - 1;
+  steps[1].received.queue_dropped = 3;
+  make(steps);
+  expect_speed(1.5, WM_NS_PER_S);
+  TEST_ASSERT_EQUAL_UINT64(UINT32_MAX - 1, source->counts.overflows);
+  expect_speed(1.5, WM_NS_PER_S);
+  TEST_ASSERT_EQUAL_UINT64(UINT64_C(4294967299), source->counts.overflows);
+}
+
 // ── stamps ──────────────────────────────────────────────────────────────────────────────────────────────────────────
 
 static void without_a_stamp_the_time_of_reading_is_taken(void) {
@@ -237,6 +250,25 @@ static void an_adapters_own_clock_is_followed(void) {
   TEST_ASSERT_LESS_OR_EQUAL_INT64(WM_NS_PER_MS, clock.uncertainty_ns);
 }
 
+// A clock of 32 bits in microseconds, as adapters have it, wraps after 71.6 minutes. Seven frames look delayed: they
+// get the stamp of the one before. From the eighth on the clock counts as begun anew.
+static void an_adapters_clock_of_32_bits_wraps(void) {
+  can_clock clock = {0};
+  const wm_time_ns wrap_ns = (INT64_C(1) << 32) * WM_NS_PER_US, period_ns = 10 * WM_NS_PER_MS;
+  int held = 0;
+  for (int i = 0; i < 2000; i++) {
+    const wm_time_ns true_ns = AT(10 * i), now_ns = true_ns + WM_NS_PER_MS;
+    can_received r = fake_frame(true_ns + 200 * WM_NS_PER_US, 0);
+    r.hardware_ns = (wrap_ns - 1000 * period_ns + i * period_ns + WM_NS_PER_MS) % wrap_ns;
+    const wm_time_ns late_ns = true_ns - can_clock_stamp(&clock, &r, now_ns, now_ns + FAKE_UTC_NS);
+    if (late_ns > WM_NS_PER_MS) held++;
+    if (i < 1000 || i >= 1007) TEST_ASSERT_INT64_WITHIN(WM_NS_PER_MS, 0, late_ns);
+    TEST_ASSERT_INT64_WITHIN(7 * period_ns, 0, late_ns);
+  }
+  TEST_ASSERT_EQUAL(7, held);
+  TEST_ASSERT_EQUAL_UINT64(1, clock.adapter.restarts);
+}
+
 // ── what the kernel hands out ───────────────────────────────────────────────────────────────────────────────────────
 
 static void a_message_of_the_kernel_is_read_with_its_stamps(void) {
@@ -288,11 +320,13 @@ int main(void) {
   RUN_TEST(an_interface_that_was_never_there_is_waited_for);
   RUN_TEST(error_frames_say_how_the_controller_is);
   RUN_TEST(what_the_sockets_queue_lost_is_counted);
+  RUN_TEST(the_count_of_what_the_sockets_queue_lost_wraps);
   RUN_TEST(without_a_stamp_the_time_of_reading_is_taken);
   RUN_TEST(a_wall_clock_that_is_set_between_stamp_and_reading_does_no_harm);
   RUN_TEST(a_stamp_that_is_slightly_in_the_future_is_now);
   RUN_TEST(an_absurd_stamp_is_not_believed);
   RUN_TEST(an_adapters_own_clock_is_followed);
+  RUN_TEST(an_adapters_clock_of_32_bits_wraps);
   RUN_TEST(a_message_of_the_kernel_is_read_with_its_stamps);
   return UNITY_END();
 }

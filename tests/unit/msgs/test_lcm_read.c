@@ -251,6 +251,17 @@ static void control_characters_of_names(void) {
   TEST_ASSERT_EQUAL(sizeof read.host - 1, strlen(read.host));
 }
 
+// Of 32 bits, with a sign in the message.
+static void counts_of_a_pose_that_wrap(void) {
+  const uint32_t counts[] = {INT32_MAX, (uint32_t)INT32_MAX + 1, UINT32_MAX, 0};
+  for (size_t i = 0; i < sizeof counts / sizeof counts[0]; i++) {
+    wm_published p = {.jumps = counts[i], .now = {.resets = counts[i], .dof = 3}}, read;
+    TEST_ASSERT_NULL(wm_lcm_read_pose(bytes, wm_lcm_pose(&p, 12, bytes, sizeof bytes), &read));
+    TEST_ASSERT_EQUAL_UINT32(counts[i], read.jumps);
+    TEST_ASSERT_EQUAL_UINT32(counts[i], read.now.resets);
+  }
+}
+
 // Into a row that was used before: nothing of it stays.
 static void rows_of_streams(void) {
   static const struct {
@@ -288,6 +299,7 @@ int main(void) {
   RUN_TEST(limits_of_a_sighting);
   RUN_TEST(identities_of_sightings);
   RUN_TEST(control_characters_of_names);
+  RUN_TEST(counts_of_a_pose_that_wrap);
   RUN_TEST(rows_of_streams);
   return UNITY_END();
 }
