@@ -195,6 +195,8 @@ void test_a_velocity_of_its_own(void) {
     wm_pose2 truth = {0.1 * normal(), 0.1 * normal(), 0.1 * normal()};
     double v[3] = {normal(), normal(), normal()};  // a start sigma of two of the walk
     filter.move_to(0);
+    const double walks[3] = {params.velocity_speed_walk, params.velocity_speed_walk, params.velocity_turn_walk};
+    for (int k = 0; k < 3; k++) TEST_ASSERT_EQUAL_DOUBLE(4.0 * walks[k] * walks[k], filter.variance(3 + k));
     for (int i = 1; i <= steps; i++) {
       for (int k = 0; k < fine; k++) {
         truth = {truth.x_m + 0.01 * v[0], truth.y_m + 0.01 * v[1], wm::wrap(truth.heading_rad + 0.01 * v[2])};
