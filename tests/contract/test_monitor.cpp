@@ -153,7 +153,8 @@ void a_turn_with_the_wrong_sign_is_named(void) {
   drives::scene scene(motion::twist, kSightings, 0, kEnd_s);
   const seen good = drive("landmark_ekf", scene, {}, nullptr);
   const seen bad = drive("landmark_ekf", scene, {}, turn_to_the_right);
-  TEST_ASSERT_TRUE(std::isinf(good.doubted_s) && std::isinf(good.turn_s));
+  TEST_ASSERT_DOUBLE_IS_INF(good.doubted_s);
+  TEST_ASSERT_DOUBLE_IS_INF(good.turn_s);
   TEST_ASSERT_TRUE_MESSAGE(bad.turn_s < kContradicted_s, "the turn is not the cause");
 }
 
@@ -405,7 +406,8 @@ void positions_far_from_the_way_are_doubt(void) {
   const std::vector<parameters::setting> settings = {{"correlated.gnss_m", 1.0}, {"correlated.gnss_tau_s", 20.0}};
   const seen good = drive("landmark_ekf", scene, settings, nullptr);
   const seen bad = drive("landmark_ekf", scene, settings, drift);
-  TEST_ASSERT_TRUE(!good.is_lasting && std::isinf(good.doubted_s));
+  TEST_ASSERT_TRUE(!good.is_lasting);
+  TEST_ASSERT_DOUBLE_IS_INF(good.doubted_s);
   TEST_ASSERT_TRUE(bad.is_lasting);
 }
 

@@ -257,11 +257,11 @@ static void ticks_after_a_silence(void) {
   TEST_ASSERT_EQUAL_DOUBLE(35000, moved_in_silence(1500, 25, 35000));  // beyond half a cycle
   TEST_ASSERT_EQUAL_DOUBLE(-15000, moved_in_silence(1500, 20, -15000));
   TEST_ASSERT_EQUAL_DOUBLE(-35000, moved_in_silence(-1500, 25, -35000));
-  TEST_ASSERT_TRUE(isnan(moved_in_silence(1500, 60, 89000)));
-  TEST_ASSERT_TRUE(isnan(moved_in_silence(1500, 60, 464)));
+  TEST_ASSERT_DOUBLE_IS_NAN(moved_in_silence(1500, 60, 89000));
+  TEST_ASSERT_DOUBLE_IS_NAN(moved_in_silence(1500, 60, 464));
   TEST_ASSERT_EQUAL_DOUBLE(0, moved_in_silence(0, 60, 0));
   TEST_ASSERT_EQUAL_DOUBLE(3000, moved_in_silence(0, 60, 3000));  // the other way round is 20 times as far
-  TEST_ASSERT_TRUE(isnan(moved_in_silence(0, 60, 9000)));
+  TEST_ASSERT_DOUBLE_IS_NAN(moved_in_silence(0, 60, 9000));
   TEST_ASSERT_EQUAL_DOUBLE(500, moved_in_silence(100, 3, 500));
 }
 

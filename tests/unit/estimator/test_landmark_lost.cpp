@@ -90,8 +90,9 @@ void drive(double for_s, int seen, sees how = sees::right) {
     const wm_estimate e = estimate();
     const double off =
         std::sqrt(wm::square(e.pose_map_base.p_m[0] - truth.x_m) + wm::square(e.pose_map_base.p_m[1] - truth.y_m));
-    for (const double value : e.covariance) TEST_ASSERT_TRUE(wm::finite(value));
-    TEST_ASSERT_TRUE(wm::finite(off) && wm::finite(e.heading_rad));
+    for (const double value : e.covariance) TEST_ASSERT_DOUBLE_IS_DETERMINATE(value);
+    TEST_ASSERT_DOUBLE_IS_DETERMINATE(off);
+    TEST_ASSERT_DOUBLE_IS_DETERMINATE(e.heading_rad);
     const double p = e.lost_probability;
     TEST_ASSERT_GREATER_OR_EQUAL_DOUBLE(0.0, p);
     TEST_ASSERT_LESS_OR_EQUAL_DOUBLE(1.0, p);

@@ -230,7 +230,8 @@ void test_motion_since_a_picture_and_considered_states(void) {
   TEST_ASSERT_EQUAL_DOUBLE(square(0.02), a.filter->variance(a.filter->at(kPictureScale)));
   TEST_ASSERT_EQUAL_DOUBLE(0.0, a.filter->head1(kPictureScale, 1));
   const double left = a.filter->variance(a.filter->at(kVelocityScale));
-  TEST_ASSERT_TRUE(left < scale && left > 0.4 * scale);
+  TEST_ASSERT_TRUE(left < scale);
+  TEST_ASSERT_GREATER_THAN_DOUBLE(0.4 * scale, left);
 }
 
 // One block of rows against the textbook's dense update; then points added, removed and their correlations.

@@ -200,7 +200,7 @@ static void zeros_that_stood_for_absent_numbers_become_nan(void) {
   TEST_ASSERT_EQUAL_DOUBLE(0, out.as.sighting.elevation_sigma_rad);  // today a zero is a zero
   bytes[0] = 4;
   TEST_ASSERT_EQUAL(WM_OK, wm_event_decode(bytes, length, &out, &used));
-  TEST_ASSERT_TRUE(isnan(out.as.sighting.elevation_sigma_rad));
+  TEST_ASSERT_DOUBLE_IS_NAN(out.as.sighting.elevation_sigma_rad);
   TEST_ASSERT_FALSE(wm_sighting_has_elevation(&out.as.sighting));
   TEST_ASSERT_EQUAL_DOUBLE(0, out.as.sighting.bearing_rad);
 
@@ -208,7 +208,8 @@ static void zeros_that_stood_for_absent_numbers_become_nan(void) {
   length = wm_event_encode(&in, bytes, sizeof bytes);
   bytes[0] = 4;
   TEST_ASSERT_EQUAL(WM_OK, wm_event_decode(bytes, length, &out, &used));
-  TEST_ASSERT_TRUE(isnan(out.as.marker.along_sigma_m) && isnan(out.as.marker.bloom_px));
+  TEST_ASSERT_DOUBLE_IS_NAN(out.as.marker.along_sigma_m);
+  TEST_ASSERT_DOUBLE_IS_NAN(out.as.marker.bloom_px);
   TEST_ASSERT_EQUAL_DOUBLE(0.25, out.as.marker.yaw_sigma_rad);
   TEST_ASSERT_EQUAL_DOUBLE(0, out.as.marker.yaw_rad);
 }
@@ -292,7 +293,7 @@ static void a_published_pose_of_the_version_before_is_read(void) {
   bytes[0] = 1;
   TEST_ASSERT_EQUAL(WM_OK, wm_published_decode(bytes, length - 8, &out, &used));
   TEST_ASSERT_EQUAL(length - 8, used);
-  TEST_ASSERT_TRUE(isnan(out.now.lost_probability));
+  TEST_ASSERT_DOUBLE_IS_NAN(out.now.lost_probability);
   TEST_ASSERT_EQUAL(WM_STATE_LOST, out.now.state);
   TEST_ASSERT_EQUAL_INT64(5, out.made_ns);
   TEST_ASSERT_EQUAL(2, out.jumps);
@@ -410,8 +411,11 @@ static void absent_numbers_of_a_landmark_are_nan_and_keep_the_hash_of_older_logs
   TEST_ASSERT_EQUAL_DOUBLE(0, out.yaw_sigma_rad);  // today a zero is a zero
   bytes[0] = 2;
   TEST_ASSERT_EQUAL(WM_OK, wm_landmark_decode(bytes, length, &out, &used));
-  TEST_ASSERT_TRUE(isnan(out.sigma_m) && isnan(out.cov_m2[0]) && isnan(out.cov_m2[1]) && isnan(out.cov_m2[2]) &&
-                   isnan(out.yaw_sigma_rad));
+  TEST_ASSERT_DOUBLE_IS_NAN(out.sigma_m);
+  TEST_ASSERT_DOUBLE_IS_NAN(out.cov_m2[0]);
+  TEST_ASSERT_DOUBLE_IS_NAN(out.cov_m2[1]);
+  TEST_ASSERT_DOUBLE_IS_NAN(out.cov_m2[2]);
+  TEST_ASSERT_DOUBLE_IS_NAN(out.yaw_sigma_rad);
   TEST_ASSERT_EQUAL_UINT64(wm_landmarks_hash(&zeros, 1), wm_landmarks_hash(&in, 1));
   TEST_ASSERT_EQUAL_UINT64(wm_hash(WM_HASH_START, bytes, length), wm_landmarks_hash(&in, 1));
   bytes[0] = 1;
