@@ -153,6 +153,14 @@ void test_impossible_increments_are_refused(void) {
   TEST_ASSERT_EQUAL(WM_OK, filter.check_motion(make::increment(0.0, 1.0, {1, 0, 0}, correlated)));
   const double three[6] = {1, 0.9, 1, 0.9, -0.9, 1};  // each two of them may be, all three may not
   TEST_ASSERT_EQUAL(WM_OUT_OF_RANGE, filter.check_motion(make::increment(0.0, 1.0, {1, 0, 0}, three)));
+  const int diagonal[3] = {0, 2, 5};
+  for (int i : diagonal) {
+    double one[6] = {1e-4, 0, 1e-4, 0, 0, 1e-4};
+    one[i] = 0.0;  // exact
+    TEST_ASSERT_EQUAL(WM_OK, filter.check_motion(make::increment(0.0, 1.0, {1, 0, 0}, one)));
+    one[i] = -1e-9;
+    TEST_ASSERT_EQUAL(WM_OUT_OF_RANGE, filter.check_motion(make::increment(0.0, 1.0, {1, 0, 0}, one)));
+  }
   const double none[6] = {NAN, NAN, NAN, NAN, NAN, NAN};
   TEST_ASSERT_EQUAL(WM_OK, filter.check_motion(make::increment(0.0, 1.0, {1, 0, 0}, none)));
   filter.move(make::increment(0.0, 1.0, {1, 0, 0}, none));

@@ -8,6 +8,7 @@
 
 #include "filters/relocalize/pose_consensus.hpp"
 #include "filters/stereo_ekf/space_filter.hpp"
+#include "motion/spatial.hpp"
 #include "unity.h"
 #include "waymark/random.h"
 
@@ -465,6 +466,20 @@ void test_no_orientation_of_a_line_or_of_contradictions(void) {
   TEST_ASSERT_FALSE(consensus->find(0, {{{0, 0, 0}, kNoTurn}, 0, 0}, 0.5, 0.25, 1).found);
 }
 
+// What was in the memory before is of no effect: the same events give the same bytes.
+void test_motion_in_space_begins_the_same_in_any_memory(void) {
+  wm_motion_params params;
+  wm_wheels wheels{};
+  wm_params_defaults(&wm_motion_params_table, &params);
+  alignas(64) static unsigned char memory[2][sizeof(wm::spatial_motion)];
+  for (int i = 0; i < 2; i++) {
+    std::memset(memory[i], i == 0 ? 0x00 : 0xa5, sizeof memory[i]);
+    auto *motion = new (memory[i]) wm::spatial_motion;
+    motion->init(&params, &wheels, {{0.1, 0.1, 0.1}, {0.01, 0.01, 0.01}, 0.05, 0.05});
+  }
+  TEST_ASSERT_EQUAL_MEMORY(memory[0], memory[1], sizeof memory[0]);
+}
+
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_turns_there_and_back);
@@ -479,5 +494,6 @@ int main(void) {
   RUN_TEST(test_pictures_alone_do_not_tell_the_mounting_or_the_time);
   RUN_TEST(test_orientation_is_found_with_a_third_wrong);
   RUN_TEST(test_no_orientation_of_a_line_or_of_contradictions);
+  RUN_TEST(test_motion_in_space_begins_the_same_in_any_memory);
   return UNITY_END();
 }
