@@ -179,6 +179,32 @@ void test_what_may_have_moved_unseen(void) {
   }
 }
 
+// A gyro that is overdue while the counts go on: the way is known, its direction walks, up to any direction at all.
+// The variance of the heading after it is that of a turn rate that changes by noise_hold_radps2 for hold_max_s, then of
+// 0.3 rad per sqrt(s).
+void test_a_known_way_in_an_unknown_direction(void) {
+  wm_motion_params params;
+  wm_params_defaults(&wm_motion_params_table, &params);
+  params.hold_max_s = 2.0;
+  params.noise_hold_radps2 = 0.4;
+  const struct {
+    double overdue_s, dt_s, rotation_rad2;
+  } rows[] = {{0.0, 0.5, 0.2 * 0.2 * 0.0625}, {1.0, 1.0, 0.2 * 0.2 * 15.0}, {10.0, 2.0, 0.18}, {2.0, 100.0, 9.0}};
+  for (const auto &row : rows) {
+    wm::motion_segment segment{};
+    wm::motion_noise noise{};
+    segment.input.model = WM_MOTION_SPEED_YAW_RATE;
+    segment.input.a = 2.0;
+    segment.overdue_s = row.overdue_s;
+    segment.dt_s = row.dt_s;
+    wm::add_overdue_noise(segment, params, true, 0.0, &noise);
+    const double way_m2 = 4.0 * row.dt_s * row.dt_s, q = row.rotation_rad2;
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12 * q, q, noise.rotation_rad2);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12 * way_m2, way_m2 * std::fmin(q / 3.0, 0.5), noise.lateral_m2);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12 * way_m2, way_m2 * std::fmin(q * q / 8.0, 0.5), noise.distance_m2);
+  }
+}
+
 }  // namespace
 
 void setUp(void) {}
@@ -193,5 +219,6 @@ int main(void) {
   RUN_TEST(test_a_slow_robots_stuck_gyro_is_found);
   RUN_TEST(test_repeated_numbers_that_are_right_are_no_fault);
   RUN_TEST(test_what_may_have_moved_unseen);
+  RUN_TEST(test_a_known_way_in_an_unknown_direction);
   return UNITY_END();
 }
