@@ -43,7 +43,7 @@ static void other_reports_are_read(void) {
   TEST_ASSERT_EQUAL(GPSD_OTHER, report.kind);
   expect("{\"class\":\"TPV\",\"device\":\"/dev/pts/1\",\"mode\":1}");
   TEST_ASSERT_EQUAL(GPSD_TPV, report.kind);
-  TEST_ASSERT_EQUAL(1, report.mode);
+  TEST_ASSERT_EQUAL_DOUBLE(1, report.mode);
   TEST_ASSERT_DOUBLE_IS_NAN(report.latitude_deg);
   TEST_ASSERT_EQUAL_INT64(WM_TIME_NONE, report.time_ns);
   expect("{\"class\":\"ATT\",\"device\":\"/dev/ttyACM0\",\"heading\":90.5,\"mag_st\":\"N\"}");
@@ -51,7 +51,7 @@ static void other_reports_are_read(void) {
   TEST_ASSERT_EQUAL_DOUBLE(90.5, report.heading_deg);
   expect("{\"class\":\"DEVICE\",\"path\":\"/dev/ttyACM0\",\"activated\":0}");
   TEST_ASSERT_EQUAL(GPSD_DEVICE, report.kind);
-  TEST_ASSERT_EQUAL(0, report.activated);
+  TEST_ASSERT_EQUAL_DOUBLE(0, report.activated);
   expect("{\"class\":\"DEVICE\",\"path\":\"/dev/ttyACM0\",\"activated\":\"2026-11-23T23:50:58.125Z\"}");
   TEST_ASSERT_DOUBLE_IS_NAN(report.activated);
   expect("{\"class\":\"ERROR\",\"message\":\"Unrecognized request '?'\"}");

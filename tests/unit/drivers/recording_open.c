@@ -138,7 +138,7 @@ static void whole_calibration(void) {
   TEST_ASSERT_DOUBLE_IS_INF(sensors[1].max_range_m);
   TEST_ASSERT_TRUE(!sensors[1].range_is_depth);
   const wm_wheels *wheels = wm_site_wheels(wm_recording_site(recording));
-  TEST_ASSERT_EQUAL(2048, wheels->ticks_per_turn);
+  TEST_ASSERT_EQUAL_DOUBLE(2048, wheels->ticks_per_turn);
   TEST_ASSERT_EQUAL_DOUBLE(-0.2, wheels->encoder_offset_m);
   TEST_ASSERT_EQUAL_DOUBLE(13, wheels->steering_ratio);
   TEST_ASSERT_EQUAL(3, wheels->steering_table_count);

@@ -211,7 +211,7 @@ static void source_settings(void) {
   TEST_ASSERT_EQUAL(0, rank);
   TEST_ASSERT_EQUAL_DOUBLE(25, s.until_s);
   TEST_ASSERT_EQUAL_DOUBLE(100, s.lateness_max_ms);
-  TEST_ASSERT_DOUBLE_IS_INF(s.from_s);
+  TEST_ASSERT_DOUBLE_IS_NEG_INF(s.from_s);
   wm_config_source(&config, "sightings:radar", &s, &rank);
   TEST_ASSERT_EQUAL(1, rank);
   TEST_ASSERT_EQUAL_DOUBLE(300, s.lateness_max_ms);

@@ -122,7 +122,7 @@ void outlines_are_closed_and_have_free_space_on_their_left() {
   double sum_x = 0, sum_y = 0;
   for (const Face &f : drawn.plan.faces) {
     const double dx = f.b.x_m - f.a.x_m, dy = f.b.y_m - f.a.y_m, length = std::sqrt(dx * dx + dy * dy);
-    TEST_ASSERT_GREATER_THAN(0, length);
+    TEST_ASSERT_GREATER_THAN_DOUBLE(0, length);
     const Point middle{0.5 * (f.a.x_m + f.b.x_m), 0.5 * (f.a.y_m + f.b.y_m)};
     const double nx = -dy / length * 0.003, ny = dx / length * 0.003;
     TEST_ASSERT_TRUE(drawn.plan.free({middle.x_m + nx, middle.y_m + ny}));
