@@ -106,7 +106,8 @@ wm_status motion_front_end::check(const wm_event &event) const {
 void motion_front_end::feed(const wm_event &event) {
   if (now_ns_ == WM_TIME_NONE) set_now(event.kind == WM_EVENT_INCREMENT ? event.as.increment.from_ns : event.t_ns);
   yaw_fresh_ = 0;
-  if (now_ns_ > fed_ns_ && history_.is_overdue(now_ns_)) observed_without_ = 3;
+  const bool uncounted = ticks_drive() && age_of_speed(now_ns_).is_overdue();
+  if (now_ns_ > fed_ns_ && (uncounted || history_.is_overdue(now_ns_))) observed_without_ = 3;
   fed_ns_ = event.t_ns;
   if (event.kind == WM_EVENT_QUANTITIES)
     take_quantities(event);
@@ -114,6 +115,7 @@ void motion_front_end::feed(const wm_event &event) {
     take_increment(event);
   else
     take_twist(event);
+  note_silence(event.t_ns);
 }
 
 void motion_front_end::take_twist(const wm_event &event) {
@@ -163,10 +165,14 @@ void motion_front_end::take_twist(const wm_event &event) {
 
 // The speeds of a twist and the turn rate of a gyro, as of a car's speed and yaw rate.
 void motion_front_end::take_twist_beside_gyro(wm_time_ns t_ns, const planar_twist &sample) {
+  note_period(kTwistSpeed, t_ns, 1);
   const bool v_plausible = is_plausible_level(kTwistSpeed, t_ns, sample.v);
   const bool plausible = is_plausible_level(kTwistSide, t_ns, sample.u) && v_plausible;
   note_plausibility(t_ns, quantity_bit(kTwistSpeed) | quantity_bit(kTwistSide), plausible);
-  if (plausible) twist_ = sample;
+  if (plausible) {
+    twist_ = sample;
+    stamp_ns_[kTwistSpeed] = t_ns;
+  }
   watch_standstill(t_ns, plausible && is_still(twist_.v));
   push_input(t_ns, twist_.v, value_[WM_Q_YAW_RATE], (health_ & WM_MOTION_HEALTH_YAW_RATE_STUCK) != 0, !plausible,
              twist_.u);
@@ -224,19 +230,34 @@ void motion_front_end::take_quantities(const wm_event &event) {
 void motion_front_end::push_quantities(wm_time_ns t_ns, uint32_t fresh, bool frozen, bool refused) {
   double v = 0.0;
   if (!read_speed(&v)) return;
-  const bool still = watch_standstill(t_ns, is_still(v) && !refused);
+  const bool known = !refused && !age_of_speed(t_ns).is_overdue();
+  const bool still = watch_standstill(t_ns, is_still(v) && known);
   const bool speed = (fresh & (kSpeeds | kCounts)) != 0, rate = (fresh & quantity_bit(WM_Q_YAW_RATE)) != 0;
   if (model_ == WM_MOTION_SPEED_YAW_RATE && (speed || rate)) {
     watch_yaw_rate(t_ns, v, rate && !refused);
     yaw_fresh_ = rate && !refused && still;
-    const bool unsure = frozen || silent(WM_Q_YAW_RATE, t_ns) || (health_ & WM_MOTION_HEALTH_YAW_RATE_STUCK);
-    push_input(t_ns, v, value_[WM_Q_YAW_RATE], unsure, refused, speed_source_ == kOfTwist ? twist_.u : 0.0);
+    push_speed_and_rate(t_ns, v, frozen, refused);
   } else if (model_ == WM_MOTION_ACKERMANN && (speed || (fresh & kSteering))) {
     double angle = 0.0;
+    watch_yaw_rate(t_ns, v, rate && !refused);
     if (read_road_wheel(&angle)) push_input(t_ns, v, angle, frozen, refused);
   } else if (model_ == WM_MOTION_TWIST && speed_source_ == kOfTwist) {
     watch_yaw_rate(t_ns, v, rate && !refused);  // stuck until now: does it move again?
   }
+}
+
+// The turn rate is the gyro's; while that is silent or stuck, that of the rear wheels' speeds; without them it holds.
+void motion_front_end::push_speed_and_rate(wm_time_ns t_ns, double speed_mps, bool frozen, bool refused) {
+  const double side_mps = speed_source_ == kOfTwist ? twist_.u : 0.0;
+  double rate = 0.0;
+  if (!gyro_is_alive() && wheels_stand_in(false) && read_rear_turn_rate(&rate)) {
+    stand_in(t_ns, speed_mps, rate);
+    push_input(t_ns, speed_mps, rate, frozen, refused, side_mps, true);
+    return;
+  }
+  stand_in_rad_ = 0.0;
+  if (!silent(WM_Q_YAW_RATE, t_ns)) rate = value_[WM_Q_YAW_RATE];
+  push_input(t_ns, speed_mps, rate, frozen || (health_ & WM_MOTION_HEALTH_YAW_RATE_STUCK), refused, side_mps);
 }
 
 // The best model that the data seen so far allow, or the one that the config names. `kinds`: of the newest event.
@@ -244,11 +265,12 @@ void motion_front_end::choose_model(uint32_t kinds) {
   double ignored;
   const bool speed = read_speed(&ignored);
   const bool ticks = counts_ticks() && finite(wheels_.track_m);
-  const bool gyro = gyro_is_alive(ticks), has_other = ticks || speed_source_ == kOfTwist;
+  const bool steering = speed && finite(wheels_.wheelbase_m) && read_road_wheel(&ignored);
+  const bool has_other = ticks || speed_source_ == kOfTwist || (steering && !age_of_steering(now_ns_).is_overdue());
   const bool possible[] = {false,
                            ticks,
-                           speed && gyro,
-                           speed && finite(wheels_.wheelbase_m) && read_road_wheel(&ignored),
+                           speed && (gyro_is_alive() || wheels_stand_in(steering)),
+                           steering,
                            (kinds & WM_TWIST_EVENTS) != 0,
                            (kinds & WM_EVENT_BIT(WM_EVENT_INCREMENT)) != 0};
   const int wanted = params_->model;
@@ -262,17 +284,6 @@ void motion_front_end::choose_model(uint32_t kinds) {
     if (possible[model]) model_ = model;
     if (model_ == model && (possible[model] || model != WM_MOTION_SPEED_YAW_RATE || !has_other)) return;
   }
-}
-
-// A gyro that fell silent or stuck yields to the wheels' difference, or to the twist's turn rate, until it is back.
-bool motion_front_end::gyro_is_alive(bool ticks) const {
-  if (!seen(WM_Q_YAW_RATE)) return false;
-  const bool stuck = (health_ & WM_MOTION_HEALTH_YAW_RATE_STUCK) != 0;
-  if (ticks) return !silent(WM_Q_YAW_RATE, now_ns_) && !stuck;
-  if (speed_source_ != kOfTwist) return true;
-  const double period_s = period_s_[WM_Q_YAW_RATE] * motion_history::kOverduePeriods;
-  const double overdue_s = period_s > motion_history::kOverdueS ? period_s : motion_history::kOverdueS;
-  return wm_seconds_between(stamp_ns_[WM_Q_YAW_RATE], now_ns_) <= overdue_s && !stuck;
 }
 
 motion_kind motion_front_end::kind() const {
@@ -306,7 +317,7 @@ bool motion_front_end::read_speed(double *speed_mps) {
   uint8_t source = kNone;
   if (mean_of(WM_Q_WHEEL_SPEED_REAR_LEFT, WM_Q_WHEEL_SPEED_REAR_RIGHT, &speed)) {
     source = kRearWheels;
-  } else if (counts_ticks()) {
+  } else if (counts_ticks() && !(silent(WM_Q_WHEEL_TICKS_LEFT, now_ns_) && silent(WM_Q_WHEEL_TICKS_RIGHT, now_ns_))) {
     speed = mean_of_wheels(wheel_[0].speed_mps, wheel_[1].speed_mps);
     source = kTicksMean;
   } else if (mean_of(WM_Q_VEHICLE_SPEED, WM_Q_VEHICLE_SPEED, &speed)) {
@@ -363,8 +374,8 @@ bool motion_front_end::watch_standstill(wm_time_ns t_ns, bool still) {
 }
 
 // `doubtful`: the input that holds from here on; `miscounted`: the counts of the segment that ends here.
-void motion_front_end::push_input(wm_time_ns t_ns, double a, double b, bool doubtful, bool miscounted,
-                                  double side_mps) {
+void motion_front_end::push_input(wm_time_ns t_ns, double a, double b, bool doubtful, bool miscounted, double side_mps,
+                                  bool beside_gyro) {
   motion_input input{};
   input.t_ns = t_ns;
   input.a = a;
@@ -374,10 +385,11 @@ void motion_front_end::push_input(wm_time_ns t_ns, double a, double b, bool doub
   input.holonomic = drives_sideways();
   input.command = model_ == WM_MOTION_TWIST && commands_ != 0;
   if (input.command) begin_response(*params_, history_.empty() ? nullptr : &history_.newest(), &input);
-  input.kind = kind();
-  input.beside_gyro = model_ == WM_MOTION_TWIST && speed_source_ == kOfTwist;
+  input.kind = beside_gyro ? kKindSteering : kind();
+  input.beside_gyro = beside_gyro || (model_ == WM_MOTION_TWIST && speed_source_ == kOfTwist);
   input.doubtful = doubtful;
   mark_refused(&input);
+  note_ages(&input);
   note_samples(&input);
   input.sampling[1] += static_cast<float>(missed_turn_rad2_);
   missed_turn_rad2_ = 0.0;
@@ -523,11 +535,7 @@ bool motion_front_end::read_other_turn_rate(double speed_mps, double *rate_radps
     *rate_radps = counted_turn_rate();
     return true;
   }
-  if (finite(wheels_.track_m) && seen(WM_Q_WHEEL_SPEED_REAR_LEFT) && seen(WM_Q_WHEEL_SPEED_REAR_RIGHT)) {
-    *rate_radps = (value_[WM_Q_WHEEL_SPEED_REAR_RIGHT] - value_[WM_Q_WHEEL_SPEED_REAR_LEFT]) / wheels_.track_m;
-    return true;
-  }
-  return false;
+  return read_rear_turn_rate(rate_radps);
 }
 
 }  // namespace wm

@@ -24,6 +24,11 @@ inline constexpr uint32_t kSteering = quantity_bits(WM_Q_STEERING_WHEEL, WM_Q_ST
 constexpr bool is_count(int id) { return (kCounts & quantity_bit(id)) != 0; }
 inline constexpr double kPeriodGain = 1.0 / 16.0;  // of the average of a message's period
 
+struct sample_age {
+  double age_s, due_s;
+  bool is_overdue() const { return age_s > due_s; }
+};
+
 // Plain memory, no pointers but to the parameters, which outlive it.
 class motion_front_end {
  public:
@@ -66,8 +71,7 @@ class motion_front_end {
       if (segment.input.model == WM_MOTION_CONSTANT_VELOCITY) static_cast<planar_twist &>(twist) = velocity_;
       motion_noise noise = noise_of(segment.input, twist, segment.dt_s, *params_, wheels_, calibration,
                                     stated_noise_now(), noise_factors_);
-      add_overdue_noise(segment, *params_, ticks_drive() && segment.has_next && !segment.input.uncounted, position_m2,
-                        &noise);
+      add_overdue_noise(segment, *params_, counts_give_way(segment), position_m2, &noise);
       add_refused_noise(segment, *params_, &noise);
       if (segment.input.command) add_change_noise(segment, *params_, &noise);
       if (segment.held_s == 0.0) add_sampling_noise(segment.input, &noise);
@@ -111,7 +115,7 @@ class motion_front_end {
   }
   int model() const { return model_; }
   motion_kind kind() const;
-  // The next input is overdue at that time.
+  // The next input of any kind is overdue at that time.
   bool is_overdue(wm_time_ns t_ns) const { return model_ != WM_MOTION_CONSTANT_VELOCITY && history_.is_overdue(t_ns); }
   // Sigmas of the speed and the turn rate of one period by the counts' steps; 0 where no counts drive.
   void count_noise(double *speed_mps, double *turn_rate_radps) const;
@@ -148,6 +152,7 @@ class motion_front_end {
   stated_noise stated_noise_now() const;
   void watch_plane(wm_time_ns t_ns, const wm_twist6 &twist);
   void push_quantities(wm_time_ns t_ns, uint32_t fresh, bool frozen, bool refused);
+  void push_speed_and_rate(wm_time_ns t_ns, double speed_mps, bool frozen, bool refused);
   bool is_plausible(const wm_quantities &q, wm_time_ns t_ns);
   bool counter_is_wrong(const wm_quantities &q, wm_time_ns t_ns) const;
   // `bound`: this fraction of the limits.
@@ -160,7 +165,20 @@ class motion_front_end {
   void choose_model(uint32_t kinds);
   void watch_encoders();
   bool twist_gives_speed() const;
-  bool gyro_is_alive(bool ticks) const;
+  bool gyro_is_alive() const;
+  // The age of the newest sample, of `first` or `last`, and the age at which the next one is overdue.
+  sample_age age_of(int first, int last, wm_time_ns t_ns) const;
+  sample_age age_of_speed(wm_time_ns t_ns) const;
+  sample_age age_of_steering(wm_time_ns t_ns) const;
+  bool wheels_stand_in(bool steering) const;
+  // Counts have come since, which give the distance; not where the gyro's inputs alone are newer.
+  bool counts_give_way(const motion_segment &segment) const {
+    const motion_input &input = segment.input;
+    return ticks_drive() && segment.has_next && !input.uncounted && (input.counted || !(input.age_s[0] > 0.0F));
+  }
+  void note_ages(motion_input *input) const;
+  void note_silence(wm_time_ns t_ns);
+  void stand_in(wm_time_ns t_ns, double speed_mps, double turn_radps);
   bool is_still(double speed_mps) const;
   void watch_yaw_rate(wm_time_ns t_ns, double speed_mps, bool fresh);
   bool watch_standstill(wm_time_ns t_ns, bool still);
@@ -168,9 +186,11 @@ class motion_front_end {
   bool read_road_wheel(double *angle_rad) const;
   bool read_other_turn_rate(double speed_mps, double *rate_radps) const;
   double counted_turn_rate() const;
+  bool read_rear_turn_rate(double *rate_radps) const;
   void leave_gyro();
   void begin_velocity();
-  void push_input(wm_time_ns t_ns, double a, double b, bool doubtful, bool miscounted, double side_mps = 0.0);
+  void push_input(wm_time_ns t_ns, double a, double b, bool doubtful, bool miscounted, double side_mps = 0.0,
+                  bool beside_gyro = false);
   void push_ticks(wm_time_ns t_ns, bool doubtful, bool miscounted);
   void note_samples(motion_input *input);
   void note_holonomic(motion_input *input);
@@ -196,8 +216,8 @@ class motion_front_end {
   double position_m2_;     // variance of the position, of all axes together
   motion_history history_;
   double value_[WM_Q_COUNT];
-  wm_time_ns stamp_ns_[WM_Q_COUNT], message_ns_[WM_Q_COUNT];  // newest accepted value; newest message
-  double period_s_[WM_Q_COUNT];  // usual time between two messages with that quantity; 0: unknown
+  wm_time_ns stamp_ns_[kSlots], message_ns_[kSlots];  // newest accepted value; newest message
+  double period_s_[kSlots];                           // usual time between two messages with that quantity; 0: unknown
   sample_check check_[kSlots];
   command_detector twists_;
   uint32_t refused_slots_;  // of check_: the last sample was refused
@@ -221,7 +241,8 @@ class motion_front_end {
     wm_time_ns moved_ns;   // the newest sample at which the robot moved
     double explained_rad;  // of the turn by the other sensor less the gyro's, by that sensor's errors
   } yaw_watch_;
-  double missed_turn_rad2_;  // variance of the heading for the next input: what a stuck gyro has missed
+  double missed_turn_rad2_;  // variance of the heading for the next input: what the gyro has missed
+  double stand_in_rad_;      // error of the heading since the wheels' difference stands in for the gyro
   uint64_t outliers_;
   uint32_t health_;
   uint8_t model_;

@@ -30,7 +30,10 @@ struct motion_input {
   float side_sampling;  // the same to the side, of a holonomic drive
   float period_s;       // between increments; 0: that between the inputs
   float response[2];    // of commands: speed and turn rate of the drive at t_ns (commands.hpp)
-  uint8_t beside_gyro;  // a twist whose turn rate stands in for a gyro's
+  // Of the speed and of the turn: at t_ns the age of the newest sample, and the age at which the next one was overdue.
+  // 0: in time.
+  float age_s[2], due_s[2];
+  uint8_t beside_gyro;  // the turn rate is not the gyro's, which is silent or stuck
   uint8_t uncounted;    // no count gives the distance until the next input's t_ns
   uint8_t holonomic;    // of a twist: the drive moves sideways
   uint8_t unused[5];
@@ -59,11 +62,12 @@ struct motion_segment {
   drive_terms drive;
   double changed2[2];  // of commands: squares of what the drive still has to change, beginning less end
   planar_twist end;    // of commands: at its end
-  double overdue_s;    // at its beginning: for how long the next input has been overdue; below 0: it isn't
-  double unknown_s;    // at its beginning: for how long the input has been held for too long; 0: it isn't
-  double refused_s;    // at its beginning: for how long samples have been refused; only where input.refused
-  bool has_next;       // a later input has come
-  bool first, last;    // of the interval: their length depends on the lag
+  double overdue_s;    // at its beginning: for how long the next input, or speed, has been overdue; below 0: it isn't
+  double turn_overdue_s;  // the same of the turn
+  double unknown_s;       // at its beginning: for how long the input has been held for too long; 0: it isn't
+  double refused_s;       // at its beginning: for how long samples have been refused; only where input.refused
+  bool has_next;          // a later input has come
+  bool first, last;       // of the interval: their length depends on the lag
 };
 
 class motion_history {
@@ -121,7 +125,7 @@ class motion_history {
  private:
   static motion_segment unknown() {
     motion_segment segment{};
-    segment.overdue_s = -1.0;
+    segment.overdue_s = segment.turn_overdue_s = -1.0;
     return segment;
   }
 
@@ -129,15 +133,23 @@ class motion_history {
   motion_segment held(uint64_t next, uint64_t oldest, wm_time_ns begin, wm_time_ns hold_max_ns, wm_time_ns *end) const {
     motion_segment segment{};
     segment.input = at(next - 1);
-    const wm_time_ns held_until = segment.input.t_ns + hold_max_ns;
+    const wm_time_ns age_ns = wm_ns_from_seconds(static_cast<double>(segment.input.age_s[0]));
+    const wm_time_ns held_until = segment.input.t_ns + hold_max_ns - age_ns;
     segment.input.stale = begin >= held_until;
     if (!segment.input.stale && *end > held_until) *end = held_until;
     if (segment.input.counted) segment.input.stale = 0;  // the distance is known, however long it took
-    segment.overdue_s = wm_seconds_between(segment.input.t_ns, begin) - due_s(next, oldest);
-    segment.refused_s = segment.input.refused_s + wm_seconds_between(segment.input.t_ns, begin);
-    segment.unknown_s = begin > held_until ? wm_seconds_between(held_until, begin) : 0.0;
     segment.held_s = wm_seconds_between(segment.input.t_ns, begin);
+    segment.overdue_s = part_overdue_s(segment, 0, due_s(next, oldest));
+    segment.turn_overdue_s = part_overdue_s(segment, 1, due_s(next, oldest));
+    segment.refused_s = segment.input.refused_s + segment.held_s;
+    segment.unknown_s = begin > held_until ? wm_seconds_between(held_until, begin) : 0.0;
     return segment;
+  }
+
+  static double part_overdue_s(const motion_segment &segment, int part, double input_due_s) {
+    const double age_s = static_cast<double>(segment.input.age_s[part]);
+    const double due_s = age_s > 0.0 ? static_cast<double>(segment.input.due_s[part]) : input_due_s;
+    return age_s + segment.held_s - due_s;
   }
 
   // How old the input before `next` may become before `next` is overdue.

@@ -51,7 +51,7 @@ motion_twist from_speed_and_rate(double speed, double side, double rate, const w
   return t;
 }
 
-// A twist while the gyro is silent: the states of the turn rate are the gyro's, and this rate is the wheels'.
+// While the gyro is silent or stuck: the states of the turn rate are the gyro's, and this rate is another sensor's.
 motion_twist without_gyro(const motion_input &input, const wm_motion_calibration &c) {
   motion_twist t{};
   t.w = input.b;
@@ -114,12 +114,12 @@ motion_twist about_center(motion_twist t, const wm_motion_calibration &c) {
 
 motion_twist twist_of_moving(const motion_input &input, const wm_motion_calibration &c, const wm_wheels &wheels,
                              const drive_terms &drive) {
+  if (input.beside_gyro) return without_gyro(input, c);
   switch (input.model) {
     case WM_MOTION_TICKS: return from_wheels(input.a, input.b, c, wheels.track_m);
     case WM_MOTION_SPEED_YAW_RATE: return from_speed_and_rate(input.a, input.side_mps, input.b, c);
     case WM_MOTION_ACKERMANN: return from_steering(input.a, input.b, c, wheels);
     case WM_MOTION_TWIST:
-      if (input.beside_gyro) return without_gyro(input, c);
       return input.command ? twist_of_command({input.a, input.side_mps, input.b}, drive, c, wheels.track_m)
                            : twist_of_sample(input.a, input.side_mps, input.b, c, wheels.track_m);
     case WM_MOTION_INCREMENTS:
@@ -264,6 +264,22 @@ void turn_to_axes(const planar_twist &twist, motion_noise *noise) {
   noise->distance_lateral = (along - across) * forwards * left;
 }
 
+namespace {
+
+// Of a segment: the growth of t^4, t seconds after a sample was overdue, and the time for which it is unknown.
+struct held_time {
+  double grown_s4, unknown_s;
+};
+
+held_time held_time_of(double overdue_s, double dt_s, double hold_max_s) {
+  const double from_s = overdue_s > 0.0 ? overdue_s : 0.0, to_s = overdue_s + dt_s;
+  if (to_s <= from_s) return {0.0, 0.0};
+  const double held_from_s = least(from_s, hold_max_s), held_to_s = least(to_s, hold_max_s);
+  return {square(square(held_to_s)) - square(square(held_from_s)), to_s - from_s - (held_to_s - held_from_s)};
+}
+
+}  // namespace
+
 void add_overdue_noise(const motion_segment &segment, const wm_motion_params &p, bool is_counted, double position_m2,
                        motion_noise *noise) {
   if (segment.input.model >= WM_MOTION_INCREMENTS && segment.input.counted) return;
@@ -281,17 +297,15 @@ void add_overdue_noise(const motion_segment &segment, const wm_motion_params &p,
     noise->lateral_m2 += gone_m2;
     return;
   }
-  const double from_s = segment.overdue_s > 0.0 ? segment.overdue_s : 0.0, to_s = segment.overdue_s + segment.dt_s;
-  if (to_s <= from_s) return;
   // Variances that add up to the square of the whole, however the time is cut.
-  const double held_from_s = least(from_s, p.hold_max_s), held_to_s = least(to_s, p.hold_max_s);
-  const double grown_s4 = square(square(held_to_s)) - square(square(held_from_s));
-  const double held_m2 = square(0.5 * p.noise_hold_mps2) * grown_s4;
+  const held_time way = held_time_of(segment.overdue_s, segment.dt_s, p.hold_max_s);
+  const double held_m2 = square(0.5 * p.noise_hold_mps2) * way.grown_s4;
   if (!is_counted) noise->distance_m2 += held_m2;
   if (has_own_axes(segment.input)) noise->lateral_m2 += held_m2;
   if (is_counted && segment.input.model == WM_MOTION_TICKS) return;
-  const double rotation_rad2 = square(0.5 * p.noise_hold_radps2) * grown_s4 +
-                               square(kUnknownRate_radps) * (to_s - from_s - (held_to_s - held_from_s));
+  const held_time turn = held_time_of(segment.turn_overdue_s, segment.dt_s, p.hold_max_s);
+  const double rotation_rad2 =
+      square(0.5 * p.noise_hold_radps2) * turn.grown_s4 + square(kUnknownRate_radps) * turn.unknown_s;
   noise->rotation_rad2 += rotation_rad2;
   if (!is_counted) return;
   // The distance is known, its direction is not: a heading that walks to that variance, at most any heading at all.

@@ -117,7 +117,9 @@ static void about_motion(uint32_t bits, wm_findings *out) {
       "the vehicle rose, rolled or pitched for seconds, which an estimator in the plane does not model",
       "the gyro's roll rate never changed (stuck sensor?); it is not used",
       "the gyro's pitch rate never changed (stuck sensor?); it is not used",
-      "the accelerometer gave one and the same value (stuck sensor?); it is not used"};
+      "the accelerometer gave one and the same value (stuck sensor?); it is not used",
+      "the speed is silent while other sensors of the motion go on; the last one holds for a while",
+      "the gyro, or the steering, is silent while the speed comes; the wheels or another sensor stand in"};
   for (unsigned i = 0; i < sizeof kTexts / sizeof kTexts[0]; i++)
     if ((bits >> i) & 1u) wm_find(out, WM_FOUND_MOTION_SENSOR, WM_SEVERITY_BAD, "motion", NULL, "%s", kTexts[i]);
 }

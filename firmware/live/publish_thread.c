@@ -117,7 +117,7 @@ static void say_changes(live *run, const wm_health *health) {
     live_say_later(run, line);
   }
   if (health->motion_health != self->said_motion_health)
-    live_say_later(run, health->motion_health ? "motion: a sensor is dead or stuck (see health)"
+    live_say_later(run, health->motion_health ? "motion: a sensor is dead, stuck or silent (see health)"
                                               : "motion: the sensors work again");
   self->said_motion_health = health->motion_health;
 }

@@ -143,7 +143,7 @@ class Faults(unittest.TestCase):
         """config/faults/indoor.yaml: the next fault begins a second or more after the pose has to be well again."""
         faults = yaml.safe_load((ROOT / "config/faults/indoor.yaml").read_text())["faults"]
         spans = [(one["name"], one["from_s"], one["from_s"] + one.get("for_s", 0) + one.get("pose", {}).get("within_s", 0)) for one in faults]
-        self.assertEqual(len(faults), 20)
+        self.assertEqual(len(faults), 24)
         for (_, _, due_s), (name, from_s, _) in zip(spans, spans[1:]):
             self.assertGreaterEqual(from_s, due_s + 1, name)
 

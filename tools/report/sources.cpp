@@ -149,7 +149,7 @@ std::vector<CalibrationState> calibration_of(const Json &health) {
 
 // What the run had to complain of beside its counts.
 std::string complaints(const Json &health) {
-  static constexpr std::array<std::pair<const char *, const char *>, 9> kMotion{{
+  static constexpr std::array<std::pair<const char *, const char *>, 11> kMotion{{
       {"encoder_left_dead", "The left wheel’s encoder stood still while the robot drove: it is taken for dead."},
       {"encoder_right_dead", "The right wheel’s encoder stood still while the robot drove: it is taken for dead."},
       {"counter_frozen", "A motion message kept coming with a counter that stood still: its sender hung."},
@@ -159,6 +159,8 @@ std::string complaints(const Json &health) {
       {"roll_rate_stuck", "The gyro gave one and the same roll rate: that axis is taken for stuck."},
       {"pitch_rate_stuck", "The gyro gave one and the same pitch rate: that axis is taken for stuck."},
       {"accelerometer_stuck", "The accelerometer gave one and the same value: it is taken for stuck."},
+      {"speed_silent", "The speed had fallen silent by the end, while other sensors of the motion went on."},
+      {"turn_silent", "The gyro, or the steering, had fallen silent by the end, while the speed came."},
   }};
   std::string out;
   const auto each = [&health](const char *key, const auto &then) {

@@ -58,6 +58,9 @@ void wm_motion_choose(wm_motion_params *params, uint32_t kinds);
 #define WM_MOTION_HEALTH_ROLL_RATE_STUCK (1u << 6)
 #define WM_MOTION_HEALTH_PITCH_RATE_STUCK (1u << 7)
 #define WM_MOTION_HEALTH_ACCELEROMETER_STUCK (1u << 8)
+// Overdue while other sensors of the motion go on: another one stands in, or the last value holds with growing noise.
+#define WM_MOTION_HEALTH_SPEED_SILENT (1u << 9)
+#define WM_MOTION_HEALTH_TURN_SILENT (1u << 10)  // the gyro, or the steering of a robot without one
 
 // Calibration of the motion sensors, as an estimator has learnt it. Neutral: scales 1, the rest 0.
 typedef enum wm_motion_term {

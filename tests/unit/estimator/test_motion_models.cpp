@@ -106,7 +106,7 @@ void test_a_silent_gyro_yields_to_the_ticks(void) {
   d.go(10, true);
   d.go(10, false);
   TEST_ASSERT_EQUAL(WM_MOTION_TICKS, d.front.model());
-  TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.04 * (10 - 2), d.pose.heading_rad);  // 2 s: motion.hold_max_s
+  TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.04 * (10 - 0.25), d.pose.heading_rad);  // 0.25 s until it is overdue
   const double way = std::sqrt(d.pose.x_m * d.pose.x_m + d.pose.y_m * d.pose.y_m);
   TEST_ASSERT_DOUBLE_WITHIN(0.1, 0.5 * 20 * 1.02, way);
   d.go(1, true);
