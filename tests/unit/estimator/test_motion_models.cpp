@@ -195,7 +195,8 @@ void test_a_known_way_in_an_unknown_direction(void) {
     wm::motion_noise noise{};
     segment.input.model = WM_MOTION_SPEED_YAW_RATE;
     segment.input.a = 2.0;
-    segment.overdue_s = row.overdue_s;
+    segment.overdue_s = -1.0;
+    segment.turn_overdue_s = row.overdue_s;
     segment.dt_s = row.dt_s;
     wm::add_overdue_noise(segment, params, true, 0.0, &noise);
     const double way_m2 = 4.0 * row.dt_s * row.dt_s, q = row.rotation_rad2;
