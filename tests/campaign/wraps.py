@@ -5,6 +5,8 @@ the same poses as the one that begins at 100 s.
 
     wraps.py BIN_DIR SOURCE_DIR
 
+The numbers of a stereo detector's tracks begin anew behind 2^31 - 1: a recording in which they do that half way gives the same poses, too.
+
 Starts: 2^32 ns, 2^31 and 2^32 us, 2^31 and 2^32 ms, 2^53 ns (the last ns that a double holds), 2^31 s (the year 2038), and the last stamps that are taken. Exit code 1
 where a stamp differs, a row is missing, or a pose differs by more than 1 um."""
 import argparse
@@ -23,6 +25,9 @@ DRIVES = [("crossing", "datasets/crossing-points", 20), ("loops-markers", "datas
 LEAD_S = 5  # the wrap is so long after the begin
 STARTS = {"2^32 ns": 2**32 / 1e9, "2^31 us": 2**31 / 1e6, "2^32 us": 2**32 / 1e6, "2^31 ms": 2**31 / 1e3, "2^32 ms": 2**32 / 1e3,
           "2^53 ns": 2**53 / 1e9, "2^31 s": 2**31, "last": 3_999_999_900}
+# Numbers of tracks, from the first on to the last, and the drive in which they begin anew half way.
+FIRST_TRACK, LAST_TRACK = 2**30, 2**31 - 1
+TRACKS = ("seabed-rounds", "datasets/seabed-rounds", 40)
 MOST_M = 1e-6
 
 
@@ -57,6 +62,63 @@ def replayed(options, recording, config, start_s, scratch):
             for r in replays.rows(scratch / "run/trajectory.csv")]
 
 
+def compare(before, poses):
+    """Whether these are the same poses, and a table's cell about them."""
+    far = max((abs(x - y) for a, b in zip(before, poses) for x, y in zip(a, b)), default=0)
+    good = len(poses) == len(before) > 0 and far <= MOST_M
+    return good, "same" if good and far == 0 else f"{far:.0e}" if good else f"DIFFERS: {len(poses)} poses, {far:.3g}"
+
+
+def simulated(options, folder, world, seconds):
+    recording = pathlib.Path(folder) / "drive"
+    replays.command(options.bin_dir / "waymark-simulate", options.source_dir / f"config/worlds/{world}.yaml", "--no-video", "--duration", seconds, "--out",
+                    recording)
+    return recording, int(replays.rows(recording / "truth.csv")[0]["t_ns"]) / 1e9
+
+
+def clocks(options, world, config, seconds):
+    with tempfile.TemporaryDirectory() as folder:
+        recording, first_s = simulated(options, folder, world, seconds)
+        cells, before, is_good = [], [], True
+        for number, start_s in enumerate((first_s, *(max(0, round(v, 6) - LEAD_S) for v in STARTS.values()))):
+            scratch = pathlib.Path(folder) / str(number)
+            scratch.mkdir()
+            poses = replayed(options, recording, config, start_s, scratch)
+            before = before or poses
+            good, cell = compare(before, poses)
+            is_good = is_good and good
+            cells.append(cell)
+    print(f"| {world} | {len(before)} | " + " | ".join(cells[1:]) + " |", flush=True)
+    return is_good
+
+
+def tracks(options, world, config, seconds):
+    with tempfile.TemporaryDirectory() as folder:
+        recording, first_s = simulated(options, folder, world, seconds)
+        given = [int(row["id"]) for row in replays.rows(recording / "stereo.csv")]
+        middle = (min(given) + max(given)) // 2
+
+        def renumbered(text):
+            head, *lines = text.splitlines()
+            at, out = head.split(",").index("id"), [head]
+            for line in lines:
+                fields = line.split(",")
+                number = LAST_TRACK - middle + int(fields[at])
+                fields[at] = str(number if number <= LAST_TRACK else number - LAST_TRACK - 1 + FIRST_TRACK)
+                out.append(",".join(fields))
+            return "\n".join(out) + "\n"
+
+        replays.copy_changed(recording, pathlib.Path(folder) / "renumbered", {"stereo.csv": renumbered})
+        both = []
+        for one in (recording, pathlib.Path(folder) / "renumbered"):
+            scratch = pathlib.Path(folder) / f"run-{one.name}"
+            scratch.mkdir()
+            both.append(replayed(options, one, config, first_s, scratch))
+    good, cell = compare(*both)
+    print(f"\n{world}, tracks {min(given)} to {max(given)} of {len(set(given))} begin anew in the middle: {cell}")
+    return good
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     for name in ("bin_dir", "source_dir"):
@@ -65,26 +127,10 @@ def main():
     if not (options.bin_dir / "waymark-simulate").exists():
         print("no simulator here")
         return 77
-    is_good = True
     print("| drive | poses | " + " | ".join(STARTS) + " |\n|" + " --- |" * (2 + len(STARTS)))
-    for world, config, seconds in DRIVES:
-        with tempfile.TemporaryDirectory() as folder:
-            recording = pathlib.Path(folder) / "drive"
-            replays.command(options.bin_dir / "waymark-simulate", options.source_dir / f"config/worlds/{world}.yaml", "--no-video", "--duration", seconds,
-                            "--out", recording)
-            first_s = int(replays.rows(recording / "truth.csv")[0]["t_ns"]) / 1e9
-            cells, before = [], []
-            for number, start_s in enumerate((first_s, *(max(0, round(v, 6) - LEAD_S) for v in STARTS.values()))):
-                scratch = pathlib.Path(folder) / str(number)
-                scratch.mkdir()
-                poses = replayed(options, recording, config, start_s, scratch)
-                before = before or poses
-                far = max((abs(x - y) for a, b in zip(before, poses) for x, y in zip(a, b)), default=0)
-                good = len(poses) == len(before) > 0 and far <= MOST_M
-                is_good = is_good and good
-                cells.append("same" if good and far == 0 else f"{far:.0e}" if good else f"DIFFERS: {len(poses)} poses, {far:.3g}")
-        print(f"| {world} | {len(before)} | " + " | ".join(cells[1:]) + " |", flush=True)
-    return 0 if is_good else 1
+    is_good = [clocks(options, *drive) for drive in DRIVES]
+    is_good.append(tracks(options, *TRACKS))
+    return 0 if all(is_good) else 1
 
 
 if __name__ == "__main__":

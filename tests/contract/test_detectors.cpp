@@ -143,7 +143,7 @@ void check_events(size_t count) {
       TEST_ASSERT_TRUE(std::isnan(seen.range_m) || (seen.range_m > 0 && seen.range_sigma_m > 0));
       if (seen.landmark_id == -1) continue;  // one of a class
       TEST_ASSERT_GREATER_THAN(0, seen.landmark_id);
-      for (size_t k = 0; k < i; k++) TEST_ASSERT_TRUE(events[k].as.sighting.landmark_id != seen.landmark_id);
+      for (size_t k = 0; k < i; k++) TEST_ASSERT_NOT_EQUAL(seen.landmark_id, events[k].as.sighting.landmark_id);
     }
     if (e.kind != WM_EVENT_POINTS) continue;
     const wm_points &points = e.as.points;
@@ -151,7 +151,8 @@ void check_events(size_t count) {
     TEST_ASSERT_LESS_OR_EQUAL(WM_POINTS_MAX, points.count);
     TEST_ASSERT_EQUAL(0, points.camera);
     for (uint32_t k = 0; k < points.count; k++) {
-      TEST_ASSERT_TRUE(std::isfinite(points.x_m[k]) && std::isfinite(points.y_m[k]));
+      TEST_ASSERT_FLOAT_IS_DETERMINATE(points.x_m[k]);
+      TEST_ASSERT_FLOAT_IS_DETERMINATE(points.y_m[k]);
       TEST_ASSERT_TRUE(std::isnan(points.normal_rad[k]) || std::fabs(points.normal_rad[k]) <= 3.1416F);
       TEST_ASSERT_TRUE(std::isnan(points.sigma_m[k]) || points.sigma_m[k] > 0);
     }

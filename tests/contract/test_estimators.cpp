@@ -138,7 +138,7 @@ void assert_sound(const wm_estimate &e) {
   for (int i = 0; i < 3; i++)
     for (int j = 0; j < 3; j++) {
       p[i][j] = e.covariance[wm_cov_index(at[i], at[j])];
-      TEST_ASSERT_TRUE(std::isfinite(p[i][j]));
+      TEST_ASSERT_DOUBLE_IS_DETERMINATE(p[i][j]);
       const double mirrored = e.covariance[wm_cov_index(at[j], at[i])];
       TEST_ASSERT_EQUAL_MEMORY(&mirrored, &p[i][j], sizeof mirrored);
     }
@@ -148,12 +148,13 @@ void assert_sound(const wm_estimate &e) {
   TEST_ASSERT_TRUE(p[0][0] > 0 && p[1][1] > 0 && p[2][2] > 0);
   TEST_ASSERT_GREATER_THAN_DOUBLE(-1e-9 * p[0][0] * p[1][1], minor);
   TEST_ASSERT_GREATER_THAN_DOUBLE(-1e-9 * p[0][0] * p[1][1] * p[2][2], det);
-  TEST_ASSERT_TRUE(std::isfinite(e.pose_map_base.p_m[0]) && std::isfinite(e.pose_map_base.p_m[1]));
+  TEST_ASSERT_DOUBLE_IS_DETERMINATE(e.pose_map_base.p_m[0]);
+  TEST_ASSERT_DOUBLE_IS_DETERMINATE(e.pose_map_base.p_m[1]);
   TEST_ASSERT_GREATER_THAN_DOUBLE(-3.1415926535897936, e.heading_rad);
   TEST_ASSERT_LESS_OR_EQUAL_DOUBLE(3.1415926535897936, e.heading_rad);
   const double *q = e.pose_map_base.q_xyzw;
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 1.0, q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-  TEST_ASSERT_TRUE(e.state <= WM_STATE_LOST);
+  TEST_ASSERT_LESS_OR_EQUAL(WM_STATE_LOST, e.state);
 }
 
 void test_the_same_events_give_the_same_bytes_and_a_copy_goes_on_alike(void) {
@@ -209,7 +210,7 @@ void test_an_absent_number_of_a_landmark_counts_as_zero(void) {
     machine a;
     for (uint64_t i = 0; i < 3000; i++) a.take(event_at(i, 0.02 * (double)i));
     with[std::isnan(absent)] = a.estimate();
-    TEST_ASSERT_TRUE(std::isfinite(with[1].covariance[0]));
+    TEST_ASSERT_DOUBLE_IS_DETERMINATE(with[1].covariance[0]);
   }
   TEST_ASSERT_EQUAL_DOUBLE(with[0].heading_rad, with[1].heading_rad);
   for (int k = 0; k < 36; k++) TEST_ASSERT_EQUAL_DOUBLE(with[0].covariance[k], with[1].covariance[k]);
@@ -330,7 +331,8 @@ void test_set_pose_works_at_any_time(void) {
     TEST_ASSERT_DOUBLE_WITHIN(1e-12, 2 * asin(0.6), out.heading_rad);
     TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.09, out.covariance[0]);
     TEST_ASSERT_EQUAL_UINT32(resets + 1, out.resets);
-    TEST_ASSERT_TRUE(out.state != WM_STATE_SEARCHING && out.state != WM_STATE_LOST);
+    TEST_ASSERT_NOT_EQUAL(WM_STATE_SEARCHING, out.state);
+    TEST_ASSERT_NOT_EQUAL(WM_STATE_LOST, out.state);
   }
 }
 
@@ -447,9 +449,11 @@ void test_what_is_learnt_is_listed_and_given_to_the_predictor(void) {
   TEST_ASSERT_EQUAL(count, estimator->calibration(a.state, values, 1));
   wm_motion_calibration c;
   estimator->motion(a.state, &c);
-  TEST_ASSERT_TRUE(std::isfinite(c.value[WM_SPEED_SCALE]) && c.value[WM_SPEED_SCALE] > 0);
+  TEST_ASSERT_DOUBLE_IS_DETERMINATE(c.value[WM_SPEED_SCALE]);
+  TEST_ASSERT_GREATER_THAN_DOUBLE(0, c.value[WM_SPEED_SCALE]);
   for (size_t i = 0; i < count && i < 1; i++) {
-    TEST_ASSERT_TRUE(std::isfinite(values[i].value) && values[i].sigma > 0);
+    TEST_ASSERT_DOUBLE_IS_DETERMINATE(values[i].value);
+    TEST_ASSERT_TRUE(values[i].sigma > 0);
     TEST_ASSERT_GREATER_THAN(0, strlen(values[i].name));
   }
 }

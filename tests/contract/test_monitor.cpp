@@ -153,7 +153,8 @@ void a_turn_with_the_wrong_sign_is_named(void) {
   drives::scene scene(motion::twist, kSightings, 0, kEnd_s);
   const seen good = drive("landmark_ekf", scene, {}, nullptr);
   const seen bad = drive("landmark_ekf", scene, {}, turn_to_the_right);
-  TEST_ASSERT_TRUE(std::isinf(good.doubted_s) && std::isinf(good.turn_s));
+  TEST_ASSERT_DOUBLE_IS_INF(good.doubted_s);
+  TEST_ASSERT_DOUBLE_IS_INF(good.turn_s);
   TEST_ASSERT_TRUE_MESSAGE(bad.turn_s < kContradicted_s, "the turn is not the cause");
 }
 
@@ -330,6 +331,20 @@ void a_scale_that_is_off_by_less_than_a_fifth_is_no_contradiction(void) {
   TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, {"motion.left_scale", 1.22, 0.003}));
 }
 
+// Of any sensor, against the prior of all of them.
+void a_scale_of_ranges_is_held_against_the_sensors_prior(void) {
+  parameters::values sightings(wm_sighting_params_table, {{"states.range_scale_sigma", 0.02}});
+  const wm_landmark post{};
+  wm_setup setup{};
+  setup.sightings = reinterpret_cast<const wm_sighting_params *>(sightings.data());
+  setup.landmarks = &post;
+  setup.landmark_count = 1;
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, state_with(setup, {"eye.range_scale", 1.12, 0.003}));
+  TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, {"eye.range_scale", 1.25, 0.003}));
+  TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, {"left.eye.range_scale", 0.79, 0.003}));
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, state_with(setup, {"eye.range_scales", 1.25, 0.003}));
+}
+
 // Its effective track is 1.5 +- 0.25 of the distance of its wheels. The third value of `drive` is skid_steer.
 void the_wide_track_of_skid_steer_is_its_prior(void) {
   const parameters::values plain(wm_motion_params_table, {}), skids(wm_motion_params_table, {{"drive", 2}});
@@ -405,7 +420,8 @@ void positions_far_from_the_way_are_doubt(void) {
   const std::vector<parameters::setting> settings = {{"correlated.gnss_m", 1.0}, {"correlated.gnss_tau_s", 20.0}};
   const seen good = drive("landmark_ekf", scene, settings, nullptr);
   const seen bad = drive("landmark_ekf", scene, settings, drift);
-  TEST_ASSERT_TRUE(!good.is_lasting && std::isinf(good.doubted_s));
+  TEST_ASSERT_TRUE(!good.is_lasting);
+  TEST_ASSERT_DOUBLE_IS_INF(good.doubted_s);
   TEST_ASSERT_TRUE(bad.is_lasting);
 }
 
@@ -488,6 +504,7 @@ int main(void) {
   RUN_TEST(lengths_that_contradict_each_other_are_degraded);
   RUN_TEST(a_scale_that_is_off_by_less_than_a_fifth_is_no_contradiction);
   RUN_TEST(a_contradicted_pose_may_head_anywhere);
+  RUN_TEST(a_scale_of_ranges_is_held_against_the_sensors_prior);
   RUN_TEST(the_wide_track_of_skid_steer_is_its_prior);
   RUN_TEST(a_run_that_was_contradicted_for_long_has_to_fit_for_longer);
   RUN_TEST(a_pose_off_the_map_is_degraded);

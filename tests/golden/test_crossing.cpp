@@ -165,7 +165,7 @@ void test_lateness_changes_nothing() {
   for (Camera &camera : scenario.cameras) camera.latency_s = 0.15, camera.latency_jitter_s = 0.13;
   drive(shipped(), "late");
   const std::string fresh = bytes_of(folder + "/fresh/trajectory.csv");
-  TEST_ASSERT_TRUE(fresh.size() > 100000);
+  TEST_ASSERT_GREATER_THAN(100000, fresh.size());
   TEST_ASSERT_TRUE(fresh == bytes_of(folder + "/late/trajectory.csv"));
   TEST_ASSERT_EQUAL_UINT64(0, source("sightings:left").late);
 }

@@ -93,6 +93,9 @@ static void outermost_values_are_no_measurement(void) {
   TEST_ASSERT_EQUAL(WM_BAD_DATA, feed(&f, "can0 100#FFFF000000000000"));
   TEST_ASSERT_EQUAL_DOUBLE(65534, value_of(&f, "can0 100#FEFF000000000000"));
   close_it(&f);
+  open_one(&f, RANGED("0|16@1+ (1,0) [0|0]"), binding(WM_Q_VEHICLE_SPEED, "M", "A"));  // no range
+  TEST_ASSERT_EQUAL_DOUBLE(65535, value_of(&f, "can0 100#FFFF000000000000"));
+  close_it(&f);
 }
 
 static void a_dbc_from_a_file(void) {

@@ -77,6 +77,16 @@ static void odd_but_right(void) {
   wm_dbc_free(dbc);
 }
 
+// An attribute without a message's number, or with one that is too large, names no message.
+static void long_names_of_no_message(void) {
+  load("BO_ 0 M: 8 X\nBA_ \"SystemMessageLongSymbol\" BO_ \"WITHOUT_A_NUMBER\";\n");
+  TEST_ASSERT_EQUAL_size_t(0, wm_dbc_find(dbc, dbc_key(0, 0))->long_name.length);
+  wm_dbc_free(dbc);
+  load("BO_ 1 M: 8 X\nBA_ \"SystemMessageLongSymbol\" BO_ 4294967297 \"2_TO_THE_32_AND_1\";\n");
+  TEST_ASSERT_EQUAL_size_t(0, wm_dbc_find(dbc, dbc_key(1, 0))->long_name.length);
+  wm_dbc_free(dbc);
+}
+
 static void nothing_in_it(void) {
   load("");
   TEST_ASSERT_EQUAL_size_t(0, dbc->message_count);
@@ -129,6 +139,7 @@ static void every_prefix(void) {
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(odd_but_right);
+  RUN_TEST(long_names_of_no_message);
   RUN_TEST(nothing_in_it);
   RUN_TEST(overlapping_signals_are_makers_wish);
   RUN_TEST(multiplexers_in_a_ring);

@@ -22,26 +22,48 @@ static double si_of(int quantity, const char *unit) {
   return one / 10.0;
 }
 
-static void units_of_speed(void) {
-  const char *kmh[] = {"km/h", "kph", "KMH", "km / h", "km/hr", "Unit_KiloMeterPerHour"};
-  for (size_t i = 0; i < sizeof kmh / sizeof *kmh; i++)
-    TEST_ASSERT_DOUBLE_WITHIN(1e-15, 1 / 3.6, si_of(WM_Q_VEHICLE_SPEED, kmh[i]));
-  TEST_ASSERT_EQUAL_DOUBLE(1.0, si_of(WM_Q_WHEEL_SPEED_REAR_LEFT, "m/s"));
-  TEST_ASSERT_EQUAL_DOUBLE(1.0, si_of(WM_Q_WHEEL_SPEED_FRONT_RIGHT, "mps"));
-  TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0.44704, si_of(WM_Q_VEHICLE_SPEED, "mph"));
-}
+#define SPELLED_MOST 16
 
-static void units_of_angles_and_lengths(void) {
-  const char *degrees[] = {"deg", "Degree", "degrees", "\xC2\xB0", "\xB0", "Unit_DegreeOfArc"};
-  for (size_t i = 0; i < sizeof degrees / sizeof *degrees; i++)
-    TEST_ASSERT_DOUBLE_WITHIN(1e-15, PI / 180, si_of(WM_Q_STEERING_WHEEL, degrees[i]));
-  const char *rates[] = {"deg/s", "degree/s", "\xC2\xB0/s", "\xB0/s", "deg/sec", "\xB0 / s"};
-  for (size_t i = 0; i < sizeof rates / sizeof *rates; i++)
-    TEST_ASSERT_DOUBLE_WITHIN(1e-15, PI / 180, si_of(WM_Q_YAW_RATE, rates[i]));
-  TEST_ASSERT_EQUAL_DOUBLE(1.0, si_of(WM_Q_YAW_RATE, "rad/s"));
-  TEST_ASSERT_DOUBLE_WITHIN(1e-15, 2 * PI / 60, si_of(WM_Q_YAW_RATE, "rpm"));
-  TEST_ASSERT_EQUAL_DOUBLE(1.0, si_of(WM_Q_ROAD_WHEEL, "rad"));
-  TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0.001, si_of(WM_Q_STEERING_ACTUATOR, "mm"));
+// Every spelling that is taken, by its dimension and its size in SI. Names of real files, and with blanks and capitals.
+static void every_spelling_of_a_unit_has_its_size(void) {
+  static const struct {
+    int quantity;
+    double si;
+    const char *spelled[SPELLED_MOST];
+  } rows[] = {
+      {WM_Q_VEHICLE_SPEED,
+       1,
+       {"m/s", "mps", "m/sec", "meter/s", "meters/s", "Unit_MeterPerSecond", "Unit_MeterPerSecon"}},
+      {WM_Q_WHEEL_SPEED_REAR_LEFT, 0.01, {"cm/s"}},
+      {WM_Q_WHEEL_SPEED_FRONT_RIGHT, 0.001, {"mm/s"}},
+      {WM_Q_VEHICLE_SPEED,
+       1 / 3.6,
+       {"km/h", "kmh", "KMH", "km / h", "kph", "kmph", "km/hr", "km/hour", "Unit_KiloMeterPerHour"}},
+      {WM_Q_VEHICLE_SPEED, 0.44704, {"mph", "mi/h", "mile/h", "miles/h", "MilePerHour", "milesperhour"}},
+      {WM_Q_VEHICLE_SPEED, 0.3048, {"ft/s"}},
+      {WM_Q_YAW_RATE, 1, {"rad/s", "rad/sec", "rads", "radian/s", "radians/s"}},
+      {WM_Q_YAW_RATE, 0.001, {"mrad/s"}},
+      {WM_Q_YAW_RATE,
+       PI / 180,
+       {"deg/s", "deg/sec", "deg/sek", "degs", "dps", "degree/s", "\xB0 / s", "degree/sec", "degrees/sec", "degrees/s",
+        "\xC2\xB0/s", "degpersecond", "\xB0Grad/s"}},
+      {WM_Q_YAW_RATE, PI / 180, {"degreespersecond", "Unit_DegreeOfArcPerSecon", "Unit_DegreeOfArcPerSecond"}},
+      {WM_Q_YAW_RATE, 2 * PI / 60, {"rpm", "1/min", "U/min", "umin", "upm", "r/min", "rev/min"}},
+      {WM_Q_ROAD_WHEEL, 1, {"rad", "radian", "radians"}},
+      {WM_Q_ROAD_WHEEL, 0.001, {"mrad"}},
+      {WM_Q_STEERING_WHEEL, PI / 180, {"deg", "Degree", "degrees", "\xC2\xB0", "\xB0", "Unit_DegreeOfArc", "\xB0Grad"}},
+      {WM_Q_STEERING_ACTUATOR, 1, {"m", "meter", "meters"}},
+      {WM_Q_STEERING_ACTUATOR, 0.01, {"cm"}},
+      {WM_Q_STEERING_ACTUATOR, 0.001, {"mm"}},
+      {WM_Q_STEERING_ACTUATOR, 0.0254, {"in", "inch"}},
+      {WM_Q_ACCELERATION_X, 1, {"m/s2", "m/s^2", "m/s/s", "mps2", "Unit_MeterPerSecondSquared"}},
+      {WM_Q_ACCELERATION_Y, 9.80665, {"g"}},
+      {WM_Q_ACCELERATION_Z, 0.00980665, {"mg"}},
+  };
+  for (size_t r = 0; r < sizeof rows / sizeof *rows; r++)
+    for (size_t i = 0; i < SPELLED_MOST && rows[r].spelled[i]; i++)
+      TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(1e-14 * rows[r].si, rows[r].si, si_of(rows[r].quantity, rows[r].spelled[i]),
+                                        rows[r].spelled[i]);
 }
 
 static void unit_scale_and_offset_of_the_binding(void) {
@@ -235,11 +257,11 @@ static void ticks_after_a_silence(void) {
   TEST_ASSERT_EQUAL_DOUBLE(35000, moved_in_silence(1500, 25, 35000));  // beyond half a cycle
   TEST_ASSERT_EQUAL_DOUBLE(-15000, moved_in_silence(1500, 20, -15000));
   TEST_ASSERT_EQUAL_DOUBLE(-35000, moved_in_silence(-1500, 25, -35000));
-  TEST_ASSERT_TRUE(isnan(moved_in_silence(1500, 60, 89000)));
-  TEST_ASSERT_TRUE(isnan(moved_in_silence(1500, 60, 464)));
+  TEST_ASSERT_DOUBLE_IS_NAN(moved_in_silence(1500, 60, 89000));
+  TEST_ASSERT_DOUBLE_IS_NAN(moved_in_silence(1500, 60, 464));
   TEST_ASSERT_EQUAL_DOUBLE(0, moved_in_silence(0, 60, 0));
   TEST_ASSERT_EQUAL_DOUBLE(3000, moved_in_silence(0, 60, 3000));  // the other way round is 20 times as far
-  TEST_ASSERT_TRUE(isnan(moved_in_silence(0, 60, 9000)));
+  TEST_ASSERT_DOUBLE_IS_NAN(moved_in_silence(0, 60, 9000));
   TEST_ASSERT_EQUAL_DOUBLE(500, moved_in_silence(100, 3, 500));
 }
 
@@ -400,8 +422,7 @@ static void several_quantities_and_ids(void) {
 
 int main(void) {
   UNITY_BEGIN();
-  RUN_TEST(units_of_speed);
-  RUN_TEST(units_of_angles_and_lengths);
+  RUN_TEST(every_spelling_of_a_unit_has_its_size);
   RUN_TEST(unit_scale_and_offset_of_the_binding);
   RUN_TEST(sum_of_signals);
   RUN_TEST(floats);

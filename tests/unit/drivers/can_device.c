@@ -175,6 +175,19 @@ static void what_the_sockets_queue_lost_is_counted(void) {
   TEST_ASSERT_EQUAL_UINT64(9, source->counts.overflows);
 }
 
+// The kernel counts with 32 bits.
+static void the_count_of_what_the_sockets_queue_lost_wraps(void) {
+  fake_step steps[] = {FRAME(1, 1500), FRAME(2, 1500), END};
+  for (int i = 0; i < 2; i++) steps[i].received.has_queue_dropped = 1;
+  steps[0].received.queue_dropped = UINT32_MAX - 1;
+  steps[1].received.queue_dropped = 3;
+  make(steps);
+  expect_speed(1.5, WM_NS_PER_S);
+  TEST_ASSERT_EQUAL_UINT64(UINT32_MAX - 1, source->counts.overflows);
+  expect_speed(1.5, WM_NS_PER_S);
+  TEST_ASSERT_EQUAL_UINT64(UINT64_C(4294967299), source->counts.overflows);
+}
+
 // ── stamps ──────────────────────────────────────────────────────────────────────────────────────────────────────────
 
 static void without_a_stamp_the_time_of_reading_is_taken(void) {
@@ -193,6 +206,18 @@ static void a_wall_clock_that_is_set_between_stamp_and_reading_does_no_harm(void
   c.software_ns += leap_ns;  // stamped by the new time
   TEST_ASSERT_EQUAL_INT64(AT(3), can_clock_stamp(&clock, &c, AT(6), AT(6) + FAKE_UTC_NS + leap_ns));
   TEST_ASSERT_EQUAL_UINT64(0, clock.implausible);
+}
+
+// The two clocks are read one after the other.
+static void a_stamp_that_is_slightly_in_the_future_is_now(void) {
+  can_clock clock = {0};
+  can_received soon = fake_frame(AT(7) + WM_NS_PER_MS / 2, 0), later = fake_frame(AT(9), 0);
+  TEST_ASSERT_EQUAL_INT64(AT(7), can_clock_stamp(&clock, &soon, AT(7), AT(7) + FAKE_UTC_NS));
+  TEST_ASSERT_EQUAL_INT64(250 * WM_NS_PER_US, clock.uncertainty_ns);
+  TEST_ASSERT_EQUAL_UINT64(0, clock.implausible);
+  TEST_ASSERT_EQUAL_INT64(AT(8),
+                          can_clock_stamp(&clock, &later, AT(8), AT(8) + FAKE_UTC_NS));  // by a whole millisecond
+  TEST_ASSERT_EQUAL_UINT64(1, clock.implausible);
 }
 
 static void an_absurd_stamp_is_not_believed(void) {
@@ -223,6 +248,25 @@ static void an_adapters_own_clock_is_followed(void) {
   TEST_ASSERT_LESS_OR_EQUAL_INT64(500 * WM_NS_PER_US, worst_ns);
   TEST_ASSERT_EQUAL_UINT64(1, clock.adapter.restarts);
   TEST_ASSERT_LESS_OR_EQUAL_INT64(WM_NS_PER_MS, clock.uncertainty_ns);
+}
+
+// A clock of 32 bits in microseconds, as adapters have it, wraps after 71.6 minutes. Seven frames look delayed: they
+// get the stamp of the one before. From the eighth on the clock counts as begun anew.
+static void an_adapters_clock_of_32_bits_wraps(void) {
+  can_clock clock = {0};
+  const wm_time_ns wrap_ns = (INT64_C(1) << 32) * WM_NS_PER_US, period_ns = 10 * WM_NS_PER_MS;
+  int held = 0;
+  for (int i = 0; i < 2000; i++) {
+    const wm_time_ns true_ns = AT(10 * i), now_ns = true_ns + WM_NS_PER_MS;
+    can_received r = fake_frame(true_ns + 200 * WM_NS_PER_US, 0);
+    r.hardware_ns = (wrap_ns - 1000 * period_ns + i * period_ns + WM_NS_PER_MS) % wrap_ns;
+    const wm_time_ns late_ns = true_ns - can_clock_stamp(&clock, &r, now_ns, now_ns + FAKE_UTC_NS);
+    if (late_ns > WM_NS_PER_MS) held++;
+    if (i < 1000 || i >= 1007) TEST_ASSERT_INT64_WITHIN(WM_NS_PER_MS, 0, late_ns);
+    TEST_ASSERT_INT64_WITHIN(7 * period_ns, 0, late_ns);
+  }
+  TEST_ASSERT_EQUAL(7, held);
+  TEST_ASSERT_EQUAL_UINT64(1, clock.adapter.restarts);
 }
 
 // ── what the kernel hands out ───────────────────────────────────────────────────────────────────────────────────────
@@ -276,10 +320,13 @@ int main(void) {
   RUN_TEST(an_interface_that_was_never_there_is_waited_for);
   RUN_TEST(error_frames_say_how_the_controller_is);
   RUN_TEST(what_the_sockets_queue_lost_is_counted);
+  RUN_TEST(the_count_of_what_the_sockets_queue_lost_wraps);
   RUN_TEST(without_a_stamp_the_time_of_reading_is_taken);
   RUN_TEST(a_wall_clock_that_is_set_between_stamp_and_reading_does_no_harm);
+  RUN_TEST(a_stamp_that_is_slightly_in_the_future_is_now);
   RUN_TEST(an_absurd_stamp_is_not_believed);
   RUN_TEST(an_adapters_own_clock_is_followed);
+  RUN_TEST(an_adapters_clock_of_32_bits_wraps);
   RUN_TEST(a_message_of_the_kernel_is_read_with_its_stamps);
   return UNITY_END();
 }

@@ -59,16 +59,17 @@ static void a_fault_has_its_times_parameters_and_statements(void) {
   TEST_ASSERT_EQUAL(WM_STATES_COUNTER, f->states[0].kind);
   TEST_ASSERT_EQUAL_STRING("lost", f->states[0].what);
   TEST_ASSERT_EQUAL_DOUBLE(28, f->states[0].at_most);
-  TEST_ASSERT_TRUE(isnan(f->states[0].within_s));
+  TEST_ASSERT_DOUBLE_IS_NAN(f->states[0].within_s);
   TEST_ASSERT_EQUAL_STRING("motion_stale", f->states[1].what);
   TEST_ASSERT_EQUAL_STRING("degraded", f->states[2].what);
   TEST_ASSERT_EQUAL_STRING("bus-off", f->states[5].what);
   TEST_ASSERT_EQUAL_STRING("can", f->states[5].source);
-  TEST_ASSERT_TRUE(f->has_pose && isnan(f->pose.rate_hz));
+  TEST_ASSERT_TRUE(f->has_pose);
+  TEST_ASSERT_DOUBLE_IS_NAN(f->pose.rate_hz);
   TEST_ASSERT_EQUAL_DOUBLE(4, f->pose.error_sigmas);
   TEST_ASSERT_EQUAL_DOUBLE(3, faults.fault[1].until_s);
   TEST_ASSERT_EQUAL_STRING("waymark", faults.fault[1].text);
-  TEST_ASSERT_TRUE(isinf(faults.fault[2].until_s));
+  TEST_ASSERT_DOUBLE_IS_INF(faults.fault[2].until_s);
   TEST_ASSERT_EQUAL_HEX32(0x1A0, faults.fault[2].ids[0]);
   TEST_ASSERT_EQUAL_HEX32(0x101, faults.fault[2].ids[1]);
 }

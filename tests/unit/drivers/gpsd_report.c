@@ -33,7 +33,7 @@ static void positions_are_read(void) {
   TEST_ASSERT_EQUAL_DOUBLE(0.012, report.east_m);
   TEST_ASSERT_EQUAL_DOUBLE(271.5, report.track_deg);
   TEST_ASSERT_EQUAL_DOUBLE(3, report.status);
-  TEST_ASSERT_TRUE(isnan(report.heading_deg));
+  TEST_ASSERT_DOUBLE_IS_NAN(report.heading_deg);
   TEST_ASSERT_EQUAL_STRING("RTK fixed", gpsd_fix_name(3));
   TEST_ASSERT_EQUAL_STRING("fix", gpsd_fix_name(99));
 }
@@ -42,18 +42,23 @@ static void other_reports_are_read(void) {
   expect("{\"class\":\"VERSION\",\"release\":\"3.22\",\"rev\":\"3.22\",\"proto_major\":3,\"proto_minor\":14}");
   TEST_ASSERT_EQUAL(GPSD_OTHER, report.kind);
   expect("{\"class\":\"TPV\",\"device\":\"/dev/pts/1\",\"mode\":1}");
-  TEST_ASSERT_TRUE(report.kind == GPSD_TPV && report.mode == 1 && isnan(report.latitude_deg));
+  TEST_ASSERT_EQUAL(GPSD_TPV, report.kind);
+  TEST_ASSERT_EQUAL_DOUBLE(1, report.mode);
+  TEST_ASSERT_DOUBLE_IS_NAN(report.latitude_deg);
   TEST_ASSERT_EQUAL_INT64(WM_TIME_NONE, report.time_ns);
   expect("{\"class\":\"ATT\",\"device\":\"/dev/ttyACM0\",\"heading\":90.5,\"mag_st\":\"N\"}");
-  TEST_ASSERT_TRUE(report.kind == GPSD_ATT && report.heading_deg == 90.5);
+  TEST_ASSERT_EQUAL(GPSD_ATT, report.kind);
+  TEST_ASSERT_EQUAL_DOUBLE(90.5, report.heading_deg);
   expect("{\"class\":\"DEVICE\",\"path\":\"/dev/ttyACM0\",\"activated\":0}");
-  TEST_ASSERT_TRUE(report.kind == GPSD_DEVICE && report.activated == 0);
+  TEST_ASSERT_EQUAL(GPSD_DEVICE, report.kind);
+  TEST_ASSERT_EQUAL_DOUBLE(0, report.activated);
   expect("{\"class\":\"DEVICE\",\"path\":\"/dev/ttyACM0\",\"activated\":\"2026-11-23T23:50:58.125Z\"}");
-  TEST_ASSERT_TRUE(isnan(report.activated));
+  TEST_ASSERT_DOUBLE_IS_NAN(report.activated);
   expect("{\"class\":\"ERROR\",\"message\":\"Unrecognized request '?'\"}");
   TEST_ASSERT_EQUAL_STRING("Unrecognized request '?'", report.message);
   expect("{\"class\":\"TPV\",\"lat\":nan,\"lon\":null,\"time\":\"yesterday\"}");
-  TEST_ASSERT_TRUE(isnan(report.latitude_deg) && report.time_ns == WM_TIME_NONE);
+  TEST_ASSERT_DOUBLE_IS_NAN(report.latitude_deg);
+  TEST_ASSERT_EQUAL_INT64(WM_TIME_NONE, report.time_ns);
   expect("{}");
 }
 

@@ -58,8 +58,10 @@ static void bare(void) {
   TEST_ASSERT_EQUAL_STRING("drive", wm_recording_name(recording));
   TEST_ASSERT_EQUAL_DOUBLE(12.5, wm_recording_duration_s(recording));
   const wm_start *start = wm_site_start(wm_recording_site(recording));
-  TEST_ASSERT_TRUE(start->t_ns == WM_TIME_NONE && isnan(start->p_m[0]) && isnan(start->heading_rad));
-  TEST_ASSERT_TRUE(isnan(wm_site_wheels(wm_recording_site(recording))->radius_m));
+  TEST_ASSERT_EQUAL_INT64(WM_TIME_NONE, start->t_ns);
+  TEST_ASSERT_DOUBLE_IS_NAN(start->p_m[0]);
+  TEST_ASSERT_DOUBLE_IS_NAN(start->heading_rad);
+  TEST_ASSERT_DOUBLE_IS_NAN(wm_site_wheels(wm_recording_site(recording))->radius_m);
   size_t count;
   wm_site_sensors(wm_recording_site(recording), &count);
   TEST_ASSERT_EQUAL(0, count);
@@ -74,7 +76,7 @@ static void name_of_the_folder(void) {
   folder_write("recording.yaml", "format: waymark-recording/1\n");
   open_it();
   TEST_ASSERT_EQUAL_STRING_LEN("waymark-test-", wm_recording_name(recording), 13);
-  TEST_ASSERT_TRUE(isnan(wm_recording_duration_s(recording)));
+  TEST_ASSERT_DOUBLE_IS_NAN(wm_recording_duration_s(recording));
 }
 
 static void start_pose(void) {
@@ -82,7 +84,10 @@ static void start_pose(void) {
                ABOUT "vehicle:\n  initial_pose: {t_ns: 5, x_m: 1, y_m: 2, heading_rad: 4, sigma_heading_deg: 9}\n");
   open_it();
   const wm_start *start = wm_site_start(wm_recording_site(recording));
-  TEST_ASSERT_TRUE(start->t_ns == 5 && start->p_m[1] == 2 && isnan(start->p_m[2]) && isnan(start->q_xyzw[0]));
+  TEST_ASSERT_EQUAL_INT64(5, start->t_ns);
+  TEST_ASSERT_EQUAL_DOUBLE(2, start->p_m[1]);
+  TEST_ASSERT_DOUBLE_IS_NAN(start->p_m[2]);
+  TEST_ASSERT_DOUBLE_IS_NAN(start->q_xyzw[0]);
   TEST_ASSERT_DOUBLE_WITHIN(1e-15, 4 - 2 * M_PI, start->heading_rad);
   TEST_ASSERT_DOUBLE_WITHIN(1e-15, M_PI / 20, start->sigma_heading_rad);
   TEST_ASSERT_EQUAL_DOUBLE(0.05, start->sigma_xy_m);
@@ -126,10 +131,16 @@ static void whole_calibration(void) {
   TEST_ASSERT_EQUAL_STRING("laser", sensors[0].name);
   TEST_ASSERT_DOUBLE_WITHIN(1e-15, M_PI / 2, sensors[0].mounting.rpy_rad[1]);
   TEST_ASSERT_DOUBLE_WITHIN(1e-15, M_PI / 180, sensors[0].bearing_sigma_rad);
-  TEST_ASSERT_TRUE(sensors[0].mounting.xyz_m[2] == 3 && sensors[0].max_range_m == 30 && sensors[0].range_is_depth);
-  TEST_ASSERT_TRUE(isnan(sensors[1].range_sigma_m) && isinf(sensors[1].max_range_m) && !sensors[1].range_is_depth);
+  TEST_ASSERT_EQUAL_DOUBLE(3, sensors[0].mounting.xyz_m[2]);
+  TEST_ASSERT_EQUAL_DOUBLE(30, sensors[0].max_range_m);
+  TEST_ASSERT_TRUE(sensors[0].range_is_depth);
+  TEST_ASSERT_DOUBLE_IS_NAN(sensors[1].range_sigma_m);
+  TEST_ASSERT_DOUBLE_IS_INF(sensors[1].max_range_m);
+  TEST_ASSERT_TRUE(!sensors[1].range_is_depth);
   const wm_wheels *wheels = wm_site_wheels(wm_recording_site(recording));
-  TEST_ASSERT_TRUE(wheels->ticks_per_turn == 2048 && wheels->encoder_offset_m == -0.2 && wheels->steering_ratio == 13);
+  TEST_ASSERT_EQUAL_DOUBLE(2048, wheels->ticks_per_turn);
+  TEST_ASSERT_EQUAL_DOUBLE(-0.2, wheels->encoder_offset_m);
+  TEST_ASSERT_EQUAL_DOUBLE(13, wheels->steering_ratio);
   TEST_ASSERT_EQUAL(3, wheels->steering_table_count);
   TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0.008, wheels->actuator_m[0]);
   TEST_ASSERT_DOUBLE_WITHIN(1e-15, -M_PI / 6, wheels->road_wheel_rad[0]);
@@ -174,8 +185,14 @@ static void landmarks(void) {
   size_t count;
   const wm_landmark *all = wm_site_landmarks(wm_recording_site(recording), &count);
   TEST_ASSERT_EQUAL(2, count);
-  TEST_ASSERT_TRUE(all[0].id == 7 && all[0].p_m[2] == 0 && all[0].sigma_m == 0.5 && isnan(all[0].yaw_rad));
-  TEST_ASSERT_TRUE(all[1].id == 3 && all[1].p_m[2] == 6 && isnan(all[1].sigma_m) && all[1].yaw_rad == 1.5);
+  TEST_ASSERT_EQUAL(7, all[0].id);
+  TEST_ASSERT_EQUAL_DOUBLE(0, all[0].p_m[2]);
+  TEST_ASSERT_EQUAL_DOUBLE(0.5, all[0].sigma_m);
+  TEST_ASSERT_DOUBLE_IS_NAN(all[0].yaw_rad);
+  TEST_ASSERT_EQUAL(3, all[1].id);
+  TEST_ASSERT_EQUAL_DOUBLE(6, all[1].p_m[2]);
+  TEST_ASSERT_DOUBLE_IS_NAN(all[1].sigma_m);
+  TEST_ASSERT_EQUAL_DOUBLE(1.5, all[1].yaw_rad);
   TEST_ASSERT_NOT_NULL(strstr(warnings, "z_m: empty for 1 of 2 landmarks; taken as 0"));
   // As a run writes its map; what is no covariance is none.
   folder_write("landmarks.csv",
@@ -183,9 +200,13 @@ static void landmarks(void) {
                "1,1,2,3,0.2,0.04,0.01,0.01,0.5,0.0004\n2,1,2,3,0.2,0.04,0.03,0.01,,\n");
   open_it();
   all = wm_site_landmarks(wm_recording_site(recording), &count);
-  TEST_ASSERT_TRUE(all[0].cov_m2[0] == 0.04 && all[0].cov_m2[1] == 0.01 && all[0].cov_m2[2] == 0.01);
+  TEST_ASSERT_EQUAL_DOUBLE(0.04, all[0].cov_m2[0]);
+  TEST_ASSERT_EQUAL_DOUBLE(0.01, all[0].cov_m2[1]);
+  TEST_ASSERT_EQUAL_DOUBLE(0.01, all[0].cov_m2[2]);
   TEST_ASSERT_EQUAL_DOUBLE(0.02, all[0].yaw_sigma_rad);
-  TEST_ASSERT_TRUE(isnan(all[1].cov_m2[0]) && isnan(all[1].cov_m2[1]) && isnan(all[1].yaw_sigma_rad));
+  TEST_ASSERT_DOUBLE_IS_NAN(all[1].cov_m2[0]);
+  TEST_ASSERT_DOUBLE_IS_NAN(all[1].cov_m2[1]);
+  TEST_ASSERT_DOUBLE_IS_NAN(all[1].yaw_sigma_rad);
 
   folder_write("landmarks.csv", "id,x_m,y_m\n1,0,0\n2,0\n");
   refused("landmarks.csv:3: 2 fields where the header has 3");

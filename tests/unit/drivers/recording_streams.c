@@ -63,12 +63,15 @@ static void motion_exact(void) {
   folder_write("motion.csv", "t_ns,v_mps,w_radps\n9007199254740993,0.1,-0.25\n9007199254740994,-1e-3,.5\n");
   wm_source *motion = source("motion");
   wm_event event = next(motion);
-  TEST_ASSERT_TRUE(event.t_ns == INT64_C(9007199254740993) && event.arrival_ns == event.t_ns);
-  TEST_ASSERT_TRUE(event.as.twist2.v_mps == 0.1 && event.as.twist2.w_radps == -0.25);
+  TEST_ASSERT_EQUAL_INT64(INT64_C(9007199254740993), event.t_ns);
+  TEST_ASSERT_EQUAL_INT64(event.t_ns, event.arrival_ns);
+  TEST_ASSERT_EQUAL_DOUBLE(0.1, event.as.twist2.v_mps);
+  TEST_ASSERT_EQUAL_DOUBLE(-0.25, event.as.twist2.w_radps);
   TEST_ASSERT_EQUAL(WM_EVENT_TWIST2, event.kind);
   TEST_ASSERT_EQUAL(0, event.seq);
   event = next(motion);
-  TEST_ASSERT_TRUE(event.as.twist2.v_mps == -1e-3 && event.as.twist2.w_radps == 0.5);
+  TEST_ASSERT_EQUAL_DOUBLE(-1e-3, event.as.twist2.v_mps);
+  TEST_ASSERT_EQUAL_DOUBLE(0.5, event.as.twist2.w_radps);
   TEST_ASSERT_EQUAL(1, event.seq);
   at_end(motion);
   TEST_ASSERT_TRUE(motion->is_motion);
@@ -81,8 +84,10 @@ static void motion_sideways(void) {
   TEST_ASSERT_EQUAL_HEX32(WM_EVENT_BIT(WM_EVENT_TWIST2) | WM_EVENT_BIT(WM_EVENT_TWIST6), motion->kinds);
   wm_event event = next(motion);
   TEST_ASSERT_EQUAL(WM_EVENT_TWIST6, event.kind);
-  TEST_ASSERT_TRUE(event.as.twist6.v_mps[0] == 0.5 && event.as.twist6.v_mps[1] == 0.25);
-  TEST_ASSERT_TRUE(event.as.twist6.v_mps[2] == 0 && event.as.twist6.w_radps[2] == -0.125);
+  TEST_ASSERT_EQUAL_DOUBLE(0.5, event.as.twist6.v_mps[0]);
+  TEST_ASSERT_EQUAL_DOUBLE(0.25, event.as.twist6.v_mps[1]);
+  TEST_ASSERT_EQUAL_DOUBLE(0, event.as.twist6.v_mps[2]);
+  TEST_ASSERT_EQUAL_DOUBLE(-0.125, event.as.twist6.w_radps[2]);
   TEST_ASSERT_EQUAL(WM_EVENT_TWIST2, next(motion).kind);
   at_end(motion);
 }
@@ -117,8 +122,10 @@ static void spellings(void) {
     wm_source *motion = source("motion");
     for (int row = 0; row < 2; row++) {
       wm_event event = next(motion);
-      TEST_ASSERT_TRUE(event.t_ns == 10 * (row + 1) && event.arrival_ns == event.t_ns);
-      TEST_ASSERT_TRUE(event.as.twist2.v_mps == 1 + 2 * row && event.as.twist2.w_radps == 2 + 2 * row);
+      TEST_ASSERT_EQUAL_INT64(10 * (row + 1), event.t_ns);
+      TEST_ASSERT_EQUAL_INT64(event.t_ns, event.arrival_ns);
+      TEST_ASSERT_EQUAL_DOUBLE(1 + 2 * row, event.as.twist2.v_mps);
+      TEST_ASSERT_EQUAL_DOUBLE(2 + 2 * row, event.as.twist2.w_radps);
     }
     at_end(motion);
     TEST_ASSERT_EQUAL(0, motion->counts.malformed + motion->counts.out_of_order);
@@ -184,7 +191,8 @@ static void long_file(void) {
   wm_source *motion = source("motion");
   for (int i = 0; i < ROWS; i++) {
     wm_event event = next(motion);
-    TEST_ASSERT_TRUE(event.t_ns == i * INT64_C(1000003) && event.as.twist2.w_radps == i % 3);
+    TEST_ASSERT_EQUAL_INT64(i * INT64_C(1000003), event.t_ns);
+    TEST_ASSERT_EQUAL_DOUBLE(i % 3, event.as.twist2.w_radps);
   }
   at_end(motion);
 }
@@ -202,7 +210,8 @@ static void order_of_arrival(void) {
   }
   TEST_ASSERT_EQUAL(1, motion->counts.out_of_order);
   wm_event event = next(gnss);
-  TEST_ASSERT_TRUE(isnan(event.as.position.p_m[2]) && isnan(event.as.position.sigma_z_m));
+  TEST_ASSERT_DOUBLE_IS_NAN(event.as.position.p_m[2]);
+  TEST_ASSERT_DOUBLE_IS_NAN(event.as.position.sigma_z_m);
   TEST_ASSERT_EQUAL(200, event.arrival_ns);
   event = next(gnss);
   TEST_ASSERT_EQUAL(5, event.t_ns);
@@ -260,15 +269,17 @@ static void sightings_by_sensor(void) {
   wm_event event = next(left);
   TEST_ASSERT_EQUAL_STRING("left", sensors[event.as.sighting.sensor].name);
   TEST_ASSERT_EQUAL(7, event.as.sighting.landmark_id);
-  TEST_ASSERT_TRUE(event.as.sighting.bearing_rad == 0.5 && isnan(event.as.sighting.range_m) &&
-                   isnan(event.as.sighting.bearing_sigma_rad));
+  TEST_ASSERT_EQUAL_DOUBLE(0.5, event.as.sighting.bearing_rad);
+  TEST_ASSERT_DOUBLE_IS_NAN(event.as.sighting.range_m);
+  TEST_ASSERT_DOUBLE_IS_NAN(event.as.sighting.bearing_sigma_rad);
   event = next(left);
   TEST_ASSERT_EQUAL(-1, event.as.sighting.landmark_id);
   TEST_ASSERT_DOUBLE_WITHIN(1e-15, 4.0 - 2 * M_PI, event.as.sighting.bearing_rad);
   at_end(left);
   event = next(right);
   TEST_ASSERT_EQUAL(0, event.as.sighting.sensor);
-  TEST_ASSERT_TRUE(isnan(event.as.sighting.bearing_rad) && event.as.sighting.range_m == 2.5);
+  TEST_ASSERT_DOUBLE_IS_NAN(event.as.sighting.bearing_rad);
+  TEST_ASSERT_EQUAL_DOUBLE(2.5, event.as.sighting.range_m);
   at_end(right);
   event = next(front);
   TEST_ASSERT_EQUAL_DOUBLE(2.0, sensors[event.as.sighting.sensor].mounting.xyz_m[0]);
@@ -314,8 +325,10 @@ static void sightings_with_their_own_noise(void) {
       "4,eye,1,0,2,,,0.04,,0.09,,\n5,eye,1,0,,,,0.04,0,0.09,,\n6,eye,1,0,2,,,1,2,1,,\n7,eye,1,0,2,,,,,,0.1,\n");
   wm_source *eye = source("sightings:eye");
   wm_sighting s = next(eye).as.sighting;
-  TEST_ASSERT_TRUE(s.bearing_sigma_rad == 0.03 && s.range_sigma_m == 0.2);
-  TEST_ASSERT_TRUE(s.elevation_rad == 0.1 && s.elevation_sigma_rad == 0.02);
+  TEST_ASSERT_EQUAL_DOUBLE(0.03, s.bearing_sigma_rad);
+  TEST_ASSERT_EQUAL_DOUBLE(0.2, s.range_sigma_m);
+  TEST_ASSERT_EQUAL_DOUBLE(0.1, s.elevation_rad);
+  TEST_ASSERT_EQUAL_DOUBLE(0.02, s.elevation_sigma_rad);
   s = next(eye).as.sighting;
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.3, s.range_sigma_m);
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.2 / 2, s.bearing_sigma_rad);
@@ -336,11 +349,16 @@ static void increments_with_and_without_covariance(void) {
   wm_event event = next(increments);
   const wm_increment *i = &event.as.increment;
   TEST_ASSERT_EQUAL(WM_EVENT_INCREMENT, event.kind);
-  TEST_ASSERT_TRUE(event.t_ns == 5 && i->from_ns == 0 && i->dx_m == 0.1 && i->dy_m == 0.2 && i->dheading_rad == 0.3);
+  TEST_ASSERT_EQUAL_INT64(5, event.t_ns);
+  TEST_ASSERT_EQUAL_INT64(0, i->from_ns);
+  TEST_ASSERT_EQUAL_DOUBLE(0.1, i->dx_m);
+  TEST_ASSERT_EQUAL_DOUBLE(0.2, i->dy_m);
+  TEST_ASSERT_EQUAL_DOUBLE(0.3, i->dheading_rad);
   const double covariance[6] = {1, 0.1, 2, 0.2, 0.3, 3};
   TEST_ASSERT_EQUAL_MEMORY(covariance, i->covariance, sizeof covariance);
   event = next(increments);
-  TEST_ASSERT_TRUE(isnan(event.as.increment.covariance[0]) && isnan(event.as.increment.covariance[5]));
+  TEST_ASSERT_DOUBLE_IS_NAN(event.as.increment.covariance[0]);
+  TEST_ASSERT_DOUBLE_IS_NAN(event.as.increment.covariance[5]);
   at_end(increments);
   TEST_ASSERT_EQUAL(2, increments->counts.malformed);
 }
@@ -384,11 +402,13 @@ static void other_streams(void) {
   event = next(source("markers:up"));
   TEST_ASSERT_EQUAL(10, event.as.marker.id);
   TEST_ASSERT_DOUBLE_WITHIN(1e-15, 2 * M_PI - 3.2, event.as.marker.yaw_rad);
-  TEST_ASSERT_TRUE(isnan(event.as.marker.along_sigma_m) && isnan(event.as.marker.yaw_sigma_rad) &&
-                   isnan(event.as.marker.bloom_px));
+  TEST_ASSERT_DOUBLE_IS_NAN(event.as.marker.along_sigma_m);
+  TEST_ASSERT_DOUBLE_IS_NAN(event.as.marker.yaw_sigma_rad);
+  TEST_ASSERT_DOUBLE_IS_NAN(event.as.marker.bloom_px);
   wm_source *stereo = source("stereo");
   event = next(stereo);
-  TEST_ASSERT_TRUE(event.as.stereo.left_px[1] == 2 && isnan(event.as.stereo.right_px[0]));
+  TEST_ASSERT_EQUAL_DOUBLE(2, event.as.stereo.left_px[1]);
+  TEST_ASSERT_DOUBLE_IS_NAN(event.as.stereo.right_px[0]);
   static const uint64_t kAppearance[] = {1, 0, 0xff, UINT64_C(1) << 63}, kNone[4] = {0};
   event = next(stereo);
   TEST_ASSERT_EQUAL(4, event.t_ns);

@@ -131,7 +131,7 @@ static void typed_reads(void) {
        "x.yaml:10: huge: '1e999' is out of range; a number of at least 0 is needed");
   n = wm_yaml_get(&root, "t");
   TEST_ASSERT_EQUAL(WM_OK, wm_yaml_i64(&n, INT64_MIN, INT64_MAX, &i, &err));
-  TEST_ASSERT_TRUE(i == INT64_C(9007199254740993));
+  TEST_ASSERT_EQUAL_INT64(INT64_C(9007199254740993), i);
 }
 
 static void unknown_keys(void) {

@@ -114,7 +114,7 @@ void the_odds_turn_with_what_is_seen(void) {
   TEST_ASSERT_LESS_OR_EQUAL_DOUBLE(50.0, weight);
   TEST_ASSERT_DOUBLE_WITHIN(3.0, 11.0, alike.likelier_for_m());
   alike.forget_aliased_odds();
-  TEST_ASSERT_TRUE(alike.aliased_odds() == 0.0);
+  TEST_ASSERT_EQUAL_DOUBLE(0.0, alike.aliased_odds());
 }
 
 // GIVEN that WHEN the map usually explains no more than it does where the robot is believed to be THEN nothing turns.

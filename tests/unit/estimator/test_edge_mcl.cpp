@@ -53,7 +53,8 @@ void seeing_the_same_again_makes_it_no_surer(void) {
   const double at_first = variance();
   d.go(f, 5, 0.0, 0.0);
   const double stood = variance();
-  TEST_ASSERT_TRUE(stood > 0.6 * at_first && stood <= at_first);
+  TEST_ASSERT_GREATER_THAN_DOUBLE(0.6 * at_first, stood);
+  TEST_ASSERT_TRUE(stood <= at_first);
   d.go(f, 5, 0.5, 0.0);
   TEST_ASSERT_LESS_THAN_DOUBLE(0.4 * stood, variance());
 }
@@ -126,7 +127,8 @@ void places_that_look_the_same_are_listed_beside_the_pose(void) {
     TEST_ASSERT_GREATER_OR_EQUAL_DOUBLE(0, h.weight);
     sum += h.weight;
   }
-  TEST_ASSERT_TRUE(sum > 0 && sum < 0.01);
+  TEST_ASSERT_TRUE(sum > 0);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.01, sum);
 }
 
 // GIVEN a start pose that is 0.8 m off along a corridor, with a sigma of 0.5 m along it WHEN a corner comes into view

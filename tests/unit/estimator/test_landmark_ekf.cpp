@@ -231,8 +231,8 @@ void test_tilt_and_angle_scale(void) {
   };
   TEST_ASSERT_DOUBLE_WITHIN(1e-4, change(rolled), e.bearing_by[wm::kBySensor + wm::kRoll]);
   TEST_ASSERT_DOUBLE_WITHIN(1e-4, change(pitched), e.bearing_by[wm::kBySensor + wm::kPitch]);
-  TEST_ASSERT_TRUE(std::fabs(e.bearing_by[wm::kBySensor + wm::kRoll]) > 0.1 &&
-                   std::fabs(e.bearing_by[wm::kBySensor + wm::kPitch]) > 0.01);
+  TEST_ASSERT_GREATER_THAN_DOUBLE(0.1, std::fabs(e.bearing_by[wm::kBySensor + wm::kRoll]));
+  TEST_ASSERT_GREATER_THAN_DOUBLE(0.01, std::fabs(e.bearing_by[wm::kBySensor + wm::kPitch]));
   for (const wm::sensor_state which : {wm::kRoll, wm::kPitch, wm::kAngleScale}) {
     wm::sensor_errors errors;
     errors[which] = h;

@@ -7,6 +7,7 @@
 #include <cstring>
 
 #include "events.hpp"
+#include "filters/core/landmark_bias.hpp"
 #include "filters/core/landmark_evidence.hpp"
 #include "filters/landmark_ekf/params.h"
 #include "filters/relocalize/pose_search.hpp"
@@ -90,8 +91,9 @@ void drive(double for_s, int seen, sees how = sees::right) {
     const wm_estimate e = estimate();
     const double off =
         std::sqrt(wm::square(e.pose_map_base.p_m[0] - truth.x_m) + wm::square(e.pose_map_base.p_m[1] - truth.y_m));
-    for (const double value : e.covariance) TEST_ASSERT_TRUE(wm::finite(value));
-    TEST_ASSERT_TRUE(wm::finite(off) && wm::finite(e.heading_rad));
+    for (const double value : e.covariance) TEST_ASSERT_DOUBLE_IS_DETERMINATE(value);
+    TEST_ASSERT_DOUBLE_IS_DETERMINATE(off);
+    TEST_ASSERT_DOUBLE_IS_DETERMINATE(e.heading_rad);
     const double p = e.lost_probability;
     TEST_ASSERT_GREATER_OR_EQUAL_DOUBLE(0.0, p);
     TEST_ASSERT_LESS_OR_EQUAL_DOUBLE(1.0, p);
@@ -161,6 +163,28 @@ void test_an_old_contradiction_is_forgotten(void) {
   evidence.note(make::at(17.0), 1, 0.0, 0.0, 0.0, &record);
   TEST_ASSERT_LESS_THAN_DOUBLE(prior + 0.45, evidence.log_odds());
   TEST_ASSERT_GREATER_THAN_DOUBLE(prior + 0.1, evidence.log_odds());
+}
+
+// The worst landmark may have moved; a second one whose innovations have a mean contradicts. Of one alone nothing is
+// left.
+void test_the_worst_landmark_is_left_out(void) {
+  for (int off = 0; off <= 3; off++)
+    for (int count = 1; count <= 3; count++) {
+      wm_monitor_landmarks seen;
+      wm::landmark_bias_clear(&seen);
+      for (int k = 0; k < 100; k++)
+        for (int id = 0; id < count; id++) {
+          wm_innovation i{};
+          i.t_ns = make::at(0.1 * k);
+          i.landmark_id = id;
+          i.residual = WM_RESIDUAL_RANGE;
+          i.variance = 1.0;
+          i.observed = id < off ? 2.0 : k % 2 ? 0.5 : -0.5;
+          wm::landmark_bias_take(&seen, i);
+        }
+      wm::landmark_bias_test(&seen, make::at(10.0));
+      TEST_ASSERT_EQUAL(std::fmin(off, count) >= 2, wm::landmark_bias_contradicts(seen));
+    }
 }
 
 void test_one_that_contradicts_has_moved_and_many_mean_lost(void) {
@@ -442,6 +466,7 @@ int main(void) {
   RUN_TEST(test_three_bearings_give_the_pose);
   RUN_TEST(test_bearings_that_say_nothing_give_no_pose);
   RUN_TEST(test_an_old_contradiction_is_forgotten);
+  RUN_TEST(test_the_worst_landmark_is_left_out);
   RUN_TEST(test_one_that_contradicts_has_moved_and_many_mean_lost);
   RUN_TEST(test_one_against_one_is_doubt_not_lost);
   RUN_TEST(test_misfits_that_scatter_say_nothing_those_in_one_place_do);

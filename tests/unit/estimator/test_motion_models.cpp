@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The choice of the motion's model: by the data that come, and by what is known to be there before the drive.
+#include <cmath>
 #include <initializer_list>
 
 #include "events.hpp"
@@ -154,6 +155,57 @@ void test_repeated_numbers_that_are_right_are_no_fault(void) {
   TEST_ASSERT_FALSE(is_found_stuck(120, 0.0, 0.0, 0.02));
 }
 
+// Without motion data a robot may have braked, accelerated or turned for hold_max_s; then its heading walks by 0.3 rad
+// per sqrt(s).
+void test_what_may_have_moved_unseen(void) {
+  wm_motion_params params;
+  wm_params_defaults(&wm_motion_params_table, &params);
+  params.hold_max_s = 2.0;
+  params.noise_hold_mps2 = 0.6;
+  params.noise_hold_radps2 = 0.4;
+  const double walk = 0.3;
+  const struct {
+    double blind_s, xy_m, heading_rad;
+  } rows[] = {{0.0, 0.0, 0.0},
+              {1.0, 0.3, 0.2},
+              {2.0, 1.2, 0.8},
+              {5.0, 1.2 + 0.6 * 3.0, std::sqrt(0.64 + walk * walk * 3.0)},
+              {102.0, 1.2 + 0.6 * 100.0, std::sqrt(0.64 + walk * walk * 100.0)}};
+  for (const auto &row : rows) {
+    double xy_m = -1, heading_rad = -1;
+    wm_motion_unseen(&params, row.blind_s, &xy_m, &heading_rad);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, row.xy_m, xy_m);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, row.heading_rad, heading_rad);
+  }
+}
+
+// A gyro that is overdue while the counts go on: the way is known, its direction walks, up to any direction at all.
+// The variance of the heading after it is that of a turn rate that changes by noise_hold_radps2 for hold_max_s, then of
+// 0.3 rad per sqrt(s).
+void test_a_known_way_in_an_unknown_direction(void) {
+  wm_motion_params params;
+  wm_params_defaults(&wm_motion_params_table, &params);
+  params.hold_max_s = 2.0;
+  params.noise_hold_radps2 = 0.4;
+  const struct {
+    double overdue_s, dt_s, rotation_rad2;
+  } rows[] = {{0.0, 0.5, 0.2 * 0.2 * 0.0625}, {1.0, 1.0, 0.2 * 0.2 * 15.0}, {10.0, 2.0, 0.18}, {2.0, 100.0, 9.0}};
+  for (const auto &row : rows) {
+    wm::motion_segment segment{};
+    wm::motion_noise noise{};
+    segment.input.model = WM_MOTION_SPEED_YAW_RATE;
+    segment.input.a = 2.0;
+    segment.overdue_s = -1.0;
+    segment.turn_overdue_s = row.overdue_s;
+    segment.dt_s = row.dt_s;
+    wm::add_overdue_noise(segment, params, true, 0.0, &noise);
+    const double way_m2 = 4.0 * row.dt_s * row.dt_s, q = row.rotation_rad2;
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12 * q, q, noise.rotation_rad2);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12 * way_m2, way_m2 * std::fmin(q / 3.0, 0.5), noise.lateral_m2);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12 * way_m2, way_m2 * std::fmin(q * q / 8.0, 0.5), noise.distance_m2);
+  }
+}
+
 }  // namespace
 
 void setUp(void) {}
@@ -167,5 +219,7 @@ int main(void) {
   RUN_TEST(test_a_stuck_gyro_yields_to_the_ticks);
   RUN_TEST(test_a_slow_robots_stuck_gyro_is_found);
   RUN_TEST(test_repeated_numbers_that_are_right_are_no_fault);
+  RUN_TEST(test_what_may_have_moved_unseen);
+  RUN_TEST(test_a_known_way_in_an_unknown_direction);
   return UNITY_END();
 }

@@ -148,7 +148,8 @@ static void a_search_is_spread_over_cycles() {
   matched_points all, some;
   const double share = search.matches(m.map, place, &all);
   TEST_ASSERT_EQUAL(36, all.count);
-  TEST_ASSERT_TRUE(share >= kShareLeast && share <= kShareMost);
+  TEST_ASSERT_GREATER_OR_EQUAL_DOUBLE(kShareLeast, share);
+  TEST_ASSERT_LESS_OR_EQUAL_DOUBLE(kShareMost, share);
   const agreed_pose best = pose_of_most(all, 300, 1);
   TEST_ASSERT_EQUAL(36, best.inliers);
   search.found(best.at);
@@ -190,8 +191,8 @@ static void agreement_by_chance_is_bounded() {
                          k * std::log(share) + (others - k) * std::log(1 - share));
       const double exact = std::log(tail * count * (count - 1.0) * (count - 2.0) / 6);
       const double bound = log_by_chance(agreeing, count, share);
-      TEST_ASSERT_TRUE(bound > exact - 1e-6);
-      if (agreeing - 3 > 0.3 * others) TEST_ASSERT_TRUE(bound < exact + 4.0);
+      TEST_ASSERT_GREATER_THAN_DOUBLE(exact - 1e-6, bound);
+      if (agreeing - 3 > 0.3 * others) TEST_ASSERT_LESS_THAN_DOUBLE(exact + 4.0, bound);
     }
   TEST_ASSERT_EQUAL_DOUBLE(0.0, log_by_chance(3, 3, 0.1));
 }

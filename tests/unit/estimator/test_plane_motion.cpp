@@ -153,6 +153,14 @@ void test_impossible_increments_are_refused(void) {
   TEST_ASSERT_EQUAL(WM_OK, filter.check_motion(make::increment(0.0, 1.0, {1, 0, 0}, correlated)));
   const double three[6] = {1, 0.9, 1, 0.9, -0.9, 1};  // each two of them may be, all three may not
   TEST_ASSERT_EQUAL(WM_OUT_OF_RANGE, filter.check_motion(make::increment(0.0, 1.0, {1, 0, 0}, three)));
+  const int diagonal[3] = {0, 2, 5};
+  for (int i : diagonal) {
+    double one[6] = {1e-4, 0, 1e-4, 0, 0, 1e-4};
+    one[i] = 0.0;  // exact
+    TEST_ASSERT_EQUAL(WM_OK, filter.check_motion(make::increment(0.0, 1.0, {1, 0, 0}, one)));
+    one[i] = -1e-9;
+    TEST_ASSERT_EQUAL(WM_OUT_OF_RANGE, filter.check_motion(make::increment(0.0, 1.0, {1, 0, 0}, one)));
+  }
   const double none[6] = {NAN, NAN, NAN, NAN, NAN, NAN};
   TEST_ASSERT_EQUAL(WM_OK, filter.check_motion(make::increment(0.0, 1.0, {1, 0, 0}, none)));
   filter.move(make::increment(0.0, 1.0, {1, 0, 0}, none));
@@ -195,6 +203,8 @@ void test_a_velocity_of_its_own(void) {
     wm_pose2 truth = {0.1 * normal(), 0.1 * normal(), 0.1 * normal()};
     double v[3] = {normal(), normal(), normal()};  // a start sigma of two of the walk
     filter.move_to(0);
+    const double walks[3] = {params.velocity_speed_walk, params.velocity_speed_walk, params.velocity_turn_walk};
+    for (int k = 0; k < 3; k++) TEST_ASSERT_EQUAL_DOUBLE(4.0 * walks[k] * walks[k], filter.variance(3 + k));
     for (int i = 1; i <= steps; i++) {
       for (int k = 0; k < fine; k++) {
         truth = {truth.x_m + 0.01 * v[0], truth.y_m + 0.01 * v[1], wm::wrap(truth.heading_rad + 0.01 * v[2])};

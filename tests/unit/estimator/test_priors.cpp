@@ -56,7 +56,7 @@ wm_event driven(int i, bool commands) {
 void test_commands_are_told_by_rows_that_repeat() {
   for (const bool commands : {false, true}) {
     begin();
-    TEST_ASSERT_TRUE(std::isnan(sigma_of("motion.lag_s")));
+    TEST_ASSERT_DOUBLE_IS_NAN(sigma_of("motion.lag_s"));
     for (int i = 0; i < 200; i++) feed(driven(i, commands));
     TEST_ASSERT_FALSE(std::isnan(sigma_of("motion.speed_scale")));
     TEST_ASSERT_EQUAL(commands, !std::isnan(sigma_of("motion.lag_s")));
@@ -72,7 +72,7 @@ void test_a_measurement_that_stands_is_no_command() {
     if (i < 500) e.as.twist2 = {-0.022, 0.0006};
     feed(e);
   }
-  TEST_ASSERT_TRUE(std::isnan(sigma_of("motion.lag_s")));
+  TEST_ASSERT_DOUBLE_IS_NAN(sigma_of("motion.lag_s"));
 }
 
 void test_a_stated_kind_decides() {

@@ -96,6 +96,18 @@ void test_the_gyro_tells_the_wheels_and_the_wheels_hold_the_heading(void) {
   }
 }
 
+// The heading by the counts begins at the filter's, with the rounding of both counts to a tick: a twelfth of its square
+// each, over the track.
+void test_the_heading_by_the_counts_begins_with_their_rounding(void) {
+  Car car(true);
+  const int heading = car.filter->states() - 1;
+  while (car.t_s < 5.0 && car.filter->variance(heading) == 0.0) car.step(2.0, 0, 0.0, 0.0);
+  const double rounding = kTick_m * kTick_m / (kTrack_m * kTrack_m) / 6.0;
+  TEST_ASSERT_DOUBLE_WITHIN(1e-6 * rounding, rounding,
+                            car.filter->variance(heading) - car.filter->variance(wm::kHeading));
+  TEST_ASSERT_EQUAL_DOUBLE(car.filter->variance(wm::kHeading), car.filter->covariance(heading, wm::kHeading));
+}
+
 void test_a_slip_is_not_believed(void) {
   Car slipping(true), holding(true);
   for (int i = 0; i < 6000; i++) {
@@ -168,7 +180,8 @@ void test_wheels_of_unknown_track_are_left_alone(void) {
   car.setup.wheels.track_m = NAN;
   car.filter->init(car.setup, car.states, wm::kPoseStates + wm::planar_filter::count_motion_states(car.states));
   for (int i = 0; i < 2000; i++) car.step(2.0, 0.1, 0.0, 0.01);
-  TEST_ASSERT_TRUE(wm::finite(car.filter->pose().heading_rad) && wm::finite(car.sigma_heading()));
+  TEST_ASSERT_DOUBLE_IS_DETERMINATE(car.filter->pose().heading_rad);
+  TEST_ASSERT_DOUBLE_IS_DETERMINATE(car.sigma_heading());
   TEST_ASSERT_EQUAL_DOUBLE(0, named(car, "motion.wheel_difference").value);
 }
 
@@ -182,6 +195,7 @@ void tearDown(void) {}
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_the_gyro_tells_the_wheels_and_the_wheels_hold_the_heading);
+  RUN_TEST(test_the_heading_by_the_counts_begins_with_their_rounding);
   RUN_TEST(test_a_slip_is_not_believed);
   RUN_TEST(test_steps_of_the_counts_are_no_turn);
   RUN_TEST(test_a_pose_given_from_outside_is_kept);

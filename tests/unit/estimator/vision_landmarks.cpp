@@ -277,8 +277,8 @@ int found_from_afar() {
     if (eyes.look(draw(at, scene), nullptr) == 0) continue;
     found++;
     const wm_sighting &seen = events[0].as.sighting;
-    TEST_ASSERT_TRUE(std::fabs(std::remainder(seen.bearing_rad - true_bearing(at), 2 * M_PI)) <
-                     4 * seen.bearing_sigma_rad);
+    TEST_ASSERT_DOUBLE_WITHIN(4 * seen.bearing_sigma_rad, 0,
+                              std::remainder(seen.bearing_rad - true_bearing(at), 2 * M_PI));
     if (i % 4 != 0) continue;
     scene.there = false;
     TEST_ASSERT_EQUAL(0, eyes.look(draw(at, scene), nullptr));
@@ -347,8 +347,8 @@ void what_was_recognised_is_followed() {
     const size_t count = eyes.look(draw(at, scene), &moving, t_ns);
     for (size_t k = 0; k < count; k++) {
       if (events[k].as.sighting.landmark_id != 7) continue;
-      TEST_ASSERT_TRUE(std::fabs(std::remainder(events[k].as.sighting.bearing_rad - true_bearing(at), 2 * M_PI)) <
-                       0.002);
+      TEST_ASSERT_DOUBLE_WITHIN(0.002, 0,
+                                std::remainder(events[k].as.sighting.bearing_rad - true_bearing(at), 2 * M_PI));
       followed++;
     }
   }

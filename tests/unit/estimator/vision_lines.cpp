@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "unity.h"
+#include "vision/lines/line_tracks.hpp"
 #include "vision/lines/votes.hpp"
 #include "waymark/detector.h"
 #include "waymark/internal/sensors/lens.hpp"
@@ -277,7 +278,7 @@ void absurd_pictures_show_nothing() {
   for (size_t i = 0; i < picture.size(); i++) picture[i] = (i / 16 + i / kSide / 16) % 2 ? 255 : 0;
   for (int k = 0; k < 5; k++) {
     const size_t seen = look(t_ns += 100'000'000);
-    for (size_t i = 0; i < seen; i++) TEST_ASSERT_TRUE(std::isfinite(events[i].as.sighting.bearing_rad));
+    for (size_t i = 0; i < seen; i++) TEST_ASSERT_DOUBLE_IS_DETERMINATE(events[i].as.sighting.bearing_rad);
   }
   // Upside down: what was the left is the right, as many lines as before, none at a wrong place twice.
   const stripes wall = make_stripes(24, 3);
@@ -286,6 +287,26 @@ void absurd_pictures_show_nothing() {
     if (k >= 2) std::reverse(picture.begin(), picture.end());
     TEST_ASSERT_LESS_OR_EQUAL(26, look(t_ns += 100'000'000));
   }
+}
+
+// An identity has 27 bits: the one behind the largest is the first again.
+void identities_of_tracks_begin_anew() {
+  static wm::line_tracks tracks;
+  wm::radial_edge edges[3] = {};
+  for (int i = 0; i < 3; i++) edges[i] = {-1.0 + i, 0.001, 0, 0.1, 60.0 + 50 * i, 200.0 - 50 * i, 0, 100, 1000};
+  const auto &wish = *reinterpret_cast<const wm_lines_params *>(params.data());
+  constexpr int32_t kEnd = INT32_MAX / 16;
+  tracks.clear();
+  tracks.next_id = kEnd - 2;
+  for (int shown = 0; shown < 3; shown++) {  // they keep it
+    tracks.follow(edges, 3, WM_NS_PER_S + shown * 50 * WM_NS_PER_MS, wish);
+    const int32_t want[3] = {kEnd - 2, kEnd - 1, 1};
+    for (int i = 0; i < 3; i++) {
+      TEST_ASSERT_EQUAL_INT32(want[i], tracks.track[i].id);
+      TEST_ASSERT_EQUAL_INT32(shown + 1, tracks.track[i].seen);
+    }
+  }
+  TEST_ASSERT_EQUAL_INT32(2, tracks.next_id);
 }
 
 void what_does_not_fit_is_told() {
@@ -323,6 +344,7 @@ int main() {
   RUN_TEST(bearings_are_the_sensors_own);
   RUN_TEST(the_scalar_twin_votes_alike);
   RUN_TEST(absurd_pictures_show_nothing);
+  RUN_TEST(identities_of_tracks_begin_anew);
   RUN_TEST(what_does_not_fit_is_told);
   return UNITY_END();
 }

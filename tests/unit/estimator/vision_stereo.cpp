@@ -400,7 +400,7 @@ void a_point_looks_alike_from_another_pose() {
   }
   std::printf("of %zu points that are there %zu are found, of %zu taken %zu\n", there, right_ones, taken, right_ones);
   TEST_ASSERT_GREATER_THAN(12, right_ones);
-  TEST_ASSERT_TRUE(static_cast<double>(right_ones) > 0.6 * static_cast<double>(taken));
+  TEST_ASSERT_GREATER_THAN_DOUBLE(0.6 * static_cast<double>(taken), static_cast<double>(right_ones));
 }
 
 void setUp() {}

@@ -37,13 +37,17 @@ static const registry_params *params(void) { return config.estimator_params; }
 
 static void empty_sections(void) {
   parse(HEAD "merge:\npole_filter:\n  states:\nmotion:\n  # noise: {speed_mps: 1}\nsources:\n");
-  TEST_ASSERT_TRUE(params()->slots == 2 && config.source_count == 0);
+  TEST_ASSERT_EQUAL(2, params()->slots);
+  TEST_ASSERT_EQUAL(0, config.source_count);
 }
 
 static void defaults(void) {
   parse(HEAD);
   TEST_ASSERT_EQUAL_STRING("pole_filter", config.estimator->name);
-  TEST_ASSERT_TRUE(params()->gate == 9.0 && params()->slots == 2 && params()->on == 1 && params()->model == 0);
+  TEST_ASSERT_EQUAL_DOUBLE(9.0, params()->gate);
+  TEST_ASSERT_EQUAL(2, params()->slots);
+  TEST_ASSERT_EQUAL(1, params()->on);
+  TEST_ASSERT_EQUAL(0, params()->model);
   TEST_ASSERT_EQUAL_DOUBLE(300, config.runtime.merge_horizon_ms);
   TEST_ASSERT_EQUAL_DOUBLE(50, config.runtime.publish_rate_hz);
   TEST_ASSERT_EQUAL_STRING("WAYMARK_", config.channel_prefix);
@@ -56,7 +60,9 @@ static void defaults(void) {
 
 static void a_renamed_key_is_read_with_a_warning(void) {
   parse(HEAD "pole_filter: {gate_sigmas: 4, states: {places: 3}, walls.weight: robust}\n");
-  TEST_ASSERT_TRUE(params()->gate == 4 && params()->slots == 3 && params()->model == 1);
+  TEST_ASSERT_EQUAL_DOUBLE(4, params()->gate);
+  TEST_ASSERT_EQUAL(3, params()->slots);
+  TEST_ASSERT_EQUAL(1, params()->model);
   TEST_ASSERT_EQUAL_STRING(
       "dir/x.yaml:3: pole_filter.gate_sigmas: is now 'pole_filter.gate', and read as that\n"
       "dir/x.yaml:3: pole_filter.states.places: is now 'pole_filter.states.slots', and read as that; at most 16 by "
@@ -174,7 +180,10 @@ static void everything(void) {
         "motion: {noise: {speed_mps: 0.5}}\n"
         "pole_filter: {gate: 4, states: {slots: 3, deep: {on: false}}, model: robust, states.yaw_sigma_rad: 0.3}\n"
         "cloud_filter: {window_s: 7}\n");
-  TEST_ASSERT_TRUE(params()->gate == 4 && params()->slots == 3 && params()->on == 0 && params()->model == 1);
+  TEST_ASSERT_EQUAL_DOUBLE(4, params()->gate);
+  TEST_ASSERT_EQUAL(3, params()->slots);
+  TEST_ASSERT_EQUAL(0, params()->on);
+  TEST_ASSERT_EQUAL(1, params()->model);
   TEST_ASSERT_EQUAL_DOUBLE(0.3, params()->yaw_sigma_rad);
   TEST_ASSERT_EQUAL_DOUBLE(0.5, *(const double *)(const void *)config.motion);
   TEST_ASSERT_EQUAL_DOUBLE(400, config.runtime.merge_horizon_ms);
@@ -183,9 +192,12 @@ static void everything(void) {
   TEST_ASSERT_EQUAL(1, config.runtime.realtime_cpu);
   TEST_ASSERT_EQUAL_STRING("memq://", config.lcm_url);
   TEST_ASSERT_EQUAL_STRING("R1_", config.channel_prefix);
-  TEST_ASSERT_TRUE(config.has_initial_pose && config.initial_pose.p_m[0] == 1 && isnan(config.initial_pose.p_m[1]));
+  TEST_ASSERT_TRUE(config.has_initial_pose);
+  TEST_ASSERT_EQUAL_DOUBLE(1, config.initial_pose.p_m[0]);
+  TEST_ASSERT_DOUBLE_IS_NAN(config.initial_pose.p_m[1]);
   TEST_ASSERT_DOUBLE_WITHIN(1e-15, M_PI / 2, config.initial_pose.heading_rad);
-  TEST_ASSERT_TRUE(config.initial_pose.sigma_xy_m == 0.2 && config.initial_pose.sigma_heading_rad == 0.05);
+  TEST_ASSERT_EQUAL_DOUBLE(0.2, config.initial_pose.sigma_xy_m);
+  TEST_ASSERT_EQUAL_DOUBLE(0.05, config.initial_pose.sigma_heading_rad);
 }
 
 static void source_settings(void) {
@@ -196,14 +208,23 @@ static void source_settings(void) {
   wm_source_config s;
   int rank;
   wm_config_source(&config, "gnss", &s, &rank);
-  TEST_ASSERT_TRUE(rank == 0 && s.until_s == 25 && s.lateness_max_ms == 100 && isinf(s.from_s));
+  TEST_ASSERT_EQUAL(0, rank);
+  TEST_ASSERT_EQUAL_DOUBLE(25, s.until_s);
+  TEST_ASSERT_EQUAL_DOUBLE(100, s.lateness_max_ms);
+  TEST_ASSERT_DOUBLE_IS_NEG_INF(s.from_s);
   wm_config_source(&config, "sightings:radar", &s, &rank);
-  TEST_ASSERT_TRUE(rank == 1 && s.lateness_max_ms == 300 && s.use);
+  TEST_ASSERT_EQUAL(1, rank);
+  TEST_ASSERT_EQUAL_DOUBLE(300, s.lateness_max_ms);
+  TEST_ASSERT_TRUE(s.use);
   TEST_ASSERT_EQUAL_STRING("sightings:radar", s.name);
   wm_config_source(&config, "sightings:laser", &s, &rank);
-  TEST_ASSERT_TRUE(rank == 2 && !s.use);
+  TEST_ASSERT_EQUAL(2, rank);
+  TEST_ASSERT_TRUE(!s.use);
   wm_config_source(&config, "can", &s, &rank);
-  TEST_ASSERT_TRUE(rank == 3 && s.use && s.lateness_max_ms == 100 && isinf(s.until_s));
+  TEST_ASSERT_EQUAL(3, rank);
+  TEST_ASSERT_TRUE(s.use);
+  TEST_ASSERT_EQUAL_DOUBLE(100, s.lateness_max_ms);
+  TEST_ASSERT_DOUBLE_IS_INF(s.until_s);
 }
 
 static void devices(void) {
@@ -221,7 +242,9 @@ static void devices(void) {
   const wm_camera_device_config *camera = &config.devices.cameras[0];
   TEST_ASSERT_EQUAL(1, config.devices.camera_count);
   TEST_ASSERT_EQUAL_STRING("Y10", camera->format);
-  TEST_ASSERT_TRUE(camera->stamp == WM_STAMP_START && camera->exposure_ms == 4.5 && camera->rate_hz == 0);
+  TEST_ASSERT_EQUAL(WM_STAMP_START, camera->stamp);
+  TEST_ASSERT_EQUAL_DOUBLE(4.5, camera->exposure_ms);
+  TEST_ASSERT_EQUAL_DOUBLE(0, camera->rate_hz);
   TEST_ASSERT_EQUAL(2, camera->control_count);
   TEST_ASSERT_EQUAL_STRING("gain", camera->controls[1].name);
   TEST_ASSERT_EQUAL_INT32(-3, camera->controls[1].value);

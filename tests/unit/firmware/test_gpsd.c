@@ -157,7 +157,8 @@ static void sigmas_follow_the_fix(void) {
     report(utc_ns(), kFixes[i].members);
     expect(WM_OK);
     TEST_ASSERT_DOUBLE_WITHIN(1e-12, 2 * kFixes[i].sigma_m, event.as.position.sigma_xy_m);
-    TEST_ASSERT_TRUE(isnan(event.as.position.p_m[2]) && isnan(event.as.position.sigma_z_m));
+    TEST_ASSERT_DOUBLE_IS_NAN(event.as.position.p_m[2]);
+    TEST_ASSERT_DOUBLE_IS_NAN(event.as.position.sigma_z_m);
   }
   TEST_ASSERT_EQUAL_UINT32(4, source->counts.news);  // each type once
   expect_state(WM_DEVICE_WORKS, "RTK fixed");

@@ -162,7 +162,7 @@ static void a_buffer_is_set_up_and_read(void) {
   const wm_stream_row *row = row_source_row(source);
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, -0.1, row->number[1]);  // 0.001 (90 + 10) about x, which is -y of the board
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 9.81, row->number[5]);
-  TEST_ASSERT_TRUE(isnan(row->number[12]));
+  TEST_ASSERT_DOUBLE_IS_NAN(row->number[12]);
   TEST_ASSERT_EQUAL(WM_OK, next());
   TEST_ASSERT_EQUAL_INT64(t_ns - 1 * MS, event.t_ns);
   TEST_ASSERT_EQUAL(WM_AGAIN, next());

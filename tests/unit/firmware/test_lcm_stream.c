@@ -94,7 +94,7 @@ static void a_gyro_is_a_turn_rate_by_its_mounting(void) {
   // Rates of a turn are the same length in any axes.
   const double turn2 = q->value[0] * q->value[0] + q->value[1] * q->value[1] + q->value[2] * q->value[2];
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.5 * 0.5 + 0.25 * 0.25 + 0.125 * 0.125, turn2);
-  TEST_ASSERT_TRUE(isnan(row_source_row(source)->number[6]));  // a sigma of 0 is not given
+  TEST_ASSERT_DOUBLE_IS_NAN(row_source_row(source)->number[6]);  // a sigma of 0 is not given
   row.t_ns = wm_monotonic_ns();
   row.number[4] = (double)NAN;  // no force: the rates alone
   send("imu", "T_GYRO", row);
@@ -136,9 +136,13 @@ static void wheels_and_steering_are_quantities(void) {
   for (size_t i = 0; i < sizeof kEach / sizeof kEach[0]; i++) {
     begin_row(kEach[i].stream, (const double[6]){0.5, -0.25});
     const wm_quantities *q = &event.as.quantities;
-    TEST_ASSERT_TRUE(source->is_motion && event.kind == WM_EVENT_QUANTITIES && q->count == 2);
-    TEST_ASSERT_TRUE(q->id[0] == kEach[i].first && q->id[1] == kEach[i].second);
-    TEST_ASSERT_TRUE(q->value[0] == 0.5 && q->value[1] == -0.25);
+    TEST_ASSERT_TRUE(source->is_motion);
+    TEST_ASSERT_EQUAL(WM_EVENT_QUANTITIES, event.kind);
+    TEST_ASSERT_EQUAL(2, q->count);
+    TEST_ASSERT_EQUAL(kEach[i].first, q->id[0]);
+    TEST_ASSERT_EQUAL(kEach[i].second, q->id[1]);
+    TEST_ASSERT_EQUAL_DOUBLE(0.5, q->value[0]);
+    TEST_ASSERT_EQUAL_DOUBLE(-0.25, q->value[1]);
     tearDown();
   }
 }
@@ -150,10 +154,15 @@ static void headings_depths_and_positions_are_observations(void) {
   tearDown();
   begin_row("depth", (const double[6]){12.5, 0.125});
   const wm_position *p = &event.as.position;
-  TEST_ASSERT_TRUE(isnan(p->p_m[0]) && p->p_m[2] == -12.5 && p->sigma_z_m == 0.125);
+  TEST_ASSERT_DOUBLE_IS_NAN(p->p_m[0]);
+  TEST_ASSERT_EQUAL_DOUBLE(-12.5, p->p_m[2]);
+  TEST_ASSERT_EQUAL_DOUBLE(0.125, p->sigma_z_m);
   tearDown();
   begin_row("gnss", (const double[6]){1, 2, NAN, 0.5, 0});
-  TEST_ASSERT_TRUE(p->p_m[1] == 2 && isnan(p->p_m[2]) && p->sigma_xy_m == 0.5 && isnan(p->sigma_z_m));
+  TEST_ASSERT_EQUAL_DOUBLE(2, p->p_m[1]);
+  TEST_ASSERT_DOUBLE_IS_NAN(p->p_m[2]);
+  TEST_ASSERT_EQUAL_DOUBLE(0.5, p->sigma_xy_m);
+  TEST_ASSERT_DOUBLE_IS_NAN(p->sigma_z_m);
 }
 
 static void an_absent_sender_is_said(void) {

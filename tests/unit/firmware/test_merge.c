@@ -108,6 +108,17 @@ static void motion_comes_first_then_the_rank_then_the_file(void) {
   TEST_ASSERT_EQUAL_STRING("5/2 5/1 5/0 5/0", final_ms());
 }
 
+// The number of an event within its source has 32 bits: at 1 kHz it wraps after 50 days.
+static void the_numbers_of_events_wrap(void) {
+  open_merge((wm_merge_source[]){kMotion, kCamera}, 2);
+  next_seq = UINT32_MAX - 3;
+  for (int i = 0; i < 4; i++) TEST_ASSERT_EQUAL(WM_MERGE_TAKEN, arrive(i % 2, (10 + i) * MS, (10 + i) * MS));
+  TEST_ASSERT_EQUAL_UINT32(0, next_seq);
+  for (int i = 4; i < 8; i++) TEST_ASSERT_EQUAL(WM_MERGE_TAKEN, arrive(i % 2, (10 + i) * MS, (10 + i) * MS));
+  wm_merge_flush(merge);
+  TEST_ASSERT_EQUAL_STRING("10/0 11/1 12/0 13/1 14/0 15/1 16/0 17/1", final_ms());
+}
+
 static void a_silent_source_costs_its_lateness_and_its_first_datum_after_that_is_fused(void) {
   open_merge((wm_merge_source[]){kMotion, kCamera}, 2);
   for (int i = 0; i <= 100; i++) arrive(0, i * 10 * MS, i * 10 * MS);
@@ -313,6 +324,7 @@ int main(void) {
   RUN_TEST(newest_first_and_distinct_stamps_are_counted);
   RUN_TEST(p99_of_the_lateness);
   RUN_TEST(motion_comes_first_then_the_rank_then_the_file);
+  RUN_TEST(the_numbers_of_events_wrap);
   RUN_TEST(a_silent_source_costs_its_lateness_and_its_first_datum_after_that_is_fused);
   RUN_TEST(what_is_late_is_counted_and_dropped);
   RUN_TEST(a_periodic_source_lets_time_pass_until_its_next_datum);

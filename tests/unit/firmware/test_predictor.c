@@ -128,6 +128,21 @@ static void a_pose_set_anew_is_announced_however_small_the_move(void) {
   TEST_ASSERT_EQUAL_UINT32(1, p.jumps);
 }
 
+static void counts_of_resets_and_jumps_wrap(void) {
+  wm_published p;
+  move(0, 0, 0);
+  fuse(0, 1, 1, 0, UINT32_MAX);
+  TEST_ASSERT_EQUAL(1, wm_predictor_publish(&predictor, 20 * MS, &p));
+  predictor.jumps = UINT32_MAX;
+  fuse(1, 1, 1, 0, UINT32_MAX);
+  TEST_ASSERT_EQUAL(1, wm_predictor_publish(&predictor, 40 * MS, &p));
+  TEST_ASSERT_EQUAL_HEX32(0, p.status_flags & WM_PUB_JUMPED);
+  fuse(2, 1, 1, 0, 0);  // one reset more
+  TEST_ASSERT_EQUAL(1, wm_predictor_publish(&predictor, 60 * MS, &p));
+  TEST_ASSERT_EQUAL_HEX32(WM_PUB_JUMPED, p.status_flags & WM_PUB_JUMPED);
+  TEST_ASSERT_EQUAL_UINT32(0, p.jumps);
+}
+
 static void pictures_are_told_the_pose_or_the_motion_alone(void) {
   wm_published p;
   wm_estimate e;
@@ -174,6 +189,7 @@ int main(void) {
   RUN_TEST(odom_is_turned_into_the_map);
   RUN_TEST(a_move_of_map_against_odom_is_announced_once);
   RUN_TEST(a_pose_set_anew_is_announced_however_small_the_move);
+  RUN_TEST(counts_of_resets_and_jumps_wrap);
   RUN_TEST(pictures_are_told_the_pose_or_the_motion_alone);
   RUN_TEST(old_motion_and_old_fusion_are_said);
   RUN_TEST(without_a_pose_nothing_is_said);

@@ -222,7 +222,9 @@ static void poses_and_resets_that_are_told_become_events(void) {
   lcm_publish(lcm, "T_SET_POSE", bytes, (unsigned)length);
   TEST_ASSERT_EQUAL(WM_OK, source->ops->next(source, &event, &err));
   TEST_ASSERT_EQUAL(WM_EVENT_SET_POSE, event.kind);
-  TEST_ASSERT_TRUE(event.t_ns >= before_ns && event.t_ns <= wm_monotonic_ns() && event.arrival_ns == event.t_ns);
+  TEST_ASSERT_GREATER_OR_EQUAL_INT64(before_ns, event.t_ns);
+  TEST_ASSERT_LESS_OR_EQUAL_INT64(wm_monotonic_ns(), event.t_ns);
+  TEST_ASSERT_EQUAL_INT64(event.t_ns, event.arrival_ns);
   TEST_ASSERT_EQUAL_DOUBLE(-2, event.as.set_pose.pose_map_base.p_m[1]);
   TEST_ASSERT_EQUAL_DOUBLE(0.5, event.as.set_pose.sigma_xy_m);
 
@@ -291,7 +293,8 @@ static void sightings_of_another_program_become_events(void) {
     if (i == 1) TEST_ASSERT_EQUAL_DOUBLE(4, event.as.sighting.range_m);
     if (i == 0) TEST_ASSERT_EQUAL_DOUBLE(-0.125, event.as.sighting.elevation_rad);
     TEST_ASSERT_EQUAL(i == 0, wm_sighting_has_elevation(&event.as.sighting));
-    TEST_ASSERT_TRUE(isnan(event.as.sighting.bearing_sigma_rad) && isnan(event.as.sighting.range_sigma_m));
+    TEST_ASSERT_DOUBLE_IS_NAN(event.as.sighting.bearing_sigma_rad);
+    TEST_ASSERT_DOUBLE_IS_NAN(event.as.sighting.range_sigma_m);
   }
   TEST_ASSERT_EQUAL(WM_AGAIN, source->ops->next(source, &event, &err));
   TEST_ASSERT_EQUAL_UINT64(2, source->counts.received);

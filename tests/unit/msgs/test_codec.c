@@ -200,7 +200,7 @@ static void zeros_that_stood_for_absent_numbers_become_nan(void) {
   TEST_ASSERT_EQUAL_DOUBLE(0, out.as.sighting.elevation_sigma_rad);  // today a zero is a zero
   bytes[0] = 4;
   TEST_ASSERT_EQUAL(WM_OK, wm_event_decode(bytes, length, &out, &used));
-  TEST_ASSERT_TRUE(isnan(out.as.sighting.elevation_sigma_rad));
+  TEST_ASSERT_DOUBLE_IS_NAN(out.as.sighting.elevation_sigma_rad);
   TEST_ASSERT_FALSE(wm_sighting_has_elevation(&out.as.sighting));
   TEST_ASSERT_EQUAL_DOUBLE(0, out.as.sighting.bearing_rad);
 
@@ -208,7 +208,8 @@ static void zeros_that_stood_for_absent_numbers_become_nan(void) {
   length = wm_event_encode(&in, bytes, sizeof bytes);
   bytes[0] = 4;
   TEST_ASSERT_EQUAL(WM_OK, wm_event_decode(bytes, length, &out, &used));
-  TEST_ASSERT_TRUE(isnan(out.as.marker.along_sigma_m) && isnan(out.as.marker.bloom_px));
+  TEST_ASSERT_DOUBLE_IS_NAN(out.as.marker.along_sigma_m);
+  TEST_ASSERT_DOUBLE_IS_NAN(out.as.marker.bloom_px);
   TEST_ASSERT_EQUAL_DOUBLE(0.25, out.as.marker.yaw_sigma_rad);
   TEST_ASSERT_EQUAL_DOUBLE(0, out.as.marker.yaw_rad);
 }
@@ -292,7 +293,7 @@ static void a_published_pose_of_the_version_before_is_read(void) {
   bytes[0] = 1;
   TEST_ASSERT_EQUAL(WM_OK, wm_published_decode(bytes, length - 8, &out, &used));
   TEST_ASSERT_EQUAL(length - 8, used);
-  TEST_ASSERT_TRUE(isnan(out.now.lost_probability));
+  TEST_ASSERT_DOUBLE_IS_NAN(out.now.lost_probability);
   TEST_ASSERT_EQUAL(WM_STATE_LOST, out.now.state);
   TEST_ASSERT_EQUAL_INT64(5, out.made_ns);
   TEST_ASSERT_EQUAL(2, out.jumps);
@@ -377,6 +378,28 @@ static void a_rig_comes_back_and_a_cut_one_is_refused(void) {
   TEST_ASSERT_EQUAL(WM_BAD_DATA, wm_rig_decode(bytes, count, &back, &used));
 }
 
+// Each model of a camera, none beside them, and names that fill their room.
+static void cameras_of_a_rig_have_a_model_and_a_name(void) {
+  wm_rig rig, back;
+  uint8_t bytes[WM_RIG_ENCODED_MAX];
+  size_t used;
+  wm_rig_init(&rig);
+  rig.camera_count = 2;
+  for (int model = -1; model <= WM_CAMERA_MODEL_COUNT; model++) {
+    rig.cameras[1].model = model;
+    const size_t count = wm_rig_encode(&rig, bytes, sizeof bytes);
+    const int is_one = model >= 0 && model < WM_CAMERA_MODEL_COUNT;
+    TEST_ASSERT_EQUAL(is_one ? WM_OK : WM_BAD_DATA, wm_rig_decode(bytes, count, &back, &used));
+    if (is_one) TEST_ASSERT_EQUAL(model, back.cameras[1].model);
+  }
+  rig.cameras[1].model = WM_CAMERA_OMNI;
+  memset(rig.cameras[0].name, 'n', WM_NAME_MAX);
+  memset(rig.marker_family, 'f', WM_NAME_MAX);
+  TEST_ASSERT_EQUAL(WM_OK, wm_rig_decode(bytes, wm_rig_encode(&rig, bytes, sizeof bytes), &back, &used));
+  TEST_ASSERT_EQUAL(WM_NAME_MAX - 1, strnlen(back.cameras[0].name, WM_NAME_MAX));
+  TEST_ASSERT_EQUAL(WM_NAME_MAX - 1, strnlen(back.marker_family, WM_NAME_MAX));
+}
+
 static void absent_numbers_of_a_landmark_are_nan_and_keep_the_hash_of_older_logs(void) {
   wm_landmark in = {
       .id = 3, .p_m = {1, 2, 3}, .sigma_m = NAN, .yaw_rad = NAN, .cov_m2 = {NAN, NAN, NAN}, .yaw_sigma_rad = NAN};
@@ -388,8 +411,11 @@ static void absent_numbers_of_a_landmark_are_nan_and_keep_the_hash_of_older_logs
   TEST_ASSERT_EQUAL_DOUBLE(0, out.yaw_sigma_rad);  // today a zero is a zero
   bytes[0] = 2;
   TEST_ASSERT_EQUAL(WM_OK, wm_landmark_decode(bytes, length, &out, &used));
-  TEST_ASSERT_TRUE(isnan(out.sigma_m) && isnan(out.cov_m2[0]) && isnan(out.cov_m2[1]) && isnan(out.cov_m2[2]) &&
-                   isnan(out.yaw_sigma_rad));
+  TEST_ASSERT_DOUBLE_IS_NAN(out.sigma_m);
+  TEST_ASSERT_DOUBLE_IS_NAN(out.cov_m2[0]);
+  TEST_ASSERT_DOUBLE_IS_NAN(out.cov_m2[1]);
+  TEST_ASSERT_DOUBLE_IS_NAN(out.cov_m2[2]);
+  TEST_ASSERT_DOUBLE_IS_NAN(out.yaw_sigma_rad);
   TEST_ASSERT_EQUAL_UINT64(wm_landmarks_hash(&zeros, 1), wm_landmarks_hash(&in, 1));
   TEST_ASSERT_EQUAL_UINT64(wm_hash(WM_HASH_START, bytes, length), wm_landmarks_hash(&in, 1));
   bytes[0] = 1;
@@ -424,6 +450,7 @@ int main(void) {
   RUN_TEST(an_innovation_comes_back_and_unknown_verdicts_do_not);
   RUN_TEST(a_setup_comes_back);
   RUN_TEST(a_rig_comes_back_and_a_cut_one_is_refused);
+  RUN_TEST(cameras_of_a_rig_have_a_model_and_a_name);
   RUN_TEST(absent_numbers_of_a_landmark_are_nan_and_keep_the_hash_of_older_logs);
   RUN_TEST(the_hash_of_a_map_sees_every_number_and_the_order);
   return UNITY_END();

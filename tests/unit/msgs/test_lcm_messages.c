@@ -119,7 +119,8 @@ static void a_sighting_with_an_elevation_sigma_of_zero_has_no_elevation(void) {
   TEST_ASSERT_EQUAL(length, waymark_observations_t_encode(bytes, 0, sizeof bytes, &m));
   TEST_ASSERT_NULL(wm_lcm_read_sightings(bytes, (size_t)length, sensor, &t_ns, read, &count));
   TEST_ASSERT_EQUAL(2, count);
-  TEST_ASSERT_TRUE(isnan(read[0].elevation_sigma_rad) && !wm_sighting_has_elevation(&read[0]));
+  TEST_ASSERT_DOUBLE_IS_NAN(read[0].elevation_sigma_rad);
+  TEST_ASSERT_TRUE(!wm_sighting_has_elevation(&read[0]));
   TEST_ASSERT_TRUE(wm_sighting_has_elevation(&read[1]));
 }
 
@@ -217,7 +218,7 @@ static void more_sightings_than_fit_are_counted(void) {
   TEST_ASSERT_EQUAL(64, m.count);
   TEST_ASSERT_EQUAL(6, m.dropped);
   TEST_ASSERT_EQUAL(63, m.landmark_id[63]);
-  TEST_ASSERT_TRUE(isnan(m.range_m[0]));
+  TEST_ASSERT_DOUBLE_IS_NAN(m.range_m[0]);
   TEST_ASSERT_EQUAL_STRING("front", (const char *)m.sensor);
 }
 

@@ -7,6 +7,7 @@
 #include "unity.h"
 #include "waymark/event_fields.h"
 #include "waymark/lcm_messages.h"
+#include "waymark/lcm_streams.h"
 
 void setUp(void) {}
 void tearDown(void) {}
@@ -250,6 +251,44 @@ static void control_characters_of_names(void) {
   TEST_ASSERT_EQUAL(sizeof read.host - 1, strlen(read.host));
 }
 
+// Of 32 bits, with a sign in the message.
+static void counts_of_a_pose_that_wrap(void) {
+  const uint32_t counts[] = {INT32_MAX, (uint32_t)INT32_MAX + 1, UINT32_MAX, 0};
+  for (size_t i = 0; i < sizeof counts / sizeof counts[0]; i++) {
+    wm_published p = {.jumps = counts[i], .now = {.resets = counts[i], .dof = 3}}, read;
+    TEST_ASSERT_NULL(wm_lcm_read_pose(bytes, wm_lcm_pose(&p, 12, bytes, sizeof bytes), &read));
+    TEST_ASSERT_EQUAL_UINT32(counts[i], read.jumps);
+    TEST_ASSERT_EQUAL_UINT32(counts[i], read.now.resets);
+  }
+}
+
+// Into a row that was used before: nothing of it stays.
+static void rows_of_streams(void) {
+  static const struct {
+    const char *stream, *type;
+    int numbers;
+    uint32_t zero_is_absent;  // a bit for each number whose 0 means that there is none
+  } rows[] = {{"motion", "motion_t", 3, 0}, {"imu", "imu_t", 13, 0xfc0}, {"gnss", "gnss_t", 5, 0x10}};
+  wm_stream_row read;
+  for (size_t r = 0; r < sizeof rows / sizeof rows[0]; r++) {
+    TEST_ASSERT_EQUAL_STRING(rows[r].type, wm_lcm_stream_type(rows[r].stream));
+    wm_stream_row sent = {.t_ns = 42}, none = {.t_ns = -1};
+    for (int i = 0; i < rows[r].numbers; i++) sent.number[i] = 0.5 + i;
+    size_t length = wm_lcm_row(rows[r].stream, &sent, bytes, sizeof bytes);
+    memset(&read, 0x55, sizeof read);
+    TEST_ASSERT_NULL(wm_lcm_read_row(rows[r].stream, bytes, length, &read));
+    TEST_ASSERT_EQUAL_MEMORY(&sent, &read, sizeof read);
+    for (size_t cut = 0; cut < length; cut++) TEST_ASSERT_NOT_NULL(wm_lcm_read_row(rows[r].stream, bytes, cut, &read));
+    length = wm_lcm_row(rows[r].stream, &none, bytes, sizeof bytes);
+    TEST_ASSERT_NULL(wm_lcm_read_row(rows[r].stream, bytes, length, &read));
+    for (int i = 0; i < WM_STREAM_NUMBERS_MAX; i++)
+      TEST_ASSERT_EQUAL_MESSAGE((rows[r].zero_is_absent >> i) & 1, isnan(read.number[i]) != 0, rows[r].stream);
+  }
+  TEST_ASSERT_NULL(wm_lcm_stream_type("of nobody"));
+  TEST_ASSERT_EQUAL_STRING("is of no stream", wm_lcm_read_row("of nobody", bytes, sizeof bytes, &read));
+  TEST_ASSERT_EQUAL(0, wm_lcm_row("of nobody", &read, bytes, sizeof bytes));
+}
+
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(pose);
@@ -260,5 +299,7 @@ int main(void) {
   RUN_TEST(limits_of_a_sighting);
   RUN_TEST(identities_of_sightings);
   RUN_TEST(control_characters_of_names);
+  RUN_TEST(counts_of_a_pose_that_wrap);
+  RUN_TEST(rows_of_streams);
   return UNITY_END();
 }

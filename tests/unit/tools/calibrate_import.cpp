@@ -77,7 +77,7 @@ void test_opencv_xml_and_fisheye() {
       "<data>-0.005 0.002 -0.0016 0.0002</data></D>\n</opencv_storage>\n";
   const ForeignCamera camera = read(xml);
   TEST_ASSERT_TRUE(camera.same.has_value());
-  TEST_ASSERT_TRUE(camera.same->model == Model::equidistant);
+  TEST_ASSERT_EQUAL(Model::equidistant, camera.same->model);
   TEST_ASSERT_EQUAL_DOUBLE(-0.0016, camera.same->distortion[2]);
   TEST_ASSERT_EQUAL(720, camera.height);
   refused("has no end", "<opencv_storage>\n<K");
@@ -90,9 +90,9 @@ void test_four_coefficients_need_a_word() {
   refused("camera.yaml:2: D: four coefficients", text);
   ImportHints hints;
   hints.lens = "plain";
-  TEST_ASSERT_TRUE(read(text, hints).same->model == Model::pinhole_radtan);
+  TEST_ASSERT_EQUAL(Model::pinhole_radtan, read(text, hints).same->model);
   hints.lens = "fisheye";
-  TEST_ASSERT_TRUE(read(text, hints).same->model == Model::equidistant);
+  TEST_ASSERT_EQUAL(Model::equidistant, read(text, hints).same->model);
 }
 
 void test_skew_is_honoured() {
@@ -110,12 +110,12 @@ void test_kalibr() {
   const ForeignCamera equi = read(head +
                                   "camera_model: pinhole\n  distortion_model: equidistant\n  intrinsics: [380, 381, "
                                   "370, 240]\n  distortion_coeffs: [0.01, 0.02, -0.01, 0.001]\n");
-  TEST_ASSERT_TRUE(equi.same->model == Model::equidistant);
+  TEST_ASSERT_EQUAL(Model::equidistant, equi.same->model);
   TEST_ASSERT_EQUAL_STRING("cam0", equi.name.c_str());
   const ForeignCamera ds = read(head +
                                 "camera_model: ds\n  distortion_model: none\n  intrinsics: [-0.2, 0.59, 290, "
                                 "291, 370, 240]\n  distortion_coeffs: []\n");
-  TEST_ASSERT_TRUE(ds.same->model == Model::double_sphere);
+  TEST_ASSERT_EQUAL(Model::double_sphere, ds.same->model);
 
   rays_agree(read(head + "camera_model: pinhole\n  distortion_model: fov\n  intrinsics: [380, 381, 370, 240]\n"
                          "  distortion_coeffs: [0.92]\n"),

@@ -262,7 +262,8 @@ void test_carried_off_it_is_found(void) {
     });
     std::printf("seed %llu: carried off, found after %.1f s, then at most %.4f m, NEES/6 %.2f\n",
                 (unsigned long long)seed, found_s, worst_after_m, nees / 6);
-    TEST_ASSERT_TRUE(found_s >= 0 && found_s < 5);
+    TEST_ASSERT_GREATER_OR_EQUAL_DOUBLE(0, found_s);
+    TEST_ASSERT_LESS_THAN_DOUBLE(5, found_s);
     TEST_ASSERT_LESS_THAN_DOUBLE(0.05, worst_after_m);  // 3 sigma of a pose by the points of one picture
     TEST_ASSERT_LESS_THAN_DOUBLE(36, nees);             // 1 of 500 000 is beyond
   }
@@ -318,7 +319,7 @@ void test_a_damaged_map_is_refused_or_harmless(void) {
     drive.setup().start = kUnknown;
     drive.begin(&image);
     drive.run({10, 12}, [](double, const wm_estimate &estimate, const Error6 &) {
-      TEST_ASSERT_TRUE(std::isfinite(estimate.pose_map_base.p_m[0]));
+      TEST_ASSERT_DOUBLE_IS_DETERMINATE(estimate.pose_map_base.p_m[0]);
       return true;
     });
   }

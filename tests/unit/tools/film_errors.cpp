@@ -134,8 +134,9 @@ void camera_is_found_in_the_labels(const char *name) {
                               (truth.T_base_camera.translation() - found.T_base_camera.translation()).norm());
     for (size_t i = 0; i < 4; i++) TEST_ASSERT_DOUBLE_WITHIN(0.05, truth.intrinsics[i], found.intrinsics[i]);
     // And it is not the calibration that was found.
-    TEST_ASSERT_TRUE(x.head<3>().norm() > 0.05 * kDegree && x.segment<3>(3).norm() > 0.001 &&
-                     x.tail<4>().norm() > 2e-4);
+    TEST_ASSERT_GREATER_THAN_DOUBLE(0.05 * kDegree, x.head<3>().norm());
+    TEST_ASSERT_GREATER_THAN_DOUBLE(0.001, x.segment<3>(3).norm());
+    TEST_ASSERT_GREATER_THAN_DOUBLE(2e-4, x.tail<4>().norm());
   }
 }
 

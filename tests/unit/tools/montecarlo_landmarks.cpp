@@ -34,7 +34,9 @@ void test_as_driven_it_is_right_all_the_time() {
     LandmarkWorld world(scenario, seed);
     const LandmarkOutcome o = run_landmark_trial(world, config, trial("as-driven"));
     TEST_ASSERT_EQUAL(seed, o.seed);
-    TEST_ASSERT_TRUE(o.rms_m > 0.001 && o.rms_m < 0.15 && o.rms_deg < 1);
+    TEST_ASSERT_GREATER_THAN_DOUBLE(0.001, o.rms_m);
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.15, o.rms_m);
+    TEST_ASSERT_LESS_THAN_DOUBLE(1, o.rms_deg);
     TEST_ASSERT_EQUAL_DOUBLE(0, o.wrong_s);
     TEST_ASSERT_EQUAL(0, o.moved_seen);
     TEST_ASSERT_FALSE(o.detected_after_s.has_value());
@@ -49,7 +51,8 @@ void test_started_anywhere_it_finds_itself() {
   const LandmarkOutcome o = run_landmark_trial(world, config, trial("start"));
   TEST_ASSERT_FALSE(o.outcome.samples.front().tracking);
   TEST_ASSERT_TRUE(o.right_after_s.has_value());
-  TEST_ASSERT_TRUE(o.outcome.samples.back().tracking && o.outcome.samples.back().error_m < 0.3);
+  TEST_ASSERT_TRUE(o.outcome.samples.back().tracking);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.3, o.outcome.samples.back().error_m);
 }
 
 void test_carried_off_it_is_elsewhere_and_says_so() {

@@ -70,7 +70,7 @@ uint32_t read_through(const fs::path &folder) {
     TEST_ASSERT_EQUAL_MESSAGE(0, sources[i]->counts.malformed, sources[i]->counts.first_problem);
   }
   const wm_rig *rig = wm_site_rig(wm_recording_site(opened));
-  TEST_ASSERT_TRUE(rig->camera_count > 0);
+  TEST_ASSERT_GREATER_THAN(0, rig->camera_count);
   for (uint32_t c = 0; c < rig->camera_count; c++) {
     wm_video *video = nullptr;
     TEST_ASSERT_EQUAL_MESSAGE(

@@ -130,7 +130,8 @@ void test_what_has_no_pixel(void) {
   TEST_ASSERT_FALSE(camera_valid(c, error));
   TEST_ASSERT_NOT_NULL(std::strstr(error.c_str(), "omni needs 5 values"));
   Model model;
-  TEST_ASSERT_TRUE(model_from_name("double-sphere", model) && model == Model::double_sphere);
+  TEST_ASSERT_TRUE(model_from_name("double-sphere", model));
+  TEST_ASSERT_EQUAL(Model::double_sphere, model);
   TEST_ASSERT_FALSE(model_from_name("fisheye", model));
 }
 

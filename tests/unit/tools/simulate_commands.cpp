@@ -62,7 +62,8 @@ void test_commands_are_obeyed_after_the_dead_time_with_the_response() {
   TEST_ASSERT_GREATER_THAN_DOUBLE(0.05, worst(r, other));
   // The controller keeps to the route in spite of the drive: the robot comes back.
   const State end = r.drive.at(1e9);
-  TEST_ASSERT_TRUE(std::isfinite(end.x_m) && r.length_m > 50);
+  TEST_ASSERT_DOUBLE_IS_DETERMINATE(end.x_m);
+  TEST_ASSERT_GREATER_THAN_DOUBLE(50, r.length_m);
 }
 
 void test_rows_are_rounded_and_repeated() {
@@ -74,7 +75,7 @@ void test_rows_are_rounded_and_repeated() {
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, std::round(r.commands[i].v_mps / 0.05) * 0.05, r.commands[i].v_mps);
     same += r.commands[i].w_radps == r.commands[i - 1].w_radps;
   }
-  TEST_ASSERT_TRUE(same > 0.6 * static_cast<double>(r.commands.size()));
+  TEST_ASSERT_GREATER_THAN_DOUBLE(0.6 * static_cast<double>(r.commands.size()), same);
 }
 
 void test_acceleration_is_limited() {

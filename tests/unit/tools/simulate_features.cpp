@@ -185,7 +185,7 @@ void test_instruments_under_water() {
           const Vector3d n = T.linear().transpose() * Vector3d::UnitY();
           north.add(wrap(e.as.sighting.bearing_rad - std::atan2(n.y(), n.x())));
         } else if (e.kind == WM_EVENT_SIGHTING) {
-          TEST_ASSERT_TRUE(std::isnan(e.as.sighting.bearing_rad));
+          TEST_ASSERT_DOUBLE_IS_NAN(e.as.sighting.bearing_rad);
           const double off =
               e.as.sighting.range_m - (place(e.as.sighting.landmark_id) - T * Vector3d(0, 0, 0.2)).norm();
           ranges++;

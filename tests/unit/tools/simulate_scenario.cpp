@@ -46,7 +46,7 @@ void test_the_shipped_crossing_is_read() {
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.15, s.cameras[0].latency_s);
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.01, s.errors.wheel_radius);
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.0002 / std::sqrt(60.0), s.errors.yaw_rate_bias_walk);
-  TEST_ASSERT_TRUE(s.route.legs[2].kind == Leg::Kind::turn);
+  TEST_ASSERT_EQUAL(Leg::Kind::turn, s.route.legs[2].kind);
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, kPi / 2, s.route.legs[2].turn_rad);
   TEST_ASSERT_EQUAL(-1, s.faults.dead_encoder);
 }

@@ -70,7 +70,8 @@ void test_a_seed_says_the_same_again_and_another_seed_something_else() {
   TEST_ASSERT_TRUE(same(a.sightings, b.sightings));
   TEST_ASSERT_FALSE(same(a.can, c.can));
   TEST_ASSERT_FALSE(same(a.sightings, c.sightings));
-  TEST_ASSERT_TRUE(a.map[0].p_m[0] == b.map[0].p_m[0] && a.map[0].p_m[0] != c.map[0].p_m[0]);
+  TEST_ASSERT_EQUAL_DOUBLE(b.map[0].p_m[0], a.map[0].p_m[0]);
+  TEST_ASSERT_NOT_EQUAL_DOUBLE(c.map[0].p_m[0], a.map[0].p_m[0]);
 }
 
 void test_landmarks_change_neither_wheels_nor_each_other() {

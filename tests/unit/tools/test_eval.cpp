@@ -59,7 +59,7 @@ void test_an_ellipse_has_its_axes_and_direction() {
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.3, is.longer_m);
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.1, is.shorter_m);
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, kPi / 6, is.longer_rad);
-  TEST_ASSERT_TRUE(std::isnan(ellipse_of(covariance * kNan).longer_m));
+  TEST_ASSERT_DOUBLE_IS_NAN(ellipse_of(covariance * kNan).longer_m);
 }
 
 void test_constant_offset_to_the_left() {

@@ -122,7 +122,7 @@ void outlines_are_closed_and_have_free_space_on_their_left() {
   double sum_x = 0, sum_y = 0;
   for (const Face &f : drawn.plan.faces) {
     const double dx = f.b.x_m - f.a.x_m, dy = f.b.y_m - f.a.y_m, length = std::sqrt(dx * dx + dy * dy);
-    TEST_ASSERT_TRUE(length > 0);
+    TEST_ASSERT_GREATER_THAN_DOUBLE(0, length);
     const Point middle{0.5 * (f.a.x_m + f.b.x_m), 0.5 * (f.a.y_m + f.b.y_m)};
     const double nx = -dy / length * 0.003, ny = dx / length * 0.003;
     TEST_ASSERT_TRUE(drawn.plan.free({middle.x_m + nx, middle.y_m + ny}));
@@ -145,7 +145,7 @@ void floor_pieces_cover_the_free_floor_once() {
       }
     for (const Face &f : drawn.plan.faces)
       if (f.bottom_m <= 0) outline_m2 += 0.5 * (f.a.x_m * f.b.y_m - f.b.x_m * f.a.y_m);
-    TEST_ASSERT_TRUE(outline_m2 > 150);
+    TEST_ASSERT_GREATER_THAN_DOUBLE(150, outline_m2);
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, outline_m2, pieces_m2);
   }
 }
