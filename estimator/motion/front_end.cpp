@@ -241,7 +241,7 @@ void motion_front_end::push_quantities(wm_time_ns t_ns, uint32_t fresh, bool fro
     double angle = 0.0;
     watch_yaw_rate(t_ns, v, rate && !refused);
     if (read_road_wheel(&angle)) push_input(t_ns, v, angle, frozen, refused);
-  } else if (model_ == WM_MOTION_TWIST && speed_source_ == kOfTwist) {
+  } else if (twist_stands_in()) {
     watch_yaw_rate(t_ns, v, rate && !refused);  // stuck until now: does it move again?
   }
 }
@@ -386,7 +386,7 @@ void motion_front_end::push_input(wm_time_ns t_ns, double a, double b, bool doub
   input.command = model_ == WM_MOTION_TWIST && commands_ != 0;
   if (input.command) begin_response(*params_, history_.empty() ? nullptr : &history_.newest(), &input);
   input.kind = beside_gyro ? kKindSteering : kind();
-  input.beside_gyro = beside_gyro || (model_ == WM_MOTION_TWIST && speed_source_ == kOfTwist);
+  input.beside_gyro = beside_gyro || twist_stands_in();
   input.doubtful = doubtful;
   mark_refused(&input);
   note_ages(&input);

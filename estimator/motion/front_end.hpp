@@ -171,6 +171,7 @@ class motion_front_end {
   sample_age age_of_speed(wm_time_ns t_ns) const;
   sample_age age_of_steering(wm_time_ns t_ns) const;
   bool wheels_stand_in(bool steering) const;
+  bool twist_stands_in() const { return model_ == WM_MOTION_TWIST && speed_source_ == kOfTwist; }
   // Counts have come since, which give the distance; not where the gyro's inputs alone are newer.
   bool counts_give_way(const motion_segment &segment) const {
     const motion_input &input = segment.input;
