@@ -125,7 +125,8 @@ void motion_front_end::take_twist(const wm_event &event) {
   const double w = commands_ ? driven_rate(*params_, v, rate) : rate;
   const double u = planar ? 0.0 : event.as.twist6.v_mps[1];
   if (!planar) watch_plane(event.t_ns, event.as.twist6);
-  twist_sample_ns_ = event.t_ns;
+  note_period(kTwistSpeed, event.t_ns, 1);
+  stamp_ns_[kTwistSpeed] = twist_sample_ns_ = event.t_ns;
   choose_model(WM_EVENT_BIT(event.kind));
   twists_.note(v, rate,
                std::fabs(v) > params_->standstill_speed_mps || std::fabs(rate) > params_->standstill_yaw_rate_radps);
@@ -165,14 +166,10 @@ void motion_front_end::take_twist(const wm_event &event) {
 
 // The speeds of a twist and the turn rate of a gyro, as of a car's speed and yaw rate.
 void motion_front_end::take_twist_beside_gyro(wm_time_ns t_ns, const planar_twist &sample) {
-  note_period(kTwistSpeed, t_ns, 1);
   const bool v_plausible = is_plausible_level(kTwistSpeed, t_ns, sample.v);
   const bool plausible = is_plausible_level(kTwistSide, t_ns, sample.u) && v_plausible;
   note_plausibility(t_ns, quantity_bit(kTwistSpeed) | quantity_bit(kTwistSide), plausible);
-  if (plausible) {
-    twist_ = sample;
-    stamp_ns_[kTwistSpeed] = t_ns;
-  }
+  if (plausible) twist_ = sample;
   watch_standstill(t_ns, plausible && is_still(twist_.v));
   push_input(t_ns, twist_.v, value_[WM_Q_YAW_RATE], (health_ & WM_MOTION_HEALTH_YAW_RATE_STUCK) != 0, !plausible,
              twist_.u);

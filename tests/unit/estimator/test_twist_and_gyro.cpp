@@ -99,6 +99,20 @@ void test_a_silent_gyro_is_replaced_and_taken_up_again(void) {
   TEST_ASSERT_EQUAL(WM_MOTION_SPEED_YAW_RATE, front.model());
 }
 
+// GIVEN a twist that drives alone, at first or while the gyro is silent WHEN the gyro comes THEN the newest twist is no
+// silent speed.
+void test_the_twist_is_no_silent_speed_when_a_gyro_comes(void) {
+  for (const bool had_gyro : {false, true}) {
+    begin();
+    drive(0, 1, 0.5, 0.0, 0.1, [had_gyro](int i) { return had_gyro ? 0.1 + noise(i) : kNone; });
+    drive(1, 3, 0.5, 0.0, 0.1, [](int) { return kNone; });
+    front.feed(make::quantities(2.995, {{WM_Q_YAW_RATE, 0.1}}));
+    TEST_ASSERT_EQUAL(WM_MOTION_SPEED_YAW_RATE, front.model());
+    TEST_ASSERT_EQUAL_HEX32(0, front.health());
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.5, front.twist_at(make::at(2.996), calibration).v);
+  }
+}
+
 void test_a_stuck_gyro_is_replaced(void) {
   begin();
   drive(0, 1, 0.3, 0.0, 0.0, [](int i) { return noise(i); });
@@ -176,6 +190,7 @@ int main(void) {
   RUN_TEST(test_a_twist_alone_is_as_ever);
   RUN_TEST(test_a_slow_gyro_is_overdue_by_its_own_period);
   RUN_TEST(test_a_silent_gyro_is_replaced_and_taken_up_again);
+  RUN_TEST(test_the_twist_is_no_silent_speed_when_a_gyro_comes);
   RUN_TEST(test_a_stuck_gyro_is_replaced);
   RUN_TEST(test_a_stop_does_not_mend_a_stuck_gyro);
   RUN_TEST(test_what_a_stuck_gyro_missed_is_uncertain);
