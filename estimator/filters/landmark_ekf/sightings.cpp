@@ -119,12 +119,48 @@ wm_status landmark_ekf::fuse_sighting(const wm_event &event, const wm_sighting &
   for (int k = 0; at.elevation && k < rows[1].row.count; k++) before[k] = filter_.value(rows[1].row.index[k]);
   const double log_bayes = fuse(rows, at.elevation ? 1 : count, clutter_volume, usable, records);
   if (at.elevation) fuse_elevation(rows, before, records);
+  if (usable) test_calibration(at, rows, at.elevation ? 1 : count);
   if (at.reading.bearing)
     note(event.t_ns, at.landmark, log_bayes, rows[0].innovation,
          rows[0].innovation / std::sqrt(rows[0].record.variance));
   else
     note(event.t_ns, at.landmark, log_bayes);
   return WM_OK;
+}
+
+// Where the last sightings of a sensor contradict its states and fit their prior, the states begin again.
+void landmark_ekf::test_calibration(const sighting_context &at, const residual *rows, int count) {
+  const int sensor = at.s->sensor;
+  if (rows[0].record.verdict == WM_FUSED) return first_.fused(sensor);
+  if (!life_.tracking()) return;
+  first_sightings::row refused[2] = {};
+  for (int i = 0; i < count; i++) {
+    first_sightings::row &out = refused[i];
+    const planar_row &row = rows[i].row;
+    out.innovation = rows[i].innovation;
+    out.noise = rows[i].noise;
+    for (int k = 0; k < row.count; k++) {
+      const int state = row.index[k], own = slots_.state_of(sensor, state);
+      if (own >= 0) out.by_own[own] += row.by[k];
+      if (own >= 0) out.innovation += row.by[k] * (filter_.value(state) - kSensorStateSpecs[own].neutral);
+      if (own < 0 && state < first_sightings::kPose) out.by_pose[state] += row.by[k];
+      if (own < 0 && state >= first_sightings::kPose) out.noise += square(row.by[k]) * filter_.variance(state);
+    }
+  }
+  first_.refused(sensor, at.landmark, refused, count);
+  double pose[first_sightings::kPose][first_sightings::kPose], prior[kSensorStates] = {};
+  for (int i = 0; i < first_sightings::kPose; i++)
+    for (int j = 0; j < first_sightings::kPose; j++) pose[i][j] = filter_.covariance(i, j);
+  for (int k = 0; k < kSensorStates; k++)
+    if (const int slot = slots_.at(sensor, k); slot >= 0) prior[k] = rollback_.variance(rollback_.kStart, slot);
+  if (!first_.contradict(sensor, pose, prior)) return;
+  for (int k = 0; k < kSensorStates; k++) {
+    const int slot = slots_.at(sensor, k);
+    if (slot < 0) continue;
+    filter_.forget(slot, kSensorStateSpecs[k].neutral, prior[k]);
+    rollback_.restart(slot);
+  }
+  first_.restarted(sensor);
 }
 
 wm_verdict landmark_ekf::associate(const wm_sighting &s, sighting_context *out) {
