@@ -37,14 +37,15 @@ class first_sightings {
   void restarted(int sensor) { sensor_[sensor] = {}; }
 
  private:
-  static constexpr int kSightings = 4;  // tested jointly, of two landmarks or more; not swept
+  // Tested jointly, of two landmarks or more; not swept.
+  static constexpr int kSightings = 4;
   static constexpr int kRows = 2 * kSightings;
 
   struct sensor_record {
     row of[kRows];
-    int64_t fused, refused;             // since the states began
+    int64_t fused, refused;  // since the states began
     int32_t rows[kSightings], landmark[kSightings];
-    int64_t kept;                       // sightings, without one that was fused between
+    int64_t kept;  // sightings, without one that was fused between
   };
 
   sensor_record sensor_[kMaxSensors];

@@ -234,7 +234,7 @@ void test_an_outlier_among_the_first_sightings_does_not_keep_the_yaw() {
       see(0.1 * i, i % 2, 0.0);
       wm_estimate e;
       ekf->estimate(state.get(), &e);
-      TEST_ASSERT_EQUAL(WM_TRACKING, e.state);
+      TEST_ASSERT_EQUAL(WM_STATE_TRACKING, e.state);
     }
     TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.0, value_of("camera.yaw_rad"));
     TEST_ASSERT_LESS_THAN_DOUBLE(0.02, sigma_of("camera.yaw_rad"));
