@@ -86,6 +86,8 @@ class landmark_ekf {
   void add_errors(const sighting_context &at, const lent_slots &lent, const double by[kCauses], int error_offset,
                   double error_size, residual *r) const;
   void finish_row(wm_residual kind, double observed, double expected, const wm_innovation &record, residual *r) const;
+  first_sightings::row row_at_prior(const residual &r, int sensor) const;
+  void restart_calibration(int sensor, const double prior[kSensorStates]);
   void test_calibration(const sighting_context &at, const residual *rows, int count);
   void decay_tilt(wm_time_ns t_ns);
   void decay_gnss_error(wm_time_ns t_ns, double sigma_m);

@@ -128,32 +128,46 @@ wm_status landmark_ekf::fuse_sighting(const wm_event &event, const wm_sighting &
   return WM_OK;
 }
 
+// A row that the gate refused, with the sensor's states at their prior's mean.
+first_sightings::row landmark_ekf::row_at_prior(const residual &r, int sensor) const {
+  first_sightings::row out{};
+  out.innovation = r.innovation;
+  out.noise = r.noise;
+  for (int i = 0; i < r.row.count; i++) {
+    const int state = r.row.index[i], own = slots_.state_of(sensor, state);
+    const double by = r.row.by[i];
+    if (own >= 0) {
+      out.by_own[own] += by;
+      out.innovation += by * (filter_.value(state) - kSensorStateSpecs[own].neutral);
+    } else if (state < first_sightings::kPose) {
+      out.by_pose[state] += by;
+    } else {
+      out.noise += square(by) * filter_.variance(state);
+    }
+  }
+  return out;
+}
+
 // Where the last sightings of a sensor contradict its states and fit their prior, the states begin again.
 void landmark_ekf::test_calibration(const sighting_context &at, const residual *rows, int count) {
   const int sensor = at.s->sensor;
   if (rows[0].record.verdict == WM_FUSED) return first_.fused(sensor);
   if (!life_.tracking()) return;
-  first_sightings::row refused[2] = {};
-  for (int i = 0; i < count; i++) {
-    first_sightings::row &out = refused[i];
-    const planar_row &row = rows[i].row;
-    out.innovation = rows[i].innovation;
-    out.noise = rows[i].noise;
-    for (int k = 0; k < row.count; k++) {
-      const int state = row.index[k], own = slots_.state_of(sensor, state);
-      if (own >= 0) out.by_own[own] += row.by[k];
-      if (own >= 0) out.innovation += row.by[k] * (filter_.value(state) - kSensorStateSpecs[own].neutral);
-      if (own < 0 && state < first_sightings::kPose) out.by_pose[state] += row.by[k];
-      if (own < 0 && state >= first_sightings::kPose) out.noise += square(row.by[k]) * filter_.variance(state);
-    }
-  }
+  first_sightings::row refused[2];
+  for (int i = 0; i < count; i++) refused[i] = row_at_prior(rows[i], sensor);
   first_.refused(sensor, at.landmark, refused, count);
-  double pose[first_sightings::kPose][first_sightings::kPose], prior[kSensorStates] = {};
+  double pose[first_sightings::kPose][first_sightings::kPose];
   for (int i = 0; i < first_sightings::kPose; i++)
     for (int j = 0; j < first_sightings::kPose; j++) pose[i][j] = filter_.covariance(i, j);
-  for (int k = 0; k < kSensorStates; k++)
-    if (const int slot = slots_.at(sensor, k); slot >= 0) prior[k] = rollback_.variance(rollback_.kStart, slot);
-  if (!first_.contradict(sensor, pose, prior)) return;
+  double prior[kSensorStates];
+  for (int k = 0; k < kSensorStates; k++) {
+    const int slot = slots_.at(sensor, k);
+    prior[k] = slot < 0 ? 0.0 : rollback_.variance(rollback_.kStart, slot);
+  }
+  if (first_.contradict(sensor, pose, prior)) restart_calibration(sensor, prior);
+}
+
+void landmark_ekf::restart_calibration(int sensor, const double prior[kSensorStates]) {
   for (int k = 0; k < kSensorStates; k++) {
     const int slot = slots_.at(sensor, k);
     if (slot < 0) continue;
