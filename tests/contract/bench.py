@@ -35,6 +35,7 @@ class Bench:
         options, judged_by = tuple(map(str, replay)), tuple(map(str, evaluation))
         one = plan.Cell(title, pathlib.Path(config).stem, "waymark", seed, recording, recording, pathlib.Path(config), self._program, self._judge, options,
                         judged_by, tuple(keep))
+        self._sums.forget(one.data, one.config)  # a caller may write them anew under the same name
         key = one.key(self._sums)
         result = batch.row_of(one, self._store.run(one, key))
         with self._lock:

@@ -79,6 +79,14 @@ class Batch(unittest.TestCase):
         code, text = call("compare", self.out, self.out, "--out", self.fleet.folder / "page.html", "--no-reports")
         self.assertEqual((code, text.splitlines()[0]), (0, "3 drives, 2 with the same bits"))
 
+    def test_a_configuration_that_is_written_anew_is_another_one(self):
+        drive, config = self.fleet.folder / "drives/drive-1", self.fleet.folder / "plain.yaml"
+        runs = Bench(BIN, self.out)
+        first, _ = runs.judge("first", drive, config)
+        self.fleet.configure("plain", "sightings: {noise: {range_factor: 0.3}}\n")
+        second, _ = runs.judge("second", drive, config)
+        self.assertNotEqual(first["position_rmse_m"], second["position_rmse_m"])
+
     def test_only_what_changed_runs_again(self):
         self.batch()
         before = self.keys()

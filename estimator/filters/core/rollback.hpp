@@ -35,13 +35,22 @@ class rollback {
     take(filter, kNewest);
   }
 
-  // Value of a state, which must lie in [from, to).
+  // Value and variance of a state, which must lie in [from, to).
   double value(generation g, int state) const { return copy_[g].value[state - from_]; }
+  double variance(generation g, int state) const { return copy_[g].variance[state - from_]; }
 
   // Puts the safe copy back; correlations with all other states are cut.
   template <class Filter>
   void restore(Filter *filter, generation g = kSafe) const {
     for (int i = from_; i < to_; i++) filter->forget(i, copy_[g].value[i - from_], copy_[g].variance[i - from_]);
+  }
+
+  // Nothing was learned of this state since the start.
+  void restart(int state) {
+    for (const generation g : {kNewest, kSafe}) {
+      copy_[g].value[state - from_] = value(kStart, state);
+      copy_[g].variance[state - from_] = variance(kStart, state);
+    }
   }
 
   int from() const { return from_; }

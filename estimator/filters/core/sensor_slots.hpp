@@ -41,6 +41,12 @@ class sensor_slots {
   }
 
   int at(int sensor, int state) const { return slots_.at(sensor, state); }  // -1: off
+  // The sensor's state that this slot is of; -1: none.
+  int state_of(int sensor, int slot) const {
+    for (int k = 0; k < kSensorStates; k++)
+      if (at(sensor, k) == slot) return k;
+    return -1;
+  }
   bool is_by_default(int state) const { return by_default_[state]; }
   // `stated`: of a sighting with its own sigmas, on which states of a default do not act.
   int at(int sensor, int state, bool stated) const { return stated && by_default_[state] ? -1 : at(sensor, state); }

@@ -7,6 +7,7 @@
 
 #include <cmath>
 
+#include "filters/core/first_sightings.hpp"
 #include "filters/core/gate.hpp"
 #include "filters/core/landmark_evidence.hpp"
 #include "filters/core/lifecycle.hpp"
@@ -85,6 +86,9 @@ class landmark_ekf {
   void add_errors(const sighting_context &at, const lent_slots &lent, const double by[kCauses], int error_offset,
                   double error_size, residual *r) const;
   void finish_row(wm_residual kind, double observed, double expected, const wm_innovation &record, residual *r) const;
+  first_sightings::row row_at_prior(const residual &r, int sensor) const;
+  void restart_calibration(int sensor, const double prior[kSensorStates]);
+  void test_calibration(const sighting_context &at, const residual *rows, int count);
   void decay_tilt(wm_time_ns t_ns);
   void decay_gnss_error(wm_time_ns t_ns, double sigma_m);
   double lasting_error() const;  // of the receiver, over its sigma; 0 where it is no state
@@ -152,6 +156,7 @@ class landmark_ekf {
   int calibration_states_;  // pose and calibration; the lent states come behind
   lifecycle life_;
   landmark_evidence evidence_;
+  first_sightings first_;
   pose_search observations_;
   start_hypotheses start_;
   observation prior_[2];

@@ -119,12 +119,62 @@ wm_status landmark_ekf::fuse_sighting(const wm_event &event, const wm_sighting &
   for (int k = 0; at.elevation && k < rows[1].row.count; k++) before[k] = filter_.value(rows[1].row.index[k]);
   const double log_bayes = fuse(rows, at.elevation ? 1 : count, clutter_volume, usable, records);
   if (at.elevation) fuse_elevation(rows, before, records);
+  if (usable) test_calibration(at, rows, at.elevation ? 1 : count);
   if (at.reading.bearing)
     note(event.t_ns, at.landmark, log_bayes, rows[0].innovation,
          rows[0].innovation / std::sqrt(rows[0].record.variance));
   else
     note(event.t_ns, at.landmark, log_bayes);
   return WM_OK;
+}
+
+// A row that the gate refused, with the sensor's states at their prior's mean.
+first_sightings::row landmark_ekf::row_at_prior(const residual &r, int sensor) const {
+  first_sightings::row out{};
+  out.innovation = r.innovation;
+  out.noise = r.noise;
+  for (int i = 0; i < r.row.count; i++) {
+    const int state = r.row.index[i], own = slots_.state_of(sensor, state);
+    const double by = r.row.by[i];
+    if (own >= 0) {
+      out.by_own[own] += by;
+      out.innovation += by * (filter_.value(state) - kSensorStateSpecs[own].neutral);
+    } else if (state < first_sightings::kPose) {
+      out.by_pose[state] += by;
+    } else {
+      out.noise += square(by) * filter_.variance(state);
+    }
+  }
+  return out;
+}
+
+// Where the last sightings of a sensor contradict its states and fit their prior, the states begin again.
+void landmark_ekf::test_calibration(const sighting_context &at, const residual *rows, int count) {
+  const int sensor = at.s->sensor;
+  if (rows[0].record.verdict == WM_FUSED) return first_.fused(sensor);
+  if (!life_.tracking()) return;
+  first_sightings::row refused[2];
+  for (int i = 0; i < count; i++) refused[i] = row_at_prior(rows[i], sensor);
+  first_.refused(sensor, at.landmark, refused, count);
+  double pose[first_sightings::kPose][first_sightings::kPose];
+  for (int i = 0; i < first_sightings::kPose; i++)
+    for (int j = 0; j < first_sightings::kPose; j++) pose[i][j] = filter_.covariance(i, j);
+  double prior[kSensorStates];
+  for (int k = 0; k < kSensorStates; k++) {
+    const int slot = slots_.at(sensor, k);
+    prior[k] = slot < 0 ? 0.0 : rollback_.variance(rollback_.kStart, slot);
+  }
+  if (first_.contradict(sensor, pose, prior)) restart_calibration(sensor, prior);
+}
+
+void landmark_ekf::restart_calibration(int sensor, const double prior[kSensorStates]) {
+  for (int k = 0; k < kSensorStates; k++) {
+    const int slot = slots_.at(sensor, k);
+    if (slot < 0) continue;
+    filter_.forget(slot, kSensorStateSpecs[k].neutral, prior[k]);
+    rollback_.restart(slot);
+  }
+  first_.restarted(sensor);
 }
 
 wm_verdict landmark_ekf::associate(const wm_sighting &s, sighting_context *out) {

@@ -206,6 +206,62 @@ void test_a_receivers_lasting_error_falls_with_its_sigma() {
   TEST_ASSERT_DOUBLE_WITHIN(2.0, 0.0, e.pose_map_base.p_m[1]);
 }
 
+// A robot that stands sees landmark k at `t_s`, `off_rad` beside it.
+void see(double t_s, int k, double off_rad) {
+  feed(make::twist(t_s, 0.0, 0.0));
+  feed(make::sighting(t_s, k, std::atan2(landmarks[k].p_m[1], landmarks[k].p_m[0]) + off_rad, NAN));
+}
+
+double value_of(const std::string &name) {
+  for (const wm_calibration_value &v : calibration())
+    if (name == v.name) return v.value;
+  return NAN;
+}
+
+// A robot whose place and heading are known; the camera's yaw is open by 0.05 rad.
+void begin_known() {
+  setup.start.sigma_xy_m = setup.start.sigma_heading_rad = 0.005;
+  begin();
+}
+
+// The first one fits the yaw's prior, and decides the yaw; the good ones agree with each other.
+void test_an_outlier_among_the_first_sightings_does_not_keep_the_yaw() {
+  for (const double off_rad : {-0.12, 0.12}) {
+    begin_known();
+    see(0.0, 0, off_rad);
+    TEST_ASSERT_DOUBLE_WITHIN(0.03, -off_rad, value_of("camera.yaw_rad"));
+    for (int i = 1; i < 20; i++) {
+      see(0.1 * i, i % 2, 0.0);
+      wm_estimate e;
+      ekf->estimate(state.get(), &e);
+      TEST_ASSERT_EQUAL(WM_STATE_TRACKING, e.state);
+    }
+    TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.0, value_of("camera.yaw_rad"));
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.02, sigma_of("camera.yaw_rad"));
+  }
+}
+
+// With one landmark alone, that landmark has moved as well; outliers that scatter agree with nothing.
+void test_what_agrees_by_one_landmark_or_not_at_all_leaves_the_yaw() {
+  for (const bool scatter : {false, true}) {
+    begin_known();
+    see(0.0, 1, 0.0);
+    for (int i = 1; i < 9; i++) see(0.1 * i, scatter ? i % 2 : 0, scatter && i % 4 < 2 ? -0.12 : 0.12);
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.02, sigma_of("camera.yaw_rad"));
+    TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.0, value_of("camera.yaw_rad"));
+  }
+}
+
+// What many sightings have shown is not forgotten for a few.
+void test_a_yaw_that_many_sightings_confirm_is_kept() {
+  begin_known();
+  for (int i = 0; i < 40; i++) see(0.1 * i, i % 2, 0.0);
+  for (int i = 40; i < 60; i++) {
+    see(0.1 * i, i % 2, 0.12);
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.02, sigma_of("camera.yaw_rad"));
+  }
+}
+
 }  // namespace
 
 void setUp() {
@@ -235,5 +291,8 @@ int main() {
   RUN_TEST(test_a_vague_receiver_finds_the_robot_too);
   RUN_TEST(test_a_gyros_scale_is_known_from_its_data_sheet);
   RUN_TEST(test_a_receivers_lasting_error_falls_with_its_sigma);
+  RUN_TEST(test_an_outlier_among_the_first_sightings_does_not_keep_the_yaw);
+  RUN_TEST(test_what_agrees_by_one_landmark_or_not_at_all_leaves_the_yaw);
+  RUN_TEST(test_a_yaw_that_many_sightings_confirm_is_kept);
   return UNITY_END();
 }

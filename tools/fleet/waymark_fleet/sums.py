@@ -54,6 +54,10 @@ class Sums:
             self._of[at] = function(what)
         return self._of[at]
 
+    def forget(self, *paths):
+        """These may have another content than in once()."""
+        self._of = {at: made for at, made in list(self._of.items()) if at[1] not in paths}
+
     def folder(self, path):
         """Sum of the names and bytes of all files below a folder; of a file, its own."""
         path = pathlib.Path(path)
