@@ -38,8 +38,12 @@ def with_realtime(config, keys):
     return config + f"\nrealtime: {{{keys}}}\n"
 
 
-def compile_helper(source, program):
-    subprocess.run([COMPILER, "-O2", "-static", source, "-o", program], check=True)
+def compile_helper(program, *sources):
+    subprocess.run([COMPILER, "-O2", "-static", *sources, "-o", program], check=True)
+
+
+def compile_player(here, folder):
+    compile_helper(folder / "play", here / "play.c", here / "play_devices.c")
 
 
 def write(scenario, here, items, blob, seconds):
@@ -47,7 +51,7 @@ def write(scenario, here, items, blob, seconds):
     (scenario / "timeline").write_text("".join(f"{t} {what}\n" for t, what in sorted(items)))
     (scenario / "pictures").write_bytes(blob)
     (scenario / "duration").write_text(f"{seconds:.0f}\n")
-    compile_helper(here / "play.c", scenario / "play")
+    compile_player(here, scenario)
 
 
 def judge(name, work, waymark, recording, config, seconds, *logged_options):
