@@ -18,7 +18,7 @@ def twists(work, recording):
         for row in csv.DictReader(f):
             said = waymark.motion_t()
             said.t_ns = int(row["t_ns"])
-            said.v_mps, said.vy_mps, said.w_radps = (float(row.get(name) or 0) for name in ("v_mps", "vy_mps", "w_radps"))
+            said.v_mps, said.vy_mps, said.w_radps = (float(row.get(name) or "nan") for name in ("v_mps", "vy_mps", "w_radps"))
             yield said.t_ns, said.encode()
 
 
