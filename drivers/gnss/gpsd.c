@@ -64,6 +64,7 @@ static void disconnect(gpsd *self) {
   self->is_connected = self->skips = 0;
   self->used = self->taken = 0;
   self->fix = -1;
+  self->deviations_ns = WM_TIME_NONE;
   self->gone[0] = '\0';
 }
 
@@ -149,7 +150,8 @@ static const char *next_line(gpsd *self, size_t *length, wm_source_counts *count
 static void set_fix(gpsd *self, int fix, const char *why, wm_source_counts *counts) {
   if (fix != self->fix) {
     counts->news++;
-    self->deviations_ns = WM_TIME_NONE;
+    // Those that came before the first report of a fix are of the same fix.
+    if (self->fix >= 0) self->deviations_ns = WM_TIME_NONE;
   }
   self->fix = fix;
   (void)snprintf(self->gone, sizeof self->gone, "%s", why);

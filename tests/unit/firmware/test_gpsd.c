@@ -185,6 +185,20 @@ static void a_receivers_deviations_are_of_its_fix(void) {
   TEST_ASSERT_EQUAL_DOUBLE(5, event.as.position.sigma_xy_m);
 }
 
+// Of a burst of sentences those come before the position.
+static void deviations_before_the_first_fix_are_of_it(void) {
+  begin_connected();
+  deviations("0.02");
+  report(utc_ns(), "\"mode\":3,\"status\":3," PLACE);
+  expect(WM_OK);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.02, event.as.position.sigma_xy_m);
+  report(utc_ns(), "\"mode\":0");
+  expect(WM_AGAIN);
+  report(utc_ns(), "\"mode\":3,\"status\":1,\"lat\":48,\"lon\":11");
+  expect(WM_OK);
+  TEST_ASSERT_EQUAL_DOUBLE(5, event.as.position.sigma_xy_m);
+}
+
 static void a_course_is_a_heading(void) {
   config.from = WM_GPSD_COURSE;
   begin_connected();
@@ -357,6 +371,7 @@ int main(void) {
   RUN_TEST(a_position_is_in_the_map);
   RUN_TEST(sigmas_follow_the_fix);
   RUN_TEST(a_receivers_deviations_are_of_its_fix);
+  RUN_TEST(deviations_before_the_first_fix_are_of_it);
   RUN_TEST(a_course_is_a_heading);
   RUN_TEST(antennas_give_a_heading);
   RUN_TEST(without_a_fix_nothing_is_fused);

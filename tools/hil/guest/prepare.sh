@@ -57,7 +57,7 @@ include=$include,openssh-server,libnuma1
 cyclictest='cd "$1/tmp" && APT_CONFIG=$MMDEBSTRAP_APT_CONFIG apt-get download -q rt-tests &&
   dpkg-deb --fsys-tarfile rt-tests_*.deb | tar -C "$1" -x ./usr/bin/cyclictest && rm rt-tests_*.deb'
 # The libraries of gpsd, whose package would bring Python, too; and the one of the package's page.
-include=$include,libgps28,libusb-1.0-0,libbluetooth3,libmicrohttpd12
+include=$include,libgps28,libusb-1.0-0,libbluetooth3,netbase,libmicrohttpd12
 gpsd='cd "$1/tmp" && APT_CONFIG=$MMDEBSTRAP_APT_CONFIG apt-get download -q gpsd &&
   dpkg-deb --fsys-tarfile gpsd_*.deb | tar -C "$1" -x ./usr/sbin/gpsd && rm gpsd_*.deb'
 # What the package's service runs under, and its dynamic user.
