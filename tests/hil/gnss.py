@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A car with a GNSS receiver: CAN through the guest's controller, NMEA sentences on a serial line that gpsd reads, each block when it arrived
-in the recording; landmark_ekf."""
+in the recording; landmark_ekf. gpsd's first report of a fix has no standard deviations, as the recording has, so that poses are compared with
+the replay of what the guest recorded."""
 import csv
 import datetime
 import functools
@@ -100,7 +101,7 @@ def prepare(work, root, here, simulate):
 
 def judge(work, waymark, root):
     seconds = float((work / "share/gnss/duration").read_text())
-    failures = drives.judge("gnss", work, waymark, work / "gnss-recording", root / CONFIG, seconds)
+    failures = drives.judge("gnss", work, waymark, work / "gnss-recording", root / CONFIG, seconds, is_recorded=True)
     heard = Published("gnss", work / "share/out/gnss", 0, str)
     sent = sum(1 for _ in fixes(work / "gnss-recording"))
     end_s = heard.healths[-1][0]
