@@ -20,6 +20,7 @@ GEOID_M = 40.0               # its height there, about
 BEGIN = datetime.datetime(2026, 1, 1, tzinfo=datetime.timezone.utc)
 A_M, E2 = 6378137.0, 6.69437999014e-3  # WGS84
 RECEIVED_LEAST = 0.95
+BEFORE = 20  # fixes of the standing car before the drive: a receiver is on before the run
 
 
 def earth_centred(place):
@@ -74,11 +75,11 @@ def block(t_ns, x_m, y_m, z_m, sigma_m, sigma_up_m):
 
 
 def fixes(recording):
-    """(arrival_ns, t_ns, NMEA) of gnss.csv."""
+    """(arrival_ns, t_ns, numbers) of gnss.csv."""
     with open(recording / "gnss.csv", newline="") as f:
         for row in csv.DictReader(f):
             numbers = [float(row[name]) for name in ("x_m", "y_m", "z_m", "sigma_xy_m", "sigma_z_m")]
-            yield int(row["arrival_ns"]), int(row["t_ns"]), block(int(row["t_ns"]), *numbers)
+            yield int(row["arrival_ns"]), int(row["t_ns"]), numbers
 
 
 def with_rtk(world):
@@ -88,12 +89,21 @@ def with_rtk(world):
     return world
 
 
+def before(rows):
+    """The first fixes again, each as long before the first as it is after it."""
+    first_ns = rows[0][1]
+    for arrival_ns, t_ns, numbers in rows[BEFORE:0:-1]:
+        yield arrival_ns - 2 * (t_ns - first_ns), 2 * first_ns - t_ns, numbers
+
+
 def prepare(work, root, here, simulate):
     (work / "gnss.yaml").write_text(with_rtk((root / f"config/worlds/{WORLD}.yaml").read_text()))
     recording, scenario = drives.make(work, "gnss", simulate, work / "gnss.yaml", "--duration", str(SECONDS))
     items, blob = list(drives.can_items(recording)), bytearray()
     seconds, delay_ns = (items[-1][0] - items[0][0]) * 1e-9, 0
-    for arrival_ns, t_ns, text in fixes(recording):
+    rows = list(fixes(recording))
+    for arrival_ns, t_ns, numbers in [*before(rows), *rows]:
+        text = block(t_ns, *numbers)
         items.append((arrival_ns, f"n {len(blob)} {len(text)}"))
         delay_ns = arrival_ns - t_ns
         blob += text

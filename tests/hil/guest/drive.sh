@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # In the guest, by other scripts: a recording's data through the kernel's drivers, each datum at its own time, into waymark; what
 # LCM's own logger hears is what is judged. Needs: name (of the folder), device (v4l2loopback's, or "-"), width, height; where
-# a function `beside` is defined, it starts what else must run. With record=1 the run records beside it.
+# a function `beside` is defined, it starts what else must run. With record=1 the run records beside it; it begins after `wait` seconds.
 set -u
 cp -r "/host/$name" /run/
 cd "/run/$name" || exit 1
@@ -25,7 +25,7 @@ logger=$!
 chrt -f 45 ./play timeline pictures can1 "$device" "$width" "$height" 8 >played.txt &
 player=$!
 if declare -F beside >/dev/null; then beside; fi
-sleep 1
+sleep "${wait:-1}"
 waymark run --config robot.yaml --out /run/drive ${record:+--record /run/disk/rec} --duration $((seconds + 10)) || fail "waymark run: exit code $?"
 wait $player || fail "the player: exit code $?"
 cat played.txt

@@ -149,7 +149,9 @@ static void sigmas_follow_the_fix(void) {
   } kFixes[] = {{"\"mode\":3,\"status\":1,\"lat\":48,\"lon\":11", 5},
                 {"\"mode\":3,\"status\":2,\"lat\":48,\"lon\":11", 2},
                 {"\"mode\":3,\"status\":4,\"lat\":48,\"lon\":11", 0.5},
+                {"\"mode\":3,\"status\":4,\"lat\":48,\"lon\":11,\"eph\":17.1", 0.5},
                 {"\"mode\":3,\"status\":3,\"lat\":48,\"lon\":11", 0.05},
+                {"\"mode\":3,\"status\":3,\"lat\":48,\"lon\":11,\"epx\":15,\"epy\":17", 0.05},
                 {"\"mode\":3,\"status\":3,\"lat\":48,\"lon\":11,\"eph\":0.02", 0.02}};
   config.accuracy_scale = 2;
   begin_connected();
