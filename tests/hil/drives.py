@@ -54,9 +54,9 @@ def write(scenario, here, items, blob, seconds):
     compile_player(here, scenario)
 
 
-def judge(name, work, waymark, recording, config, seconds, *logged_options, is_recorded=False):
+def judge(name, work, waymark, recording, config, seconds, *logged_options, is_recorded=False, settled_s=0):
     """Poses are compared with a replay of the recording with the data that the guest saw; where the guest's own recording is there
-    (is_recorded), with the replay of that one."""
+    (is_recorded), with the replay of that one, from settled_s on."""
     out, failures = work / f"share/out/{name}", []
 
     def replay(*words):
@@ -80,7 +80,8 @@ def judge(name, work, waymark, recording, config, seconds, *logged_options, is_r
     truth = table(recording / "truth.csv")
     live = [m for _, m, _ in differences(poses, truth, offset_ns)]
     desk = [m for _, m, _ in differences(table(work / f"{name}-desk/published.csv"), truth, 0)]
-    if len(apart) < 30 * seconds:
+    apart = [row for row in apart if row[0] >= begun_ns + settled_s * 10**9]
+    if len(apart) < 30 * (seconds - settled_s):
         return failures + [f"{name}: only {len(apart)} of {len(poses)} poses over LCM can be compared"]
     worst_m, worst_deg = max(m for _, m, _ in apart), max(d for *_, d in apart)
     of_what = "of the guest's recording" if is_recorded else "with the guest's data"
