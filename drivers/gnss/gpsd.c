@@ -64,6 +64,7 @@ static void disconnect(gpsd *self) {
   self->is_connected = self->skips = 0;
   self->used = self->taken = 0;
   self->fix = -1;
+  self->deviations_ns = WM_TIME_NONE;
   self->gone[0] = '\0';
 }
 
@@ -149,7 +150,8 @@ static const char *next_line(gpsd *self, size_t *length, wm_source_counts *count
 static void set_fix(gpsd *self, int fix, const char *why, wm_source_counts *counts) {
   if (fix != self->fix) {
     counts->news++;
-    self->deviations_ns = WM_TIME_NONE;
+    // Those that came before the first report of a fix are of the same fix.
+    if (self->fix >= 0) self->deviations_ns = WM_TIME_NONE;
   }
   self->fix = fix;
   (void)snprintf(self->gone, sizeof self->gone, "%s", why);
@@ -182,10 +184,14 @@ static int has_deviations(const gpsd *self, wm_time_ns now_ns) {
 
 static double sigma_of(const gpsd *self, const gpsd_report *report, wm_time_ns now_ns) {
   if (has_deviations(self, now_ns)) return self->deviation_m;
-  if (report->east_m > 0.0 && report->north_m > 0.0) return hypot(report->east_m, report->north_m) / M_SQRT2;
-  if (report->across_m > 0.0) return report->across_m;
-  if (report->status == GPSD_FIX_RTK_FIXED) return SIGMA_RTK_FIXED_M;
-  if (report->status == GPSD_FIX_RTK_FLOAT) return SIGMA_RTK_FLOAT_M;
+  // gpsd's estimates are without RTK: 19 m times the dilution of precision (H_UERE_NO_DGPS of gpsd 3.22).
+  const double most_m = report->status == GPSD_FIX_RTK_FIXED   ? SIGMA_RTK_FIXED_M
+                        : report->status == GPSD_FIX_RTK_FLOAT ? SIGMA_RTK_FLOAT_M
+                                                               : HUGE_VAL;
+  if (report->east_m > 0.0 && report->north_m > 0.0)
+    return fmin(hypot(report->east_m, report->north_m) / M_SQRT2, most_m);
+  if (report->across_m > 0.0) return fmin(report->across_m, most_m);
+  if (most_m < HUGE_VAL) return most_m;
   return report->status == GPSD_FIX_DGPS ? SIGMA_DGPS_M : SIGMA_PLAIN_M;
 }
 

@@ -194,6 +194,7 @@ wm_status add_bound(const sim::Scenario &scenario, const wm_config &config, uint
   if (const wm_status s = sim::simulate(scenario, seed, SIZE_MAX, real, err); s != WM_OK) return s;
   recording.start.sigma_xy_m = real.start.sigma_xy_m;
   recording.start.sigma_heading_rad = real.start.sigma_heading_rad;
+  recording.sensors = real.sensors;  // without errors, but with the noise that is stated
   Begun begun;
   if (const wm_status s = begun.begin(scenario, config, recording, err); s != WM_OK) return s;
   const wm_estimator &ops = *config.estimator;

@@ -38,8 +38,12 @@ def with_realtime(config, keys):
     return config + f"\nrealtime: {{{keys}}}\n"
 
 
-def compile_helper(source, program):
-    subprocess.run([COMPILER, "-O2", "-static", source, "-o", program], check=True)
+def compile_helper(program, *sources):
+    subprocess.run([COMPILER, "-O2", "-static", *sources, "-o", program], check=True)
+
+
+def compile_player(here, folder):
+    compile_helper(folder / "play", here / "play.c", here / "play_devices.c")
 
 
 def write(scenario, here, items, blob, seconds):
@@ -47,10 +51,12 @@ def write(scenario, here, items, blob, seconds):
     (scenario / "timeline").write_text("".join(f"{t} {what}\n" for t, what in sorted(items)))
     (scenario / "pictures").write_bytes(blob)
     (scenario / "duration").write_text(f"{seconds:.0f}\n")
-    compile_helper(here / "play.c", scenario / "play")
+    compile_player(here, scenario)
 
 
-def judge(name, work, waymark, recording, config, seconds, *logged_options):
+def judge(name, work, waymark, recording, config, seconds, *logged_options, is_recorded=False, settled_s=0):
+    """Poses are compared with a replay of the recording with the data that the guest saw; where the guest's own recording is there
+    (is_recorded), with the replay of that one, from settled_s on."""
     out, failures = work / f"share/out/{name}", []
 
     def replay(*words):
@@ -66,15 +72,21 @@ def judge(name, work, waymark, recording, config, seconds, *logged_options):
     poses = messages.rows(messages.heard(work, out / "heard.lcm")[0])
     begun_ns = table(work / f"{name}-same/published.csv")[0][0] + offset_ns + BEGIN_NS
     poses = [p for p in poses if p[0] > begun_ns]
-    apart = list(apart_of(poses, table(work / f"{name}-same/published.csv"), offset_ns))
+    if is_recorded:
+        replay(out / "rec", "--config", out / "rec/config.yaml", "--out", work / f"{name}-recorded")
+        apart = list(apart_of(poses, table(work / f"{name}-recorded/published.csv"), 0))
+    else:
+        apart = list(apart_of(poses, table(work / f"{name}-same/published.csv"), offset_ns))
     truth = table(recording / "truth.csv")
     live = [m for _, m, _ in differences(poses, truth, offset_ns)]
     desk = [m for _, m, _ in differences(table(work / f"{name}-desk/published.csv"), truth, 0)]
-    if len(apart) < 30 * seconds:
+    apart = [row for row in apart if row[0] >= begun_ns + settled_s * 10**9]
+    if len(apart) < 30 * (seconds - settled_s):
         return failures + [f"{name}: only {len(apart)} of {len(poses)} poses over LCM can be compared"]
     worst_m, worst_deg = max(m for _, m, _ in apart), max(d for *_, d in apart)
-    print(f"{name}: {len(poses)} poses over LCM; {len(apart)} of them at most {worst_m:.4f} m and {worst_deg:.3f} degrees from the "
-          f"replay with the guest's data; from the truth {rms(live):.4f} m RMS, at the desk {rms(desk):.4f} m")
+    of_what = "of the guest's recording" if is_recorded else "with the guest's data"
+    print(f"{name}: {len(poses)} poses over LCM; {len(apart)} of them at most {worst_m:.4f} m and {worst_deg:.3f} degrees from the replay "
+          f"{of_what}; from the truth {rms(live):.4f} m RMS, at the desk {rms(desk):.4f} m")
     if worst_m > POSITION_M or worst_deg > HEADING_DEG:
         failures.append(f"{name}: the guest's poses over LCM are not those of the replay with its data")
     if rms(live) > TRUTH_RATIO * rms(desk):

@@ -6,7 +6,7 @@ real (emulated) CAN controller, under qemu's instruction clock, fed from a recor
 usage: hil.py [--arch arm64|armhf] [--package DEB] WORK WAYMARK WAYMARK_SIMULATE [PART ...]
 
 The guest's image is made once, for these tests and for `waymark hil` (WAYMARK_HIL_CACHE, ~/.cache/waymark/hil). WAYMARK is this computer's.
-Parts: can, camera, libcamera, play, landmarks, motion, edges, walls, service, board, power; all of them but power where none is named.
+Parts: can, camera, libcamera, play, landmarks, motion, iio, gnss, edges, walls, service, board, power; all of them but power where none is named.
 Without --arch the guest runs WAYMARK itself, under systemd the package; else the package in all parts.
 The service and power parts run the package under systemd; without one they are left out. armhf is arm64's kernel with armhf's programs.
 
@@ -27,6 +27,8 @@ sys.path.insert(0, str(ROOT / "tools/hil"))
 import board  # noqa: E402
 import drives  # noqa: E402
 import edges  # noqa: E402
+import gnss  # noqa: E402
+import iio  # noqa: E402
 import landmarks  # noqa: E402
 import motion  # noqa: E402
 import player  # noqa: E402
@@ -95,7 +97,7 @@ def scenario_camera(work, simulate):
     (scenario / "robot.yaml").write_text(
         "format: waymark-config/1\nestimator: odometry\ncalibration: calibration.yaml\n"
         "devices: {cameras: [{name: front, device: /dev/video0, format: GREY, rate_hz: 15}]}\n")
-    drives.compile_helper(HERE / "feed.c", scenario / "feed")
+    drives.compile_helper(scenario / "feed", HERE / "feed.c")
     # Motion over a virtual bus, and a detector that looks at every picture.
     recording = work / "camera-recording"
     shutil.rmtree(recording, ignore_errors=True)
@@ -226,6 +228,8 @@ PARTS = {
     "play": [("play", OF_ROOT(player.prepare), AT_ROOT(player.judge), [], FAST, "")],
     "landmarks": [("landmarks", OF_ROOT(landmarks.prepare), AT_ROOT(landmarks.judge), CAN, FAST, "")],
     "motion": [("motion", OF_ROOT(motion.prepare), AT_ROOT(motion.judge), CAN, FAST, "")],
+    "iio": [("iio", OF_ROOT(iio.prepare), AT_ROOT(iio.judge), CAN, FAST, "")],
+    "gnss": [("gnss", OF_ROOT(gnss.prepare), AT_ROOT(gnss.judge), CAN, FAST, "")],
     "edges": [("edges", OF_ROOT(edges.prepare), AT_ROOT(edges.judge), CAN, FAST, "")],
     "walls": [("walls", OF_ROOT(walls.prepare), AT_ROOT(walls.judge), CAN, FAST, "")],
     "service": [("service", OF_ROOT(service.prepare_service), service.judge_service, CAN, FAST, "systemd")],

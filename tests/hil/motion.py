@@ -18,23 +18,26 @@ def twists(work, recording):
         for row in csv.DictReader(f):
             said = waymark.motion_t()
             said.t_ns = int(row["t_ns"])
-            said.v_mps, said.vy_mps, said.w_radps = (float(row[name]) for name in ("v_mps", "vy_mps", "w_radps"))
+            said.v_mps, said.vy_mps, said.w_radps = (float(row.get(name) or "nan") for name in ("v_mps", "vy_mps", "w_radps"))
             yield said.t_ns, said.encode()
+
+
+def over_lcm(work, recording):
+    """(when it is due, t_ns, message, channel) of twists, then of sightings."""
+    for t_ns, message in twists(work, recording):
+        yield t_ns, t_ns, message, "WAYMARK_MOTION"
+    for arrival_ns, t_ns, message in landmarks.sightings(work, recording):
+        yield arrival_ns, t_ns, message, "WAYMARK_SIGHTINGS"
 
 
 def prepare(work, root, here, simulate):
     recording, scenario = drives.make(work, "motion", simulate, root / f"config/worlds/{WORLD}.yaml")
-    items, blob = [], bytearray()
-
-    def say(due_ns, t_ns, message, channel):
+    items, blob, stamps = [], bytearray(), []
+    for due_ns, t_ns, message, channel in over_lcm(work, recording):
         items.append((due_ns, f"l {t_ns} {len(blob)} {len(message)} {channel}"))
-        blob.extend(message)
-
-    for t_ns, message in twists(work, recording):
-        say(t_ns, t_ns, message, "WAYMARK_MOTION")
-    seconds = (items[-1][0] - items[0][0]) * 1e-9
-    for arrival_ns, t_ns, message in landmarks.sightings(work, recording):
-        say(arrival_ns, t_ns, message, "WAYMARK_SIGHTINGS")
+        blob += message
+        stamps.append(t_ns)
+    seconds = (max(stamps) - min(stamps)) * 1e-9
     drives.write(scenario, here, items, blob, seconds)
     for name in ("calibration.yaml", "landmarks.csv"):
         shutil.copy(recording / name, scenario)

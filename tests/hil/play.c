@@ -3,9 +3,11 @@
 // each at its own time, by one clock, which neither canplayer nor a camera's steady rate can do. A line of TIMELINE is
 // "NANOSECONDS c ID HEXDATA", "NANOSECONDS p OFFSET BYTES" (of PICTURES, an MJPEG picture) or "NANOSECONDS l STAMP
 // OFFSET BYTES [CHANNEL]" (of PICTURES, a message for LCM, by default of sightings, stamped anew), "NANOSECONDS x" (the
-// device is closed) or "NANOSECONDS o" (it is opened again as soon as it is there), rising; lines before FROM and from
-// UNTIL on are left out. The formats are set at once (DEVICE "-": there are no pictures); the first line is due after
-// DELAY seconds. Prints how far CLOCK_MONOTONIC is ahead of the timeline, and at the end how late it was at most.
+// device is closed) or "NANOSECONDS o" (it is opened again as soon as it is there), "NANOSECONDS g X Y Z" (a gyro's
+// rates in 1e-6 rad/s, by the kernel's driver of HID sensors) or "NANOSECONDS n OFFSET BYTES" (of PICTURES, what a GNSS
+// receiver writes; /run/receiver leads to its line), rising; lines before FROM and from UNTIL on are left out. The
+// formats are set at once (DEVICE "-": there are no pictures); the first line is due after DELAY seconds. Prints how
+// far CLOCK_MONOTONIC is ahead of the timeline, and at the end how late it was at most.
 #include <arpa/inet.h>
 #include <fcntl.h>
 #include <limits.h>
@@ -22,6 +24,8 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "play_devices.h"
+
 typedef struct item {
   long long t_ns;
   char kind;
@@ -29,6 +33,7 @@ typedef struct item {
   size_t offset, bytes;
   long long stamp_ns;
   char channel[32];
+  int32_t rates[3];
 } item;
 
 static char *read_file(const char *path, size_t *length) {
@@ -54,7 +59,8 @@ static int parse(const char *line, item *out) {
     (void)snprintf(out->channel, sizeof out->channel, "WAYMARK_SIGHTINGS");
     return sscanf(line + used, "%lld %zu %zu %31s", &out->stamp_ns, &out->offset, &out->bytes, out->channel) >= 3;
   }
-  if (out->kind == 'p') return sscanf(line + used, "%zu %zu", &out->offset, &out->bytes) == 2;
+  if (out->kind == 'p' || out->kind == 'n') return sscanf(line + used, "%zu %zu", &out->offset, &out->bytes) == 2;
+  if (out->kind == 'g') return sscanf(line + used, "%d %d %d", &out->rates[0], &out->rates[1], &out->rates[2]) == 3;
   if (sscanf(line + used, "%x %16s", &id, data) < 1) return 0;
   out->frame.can_id = id;
   out->frame.can_dlc = (unsigned char)(strlen(data) / 2);
@@ -103,6 +109,12 @@ static int say(int fd, const char *channel, char *message, size_t bytes, long lo
   return sendto(fd, packet, length, 0, (const struct sockaddr *)&to, sizeof to) == (ssize_t)length;
 }
 
+static int is_among(const item *items, size_t count, char kind) {
+  for (size_t i = 0; i < count; i++)
+    if (items[i].kind == kind) return 1;
+  return 0;
+}
+
 static long long now_ns(void) {
   struct timespec t;
   clock_gettime(CLOCK_MONOTONIC, &t);
@@ -124,6 +136,12 @@ int main(int argc, char **argv) {
   const long long from_ns = argc == 10 ? atoll(argv[8]) : LLONG_MIN, until_ns = argc == 10 ? atoll(argv[9]) : LLONG_MAX;
   for (char *rest = text, *line; (line = strsep(&rest, "\n"));)
     count += parse(line, &items[count]) && items[count].t_ns >= from_ns && items[count].t_ns < until_ns;
+  const int gyro = is_among(items, count, 'g') ? gyro_open() : -2,
+            receiver = is_among(items, count, 'n') ? receiver_open("/run/receiver") : -2;
+  if (gyro == -1 || receiver == -1) {
+    perror("play: gyro, receiver");
+    return 1;
+  }
   long long begin_ns = now_ns() + (long long)(atof(argv[7]) * 1e9), worst_ns = 0, failed = 0;
   printf("ahead %lld ns\n", begin_ns - items[0].t_ns);
   (void)fflush(stdout);
@@ -135,6 +153,8 @@ int main(int argc, char **argv) {
     long long late_ns = now_ns() - due_ns;
     if (late_ns > worst_ns) worst_ns = late_ns;
     if (it->kind == 'c') failed += write(can, &it->frame, sizeof it->frame) != sizeof it->frame;
+    if (it->kind == 'g') failed += !gyro_say(gyro, it->rates);
+    if (it->kind == 'n') failed += !receiver_say(receiver, pictures + it->offset, it->bytes);
     if (it->kind == 'x') (void)close(video);
     if (it->kind == 'x' || it->kind == 'o') video = -1;
     for (int tries = 0; it->kind == 'o' && video == -1 && tries < 100; tries++) {

@@ -56,7 +56,7 @@ def scenario_of(name, work, root, here, simulate):
             pictures.append((int(row["t_ns"]), f"p {len(blob)} {len(picture)}"))
             blob += picture
     (folder / "pictures").write_bytes(blob)
-    drives.compile_helper(here / "play.c", folder / "play")
+    drives.compile_player(here, folder)
     for file in ("vehicle.dbc", "can-signals.yaml", "calibration.yaml"):
         shutil.copy(recording / file, folder)
     (folder / "robot.yaml").write_text(
@@ -184,7 +184,7 @@ def prepare_kills(work, root, here, simulate):
     recording, folder, can, pictures = scenario_of("kills", work, root, here, simulate)
     write_timeline(folder / "drive.timeline", can + pictures)
     (folder / "pauses").write_text("".join(f"{RANDOM.uniform(*PAUSE_S):.3f}\n" for _ in range(KILLS)))
-    drives.compile_helper(here / "disk_clock.c", folder / "disk_clock")
+    drives.compile_helper(folder / "disk_clock", here / "disk_clock.c")
     disk = work / "kills.disk"
     disk.unlink(missing_ok=True)
     subprocess.run(["mke2fs", "-q", "-F", "-t", "ext4", disk, f"{FILES_BYTES >> 10}k"], check=True)

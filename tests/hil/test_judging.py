@@ -553,6 +553,14 @@ class Poses(unittest.TestCase):
         self.assertAlmostEqual(metres, 0.3)
         self.assertLess(degrees, 3)
 
+    def test_a_correction_of_one_message_is_no_distance(self):
+        """A correction falls within one message: what is carried on across it has the noise of the motion. Two messages count."""
+        rows = [(k * 10**9, float(k), 0.0, 0.0, 0.0) for k in range(12)]
+        live = lambda *late: [(k * 10**9, float(k), 0.5 if k in late else 0.0, 0.0, 0.0) for k in range(12)]
+        worst = lambda *late: max(m for _, m, _ in poses.apart_of(live(*late), rows, 0))
+        self.assertAlmostEqual(worst(5), 0.0)
+        self.assertAlmostEqual(worst(5, 6), 0.5)
+
 
 if __name__ == "__main__":
     unittest.main()

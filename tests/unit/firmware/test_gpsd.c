@@ -149,7 +149,9 @@ static void sigmas_follow_the_fix(void) {
   } kFixes[] = {{"\"mode\":3,\"status\":1,\"lat\":48,\"lon\":11", 5},
                 {"\"mode\":3,\"status\":2,\"lat\":48,\"lon\":11", 2},
                 {"\"mode\":3,\"status\":4,\"lat\":48,\"lon\":11", 0.5},
+                {"\"mode\":3,\"status\":4,\"lat\":48,\"lon\":11,\"eph\":17.1", 0.5},
                 {"\"mode\":3,\"status\":3,\"lat\":48,\"lon\":11", 0.05},
+                {"\"mode\":3,\"status\":3,\"lat\":48,\"lon\":11,\"epx\":15,\"epy\":17", 0.05},
                 {"\"mode\":3,\"status\":3,\"lat\":48,\"lon\":11,\"eph\":0.02", 0.02}};
   config.accuracy_scale = 2;
   begin_connected();
@@ -180,6 +182,20 @@ static void a_receivers_deviations_are_of_its_fix(void) {
   expect(WM_OK);
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.02, event.as.position.sigma_xy_m);
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.03, event.as.position.sigma_z_m);
+  report(utc_ns(), "\"mode\":3,\"status\":1,\"lat\":48,\"lon\":11");
+  expect(WM_OK);
+  TEST_ASSERT_EQUAL_DOUBLE(5, event.as.position.sigma_xy_m);
+}
+
+// Of a burst of sentences those come before the position.
+static void deviations_before_the_first_fix_are_of_it(void) {
+  begin_connected();
+  deviations("0.02");
+  report(utc_ns(), "\"mode\":3,\"status\":3," PLACE);
+  expect(WM_OK);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.02, event.as.position.sigma_xy_m);
+  report(utc_ns(), "\"mode\":0");
+  expect(WM_AGAIN);
   report(utc_ns(), "\"mode\":3,\"status\":1,\"lat\":48,\"lon\":11");
   expect(WM_OK);
   TEST_ASSERT_EQUAL_DOUBLE(5, event.as.position.sigma_xy_m);
@@ -357,6 +373,7 @@ int main(void) {
   RUN_TEST(a_position_is_in_the_map);
   RUN_TEST(sigmas_follow_the_fix);
   RUN_TEST(a_receivers_deviations_are_of_its_fix);
+  RUN_TEST(deviations_before_the_first_fix_are_of_it);
   RUN_TEST(a_course_is_a_heading);
   RUN_TEST(antennas_give_a_heading);
   RUN_TEST(without_a_fix_nothing_is_fused);

@@ -21,6 +21,7 @@ mkdir -p /dev/pts /dev/shm
 for d in tmp run dev/shm; do mount -t tmpfs tmpfs /$d; done
 mount -t devpts devpts /dev/pts
 ln -sf /proc/self/fd /dev/fd
+[ -e /etc/hosts ] || echo "127.0.0.1 localhost" >/etc/hosts # as every installed Debian has
 if grep -qw systemd /proc/cmdline; then
   echo 0123456789abcdef0123456789abcdef >/etc/machine-id # a computer that was started before: nothing is enabled by itself
   cat >/etc/systemd/system/hil.service <<'UNIT'

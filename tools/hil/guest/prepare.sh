@@ -56,15 +56,19 @@ include=iproute2,kmod,can-utils,v4l-utils,liblcm1,procps,udev,liblcm-bin,libyaml
 include=$include,openssh-server,libnuma1
 cyclictest='cd "$1/tmp" && APT_CONFIG=$MMDEBSTRAP_APT_CONFIG apt-get download -q rt-tests &&
   dpkg-deb --fsys-tarfile rt-tests_*.deb | tar -C "$1" -x ./usr/bin/cyclictest && rm rt-tests_*.deb'
+# The libraries of gpsd, whose package would bring Python, too; and the one of the package's page.
+include=$include,libgps28,libusb-1.0-0,libbluetooth3,netbase,libmicrohttpd12
+gpsd='cd "$1/tmp" && APT_CONFIG=$MMDEBSTRAP_APT_CONFIG apt-get download -q gpsd &&
+  dpkg-deb --fsys-tarfile gpsd_*.deb | tar -C "$1" -x ./usr/sbin/gpsd && rm gpsd_*.deb'
 # What the package's service runs under, and its dynamic user.
 include=$include,systemd,libnss-systemd,init-system-helpers
 if [ "$arch" = amd64 ]; then
-  mmdebstrap --quiet --variant=minbase --include="$include,libcamera0.0.3,libcamera-ipa" --customize-hook="$cyclictest" bookworm root
+  mmdebstrap --quiet --variant=minbase --include="$include,libcamera0.0.3,libcamera-ipa" --customize-hook="$cyclictest" --customize-hook="$gpsd" bookworm root
 else
   # A mirror's security index of another architecture is sometimes in the middle of a change: the guest does without.
   mirror=$(apt-get indextargets --format '$(REPO_URI)' 'Created-By: Packages' | grep -v security | head -1)
   bash "$toolchain/foreign.sh" "$arch" mmdebstrap --quiet --mode=root --variant=minbase --architectures="$arch" --include="$include" \
-    --customize-hook="$cyclictest" bookworm root.tar "deb $mirror bookworm main" "deb $mirror bookworm-updates main"
+    --customize-hook="$cyclictest" --customize-hook="$gpsd" bookworm root.tar "deb $mirror bookworm main" "deb $mirror bookworm-updates main"
   mkdir root
   tar -C root -xf root.tar --exclude='./dev/*'
   rm root.tar

@@ -69,12 +69,16 @@ def differences(poses, rows, offset_ns):
 
 
 def apart_of(poses, rows, offset_ns):
-    """As differences, from the nearest of what is around."""
-    times = [r[0] for r in rows]
+    """As differences, from the nearest of what is around; the median of three messages. Across a correction, of which one run has not yet the
+    next message, a pair of rows is carried on, with the noise of the motion within it."""
+    times, found = [r[0] for r in rows], []
     for p in poses:
         near = around(rows, times, p[0] - offset_ns)
         if near:
-            yield p[0], *min((away(p, q) for q in near), key=lambda d: d[0] / POSITION_M + d[1] / HEADING_DEG)
+            found.append((p[0], *min((away(p, q) for q in near), key=lambda d: d[0] / POSITION_M + d[1] / HEADING_DEG)))
+    for i, (t_ns, *own) in enumerate(found):
+        three = found[i - 1:i + 2] if 0 < i < len(found) - 1 else [(t_ns, *own)]
+        yield t_ns, *(sorted(row[k] for row in three)[len(three) // 2] for k in (1, 2))
 
 
 def rms(values):
