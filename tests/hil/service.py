@@ -7,6 +7,7 @@ import pathlib
 import random
 import re
 import shutil
+import statistics
 import subprocess
 import sys
 
@@ -215,6 +216,20 @@ def report(what, times, failures):
         failures.append(f"{what}: right only after {max(right):.2f} s")
 
 
+def where_time_goes(journal, killed_s, started_s, nothing_s, first_s):
+    """Prints the medians of a start's steps, by the run's lines in the journal, whose clock is compared at the first kill."""
+    at = [(float(t), int(pid), what) for t, pid, what in
+          re.findall(r"\[ *([\d.]+)\] \S+ waymark\[(\d+)\]: note: (start: saved pose|memory: |can: can0 is up)", journal)]
+    clock_s = float(re.search(r"\[ *([\d.]+)\] .*Sent signal SIGKILL to main process", journal).group(1)) - killed_s
+    steps = []
+    for pid, start_s in zip(list(dict.fromkeys(pid for _, pid, _ in at))[-len(started_s):], started_s):
+        line = {what: t - clock_s - start_s - nothing_s for t, of, what in at if of == pid}
+        steps.append([line.get(what, math.nan) for what in ("start: saved pose", "memory: ", "can: can0 is up")])
+    middle = [statistics.median(column) for column in zip(*steps)]
+    print(f"a start, medians: the saved pose is read after {middle[0]:.3f} s (loader, configuration), memory taken and detectors ready after {middle[1]:.3f} s, "
+          f"memory locked and the bus open after {middle[2]:.3f} s, the first pose after {statistics.median(first_s):.3f} s")
+
+
 def judge_kills(work, waymark):
     out, recording, failures = work / "share/out/kills", work / "office-recording", []
     told, ahead = heard("kills", out, out / "heard.lcm", recording)
@@ -232,6 +247,7 @@ def judge_kills(work, waymark):
     nothing_s = max(abs(end - begin) for begin, end in zip(stamps[::2], stamps[1::2])) * 1e-6
     print(f"the same unit with /bin/true is over {nothing_s:.3f} s after its start at most: systemd's part, in this emulated computer")
     report("killed (SIGKILL), without that", [(first - nothing_s, right) for first, right in times], failures)
+    where_time_goes(said, killed[0] + begin_s, [start + begin_s for start in started], nothing_s, [first - nothing_s for first, _ in times])
     if subprocess.run([sys.executable, pathlib.Path(__file__).parent / "cuts.py", work, waymark]).returncode:
         failures.append("the disks that cuts of the power left (above)")
     return failures
