@@ -135,19 +135,21 @@ slam::marker_reading slam::choose_pose(const context &at, const wm_marker &m, co
   return r;
 }
 
-// The rows of a marker of the map. Where the pose is vague, the second derivatives count as noise [Athans1968]: an
-// error t across the line of sight, by a wrong heading, moves a marker at distance d by -t^2 / 2d along it, and an
-// error r along it by r t / d across. Their mean squares are 3/4 (P_tt / d)^2 and (P_rr P_tt + 2 P_rt^2) / d^2. Below
-// the marker's own noise they change no pose and are left out.
+// The rows of a marker of the map. Where the pose is vague, the second derivatives count as noise [Athans1968]. With
+// the heading's error h, and the errors r along and t across the line of sight at distance d, which are linear in the
+// state, a marker is seen h w beside its expected place along the sight, w = t + h d / 2, and -h r across. Their mean
+// squares are P_hh P_ww + 2 P_hw^2 and P_hh P_rr + 2 P_hr^2. A place alone that is vague bends nothing. Below the
+// marker's own noise they change no pose and are left out.
 void slam::expect_known_marker(const context &at, const marker_reading &r, int landmark, int count,
                                landmark_rows *out) {
   expect_marker(at, r, pose_of(landmark), lend(at), out);
   out->count = count;
   const relative_place place = relative_place_of(at, landmark);
   if (!(place.distance_m > kOnSensor_m)) return;
-  const double by_distance2 = 1.0 / square(place.distance_m);
-  const double bent[2] = {0.75 * square(place.across_m2) * by_distance2,
-                          (place.along_m2 * place.across_m2 + 2.0 * square(place.along_across_m2)) * by_distance2};
+  const double hh = place.heading_rad2, d = place.distance_m;
+  const double hw = place.heading_across + 0.5 * d * hh;
+  const double ww = place.across_m2 + d * place.heading_across + 0.25 * d * d * hh;
+  const double bent[2] = {hh * ww + 2.0 * square(hw), hh * place.along_m2 + 2.0 * square(place.heading_along)};
   for (int k = 0; k < 2; k++)
     if (bent[k] > out->noise[k]) out->noise[k] += bent[k];
 }

@@ -170,6 +170,7 @@ class slam {
   // A landmark as seen from the sensor: its distance, and the variances along and across the line of sight.
   struct relative_place {
     double distance_m, along_m2, across_m2, along_across_m2;
+    double heading_rad2, heading_along, heading_across;  // covariances of the robot's heading with itself and these
   };
   // Two landmarks that may be one line: their states, the difference of their places and its covariance.
   struct landmark_pair {

@@ -33,10 +33,11 @@ wm_pose2 slam::sensor_pose(int sensor, const past_pose &past) const {
 slam::relative_place slam::relative_place_of(const context &at, int landmark) const {
   const wm_pose2 from = sensor_pose(at.sensor, at.past), place = pose_of(landmark);
   const double dx = place.x_m - from.x_m, dy = place.y_m - from.y_m, distance2 = dx * dx + dy * dy;
-  if (!(distance2 > square(kOnSensor_m))) return {std::sqrt(distance2), 0.0, 0.0, 0.0};
+  if (!(distance2 > square(kOnSensor_m))) return {std::sqrt(distance2), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
   const double distance = std::sqrt(distance2), along[2] = {dx / distance, dy / distance};
   const int state = joint_.landmark_state(landmark);
-  joint_row r, t;
+  joint_row r, t, heading;
+  heading.add(kHeading, 1.0);
   for (int k = 0; k < 2; k++) {
     const double across = k == 0 ? -along[1] : along[0];
     const int own = k == 0 ? kX : kY;
@@ -46,7 +47,13 @@ slam::relative_place slam::relative_place_of(const context &at, int landmark) co
     t.add(own, -across);
   }
   t.add(kHeading, -distance);
-  return {distance, joint_.variance_of(r), joint_.variance_of(t), joint_.covariance_of(r, t)};
+  return {distance,
+          joint_.variance_of(r),
+          joint_.variance_of(t),
+          joint_.covariance_of(r, t),
+          joint_.variance_of(heading),
+          joint_.covariance_of(heading, r),
+          joint_.covariance_of(heading, t)};
 }
 
 // The states of this sensor's time-correlated error on this landmark, decayed to now. -1: none is carried.
