@@ -120,7 +120,9 @@ static void set_controls(wm_camera_device *self) {
   }
 }
 
-static void begin_stream(wm_camera_device *self, wm_time_ns now_ns) {
+// After the start: v4l2loopback stamps all buffers that it has anew while a reader sets it up.
+static void begin_stream(wm_camera_device *self) {
+  const wm_time_ns now_ns = self->io->monotonic_ns(self->io_context);
   self->stale = BUFFERS;
   self->begun_ns = now_ns;
   self->count.is_set = 0;
@@ -162,7 +164,7 @@ static void look_for_camera(wm_camera_device *self, wm_time_ns now_ns) {
     close_camera(self);
     return;
   }
-  begin_stream(self, now_ns);
+  begin_stream(self);
 }
 
 // ── pictures ────────────────────────────────────────────────────────────────────────────────────────────────────────

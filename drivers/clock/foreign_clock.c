@@ -3,6 +3,7 @@
 
 #define DRIFT_PER_S (100 * WM_NS_PER_US)          // two crystals of 50 ppm each
 #define LEAP_NS (200 * WM_NS_PER_MS)              // more than any delay: the clock was set, or the device restarted
+#define WRAP_NS (WM_NS_PER_US << 32)              // a counter of 32 bits in us, as CAN adapters have: 71.6 minutes
 #define LATE_IN_A_ROW 8                           // a leap backwards looks like a delay at first
 #define LEAST_UNCERTAINTY_NS (50 * WM_NS_PER_US)  // interrupt latency of the smallest delays; not swept
 
@@ -18,6 +19,9 @@ static wm_time_ns drift_since(wm_time_ns from_ns, wm_time_ns to_ns) {
   return to_ns > from_ns ? (wm_time_ns)((double)(to_ns - from_ns) * 1e-9 * (double)DRIFT_PER_S) : 0;
 }
 
+// A stamp that is one wrap late, to within a leap: no delay is as long.
+static int has_wrapped(wm_time_ns later_ns) { return later_ns > WRAP_NS - LEAP_NS && later_ns < WRAP_NS + LEAP_NS; }
+
 wm_time_ns foreign_clock_map(foreign_clock *self, wm_time_ns device_ns, wm_time_ns seen_ns, wm_time_ns delay_ns) {
   wm_time_ns offset_ns, mapped_ns;
   wm_time_ns arrival_ns = seen_ns - delay_ns;
@@ -27,6 +31,11 @@ wm_time_ns foreign_clock_map(foreign_clock *self, wm_time_ns device_ns, wm_time_
   if (!self->is_set || __builtin_sub_overflow(offset_ns, self->offset_ns, &later_ns)) {
     restart(self, offset_ns, seen_ns);
     later_ns = 0;
+  }
+  wm_time_ns wrapped_ns;
+  if (has_wrapped(later_ns) && !__builtin_add_overflow(self->offset_ns, WRAP_NS, &wrapped_ns)) {
+    self->offset_ns = wrapped_ns;
+    later_ns -= WRAP_NS;
   }
   self->late_in_a_row = later_ns > LEAP_NS ? self->late_in_a_row + 1 : 0;
   if (later_ns < -LEAP_NS || self->late_in_a_row >= LATE_IN_A_ROW) {

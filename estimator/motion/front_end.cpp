@@ -387,6 +387,7 @@ void motion_front_end::push_input(wm_time_ns t_ns, double a, double b, bool doub
   input.doubtful = doubtful;
   mark_refused(&input);
   note_ages(&input);
+  note_steady(&input);
   note_samples(&input);
   input.sampling[1] += static_cast<float>(missed_turn_rad2_);
   missed_turn_rad2_ = 0.0;
@@ -399,6 +400,7 @@ void motion_front_end::push_input(wm_time_ns t_ns, double a, double b, bool doub
     if (dt > 0.0 && !miscounted) {
       motion_input done = input;
       done.t_ns = now_ns_;
+      done.steady_after_s = 0.0F;
       done.a =
           mean_of_wheels(wheel_[0].position_m - wheel_[0].integrated_m, wheel_[1].position_m - wheel_[1].integrated_m) /
           dt;

@@ -178,6 +178,7 @@ class motion_front_end {
     return ticks_drive() && segment.has_next && !input.uncounted && (input.counted || !(input.age_s[0] > 0.0F));
   }
   void note_ages(motion_input *input) const;
+  void note_steady(motion_input *input) const;
   void note_silence(wm_time_ns t_ns);
   void stand_in(wm_time_ns t_ns, double speed_mps, double turn_radps);
   bool is_still(double speed_mps) const;

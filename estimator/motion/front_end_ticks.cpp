@@ -66,6 +66,7 @@ void motion_front_end::take_count(int side, wm_time_ns t_ns, double count) {
   wheel.before_ns = last_ns;
   wheel.before_m = from_m;
   const bool gap = wheel.period_s > 0.0 && dt > kGapPeriods * wheel.period_s;
+  wheel.note_steady(gap);
   const double counted_s = gap ? kGapPeriods * wheel.period_s : dt;
   wheel.period_s += wheel.period_s > 0.0 ? kPeriodGain * (counted_s - wheel.period_s) : counted_s;
   tick_wheel &other = wheel_[1 - side];
@@ -112,7 +113,9 @@ void motion_front_end::push_ticks(wm_time_ns t_ns, bool doubtful, bool miscounte
   next.model = model_;
   next.doubtful = doubtful || dead[0] || dead[1];
   mark_refused(&next);
+  note_steady(&next);
   done = next;
+  done.steady_after_s = 0.0F;
   done.t_ns = now_ns_;
   done.a = done_mps[0];
   done.b = done_mps[1];
@@ -174,9 +177,6 @@ void motion_front_end::count_noise(double *speed_mps, double *turn_rate_radps) c
   if (model_ == WM_MOTION_TICKS) *turn_rate_radps = wheel_mps * std::sqrt(2.0) / wheels_.track_m;
 }
 
-// Periods. Stamps of sightings lie at most so far ahead of the counts while these come; not swept.
-constexpr double kCarriedPeriods = 4.0;
-
 // Of the newest count, carried on by the speed, which is its difference to the one before: e1 + u (e1 - e0) after u
 // periods. The error does not grow with the way: the next count replaces it. Before the newest count: that of a count.
 void motion_front_end::count_variances(wm_time_ns t_ns, double *way_m2, double *turn_rad2) const {
@@ -191,6 +191,23 @@ void motion_front_end::count_variances(wm_time_ns t_ns, double *way_m2, double *
   const double share = 0.5 * (square(1.0 + u) + square(u));
   *way_m2 = share * square(speed_mps * period_s);
   *turn_rad2 = share * square(turn_rate_radps * period_s);
+}
+
+// The counts' own speed holds for some periods, then the steady one.
+void motion_front_end::note_steady(motion_input *input) const {
+  if (!ticks_drive() || input->doubtful || input->refused || wheel_[0].t_ns == WM_TIME_NONE) return;
+  const double left = wheel_[0].steady_mps, right = wheel_[1].steady_mps;
+  const bool both = model_ == WM_MOTION_TICKS;
+  const double steady[2] = {both ? left : mean_of_wheels(left, right), both ? right : input->b};
+  const double after_s = kCarriedPeriods * wheel_[0].period_s - wm_seconds_between(wheel_[0].t_ns, input->t_ns);
+  if (!(wheel_[0].period_s > 0.0)) return;
+  if (after_s > 0.0) {
+    input->steady_after_s = static_cast<float>(after_s);
+    for (int i = 0; i < 2; i++) input->steady[i] = steady[i];
+  } else {
+    input->a = steady[0];
+    input->b = steady[1];
+  }
 }
 
 void motion_front_end::note_integrated(const motion_segment &segment) {

@@ -24,6 +24,7 @@ struct motion_input {
   wm_time_ns t_ns;  // holds until the next one's
   double a, b;
   double side_mps;  // to the left; of twists in space and increments
+  double steady[2];
   // Of increments: variance per s of distance, of sideways and of rotation, and their covariances; NaN: not given.
   float increment_noise[6];
   float sampling[2];    // variances of distance and rotation by the changes since the samples before
@@ -33,10 +34,11 @@ struct motion_input {
   // Of the speed and of the turn: at t_ns the age of the newest sample, and the age at which the next one was overdue.
   // 0: in time.
   float age_s[2], due_s[2];
-  uint8_t beside_gyro;  // the turn rate is not the gyro's, which is silent or stuck
-  uint8_t uncounted;    // no count gives the distance until the next input's t_ns
-  uint8_t holonomic;    // of a twist: the drive moves sideways
-  uint8_t unused[5];
+  float steady_after_s;  // of counts: a and b hold for this time from t_ns, then `steady`; 0: always a and b
+  uint8_t beside_gyro;   // the turn rate is not the gyro's, which is silent or stuck
+  uint8_t uncounted;     // no count gives the distance until the next input's t_ns
+  uint8_t holonomic;     // of a twist: the drive moves sideways
+  uint8_t unused[1];
   uint8_t model;     // wm_motion_model; AUTO: nothing known yet
   uint8_t standing;  // the robot is known to stand
   uint8_t doubtful;  // of a frozen counter, a dead encoder
@@ -138,6 +140,16 @@ class motion_history {
     segment.input.stale = begin >= held_until;
     if (!segment.input.stale && *end > held_until) *end = held_until;
     if (segment.input.counted) segment.input.stale = 0;  // the distance is known, however long it took
+    if (segment.input.steady_after_s > 0.0F) {
+      const wm_time_ns own_until =
+          segment.input.t_ns + wm_ns_from_seconds(static_cast<double>(segment.input.steady_after_s));
+      if (begin >= own_until) {
+        segment.input.a = segment.input.steady[0];
+        segment.input.b = segment.input.steady[1];
+      } else if (*end > own_until) {
+        *end = own_until;
+      }
+    }
     segment.held_s = wm_seconds_between(segment.input.t_ns, begin);
     segment.overdue_s = part_overdue_s(segment, 0, due_s(next, oldest));
     segment.turn_overdue_s = part_overdue_s(segment, 1, due_s(next, oldest));

@@ -7,6 +7,8 @@
 
 // Rows of one frame arrive together; a source's next period is excluded only once this has passed since its last row.
 #define FRAME_COMPLETE_NS (1 * WM_NS_PER_MS)
+// Bits of an event's number in the order of events: 2^47 at 1 kHz are 4000 years.
+#define NUMBER_BITS 47
 
 typedef struct heap_entry {
   wm_time_ns t_ns;
@@ -18,6 +20,7 @@ typedef struct source_state {
   wm_merge_source is;
   wm_merge_counts counts;
   size_t waiting;
+  uint64_t number;  // of the last event: its seq, continued over the wrap of 32 bits; 0: there was none
   uint64_t recent[WM_MERGE_RECENT];  // hashes of the newest data
   uint32_t recent_next;
 } source_state;
@@ -164,6 +167,14 @@ static int seen_before(source_state *s, const wm_event *event) {
   return 0;
 }
 
+// Of events with one stamp: motion first, then by the source's rank, then as they were numbered.
+static uint64_t order_of(source_state *s, uint32_t seq) {
+  if (s->number == 0) s->number = (UINT64_C(1) << 32) + seq;  // the next one's may be smaller
+  s->number += (uint64_t)(int64_t)(int32_t)(seq - (uint32_t)s->number);
+  return ((uint64_t)!s->is.is_motion << 63) | ((uint64_t)(uint16_t)s->is.rank << NUMBER_BITS) |
+         (s->number & ((UINT64_C(1) << NUMBER_BITS) - 1));
+}
+
 wm_merge_verdict wm_merge_push(wm_merge *self, const wm_event *event) {
   source_state *s = &self->sources[event->source];
   wm_merge_counts *counts = &s->counts;
@@ -195,8 +206,7 @@ wm_merge_verdict wm_merge_push(wm_merge *self, const wm_event *event) {
   }
   uint32_t slot = self->free_slots[self->capacity - 1 - self->waiting];
   memcpy(self->slots + slot * self->slot_bytes, event, wm_event_bytes(event));
-  uint64_t order = ((uint64_t)!s->is.is_motion << 48) | ((uint64_t)(uint16_t)s->is.rank << 32) | event->seq;
-  self->heap[self->waiting] = (heap_entry){.t_ns = event->t_ns, .order = order, .slot = slot};
+  self->heap[self->waiting] = (heap_entry){.t_ns = event->t_ns, .order = order_of(s, event->seq), .slot = slot};
   sift_up(self->heap, self->waiting);
   self->waiting++;
   s->waiting++;

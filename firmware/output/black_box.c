@@ -3,6 +3,7 @@
 
 #include <dirent.h>
 #include <errno.h>
+#include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -16,6 +17,7 @@
 #define NAME_MAX_BYTES (WM_PATH_MAX + 40)
 // Deaths in intervals below this are one crash loop: a restart takes a second, other faults are rarer. Not swept.
 #define CRASH_LOOP_S 600.0
+#define NUMBER_MOST UINT64_C(999999999999999999)  // 18 digits: no counting reaches it
 static const char *const kParts[] = {"before", "now"};
 
 static void say(black_box *self, const char *text, const char *what) {
@@ -36,21 +38,22 @@ static void path_of(const black_box *self, const char *name, char out[NAME_MAX_B
 // ── what is kept ────────────────────────────────────────────────────────────────────────────────────────────────────
 
 // Number of a kept file ("lost-0012-now.wmlog", "died-0012-front-a.avi"); 0 for other names.
-static unsigned number_of(const char *name) {
-  unsigned number = 0;
-  char what[8];
-  if (sscanf(name, "%4[a-z]-%u-", what, &number) != 2) return 0;
+static uint64_t number_of(const char *name) {
+  uint64_t number = 0;
+  char what[8], after = '\0';
+  if (sscanf(name, "%4[a-z]-%18" SCNu64 "%c", what, &number, &after) != 3 || after != '-') return 0;
+  if (number > NUMBER_MOST) return 0;  // a sign was read, too
   return strcmp(what, "lost") == 0 || strcmp(what, "died") == 0 ? number : 0;
 }
 
 // The largest number in the folder; files older than the newest BLACK_BOX_KEPT_MAX are removed.
-static unsigned tidy(black_box *self) {
-  unsigned newest = 0;
+static uint64_t tidy(black_box *self) {
+  uint64_t newest = 0;
   for (int pass = 0; pass < 2; pass++) {
     DIR *folder = opendir(self->folder);
     if (!folder) return 0;
     for (struct dirent *entry; (entry = readdir(folder)) != NULL;) {
-      unsigned number = number_of(entry->d_name);
+      uint64_t number = number_of(entry->d_name);
       char path[NAME_MAX_BYTES + 260];
       if (pass == 0 && number > newest) newest = number;
       if (pass == 0 || number == 0 || number + BLACK_BOX_KEPT_MAX > newest + 1) continue;
@@ -62,7 +65,7 @@ static unsigned tidy(black_box *self) {
   return newest;
 }
 
-static void remove_kept(const black_box *self, unsigned number) {
+static void remove_kept(const black_box *self, uint64_t number) {
   DIR *folder = opendir(self->folder);
   if (!folder) return;
   for (struct dirent *entry; (entry = readdir(folder)) != NULL;) {
@@ -75,17 +78,17 @@ static void remove_kept(const black_box *self, unsigned number) {
 }
 
 // Time of the last write to the log of death `number`, in s; 0: there is none. Number 0 is the present log.
-static double died_at(const black_box *self, unsigned number) {
+static double died_at(const black_box *self, uint64_t number) {
   char name[40], path[NAME_MAX_BYTES];
   struct stat file;
-  (void)snprintf(name, sizeof name, number ? "died-%04u-now" : "now", number);
+  (void)snprintf(name, sizeof name, number ? "died-%04" PRIu64 "-now" : "now", number);
   path_of(self, name, path);
   return stat(path, &file) == 0 ? (double)file.st_mtim.tv_sec : 0;
 }
 
 // In a crash loop only the first and the newest death are kept, so that older incidents are not evicted: the previous
 // death of the loop is removed. Returns the number of the new one.
-static unsigned number_of_death(black_box *self, unsigned newest) {
+static uint64_t number_of_death(black_box *self, uint64_t newest) {
   const double now_s = died_at(self, 0), last_s = newest > 1 ? died_at(self, newest) : 0,
                before_s = newest > 1 ? died_at(self, newest - 1) : 0;
   if (now_s == 0 || last_s == 0 || before_s == 0) return newest + 1;
@@ -95,12 +98,12 @@ static unsigned number_of_death(black_box *self, unsigned newest) {
 }
 
 static void keep(black_box *self, const char *what) {
-  const unsigned newest = tidy(self);
-  const unsigned number = strcmp(what, "died") == 0 ? number_of_death(self, newest) : newest + 1;
+  const uint64_t newest = tidy(self);
+  const uint64_t number = strcmp(what, "died") == 0 ? number_of_death(self, newest) : newest + 1;
   char from[NAME_MAX_BYTES], to[NAME_MAX_BYTES], name[40];
   for (size_t i = 0; i < 2; i++) {
     path_of(self, kParts[i], from);
-    (void)snprintf(name, sizeof name, "%s-%04u-%s", what, number, kParts[i]);
+    (void)snprintf(name, sizeof name, "%s-%04" PRIu64 "-%s", what, number, kParts[i]);
     path_of(self, name, to);
     const int failed = rename_through(from, to);
     if (failed && failed != ENOENT) unwritable(self, strerror(failed));

@@ -117,7 +117,7 @@ wm_status black_box_video_subscribe(black_box_video *self, wm_pictures *pictures
   return status;
 }
 
-int black_box_video_keep(const char *folder, const char *what, unsigned number) {
+int black_box_video_keep(const char *folder, const char *what, uint64_t number) {
   char from[PATH_BYTES], to[PATH_BYTES];
   int failed = 0;
   DIR *there = opendir(folder);
@@ -125,7 +125,7 @@ int black_box_video_keep(const char *folder, const char *what, unsigned number) 
   for (struct dirent *entry; (entry = readdir(there)) != NULL;) {
     if (strncmp(entry->d_name, PREFIX, strlen(PREFIX)) != 0) continue;
     (void)snprintf(from, sizeof from, "%s/%s", folder, entry->d_name);
-    (void)snprintf(to, sizeof to, "%s/%s-%04u-%s", folder, what, number, entry->d_name + strlen(PREFIX));
+    (void)snprintf(to, sizeof to, "%s/%s-%04" PRIu64 "-%s", folder, what, number, entry->d_name + strlen(PREFIX));
     if (link(from, to) != 0 && errno != EEXIST) failed = errno;
   }
   (void)closedir(there);

@@ -33,7 +33,7 @@ wm_status black_box_video_subscribe(black_box_video *self, wm_pictures *pictures
 // Writes the pictures that have arrived, at most `rate_hz` of each camera, without waiting. 0, or errno.
 int black_box_video_take(black_box_video *self);
 // Links the videos in `folder` as WHAT-NUMBER-CAMERA-PART. 0, or errno.
-int black_box_video_keep(const char *folder, const char *what, unsigned number);
+int black_box_video_keep(const char *folder, const char *what, uint64_t number);
 // Before the cameras are closed.
 void black_box_video_close(black_box_video *self);
 

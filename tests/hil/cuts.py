@@ -69,13 +69,30 @@ def rest_of(recording, from_ns, folder):
         csv.writer(f, lineterminator="\n").writerows([head, *(row for row in rows if from_ns <= int(row[at]) < until_ns)])
 
 
-def start(waymark, work, folder, state, recording, config):
-    """A run on these files: (seconds until its first pose, until it is right for good, what it wrote)."""
+def utc_ahead_ns(work):
+    """How far the guest's UTC was ahead of its monotonic clock."""
+    poses, _ = messages.heard(work, work / "share/out/kills/heard.lcm")
+    return poses[-1].utc_offset_ns
+
+
+def let_be_old(pose, age_s):
+    """The saved pose as if it had been written that long ago: this computer's clock is not the guest's."""
+    if pose.exists():
+        pose.write_text(re.sub(r"utc_s: [0-9.]+", f"utc_s: {time.time() - age_s:.3f}", pose.read_text()))
+
+
+def saved_utc_s(pose):
+    return float(re.search(r"utc_s: ([0-9.]+)", pose.read_text()).group(1)) if pose.exists() else 0.0
+
+
+def start(waymark, work, folder, state, recording, config, began_utc_s):
+    """A run on these files that begins at this time of the guest: (seconds until its first pose, until it is right for good, what it wrote)."""
     config = re.sub(r"\ndevices:\n(  .*\n)+", "\n", config)
     config = re.sub(r"\n(calibration|dbc|can_signals): [^\n]*", "", config).replace("/var/lib/waymark", str(state))
     (folder / "config.yaml").write_text(drives.with_realtime(config, "lock_memory: false"))
     logger = subprocess.Popen(["lcm-logger", "-q", "-f", f"--lcm-url={drives.URL}", folder / "heard.lcm"])
     time.sleep(0.3)
+    let_be_old(state / "pose.yaml", began_utc_s - saved_utc_s(state / "pose.yaml"))
     began_s = time.time()
     run = subprocess.run([waymark, "run", "--config", folder / "config.yaml", "--recording", folder / "rest", "--resume", "--duration", str(PLAYED_S - 0.2)],
                          capture_output=True, text=True)
@@ -109,7 +126,7 @@ def main():
     first_ns = next(drives.can_items(recording))[0]
     mapped = next(i for i, t in enumerate(times) if t and t > first_ns + MAPPED_S * 10**9)
     last = next((i for i, t in enumerate(times) if t and t > first_ns + LAST_S * 10**9), len(times))
-    failures, starts = [], []
+    failures, starts, utc_ns = [], [], ahead_ns + utc_ahead_ns(work)
     for number, cut in enumerate(sorted(RANDOM.sample(range(mapped, last), CUTS))):
         folder = work / "cuts" / str(number)
         shutil.rmtree(folder, ignore_errors=True)
@@ -124,7 +141,7 @@ def main():
             failures.append(f"cut {number}: {e}")
             continue
         rest_of(recording, when_ns + round(OFF_S * 1e9), folder / "rest")
-        first_s, right_s, said = start(waymark, work, folder, state, recording, config)
+        first_s, right_s, said = start(waymark, work, folder, state, recording, config, (when_ns + utc_ns) * 1e-9 + OFF_S)
         starts.append((first_s, right_s))
         print(f"cut {number}: {(when_ns - first_ns) * 1e-9:.1f} s into the drive, {lost} of its writes lost; {kept} landmarks; a pose after {first_s:.2f} s, "
               f"right after {right_s:.2f} s", flush=True)

@@ -135,14 +135,23 @@ slam::marker_reading slam::choose_pose(const context &at, const wm_marker &m, co
   return r;
 }
 
-// The rows of a marker of the map.
+// The rows of a marker of the map. Where the pose is vague, the second derivatives count as noise [Athans1968]. With
+// the heading's error h, and the errors r along and t across the line of sight at distance d, which are linear in the
+// state, a marker is seen h w beside its expected place along the sight, w = t + h d / 2, and -h r across. Their mean
+// squares are P_hh P_ww + 2 P_hw^2 and P_hh P_rr + 2 P_hr^2. A place alone that is vague bends nothing. Below the
+// marker's own noise they change no pose and are left out.
 void slam::expect_known_marker(const context &at, const marker_reading &r, int landmark, int count,
                                landmark_rows *out) {
   expect_marker(at, r, pose_of(landmark), lend(at), out);
   out->count = count;
-  const bend b = bend_of(relative_place_of(at, landmark));
-  if (b.along_m2 > out->noise[0]) out->noise[0] += b.along_m2;
-  if (b.across_m2 > out->noise[1]) out->noise[1] += b.across_m2;
+  const relative_place place = relative_place_of(at, landmark);
+  if (!(place.distance_m > kOnSensor_m)) return;
+  const double hh = place.heading_rad2, d = place.distance_m;
+  const double hw = place.heading_across + 0.5 * d * hh;
+  const double ww = place.across_m2 + d * place.heading_across + 0.25 * d * d * hh;
+  const double bent[2] = {hh * ww + 2.0 * square(hw), hh * place.along_m2 + 2.0 * square(place.heading_along)};
+  for (int k = 0; k < 2; k++)
+    if (bent[k] > out->noise[k]) out->noise[k] += bent[k];
 }
 
 // NIS of all three numbers of a known marker.

@@ -170,10 +170,7 @@ class slam {
   // A landmark as seen from the sensor: its distance, and the variances along and across the line of sight.
   struct relative_place {
     double distance_m, along_m2, across_m2, along_across_m2;
-  };
-  // What the second derivatives of a landmark's place add to the variances along and across the line of sight.
-  struct bend {
-    double along_m2, across_m2;
+    double heading_rad2, heading_along, heading_across;  // covariances of the robot's heading with itself and these
   };
   // Two landmarks that may be one line: their states, the difference of their places and its covariance.
   struct landmark_pair {
@@ -229,7 +226,6 @@ class slam {
   wm_pose2 sensor_pose(int sensor, const past_pose &past) const;
   int lend(const context &at);
   relative_place relative_place_of(const context &at, int landmark) const;
-  static bend bend_of(const relative_place &p);
   gate_limits gates() const { return {sightings().gate_soft, sightings().gate_hard}; }
   void prepare(int landmark, landmark_rows *v, joint_state::innovation_block *out);
   wm_verdict fuse_rows(const context &at, const landmark_rows &v, const gate_result &g,

@@ -33,10 +33,11 @@ wm_pose2 slam::sensor_pose(int sensor, const past_pose &past) const {
 slam::relative_place slam::relative_place_of(const context &at, int landmark) const {
   const wm_pose2 from = sensor_pose(at.sensor, at.past), place = pose_of(landmark);
   const double dx = place.x_m - from.x_m, dy = place.y_m - from.y_m, distance2 = dx * dx + dy * dy;
-  if (!(distance2 > square(kOnSensor_m))) return {std::sqrt(distance2), 0.0, 0.0, 0.0};
+  if (!(distance2 > square(kOnSensor_m))) return {std::sqrt(distance2), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
   const double distance = std::sqrt(distance2), along[2] = {dx / distance, dy / distance};
   const int state = joint_.landmark_state(landmark);
-  joint_row r, t;
+  joint_row r, t, heading;
+  heading.add(kHeading, 1.0);
   for (int k = 0; k < 2; k++) {
     const double across = k == 0 ? -along[1] : along[0];
     const int own = k == 0 ? kX : kY;
@@ -46,17 +47,13 @@ slam::relative_place slam::relative_place_of(const context &at, int landmark) co
     t.add(own, -across);
   }
   t.add(kHeading, -distance);
-  return {distance, joint_.variance_of(r), joint_.variance_of(t), joint_.covariance_of(r, t)};
-}
-
-// Where the pose is vague, the second derivatives count as noise [Athans1968]: an error t across the line of sight
-// moves a landmark at distance d by -t^2 / 2d along it, and an error r along it by r t / d across. Their mean squares
-// are 3/4 (P_tt / d)^2 and (P_rr P_tt + 2 P_rt^2) / d^2. Below a row's own noise they change no pose and are left out.
-slam::bend slam::bend_of(const relative_place &p) {
-  if (!(p.distance_m > kOnSensor_m)) return {0.0, 0.0};
-  const double by_distance2 = 1.0 / square(p.distance_m);
-  return {0.75 * square(p.across_m2) * by_distance2,
-          (p.along_m2 * p.across_m2 + 2.0 * square(p.along_across_m2)) * by_distance2};
+  return {distance,
+          joint_.variance_of(r),
+          joint_.variance_of(t),
+          joint_.covariance_of(r, t),
+          joint_.variance_of(heading),
+          joint_.covariance_of(heading, r),
+          joint_.covariance_of(heading, t)};
 }
 
 // The states of this sensor's time-correlated error on this landmark, decayed to now. -1: none is carried.

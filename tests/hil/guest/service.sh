@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 # In the guest, under systemd: the package's service, as it is shipped. It begins on a computer that has no camera yet; then the
-# bus is silent for two minutes; then the camera is gone for one, then both.
+# bus is silent for two minutes; in another drive the camera is gone for one, in a third both.
 name=service
 . /host/guest/service-parts.sh
 
@@ -80,5 +80,6 @@ drive() {
 }
 drive bus
 drive camera
+drive both
 cat "$out"/*.states | awk 'NR % 8 == 1'
 exit $((fails > 0))

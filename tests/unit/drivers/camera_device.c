@@ -130,6 +130,19 @@ static void what_was_in_the_ring_before_the_start_is_thrown_away(void) {
   TEST_ASSERT_EQUAL_UINT64(0, counts()->bad_stamps);
 }
 
+// v4l2loopback stamps the buffers that it has anew, and numbers them 0, while a reader sets it up.
+static void what_was_stamped_anew_before_the_start_is_thrown_away(void) {
+  fake.start_takes_ns = 5 * MS;
+  picture(AT(2), 0)->at_ns = AT(6);
+  picture(AT(20), 60);
+  picture(AT(53), 61);
+  make();
+  expect_picture_of(AT(20));
+  expect_picture_of(AT(53));
+  TEST_ASSERT_EQUAL_UINT64(1, counts()->stale);
+  TEST_ASSERT_EQUAL_UINT64(0, counts()->lost);
+}
+
 // vivid, percentage_of_dropped_buffers=30: 7 -> 10, 15 -> 17; and numbers near their wrap (wrap_sequence_number).
 static void gaps_in_the_drivers_count_are_lost_pictures(void) {
   stale(AT(0), 4294967290u);
@@ -322,6 +335,7 @@ int main(void) {
   RUN_TEST(pictures_become_frames);
   RUN_TEST(the_first_picture_of_a_camera_with_an_empty_ring_is_used);
   RUN_TEST(what_was_in_the_ring_before_the_start_is_thrown_away);
+  RUN_TEST(what_was_stamped_anew_before_the_start_is_thrown_away);
   RUN_TEST(gaps_in_the_drivers_count_are_lost_pictures);
   RUN_TEST(damaged_buffers_are_counted_and_passed_over);
   RUN_TEST(only_the_newest_of_what_waits_is_handed_out);

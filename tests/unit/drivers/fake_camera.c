@@ -61,6 +61,7 @@ static wm_time_ns exposure_ns(void *camera) { return ((fake_camera *)camera)->ex
 static int start(void *camera, uint32_t buffers) {
   (void)buffers;
   ((fake_camera *)camera)->started++;
+  ((fake_camera *)camera)->now_ns += ((fake_camera *)camera)->start_takes_ns;
   return 0;
 }
 

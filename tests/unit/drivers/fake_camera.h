@@ -34,6 +34,7 @@ typedef struct fake_camera {
   const uint8_t *jpeg;  // instead of pixels
   uint32_t jpeg_bytes;
   wm_time_ns exposure_ns;
+  wm_time_ns start_takes_ns;
   camera_control set[8];
   int set_count;
 } fake_camera;

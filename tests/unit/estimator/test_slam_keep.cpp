@@ -129,6 +129,19 @@ void test_a_robot_that_turned_while_off_is_never_surely_wrong() {
   }
 }
 
+// GIVEN a kept map WHEN the place is vague, as after a minute without motion, and the heading is known THEN the first
+// markers give the place: it is linear in it.
+void test_a_vague_place_alone_is_found_by_the_first_markers() {
+  coded = true;
+  learn();
+  restart(truth.x_m - 1.0, truth.y_m + 0.5, truth.heading_rad, 80.0, 0.005);
+  drive(0.1);
+  std::printf("%.3f m off, sigma %.3f m\n", off(), sigma());
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.1, off());
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.3, sigma());
+  TEST_ASSERT_LESS_THAN_DOUBLE(4.0, off() / sigma());
+}
+
 void test_without_a_pose_it_is_searched_in_the_map() {
   coded = true;
   learn();
@@ -214,6 +227,7 @@ int main(void) {
   RUN_TEST(test_a_map_that_was_taken_up_is_kept_again);
   RUN_TEST(test_a_robot_that_was_moved_while_off_is_found_in_its_map);
   RUN_TEST(test_a_robot_that_turned_while_off_is_never_surely_wrong);
+  RUN_TEST(test_a_vague_place_alone_is_found_by_the_first_markers);
   RUN_TEST(test_without_a_pose_it_is_searched_in_the_map);
   RUN_TEST(test_an_image_that_is_wrong_is_refused_with_the_reason);
   RUN_TEST(test_a_map_at_its_capacity_is_kept);

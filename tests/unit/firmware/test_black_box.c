@@ -2,6 +2,7 @@
 // What is left of the last seconds, after a loss, a death, and an end in order.
 #include <fcntl.h>
 #include <glob.h>
+#include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -245,19 +246,38 @@ static void a_link_in_its_folder_is_not_followed(void) {
   TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, "symbolic link"), said);
 }
 
-// After 9999 incidents the newest are not taken for old ones.
-static void numbers_go_on_beyond_four_digits(void) {
-  char path[128];
-  (void)snprintf(path, sizeof path, "%s/lost-10041-now.wmlog", folder);
+// WHEN there is an incident of this number THEN the next two have the next numbers, and all stay.
+static void numbers_follow(uint64_t number) {
+  char name[64], path[128];
+  (void)snprintf(name, sizeof name, "lost-%" PRIu64 "-now.wmlog", number);
+  (void)snprintf(path, sizeof path, "%s/%s", folder, name);
   FILE *f = fopen(path, "w");
   TEST_ASSERT_NOT_NULL(f);
   (void)fclose(f);
-  open_box();
-  drive(5, WM_STATE_TRACKING);
-  drive(1, WM_STATE_LOST);
-  black_box_close(&box);
-  TEST_ASSERT_EQUAL(1, files("lost-10041-now.wmlog"));
-  TEST_ASSERT_EQUAL(1, files("lost-10042-now.wmlog"));
+  for (int i = 0; i < 2; i++) {
+    open_box();
+    drive(5, WM_STATE_TRACKING);
+    drive(1, WM_STATE_LOST);
+    black_box_close(&box);
+  }
+  for (uint64_t i = 0; i < 3; i++) {
+    (void)snprintf(name, sizeof name, "lost-%" PRIu64 "-now.wmlog", number + i);
+    TEST_ASSERT_EQUAL_MESSAGE(1, files(name), name);
+  }
+}
+
+// After 9999 incidents the newest are not taken for old ones.
+static void numbers_go_on_beyond_four_digits(void) { numbers_follow(10041); }
+static void numbers_go_on_beyond_32_bits(void) { numbers_follow(UINT32_MAX); }
+
+// A number that is none of a black box does not end its counting.
+static void a_number_without_end_is_no_number(void) {
+  char path[128];
+  (void)snprintf(path, sizeof path, "%s/lost-99999999999999999999-now.wmlog", folder);
+  FILE *f = fopen(path, "w");
+  TEST_ASSERT_NOT_NULL(f);
+  (void)fclose(f);
+  numbers_follow(20041);
 }
 
 // A camera whose newest picture is as the test says.
@@ -378,6 +398,8 @@ int main(void) {
   RUN_TEST(a_crash_loop_evicts_no_old_incident);
   RUN_TEST(a_link_in_its_folder_is_not_followed);
   RUN_TEST(numbers_go_on_beyond_four_digits);
+  RUN_TEST(numbers_go_on_beyond_32_bits);
+  RUN_TEST(a_number_without_end_is_no_number);
   RUN_TEST(pictures_are_kept_with_it);
   RUN_TEST(a_disk_that_takes_nothing_is_said_once);
   return UNITY_END();

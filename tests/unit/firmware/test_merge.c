@@ -119,6 +119,21 @@ static void the_numbers_of_events_wrap(void) {
   TEST_ASSERT_EQUAL_STRING("10/0 11/1 12/0 13/1 14/0 15/1 16/0 17/1", final_ms());
 }
 
+// Events with one stamp stay as they were numbered, also where their numbers wrap between them.
+static void events_of_one_stamp_keep_their_order_where_numbers_wrap(void) {
+  open_merge((wm_merge_source[]){kMotion, kCamera}, 2);
+  next_seq = UINT32_MAX - 2;
+  for (int i = 0; i < 6; i++) TEST_ASSERT_EQUAL(WM_MERGE_TAKEN, arrive(1, 10 * MS, 10 * MS));
+  wm_merge_flush(merge);
+  const uint32_t numbers[] = {UINT32_MAX - 2, UINT32_MAX - 1, UINT32_MAX, 0, 1, 2};
+  for (int i = 0; i < 6; i++) {
+    const wm_event *e = wm_merge_front(merge);
+    TEST_ASSERT_NOT_NULL(e);
+    TEST_ASSERT_EQUAL_UINT32(numbers[i], e->seq);
+    wm_merge_pop(merge);
+  }
+}
+
 static void a_silent_source_costs_its_lateness_and_its_first_datum_after_that_is_fused(void) {
   open_merge((wm_merge_source[]){kMotion, kCamera}, 2);
   for (int i = 0; i <= 100; i++) arrive(0, i * 10 * MS, i * 10 * MS);
@@ -325,6 +340,7 @@ int main(void) {
   RUN_TEST(p99_of_the_lateness);
   RUN_TEST(motion_comes_first_then_the_rank_then_the_file);
   RUN_TEST(the_numbers_of_events_wrap);
+  RUN_TEST(events_of_one_stamp_keep_their_order_where_numbers_wrap);
   RUN_TEST(a_silent_source_costs_its_lateness_and_its_first_datum_after_that_is_fused);
   RUN_TEST(what_is_late_is_counted_and_dropped);
   RUN_TEST(a_periodic_source_lets_time_pass_until_its_next_datum);
