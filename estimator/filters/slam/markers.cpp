@@ -135,21 +135,14 @@ slam::marker_reading slam::choose_pose(const context &at, const wm_marker &m, co
   return r;
 }
 
-// The rows of a marker of the map. Where the pose is vague, the second derivatives count as noise [Athans1968]: an
-// error t across the line of sight, by a wrong heading, moves a marker at distance d by -t^2 / 2d along it, and an
-// error r along it by r t / d across. Their mean squares are 3/4 (P_tt / d)^2 and (P_rr P_tt + 2 P_rt^2) / d^2. Below
-// the marker's own noise they change no pose and are left out.
+// The rows of a marker of the map.
 void slam::expect_known_marker(const context &at, const marker_reading &r, int landmark, int count,
                                landmark_rows *out) {
   expect_marker(at, r, pose_of(landmark), lend(at), out);
   out->count = count;
-  const relative_place place = relative_place_of(at, landmark);
-  if (!(place.distance_m > kOnSensor_m)) return;
-  const double by_distance2 = 1.0 / square(place.distance_m);
-  const double bent[2] = {0.75 * square(place.across_m2) * by_distance2,
-                          (place.along_m2 * place.across_m2 + 2.0 * square(place.along_across_m2)) * by_distance2};
-  for (int k = 0; k < 2; k++)
-    if (bent[k] > out->noise[k]) out->noise[k] += bent[k];
+  const bend b = bend_of(relative_place_of(at, landmark));
+  if (b.along_m2 > out->noise[0]) out->noise[0] += b.along_m2;
+  if (b.across_m2 > out->noise[1]) out->noise[1] += b.across_m2;
 }
 
 // NIS of all three numbers of a known marker.
