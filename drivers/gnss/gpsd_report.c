@@ -102,7 +102,7 @@ static void take_numbers(const wm_yaml_node *report, gpsd_report *out) {
 }
 
 const char *gpsd_report_read(const char *line, size_t length, gpsd_report *out) {
-  char time[40];
+  char time[40] = "";
   wm_yaml *document = NULL;
   wm_error ignored;
   memset(out, 0, sizeof *out);

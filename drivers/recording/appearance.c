@@ -29,6 +29,7 @@ static wm_status read_picture(const csv_reader *csv, const char *path, const csv
   if (out->width_px >= 4 && out->height_px >= 4 && out->width_px <= SIDE_MAX_PX && out->height_px <= SIDE_MAX_PX)
     return WM_OK;
   free(out->pixels);
+  out->pixels = NULL;
   return csv_fail(csv, err, WM_OUT_OF_RANGE, "picture: must have 4 to 8192 pixels a side");
 }
 

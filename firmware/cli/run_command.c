@@ -257,7 +257,7 @@ static wm_status check_new_recording(const char *folder, const char *played, wm_
 }
 
 int command_run(int argc, char *const *argv) {
-  arguments args = {.run = {.seed = 1, .speed = 1, .stop = &stop, .say = print_note}};
+  static arguments args = {.run = {.seed = 1, .speed = 1, .stop = &stop, .say = print_note}};
   int help = 0;
   const option options[] = {{"--config", OPTION_TEXT, &args.config},
                             {"--recording", OPTION_TEXT, &args.recording},

@@ -20,6 +20,8 @@ constexpr uint32_t kWidthMax = 3;   // states of a landmark: its place, and a ma
 constexpr double kRounding = 1e-6;  // of a covariance, relative to the product of its sigmas
 // A tracker's numbers begin anew at a restart. Landmarks known by such numbers get others, from the largest one down.
 constexpr int32_t kLargestId = INT32_MAX;
+// The next number of a landmark without an identity: as many are left as a drive can't have.
+constexpr int32_t kNextIdMost = INT32_MAX / 2;
 // Ages of a kept landmark at the first observation: far beyond the times that witnesses and returns are judged by.
 constexpr wm_time_ns kAge_ns = 600 * WM_NS_PER_S, kUnseen_ns = 60 * WM_NS_PER_S;
 
@@ -190,6 +192,7 @@ const char *slam::why_not_kept(const wm_slam_params &params, const wm_setup &set
   if (head.width < 2 || head.width > kWidthMax || head.landmarks > static_cast<uint32_t>(params.landmark_capacity))
     return "it has more landmarks than slam.landmarks.capacity";
   if (kept_layout(head).bytes != bytes) return "it is truncated";
+  if (head.next_id < 0 || head.next_id > kNextIdMost) return "its numbers of landmarks are used up";
   return fault_in_numbers(kept_image(image));
 }
 

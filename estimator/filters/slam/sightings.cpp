@@ -213,6 +213,20 @@ void slam::expect_point(const context &at, const planar_observation &seen, int l
   }
 }
 
+// A bearing and a range of a vague pose. The gate is without this noise: of misread identities it would let pass more.
+bool slam::add_bend(const context &at, int landmark, landmark_rows *v) const {
+  const relative_place place = relative_place_of(at, landmark);
+  const bend b = bend_of(place);
+  const double added[2] = {b.across_m2 > 0.0 ? b.across_m2 / square(place.distance_m) : 0.0, b.along_m2};
+  bool is_bent = false;
+  for (int k = 0; k < 2; k++) {
+    if (!(added[k] > v->noise[k])) continue;
+    v->noise[k] += added[k];
+    is_bent = true;
+  }
+  return is_bent;
+}
+
 // Bearing and range are gated together: a wrong one spoils the other.
 void slam::fuse_known(const context &at, const wm_sighting &s, const reading &r, int landmark) {
   landmark_rows v;
@@ -229,6 +243,8 @@ void slam::fuse_known(const context &at, const wm_sighting &s, const reading &r,
   const gate_result g = gate(block.nis, v.count, gates());
   if (s.landmark_id >= 0 && !weigh_identified(landmark, at, s, r, v, block, g.passed))
     return (void)reject(at.records, at.record, WM_REJECTED_SEARCHING);
+  if (g.passed && r.bearing && r.range && !is_point && add_bend(at, landmark, &v))
+    joint_.prepare(v.row, v.innovation, v.noise, v.count, &block);
   const wm_verdict verdict = fuse_rows(at, v, g, &block);
   if (r.bearing && !is_point) note_rotation(g.passed, v.innovation[0], false, note(landmark).last_ns);
   if (!g.passed) return note_misfit(landmark, r.range);

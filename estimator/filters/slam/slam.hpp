@@ -172,6 +172,10 @@ class slam {
     double distance_m, along_m2, across_m2, along_across_m2;
     double heading_rad2, heading_along, heading_across;  // covariances of the robot's heading with itself and these
   };
+  // What the second derivatives of a landmark's place add to the variances along and across the line of sight.
+  struct bend {
+    double along_m2, across_m2;
+  };
   // Two landmarks that may be one line: their states, the difference of their places and its covariance.
   struct landmark_pair {
     int fresh, lost;
@@ -226,6 +230,7 @@ class slam {
   wm_pose2 sensor_pose(int sensor, const past_pose &past) const;
   int lend(const context &at);
   relative_place relative_place_of(const context &at, int landmark) const;
+  static bend bend_of(const relative_place &p);
   gate_limits gates() const { return {sightings().gate_soft, sightings().gate_hard}; }
   void prepare(int landmark, landmark_rows *v, joint_state::innovation_block *out);
   wm_verdict fuse_rows(const context &at, const landmark_rows &v, const gate_result &g,
@@ -247,6 +252,7 @@ class slam {
   bool weigh_identified(int landmark, const context &at, const wm_sighting &s, const reading &r, const landmark_rows &v,
                         const joint_state::innovation_block &block, bool passed);
   void expect_point(const context &at, const planar_observation &seen, int landmark, landmark_rows *out) const;
+  bool add_bend(const context &at, int landmark, landmark_rows *v) const;
   void fuse_known(const context &at, const wm_sighting &s, const reading &r, int landmark);
   wm_status begin_landmark(context at, const wm_sighting &s, const reading &r);
   wm_verdict join_seen(const context &at, const wm_sighting &s, const reading &r);

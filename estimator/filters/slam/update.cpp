@@ -56,6 +56,17 @@ slam::relative_place slam::relative_place_of(const context &at, int landmark) co
           joint_.covariance_of(heading, t)};
 }
 
+// Of a bearing and a range. Where the pose is vague, the second derivatives count as noise [Athans1968]: an error t
+// across the line of sight moves a landmark at distance d by -t^2 / 2d along it, and an error r along it by r t / d
+// across. Their mean squares are 3/4 (P_tt / d)^2 and (P_rr P_tt + 2 P_rt^2) / d^2. Below a row's own noise they change
+// no pose and are left out.
+slam::bend slam::bend_of(const relative_place &p) {
+  if (!(p.distance_m > kOnSensor_m)) return {0.0, 0.0};
+  const double by_distance2 = 1.0 / square(p.distance_m);
+  return {0.75 * square(p.across_m2) * by_distance2,
+          (p.along_m2 * p.across_m2 + 2.0 * square(p.along_across_m2)) * by_distance2};
+}
+
 // The states of this sensor's time-correlated error on this landmark, decayed to now. -1: none is carried.
 int slam::lend(const context &at) {
   const int64_t key = static_cast<int64_t>(at.id) * kSlamSensors + at.sensor;
