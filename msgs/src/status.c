@@ -25,7 +25,7 @@ const char *wm_status_text(wm_status status) {
   return "?";
 }
 
-#undef wm_fail // what the static analyzer takes for it
+#undef wm_fail  // what the static analyzer takes for it
 wm_status wm_fail(wm_error *err, wm_status status, const char *format, ...) {
   if (err) {
     va_list args;

@@ -49,7 +49,7 @@ const char *wm_status_text(wm_status status);
 // `return wm_fail(err, WM_BAD_CONFIG, "...")`. `err` may be NULL. Not for the real-time thread.
 wm_status wm_fail(wm_error *err, wm_status status, const char *format, ...) __attribute__((format(printf, 3, 4)));
 
-#ifdef __clang_analyzer__ // which does not see the body: the result is the status that was given
+#ifdef __clang_analyzer__  // which does not see the body: the result is the status that was given
 #define wm_fail(err, status, ...) ((void)wm_fail(err, status, __VA_ARGS__), (status))
 #endif
 
