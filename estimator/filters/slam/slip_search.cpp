@@ -282,13 +282,13 @@ slip_hypothesis slip_search::search_after(const gap &g, const joint_state &joint
       if (t.members > best.members || (t.members == best.members && t.chi2 < best.chi2)) best = t;
     }
   if (best.members < 2) return out;
-  double by_rad, variance, log_of_group = 0.0;
+  double by_rad, variance;
   for (int round = 0; round < kRounds; round++) {
-    log_of_group = log_density(joint, anchor, best, &by_rad, &variance);
+    (void)log_density(joint, anchor, best, &by_rad, &variance);
     best.turn_rad = wrap(best.turn_rad + by_rad);
     place(joint, odometry, anchor, invariant, &best);
   }
-  log_of_group = log_density(joint, anchor, best, &by_rad, &variance);
+  const double log_of_group = log_density(joint, anchor, best, &by_rad, &variance);
   out.log_odds = log(kSlipPrior) + log_of_group + (count_ - best.members) * log(kWrong / kClutter_m2) -
                  log_likelihood_as_expected(joint, odometry);
   out.turn_rad = best.turn_rad;

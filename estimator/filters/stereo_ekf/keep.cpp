@@ -195,7 +195,7 @@ const char *stereo_ekf::why_not_kept(const wm_stereo_ekf_params &params, const w
 void stereo_ekf::take_kept(const void *image) {
   const kept_frames kept(image);
   const auto calibration = static_cast<int>(kept.head().calibration), frames = static_cast<int>(kept.head().frames);
-  int numbers[kFramesMost], states[kFrameStates * kFramesMost + kHeadMax];
+  int numbers[kFramesMost] = {}, states[kFrameStates * kFramesMost + kHeadMax];
   forget_map();
   filter_.remove_points();
   size_t next = 0;

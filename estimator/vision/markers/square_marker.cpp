@@ -154,7 +154,7 @@ bool nearest_code(const wm_square_reader &self, const bool *is_black, square_rea
 bool read_code(const wm_square_reader &self, const tangent_view &view, const wm_frame &frame,
                const tangent_point corner[4], square_reading *out) {
   print_reader r = {view, frame, 1.0 / self.border, {}, {}, {}};
-  double level[kModulesMax];
+  double level[kModulesMax] = {};
   if (!homography_init(&r.h, kOutline, corner, 4) || !read_levels(self, &r, level) || !complete_rings(self, level))
     return false;
   for (const double sharpen : {kSharpen, 0.0}) {
