@@ -117,7 +117,7 @@ def one_run(work, subscriber, at_s, seconds, command):
         time.sleep(0.005)
     assert subscriber.poses, run.communicate()[1]
     first_s = subscriber.poses[0][0] - began
-    time.sleep(max(0.0, began + seconds - time.monotonic()))
+    time.sleep(max(0.0, began + first_s + seconds - time.monotonic()))  # of driving, however long the program took to start
     run.send_signal(signal.SIGKILL)
     said = run.communicate()[1]
     time.sleep(0.05)
