@@ -92,7 +92,7 @@ def check_wheels(work):
                                            "sensors: {eye: {mounting: {xyz_m: [0, 0, 0], rpy_deg: [0, 0, 0]}, bearing_sigma_rad: 0.01}}\n")
     (work / "landmarks.csv").write_text("id,x_m,y_m,z_m,sigma_m\n1,10,105,0,0.01\n")
     (work / "wheels.yaml").write_text(WHEELS)
-    run = start(work, "wheels", SECONDS + 2)
+    run = start(work, "wheels", SECONDS + 3)
     subprocess.run([sys.executable, __file__, "publish_wheels"], env={"PYTHONPATH": str(work)}, check=True)
     lcm_tools.finish(run)
     replay_both(work, "wheels")
@@ -142,7 +142,7 @@ def publish_space():
 def check_space(work):
     (work / "calibration.yaml").write_text("{}\n")
     (work / "space.yaml").write_text(SPACE)
-    run = start(work, "space", SECONDS + 2)
+    run = start(work, "space", SECONDS + 3)
     subprocess.run([sys.executable, __file__, "publish_space"], env={"PYTHONPATH": str(work)}, check=True)
     lcm_tools.finish(run)
     replay_both(work, "space")
@@ -160,6 +160,9 @@ def start(work, name, seconds):
     """A run on the devices, which also records them."""
     run = subprocess.Popen([lcm_tools.WAYMARK, "run", "--config", work / f"{name}.yaml", "--out", work / name, "--record",
                             work / f"{name}-rec", "--duration", str(seconds)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    until = time.monotonic() + 5
+    while not list((work / f"{name}-rec").glob("*.csv")) and time.monotonic() < until:  # the recorder is a process of its own
+        time.sleep(0.05)
     time.sleep(0.7)
     return run
 
