@@ -196,11 +196,11 @@ void motion_front_end::count_variances(wm_time_ns t_ns, double *way_m2, double *
 // The counts' own speed holds for some periods, then the steady one.
 void motion_front_end::note_steady(motion_input *input) const {
   if (!ticks_drive() || input->doubtful || input->refused || wheel_[0].t_ns == WM_TIME_NONE) return;
+  if (!(wheel_[0].period_s > 0.0)) return;
   const double left = wheel_[0].steady_mps, right = wheel_[1].steady_mps;
   const bool both = model_ == WM_MOTION_TICKS;
   const double steady[2] = {both ? left : mean_of_wheels(left, right), both ? right : input->b};
   const double after_s = kCarriedPeriods * wheel_[0].period_s - wm_seconds_between(wheel_[0].t_ns, input->t_ns);
-  if (!(wheel_[0].period_s > 0.0)) return;
   if (after_s > 0.0) {
     input->steady_after_s = static_cast<float>(after_s);
     for (int i = 0; i < 2; i++) input->steady[i] = steady[i];

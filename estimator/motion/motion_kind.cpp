@@ -10,10 +10,7 @@ constexpr uint32_t bit(int index) { return UINT32_C(1) << index; }
 constexpr uint32_t kRates = bit(kSpeedScale) | bit(kYawRateScale) | bit(kYawRateBias) | bit(kRotationCenter);
 constexpr uint32_t kTwistRates = kRates | bit(kSideScale);
 
-// Effective track over the distance of the wheels of skid steer [Mandow2007]: above 1, as wheels slip in turns. A prior
-// for wheels and tracks on hard and soft floors. Not swept.
-constexpr double kSkidTrack = 1.5, kSkidTrackSigma = 0.25;
-// A twist of such a base is by an effective track already, but of another floor.
+// A twist of skid steer is by an effective track already, but of another floor.
 constexpr double kSkidRateSigma = 0.2;
 
 // The terms that have an effect, by motion_kind. A twist's wheel scales would only repeat its speed's and rate's.
@@ -58,14 +55,14 @@ bool is_state(double sigma, int term, motion_kind kind) {
 double start_sigma(const wm_motion_states &states, int term) {
   const double sigma = states.sigma[term];
   const bool skids = sigma < 0.0 && states.drive == WM_DRIVE_SKID_STEER;
-  if (skids && term == kTrackScale) return kSkidTrackSigma;
+  if (skids && term == kTrackScale) return WM_SKID_TRACK_SIGMA;
   if (skids && term == kYawRateScale) return kSkidRateSigma;
   return sigma < 0.0 ? -sigma : sigma;
 }
 
 double start_value(const wm_motion_states &states, int term) {
   const bool skids = states.sigma[term] < 0.0 && term == kTrackScale && states.drive == WM_DRIVE_SKID_STEER;
-  return skids ? kSkidTrack : kNeutralCalibration.value[term];
+  return skids ? WM_SKID_TRACK : kNeutralCalibration.value[term];
 }
 
 bool may_be_state(const wm_motion_states &states, int term, int model) {

@@ -9,6 +9,7 @@
 
 #include "output/drive_evidence.h"
 #include "output/likelihood.h"
+#include "waymark/motion.h"
 
 #define OBSERVATIONS_MIN 20
 #define REFUSED_BAD 0.20  // as in health_findings.c
@@ -341,10 +342,6 @@ int evidence_scale_contradicts(const wm_assembly *assembly, const wm_calibration
   return sigma > 0 && off > 5 * fmax(sigma, c->sigma) && (c->value > 1.2 || c->value < 1 / 1.2);
 }
 
-// The effective track of skid steer is wider than the distance of its wheels: its state begins at 1.5, with a sigma of
-// a quarter (motion.drive).
-#define SKID_TRACK 1.5
-
 static int is_skid_track(const wm_assembly *assembly, const wm_calibration_value *c) {
   const wm_param_table *table = &wm_motion_params_table;
   if (strcmp(c->name, "motion.track_scale") != 0) return 0;
@@ -384,13 +381,13 @@ static void calibration(const wm_assembly *assembly, const wm_health *health, wm
       if (!strstr(c->name, kLimits[k].ending) || (c->value >= kLimits[k].least && c->value <= kLimits[k].most))
         continue;
       if (fabs(c->value - kLimits[k].expected) < 3 * c->sigma) continue;
-      // Of skid steer 1 to 2 is its base's, two sigmas; beyond, `track_m` is wrong.
-      if (skids && fabs(c->value - SKID_TRACK) <= 0.5) continue;
+      // Within two sigmas of skid steer's prior it is its base's; beyond, `track_m` is wrong.
+      if (skids && fabs(c->value - WM_SKID_TRACK) <= 2 * WM_SKID_TRACK_SIGMA) continue;
       const int is_bad = !skids && (c->value < kLimits[k].bad_least || c->value > kLimits[k].bad_most ||
                                     evidence_scale_contradicts(assembly, c));
       wm_find(out, WM_FOUND_CALIBRATION_OFF, is_bad ? WM_SEVERITY_BAD : WM_SEVERITY_NOTE, "calibration", kLimits[k].fix,
               "%s is %.4g +- %.2g at the end; %g was expected", c->name, c->value, c->sigma,
-              skids ? SKID_TRACK : kLimits[k].expected)
+              skids ? WM_SKID_TRACK : kLimits[k].expected)
           ->size = c->value;
       break;
     }

@@ -2,10 +2,8 @@
 """A robot with two driven wheels and an IMU: its measured twist and the bearings of landmarks come over LCM, its turn rate from the IIO
 buffer of the kernel's driver for HID gyroscopes, each at its own time; landmark_ekf."""
 import csv
-import shutil
 
 import drives
-import landmarks
 import messages
 import motion
 from published import WORKS, Published
@@ -22,20 +20,7 @@ def rates(recording):
 
 
 def prepare(work, root, here, simulate):
-    recording, scenario = drives.make(work, "iio", simulate, root / f"config/worlds/{WORLD}.yaml")
-    items, blob = list(rates(recording)), bytearray()
-    seconds = (items[-1][0] - items[0][0]) * 1e-9
-    for due_ns, t_ns, message, channel in motion.over_lcm(work, recording):
-        items.append((due_ns, f"l {t_ns} {len(blob)} {len(message)} {channel}"))
-        blob += message
-    drives.write(scenario, here, items, blob, seconds)
-    for name in ("calibration.yaml", "landmarks.csv"):
-        shutil.copy(recording / name, scenario)
-    (scenario / "robot.yaml").write_text(
-        (root / f"config/datasets/{WORLD}.yaml").read_text() + f"\ninitial_pose: {drives.start_of(recording)}\n"
-        "calibration: calibration.yaml\nlandmarks: landmarks.csv\n"
-        f"publish: {{lcm_url: '{drives.URL}'}}\nrealtime: {{priority: 40}}\n"
-        "devices: {lcm: [{stream: motion}], iio: {device: gyro_3d}, sightings: lcm}\n")
+    motion.stage(work, root, here, simulate, "iio", WORLD, "lcm: [{stream: motion}], iio: {device: gyro_3d}, sightings: lcm", rates)
 
 
 def judge(work, waymark, root):

@@ -30,22 +30,26 @@ def over_lcm(work, recording):
         yield arrival_ns, t_ns, message, "WAYMARK_SIGHTINGS"
 
 
-def prepare(work, root, here, simulate):
-    recording, scenario = drives.make(work, "motion", simulate, root / f"config/worlds/{WORLD}.yaml")
-    items, blob, stamps = [], bytearray(), []
+def stage(work, root, here, simulate, name, world, devices, rows_of=lambda recording: ()):
+    """The scenario of a robot whose twist and sightings come over LCM, with the player's other lines, (t_ns, line) of the recording."""
+    recording, scenario = drives.make(work, name, simulate, root / f"config/worlds/{world}.yaml")
+    items, blob, stamps = list(rows_of(recording)), bytearray(), []
     for due_ns, t_ns, message, channel in over_lcm(work, recording):
         items.append((due_ns, f"l {t_ns} {len(blob)} {len(message)} {channel}"))
         blob += message
         stamps.append(t_ns)
-    seconds = (max(stamps) - min(stamps)) * 1e-9
-    drives.write(scenario, here, items, blob, seconds)
-    for name in ("calibration.yaml", "landmarks.csv"):
-        shutil.copy(recording / name, scenario)
+    drives.write(scenario, here, items, blob, (max(stamps) - min(stamps)) * 1e-9)
+    for file in ("calibration.yaml", "landmarks.csv"):
+        shutil.copy(recording / file, scenario)
     (scenario / "robot.yaml").write_text(
-        (root / f"config/datasets/{WORLD}.yaml").read_text() + f"\ninitial_pose: {drives.start_of(recording)}\n"
+        (root / f"config/datasets/{world}.yaml").read_text() + f"\ninitial_pose: {drives.start_of(recording)}\n"
         "calibration: calibration.yaml\nlandmarks: landmarks.csv\n"
         f"publish: {{lcm_url: '{drives.URL}'}}\nrealtime: {{priority: 40}}\n"
-        "devices: {lcm: [{stream: motion}], sightings: lcm}\n")
+        f"devices: {{{devices}}}\n")
+
+
+def prepare(work, root, here, simulate):
+    stage(work, root, here, simulate, "motion", WORLD, "lcm: [{stream: motion}], sightings: lcm")
 
 
 def judge(work, waymark, root):

@@ -62,6 +62,11 @@ void wm_motion_choose(wm_motion_params *params, uint32_t kinds);
 #define WM_MOTION_HEALTH_SPEED_SILENT (1u << 9)
 #define WM_MOTION_HEALTH_TURN_SILENT (1u << 10)  // the gyro, or the steering of a robot without one
 
+// Effective track over the distance of the wheels of skid steer, and the prior's sigma [Mandow2007]: above 1, as wheels
+// slip in turns. A prior for wheels and tracks on hard and soft floors. Not swept.
+#define WM_SKID_TRACK 1.5
+#define WM_SKID_TRACK_SIGMA 0.25
+
 // Calibration of the motion sensors, as an estimator has learnt it. Neutral: scales 1, the rest 0.
 typedef enum wm_motion_term {
   WM_SPEED_SCALE = 0,
