@@ -187,18 +187,6 @@ void read_camera(Reader &r, const wm_yaml_node &map, Camera &out) {
     r.fail(map, "name: 1 to 31 letters without blanks, commas or colons");
 }
 
-void read_cameras(Reader &r, const wm_yaml_node &list, Scenario &out) {
-  std::set<std::string> names;
-  for (size_t i = 0, n = r.list(list); i < n && r.ok(); i++) {
-    const wm_yaml_node item = wm_yaml_item(&list, i);
-    Camera camera;
-    read_camera(r, item, camera);
-    if (r.ok() && !names.insert(camera.name).second)
-      r.fail(item, "this name is there already; each camera needs its own");
-    out.cameras.push_back(camera);
-  }
-}
-
 void read_leg(Reader &r, const wm_yaml_node &map, Leg &out) {
   static const char *const known[] = {"stand_s", "straight_m", "turn_deg",  "radius_m",
                                       "ease_m",  "speed_mps",  "backwards", nullptr};
@@ -519,7 +507,7 @@ void read_scenario(Reader &r, const wm_yaml_node &root, Scenario &out) {
   if (pictured)
     read_pixel_cameras(r, cameras, out);
   else
-    read_cameras(r, cameras, out);
+    read_named(r, cameras, read_camera, out.cameras);
   read_sensors(r, r.child(root, "sensors", false), out);
   if (r.ok() && wm_yaml_there(&route)) read_route(r, route, out.route);
   if (r.ok() && !out.world.plan.empty() && out.route.legs.empty())

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <set>
-
 #include "simulate/scenario_reader.h"
 
 namespace wm::sim {
@@ -60,15 +58,7 @@ void read_pixel_camera(Reader &r, const wm_yaml_node &map, PixelCamera &out) {
 }  // namespace
 
 void read_pixel_cameras(Reader &r, const wm_yaml_node &list, Scenario &out) {
-  std::set<std::string> names;
-  for (size_t i = 0, n = r.list(list); i < n && r.ok(); i++) {
-    const wm_yaml_node item = wm_yaml_item(&list, i);
-    PixelCamera camera;
-    read_pixel_camera(r, item, camera);
-    if (r.ok() && !names.insert(camera.name).second)
-      r.fail(item, "this name is there already; each camera needs its own");
-    out.pixel_cameras.push_back(camera);
-  }
+  read_named(r, list, read_pixel_camera, out.pixel_cameras);
 }
 
 void read_pictures(Reader &r, const wm_yaml_node &map, Pictures &out) {

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <cstdio>
+#include <set>
 #include <string>
+#include <vector>
 
 #include "simulate/angle.h"
 #include "simulate/scenario.h"
@@ -104,6 +106,21 @@ class Reader {
   wm_error *err_;
   wm_status status_ = WM_OK;
 };
+
+// A list of cameras, each with a name of its own.
+template <class Item>
+void read_named(Reader &r, const wm_yaml_node &list, void (*read_one)(Reader &, const wm_yaml_node &, Item &),
+                std::vector<Item> &out) {
+  std::set<std::string> names;
+  for (size_t i = 0, n = r.list(list); i < n && r.ok(); i++) {
+    const wm_yaml_node node = wm_yaml_item(&list, i);
+    Item item;
+    read_one(r, node, item);
+    if (r.ok() && !names.insert(item.name).second)
+      r.fail(node, "this name is there already; each camera needs its own");
+    out.push_back(item);
+  }
+}
 
 // Keys that only worlds with pictures have: `pictures`, and `cameras` that change the world's own.
 void read_pictures(Reader &r, const wm_yaml_node &map, Pictures &out);

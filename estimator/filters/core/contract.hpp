@@ -1,11 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 // The estimator contract for a class: `estimator_of<filter, params>(name, about, takes, table, reads)` gives the
 // struct of functions. The filter is trivially copyable and has
-//   static size_t bytes(const params &, const wm_setup &, const char **why);   void init(const params &, const wm_setup
-//   &); wm_status predict(const wm_event &);   wm_status correct(const wm_event &, record_list); void
-//   estimate(wm_estimate *) const;   wm_motion_calibration motion_calibration() const; uint32_t motion_health() const;
-//   size_t list_calibration(wm_calibration_value *, size_t) const;
-// and, where it has any, list_counters(wm_counter *, size_t), list_landmarks(), list_particles(), list_hypotheses().
+//  - static size_t bytes(const params &, const wm_setup &, const char **why)
+//  - void init(const params &, const wm_setup &)
+//  - wm_status predict(const wm_event &)
+//  - wm_status correct(const wm_event &, record_list)
+//  - void estimate(wm_estimate *) const
+//  - wm_motion_calibration motion_calibration() const
+//  - uint32_t motion_health() const
+//  - size_t list_calibration(wm_calibration_value *, size_t) const
+//  - where it has any: list_counters(wm_counter *, size_t), list_landmarks(), list_particles(), list_hypotheses()
+//
+// `keeper_of<filter, params>()` does so for a filter that keeps its map (waymark/keeper.h): kept_bytes_max(), keep(),
+// why_not_kept(), take_kept().
 #ifndef WAYMARK_ESTIMATOR_CONTRACT_HPP
 #define WAYMARK_ESTIMATOR_CONTRACT_HPP
 
@@ -14,6 +21,7 @@
 #include "filters/core/counter_list.hpp"
 #include "filters/core/record_list.hpp"
 #include "waymark/estimator.h"
+#include "waymark/keeper.h"
 
 namespace wm {
 
@@ -68,6 +76,20 @@ wm_estimator estimator_of(const char *name, const char *about, uint32_t takes, w
       return static_cast<const filter *>(state)->list_hypotheses(out, capacity);
     };
   return e;
+}
+
+template <class filter, class params>
+constexpr wm_keeper keeper_of() {
+  return {[](const void *p, const wm_setup *setup) {
+            return filter::kept_bytes_max(*static_cast<const params *>(p), *setup);
+          },
+          [](const void *state, void *out, size_t capacity) {
+            return static_cast<const filter *>(state)->keep(out, capacity);
+          },
+          [](const void *p, const wm_setup *setup, const void *image, size_t bytes) {
+            return filter::why_not_kept(*static_cast<const params *>(p), *setup, image, bytes);
+          },
+          [](void *state, const void *image, size_t) { static_cast<filter *>(state)->take_kept(image); }};
 }
 
 }  // namespace wm

@@ -7,9 +7,9 @@
 // clones and rays. Little-endian, as all machines that are supported.
 #include <cstring>
 
+#include "filters/core/contract.hpp"
 #include "filters/registry.h"
 #include "filters/slam/slam.hpp"
-#include "waymark/keeper.h"
 
 namespace wm {
 namespace {
@@ -270,14 +270,4 @@ void slam::age_kept(wm_time_ns t_ns) {
 
 }  // namespace wm
 
-const wm_keeper wm_slam_keeper = {
-    [](const void *params, const wm_setup *setup) {
-      return wm::slam::kept_bytes_max(*static_cast<const wm_slam_params *>(params), *setup);
-    },
-    [](const void *state, void *out, size_t capacity) {
-      return static_cast<const wm::slam *>(state)->keep(out, capacity);
-    },
-    [](const void *params, const wm_setup *setup, const void *image, size_t bytes) {
-      return wm::slam::why_not_kept(*static_cast<const wm_slam_params *>(params), *setup, image, bytes);
-    },
-    [](void *state, const void *image, size_t) { static_cast<wm::slam *>(state)->take_kept(image); }};
+const wm_keeper wm_slam_keeper = wm::keeper_of<wm::slam, wm_slam_params>();

@@ -7,9 +7,9 @@
 // Little-endian, as all machines that are supported.
 #include <cstring>
 
+#include "filters/core/contract.hpp"
 #include "filters/registry.h"
 #include "filters/stereo_ekf/stereo_ekf.hpp"
-#include "waymark/keeper.h"
 
 namespace wm {
 namespace {
@@ -219,14 +219,4 @@ void stereo_ekf::take_kept(const void *image) {
 
 }  // namespace wm
 
-const wm_keeper wm_stereo_ekf_keeper = {
-    [](const void *params, const wm_setup *setup) {
-      return wm::stereo_ekf::kept_bytes_max(*static_cast<const wm_stereo_ekf_params *>(params), *setup);
-    },
-    [](const void *state, void *out, size_t capacity) {
-      return static_cast<const wm::stereo_ekf *>(state)->keep(out, capacity);
-    },
-    [](const void *params, const wm_setup *setup, const void *image, size_t bytes) {
-      return wm::stereo_ekf::why_not_kept(*static_cast<const wm_stereo_ekf_params *>(params), *setup, image, bytes);
-    },
-    [](void *state, const void *image, size_t) { static_cast<wm::stereo_ekf *>(state)->take_kept(image); }};
+const wm_keeper wm_stereo_ekf_keeper = wm::keeper_of<wm::stereo_ekf, wm_stereo_ekf_params>();
