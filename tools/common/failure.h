@@ -2,10 +2,8 @@
 // How a desk command says that its work failed: thrown anywhere, caught once in main().
 #pragma once
 
-#include <cmath>
 #include <stdexcept>
 #include <string>
-#include <vector>
 
 namespace wm::tools {
 
@@ -18,11 +16,5 @@ struct Failure : std::runtime_error {
   explicit Failure(const std::string &text, int code = kFailed) : std::runtime_error(text), exit_code(code) {}
   int exit_code;
 };
-
-// An option's numbers: "nan" and "inf" pass a parser and a range. Throws Failure.
-inline void need_finite(const char *option, const std::vector<double> &numbers) {
-  for (const double number : numbers)
-    if (!std::isfinite(number)) throw Failure(std::string(option) + ": every number must be finite", kUsage);
-}
 
 }  // namespace wm::tools

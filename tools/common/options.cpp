@@ -2,14 +2,31 @@
 #include "common/options.h"
 
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <cstdint>
+#include <cstdlib>
 #include <filesystem>
 #include <optional>
+#include <type_traits>
 #include <utility>
 
 #include "common/failure.h"
 
 namespace wm::cli {
+namespace {
+
+// CLI11 reads "nan" as a number, and its bounds let it pass.
+std::string fault_of_number(const std::string &text) {
+  char *end = nullptr;
+  const double value = std::strtod(text.c_str(), &end);
+  return *end == '\0' && !std::isfinite(value) ? "'" + text + "' is not a finite number" : "";
+}
+
+template <typename Value>
+constexpr bool kIsReal = std::is_same_v<Value, double> || std::is_same_v<Value, std::optional<double>> ||
+                         std::is_same_v<Value, std::vector<double>>;
+
+}  // namespace
 
 Check range(double low, double high) { return {Check::kNumber, low, high, {}}; }
 Check range(int low, int high) {
@@ -81,7 +98,9 @@ Option *App::keep(CLI::Option *option) { return &options_.emplace_back(option); 
 
 template <typename Value>
 Option *App::add_option(const std::string &names, Value &value, const std::string &help) {
-  return keep(app_->add_option(names, value, help));
+  CLI::Option *option = app_->add_option(names, value, help);
+  if constexpr (kIsReal<Value>) option->check(fault_of_number);
+  return keep(option);
 }
 template Option *App::add_option(const std::string &, std::string &, const std::string &);
 template Option *App::add_option(const std::string &, std::filesystem::path &, const std::string &);

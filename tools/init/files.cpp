@@ -238,7 +238,7 @@ void write_files(const std::string &folder, const std::vector<File> &files, bool
       if (!out) throw tools::Failure((to / file.name).string() + ": could not be written");
     }
   } catch (const fs::filesystem_error &problem) {
-    throw tools::Failure(problem.what());
+    throw tools::Failure(problem.path1().string() + ": could not be written: " + problem.code().message());
   }
 }
 

@@ -26,12 +26,8 @@ void parse_motion(wm::cli::App *app, Wish *w) {
   app->add_flag("--imu", w->imu, "another program sends an IMU's gyro over LCM");
   app->add_flag("--gnss", w->gnss, "another program sends positions over LCM");
   app->add_flag("--sender-clock", w->sender_clock, "these programs run on another computer, with its clock");
-  app->add_option("--wheel-radius", w->radius_m, "m, of the driven wheels")->check(wm::cli::positive());
-  app->add_option("--ticks", w->ticks_per_turn, "counts of one turn of a wheel")->check(wm::cli::positive());
-  app->add_option("--track", w->track_m, "m, between the wheels' middles")->check(wm::cli::positive());
-  app->add_option("--wheelbase", w->wheelbase_m, "m, from the rear axle to the front one")->check(wm::cli::positive());
-  app->add_option("--steering-ratio", w->steering_ratio, "steering wheel's angle over the road wheels'")
-      ->check(wm::cli::positive());
+  for (const wm::init::WishedNumber &number : wm::init::kNumbers)
+    app->add_option(number.option, w->*number.value, number.about)->check(wm::cli::range(number.least, number.most));
 }
 
 void parse(wm::cli::App *app, Wish *w) {
@@ -57,7 +53,6 @@ void parse(wm::cli::App *app, Wish *w) {
   app->add_option("--mounting", w->mountings, "NAME=X,Y,Z,ROLL,PITCH,YAW in m and degrees: instead of a URDF's");
   app->add_option("--tag-layout", w->tag_layout, "WPILib's JSON with the places of AprilTags");
   app->add_option("--tag-family", w->tag_family, "family of the markers; tag36h11");
-  app->add_option("--tag-size", w->tag_size_m, "m, edge of the printed black square")->check(wm::cli::positive());
   app->add_option("--landmarks", w->landmarks, "landmarks.csv, of --sees sightings, signs or tags");
   app->add_option("--map", w->map, "map.yaml, of --sees edges");
   app->add_option("--stream", w->streams,

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "init/questions.h"
 
+#include <algorithm>
+#include <cctype>
 #include <charconv>
-#include <cmath>
 #include <cstdio>
 #include <iostream>
 
@@ -151,29 +152,23 @@ void ask_numbers(Robot &robot) {
   std::vector<std::string> missing = missing_numbers(robot);
   if (w.sees == "tags" && !w.tag_size_m) missing.emplace_back("--tag-size");
   if (missing.empty()) return;
-  struct Number {
-    const char *option, *question;
-    std::optional<double> *out;
-  };
-  const Number kNumbers[] = {{"--wheel-radius", "Radius of the driven wheels in m", &w.radius_m},
-                             {"--ticks", "Counts of one turn of a wheel", &w.ticks_per_turn},
-                             {"--track", "Track in m: from the left wheel's middle to the right one's", &w.track_m},
-                             {"--wheelbase", "Wheelbase in m: from the rear axle to the front one", &w.wheelbase_m},
-                             {"--steering-ratio", "Steering wheel's angle over the road wheels'", &w.steering_ratio},
-                             {"--tag-size", "Edge of the printed black square in m", &w.tag_size_m}};
   std::string all;
   for (const std::string &one : missing) all += (all.empty() ? "" : ", ") + one;
   if (w.yes) throw Failure("this motion needs numbers that no file had: " + all, tools::kUsage);
-  for (const Number &number : kNumbers) {
+  for (const WishedNumber &number : kNumbers) {
     if (std::find(missing.begin(), missing.end(), number.option) == missing.end()) continue;
-    while (!*number.out) {
-      const std::string answer = ask(number.question, "", number.option);
+    std::optional<double> &out = w.*number.value;
+    while (!out) {
+      std::string question = number.about;
+      question[0] = static_cast<char>(std::toupper(question[0]));
+      const std::string answer = ask(question, "", number.option);
       double value = 0;
       const auto [end, problem] = std::from_chars(answer.data(), answer.data() + answer.size(), value);
-      if (problem == std::errc{} && end == answer.data() + answer.size() && std::isfinite(value) && value > 0)
-        *number.out = value;
+      const bool is_number = problem == std::errc{} && end == answer.data() + answer.size();
+      if (is_number && value >= number.least && value <= number.most)
+        out = value;
       else
-        std::printf("'%s' is not a number above 0.\n", answer.c_str());
+        std::printf("'%s' is not a number from %g to %g.\n", answer.c_str(), number.least, number.most);
     }
   }
 }

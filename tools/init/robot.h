@@ -37,6 +37,21 @@ struct Wish {
   bool yes = false, force = false;
 };
 
+// A number of the robot: an option, or else a question. Bounds as calibration.yaml's.
+struct WishedNumber {
+  const char *option, *about;
+  double least, most;
+  std::optional<double> Wish::*value;
+};
+inline constexpr WishedNumber kNumbers[] = {
+    {"--wheel-radius", "radius of the driven wheels in m", 0.001, 10, &Wish::radius_m},
+    {"--ticks", "counts of one turn of a wheel", 1, 1e9, &Wish::ticks_per_turn},
+    {"--track", "track in m: from the left wheel's middle to the right one's", 0.001, 100, &Wish::track_m},
+    {"--wheelbase", "wheelbase in m: from the rear axle to the front one", 0.001, 100, &Wish::wheelbase_m},
+    {"--steering-ratio", "steering wheel's angle over the road wheels'", 0.001, 1000, &Wish::steering_ratio},
+    {"--tag-size", "edge of the printed black square in m", 0.001, 10, &Wish::tag_size_m},
+};
+
 constexpr double kMapSigma_m = 0.02;        // of tags put up by a tape measure or a field's drawing
 constexpr double kBearingSigma_rad = 0.01;  // half a degree: a camera's or a laser's landmark
 constexpr double kRangeSigma_m = 0.05;      // of an ultrasonic or laser sensor at some metres

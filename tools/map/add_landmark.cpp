@@ -136,10 +136,6 @@ Vector3d vector_of(const std::vector<double> &v) { return {v[0], v[1], v[2]}; }
 
 AddedLandmark add_landmark(const AddLandmark &a) {
   AddedLandmark out{};
-  need_finite("--at", a.at_m);
-  need_finite("--from", a.from_m);
-  need_finite("--size", a.size_m);
-  need_finite("--corners", a.corners_px);
   const bool is_file = a.map.extension() == ".csv";
   const fs::path folder = is_file ? a.map.parent_path() : a.map;
   out.landmarks = is_file ? a.map : a.map / "landmarks.csv";

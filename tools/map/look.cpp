@@ -89,7 +89,6 @@ void draw(const GreyPicture &grey, const std::vector<wm_looked_for> &looks, cons
 }  // namespace
 
 int look_at_picture(const LookAtPicture &a) {
-  need_finite("--pose", a.pose);
   const auto map = open(a);
   const wm_rig &rig = *wm_site_rig(map.get());
   int32_t index = 0;

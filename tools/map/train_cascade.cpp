@@ -266,7 +266,6 @@ class Trainer {
 }  // namespace
 
 void train_cascade(const TrainCascade &a) {
-  need_finite("--size", a.size_m);
   Samples samples = load_samples(a);
   Trainer(a, samples).run();
 }

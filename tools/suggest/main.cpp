@@ -145,7 +145,6 @@ std::vector<Parameter> chosen(std::vector<Parameter> all, const std::vector<std:
 }
 
 int run(const Arguments &a) {
-  wm::tools::need_finite("--from, --to, --minutes", {a.from_s, a.to_s, a.minutes});
   Progress progress(!a.as_json);
   const ScratchFolder scratch("waymark-suggest");
   Config config;

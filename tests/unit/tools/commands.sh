@@ -46,9 +46,12 @@ expect 1 'published.csv: can' "$bin/waymark-eval" "$dir/run" "$dir/rec" --publis
 expect 1 'nothing to compare' "$bin/waymark-eval" "$dir/run" "$dir/rec" --from 50
 expect 1 'all at one place' "$bin/waymark-eval" "$dir/run" "$dir/rec" --align se2 --from 0.85
 printf 'P5 8 8 255\n%064d' 0 >"$dir/sign.pgm"
-expect 2 '--at: every number must be finite' "$bin/waymark-map" add-landmark "$dir/map" --id 7 --picture "$dir/sign.pgm" --at nan,2,3 --size 1,1 --yaw 0
-expect 2 '--corners: every number must be finite' "$bin/waymark-map" add-landmark "$dir/map" --id 7 --picture "$dir/sign.pgm" --at 1,2,3 --size 1,1 --yaw 0 --corners 0,0,7,0,7,inf,0,7
-expect 2 '--pose: every number must be finite' "$bin/waymark-map" look "$dir/map" --picture "$dir/sign.pgm" --calibration none.yaml --pose 0,nan,0
+expect 2 "--wheel-radius: 'nan' is not a finite number" "$bin/waymark-init" "$dir/robot" --motion ticks --wheel-radius nan --ticks 1024 --track 0.4 --sees nothing --yes
+expect 2 '--wheel-radius: Value 50 not in range' "$bin/waymark-init" "$dir/robot" --motion ticks --wheel-radius 50 --ticks 1024 --track 0.4 --sees nothing --yes
+expect 1 '/proc/robot: could not be written' "$bin/waymark-init" /proc/robot --motion twist --sees nothing --yes
+expect 2 "--at: 'nan' is not a finite number" "$bin/waymark-map" add-landmark "$dir/map" --id 7 --picture "$dir/sign.pgm" --at nan,2,3 --size 1,1 --yaw 0
+expect 2 "--corners: 'inf' is not a finite number" "$bin/waymark-map" add-landmark "$dir/map" --id 7 --picture "$dir/sign.pgm" --at 1,2,3 --size 1,1 --yaw 0 --corners 0,0,7,0,7,inf,0,7
+expect 2 "--pose: 'nan' is not a finite number" "$bin/waymark-map" look "$dir/map" --picture "$dir/sign.pgm" --calibration none.yaml --pose 0,nan,0
 # A detector against labels: a straight edge on the floor, found half.
 mkdir -p "$dir/rec/labels" "$dir/run/detections"
 printf 'frame,polyline,u_px,v_px\n0,0,400,500\n0,0,800,500\n' >"$dir/rec/labels/edges.csv"
