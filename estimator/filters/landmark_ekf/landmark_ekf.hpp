@@ -146,7 +146,7 @@ class landmark_ekf {
   unsigned components_;  // of expect(): whether the angle scale is a state
   int gnss_time_state_, gnss_error_state_;
   wm_time_ns gnss_error_ns_;
-  double gnss_error_sigma_m_;  // of the receiver's lasting error, now
+  double gnss_error_sigma_m_, gnss_stated_m_;  // of the receiver's lasting error, now and by its newest position
   state_pool<kErrorSlots> errors_;
   correlated_slot error_;  // a slot of these
   state_pool<kMapSlots> map_;

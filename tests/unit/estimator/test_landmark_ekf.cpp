@@ -34,7 +34,7 @@ double now_s;
 struct faults {
   double speed_scale = 1, yaw_scale = 1, yaw_bias = 0, lag_s = 0, sensor_yaw = 0, delay_s = 0, range_bias = 0;
   double eccentric_x = 0, eccentric_y = 0;
-  double misread = 0, gnss_delay_s = 0;
+  double misread = 0, gnss_delay_s = 0, gnss_sigma_m = 0.3, gnss_east_m = 0;
   bool nameless = false;
 } fault;
 struct past {
@@ -138,7 +138,9 @@ int drive(double for_s, unsigned sight, int seen = 3, bool carried_blind = false
       traced++;
       const wm_pose2 p = pose_at(now_s - fault.gnss_delay_s);
       traced--;
-      const wm_event e = make::position(now_s, p.x_m + gauss(0.3), p.y_m + gauss(0.3), 0.3);
+      const double sigma_m = fault.gnss_sigma_m;
+      const wm_event e =
+          make::position(now_s, p.x_m + fault.gnss_east_m + gauss(sigma_m), p.y_m + gauss(sigma_m), sigma_m);
       TEST_ASSERT_EQUAL(WM_OK, ekf->correct(state, &e, records, 8, &count));
       for (size_t k = 0; k < count; k++) fused += records[k].verdict == WM_FUSED;
       continue;
@@ -337,6 +339,24 @@ void test_gnss_and_its_delay(void) {
   drive(150, kPositions);
   TEST_ASSERT_DOUBLE_WITHIN(0.08, 0.3, calibration("gnss.time_offset_s"));
   TEST_ASSERT_LESS_THAN_DOUBLE(0.2, off());
+}
+
+// RTK is lost for ten seconds: the receiver falls back to a solution that is half a metre off, and states it.
+void test_positions_of_another_solution_have_an_error_of_their_own(void) {
+  params.gnss_correlated_m = -2;
+  params.gnss_correlated_tau_s = 20;
+  fault.gnss_sigma_m = 0.02;
+  begin();
+  drive(20, kPositions);
+  fault.gnss_sigma_m = 0.3;
+  fault.gnss_east_m = 0.5;
+  drive(10, kPositions);
+  TEST_ASSERT_LESS_THAN_DOUBLE(2.5, off() / std::sqrt(estimate().covariance[0]));
+  fault.gnss_sigma_m = 0.02;
+  fault.gnss_east_m = 0;
+  drive(1, kPositions);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.03, off());
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.05, std::sqrt(estimate().covariance[0]));
 }
 
 void test_misread_codes_are_rejected_and_do_no_harm(void) {
@@ -562,6 +582,7 @@ int main(void) {
   RUN_TEST(test_it_finds_every_error_of_its_sensors);
   RUN_TEST(test_an_eccentric_turntable_is_found);
   RUN_TEST(test_gnss_and_its_delay);
+  RUN_TEST(test_positions_of_another_solution_have_an_error_of_their_own);
   RUN_TEST(test_misread_codes_are_rejected_and_do_no_harm);
   RUN_TEST(test_nameless_sightings_are_of_the_one_that_fits);
   RUN_TEST(test_a_maps_error_is_not_averaged_away);
