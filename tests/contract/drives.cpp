@@ -434,6 +434,14 @@ dive::dive(unsigned happens, double seconds) {
           0.03};
     if (i % 30 == 9)
       add(WM_EVENT_HEADING, t + 0.01)->as.heading = {std::atan2(vehicle.R[1][0], vehicle.R[0][0]) + 0.04, 0.05};
+    if ((happens & kReceiver) && i % 5 == 3) {
+      const placed before = swim(t - 0.1, carried);
+      const double sigma_m = t < 0.5 * seconds ? 0.05 : 0.5;
+      add(WM_EVENT_POSITION, t + 0.01)->as.position = {
+          {before.p[0] + sigma_m * normal(), before.p[1] + sigma_m, before.p[2] + sigma_m * normal()},
+          sigma_m,
+          sigma_m};
+    }
     for (int k = 1; (happens & kImu) && k < 5; k++) add_imu(t + 0.02 * k);
   }
 }

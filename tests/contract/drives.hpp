@@ -39,6 +39,7 @@ enum happens : unsigned {
   kWrongStart = 1u << 10,  // the start pose is metres off
   kGlitches = 1u << 11,    // single samples of the motion that no robot can follow
   kImu = 1u << 12,         // dives: rates and specific force besides the twists
+  kReceiver = 1u << 13,    // dives: positions of a receiver, which is late and loses its best solution half way
 };
 
 // A robot, its place and what its sensors gave. Not to be copied: the setup points into it.

@@ -173,7 +173,7 @@ using drives::kBearings, drives::kRanges, drives::kElevations, drives::kNameless
     drives::kMarkers, drives::kPoints, drives::kRenamed;
 using drives::kCarriedOff, drives::kNoStart, drives::kSilence, drives::kOutliers, drives::kOneMoved, drives::kDepth,
     drives::kNoMap, drives::kBlind, drives::kReflections, drives::kFewBeacons, drives::kWrongStart, drives::kGlitches,
-    drives::kImu;
+    drives::kImu, drives::kReceiver;
 
 std::vector<scenario> scenarios() {
   const unsigned kAll = kBearings | kRanges | kPositions | kHeadings;
@@ -392,6 +392,7 @@ std::vector<dive_scenario> dive_scenarios() {
       {"carried off", kCarriedOff, 10, {}},
       {"samples that no vehicle can follow", kGlitches, 10, {}},
       {"no start", kNoStart, 8, {}},
+      {"a receiver", kReceiver | kNoMap, 10, {{"slam.points", 0}}},
       {"an IMU", kImu, 10, {{"states.accelerometer_bias_sigma_mps2", 0.2}}},
   };
 }

@@ -25,7 +25,7 @@ int map_states(const wm_sighting_params &p) { return p.use_elevation ? 3 : 2; }
 int count_states(const wm_landmark_ekf_params &p, const wm_setup &setup) {
   const wm_sighting_params &s = *setup.sightings;
   return kPoseStates + planar_filter::count_motion_states(setup.motion->states, setup.motion->model) +
-         sensor_slots::count(setup) + (p.gnss_time_offset_sigma_s > 0.0) + 2 * (p.gnss_correlated_m != 0.0) +
+         sensor_slots::count(setup) + (p.gnss.time_offset_sigma_s > 0.0) + 2 * (p.gnss.correlated_m != 0.0) +
          s.correlated_slots * correlated_slot_of(s).width + map_states(s) * p.map_slots +
          2 * (s.use_elevation && p.tilt_sigma_rad > 0.0);
 }
@@ -74,14 +74,15 @@ void landmark_ekf::init(const wm_landmark_ekf_params &params, const wm_setup &se
     return filter_.add_sensor_state(value, sigma, walk, low, high);
   });
   components_ = sightings().states.sigma[WM_SENSOR_ROW_kAngleScale] > 0.0 ? kAngleScaled : 0u;
-  gnss_time_state_ = add(0.0, params.gnss_time_offset_sigma_s);
-  gnss_error_state_ = add(0.0, std::fabs(params.gnss_correlated_m));  // below 0: the first position sets its variance
-  if (gnss_error_state_ >= 0) add(0.0, std::fabs(params.gnss_correlated_m));
+  gnss_time_state_ = add(0.0, params.gnss.time_offset_sigma_s);
+  gnss_error_state_ = add(0.0, std::fabs(params.gnss.correlated_m));  // below 0: the first position sets its variance
+  if (gnss_error_state_ >= 0) add(0.0, std::fabs(params.gnss.correlated_m));
   if (gnss_error_state_ >= 0) {
     filter_.set_correlated_position(gnss_error_state_);
-    filter_.noise().begin_correlated(square(params.gnss_correlated_m));
+    filter_.noise().begin_correlated(square(params.gnss.correlated_m));
   }
-  gnss_error_ns_ = tilt_ns_ = WM_TIME_NONE;
+  receiver_.begin();
+  tilt_ns_ = WM_TIME_NONE;
   calibration_states_ = filter_.states();
   error_ = correlated_slot_of(sightings());
   for (int i = 0; i < sightings().correlated_slots && error_.width > 0; i++) {

@@ -11,6 +11,7 @@
 #include "filters/core/gate.hpp"
 #include "filters/core/landmark_evidence.hpp"
 #include "filters/core/lifecycle.hpp"
+#include "filters/core/receiver_error.hpp"
 #include "filters/core/rollback.hpp"
 #include "filters/core/sensor_slots.hpp"
 #include "filters/core/state_pool.hpp"
@@ -145,8 +146,7 @@ class landmark_ekf {
   sensor_slots slots_;
   unsigned components_;  // of expect(): whether the angle scale is a state
   int gnss_time_state_, gnss_error_state_;
-  wm_time_ns gnss_error_ns_;
-  double gnss_error_sigma_m_, gnss_stated_m_;  // of the receiver's lasting error, now and by its newest position
+  receiver_error receiver_;
   state_pool<kErrorSlots> errors_;
   correlated_slot error_;  // a slot of these
   state_pool<kMapSlots> map_;

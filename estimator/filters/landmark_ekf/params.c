@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "filters/landmark_ekf/params.h"
 
-#include "param_rows.h"
-
 typedef struct wm_landmark_ekf_params params;
 
 static const wm_param kParams[] = {
@@ -10,24 +8,14 @@ static const wm_param kParams[] = {
         "Sigma of the robot's roll and pitch on its springs and on the ground, rad: 0.4 degrees for a car that brakes, "
         "bends or is loaded on one side. States with sightings.use.elevation, else unused."),
     F64("states.tilt_tau_s", tilt_tau_s, 2, 0.01, 1e6, "Time after which such a tilt has fallen to 1/e, s."),
-    F64("states.gnss_time_offset_sigma_s", gnss_time_offset_sigma_s, 0.5, 0, 1,
-        "Start sigma of the receiver's time offset, s: its positions are that much older than their stamps. Receivers "
-        "without a pulse a second are late by up to half a second. 0: off."),
+    POSITION_STATE_ROWS(gnss),
     I32("states.map_slots", map_slots, 8, 0, 16,
         "Landmarks (the last seen ones) whose error on the map, by their sigma_m, is carried as states. 0: the map's "
         "error counts as independent noise of each sighting, and the covariance is too small where one landmark is "
         "seen often."),
     BOOL("use.position", use_position, 1, "Fuse positions (GNSS)."),
     BOOL("use.heading", use_heading, 1, "Fuse headings."),
-    F64("noise.gnss_factor", gnss_sigma_factor, 0.5, 0.01, 100,
-        "Factor of the position's sigma: the share that is new in each position."),
-    F64("noise.gnss_min_m", gnss_sigma_min_m, 0.01, 0, 1000, "Lower limit of a position's sigma, m."),
-    F64("correlated.gnss_m", gnss_correlated_m, -2, -100, 1000,
-        "Sigma of a position's time-correlated error on each axis, m (reflections, atmosphere). 0: none. Below 0: that "
-        "multiple of the position's sigma."),
-    F64("correlated.gnss_tau_s", gnss_correlated_tau_s, 20, 0.1, 1e6,
-        "Time constant of that error, s. Among houses 10 to 20 s, under an open sky minutes. With 20 and 60 two "
-        "recordings have 9.6 and 20.1 m, 0.37 and 0.28 m."),
+    POSITION_NOISE_ROWS(gnss),
     F64("dead_reckoning_after_s", dead_reckoning_after_s, 2, 0, 3600,
         "Time without a fused observation after which the state is dead reckoning, s."),
     BOOL("recover.on", recover, 1, "Relocalize when the observations show that the pose is wrong."),

@@ -5,6 +5,7 @@
 
 #include <stdint.h>
 
+#include "filters/core/position_params.h"
 #include "waymark/params.h"
 
 #ifdef __cplusplus
@@ -13,10 +14,8 @@ extern "C" {
 
 typedef struct wm_landmark_ekf_params {
   double tilt_sigma_rad, tilt_tau_s;  // with elevations only
-  double gnss_time_offset_sigma_s;
+  wm_position_params gnss;
   int32_t map_slots, use_position, use_heading, recover;
-  double gnss_sigma_factor, gnss_sigma_min_m;
-  double gnss_correlated_m, gnss_correlated_tau_s;
   double dead_reckoning_after_s;
   double recover_window_s, recover_sigma_xy_m, recover_sigma_heading_rad;
 } wm_landmark_ekf_params;

@@ -164,7 +164,13 @@ wm_status stereo_ekf::fuse_position(const wm_event &event, record_list records) 
   move_to(event.t_ns);
   if (life_.searching()) return reject(records, blank, WM_REJECTED_SEARCHING);
   row_block rows;
-  position_rows(p, there.first, there.last, &rows);
+  if (depth) {
+    depth_rows(p, &rows);
+  } else {
+    // Another solution has another error.
+    if (receiver_.move_to(event.t_ns, p.sigma_xy_m, params_.gnss).left == 0.0) filter_.restart_receiver();
+    position_rows(p, there.last, &rows);
+  }
   double clutter_volume = 1.0;
   for (int i = there.first; i < there.last; i++) clutter_volume *= kClutter_m;
   note(event.t_ns, depth ? kDepthKey : kPositionKey, fuse_rows(rows, blank, records), clutter_volume, nullptr);

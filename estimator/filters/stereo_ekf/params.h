@@ -5,6 +5,7 @@
 
 #include <stdint.h>
 
+#include "filters/core/position_params.h"
 #include "waymark/params.h"
 
 #ifdef __cplusplus
@@ -29,6 +30,7 @@ typedef struct wm_stereo_ekf_params {
   double range_bias_sigma, bearing_bias_sigma;
   double twist_lag_sigma;
   double accelerometer_bias_sigma, accelerometer_bias_walk;
+  wm_position_params gnss;
   // noise of one row
   double pixel_px;
   double accelerometer_mps2;

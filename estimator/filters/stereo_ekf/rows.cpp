@@ -173,17 +173,33 @@ bool stereo_ekf::sighting_rows(const wm_sighting &s, int landmark, int slot, row
   return true;
 }
 
-// Coordinates [first, last) of a position.
-void stereo_ekf::position_rows(const wm_position &p, int first, int last, row_block *out) const {
+void stereo_ekf::depth_rows(const wm_position &p, row_block *out) const {
+  const double by_end[1][3] = {{0.0, 0.0, 1.0}}, by_turn[1][3] = {};
+  (void)out->add_row(WM_RESIDUAL_Z, p.p_m[2], p.p_m[2] - filter_.nominal().p.z, square(p.sigma_z_m));
+  add_pose_columns(out, state_before(0.0), {0, 0, 0}, by_end, by_turn);
+}
+
+// Coordinates below `last` of a receiver's position: of the pose a time offset ago, with the receiver's lasting error.
+void stereo_ekf::position_rows(const wm_position &p, int last, row_block *out) const {
   static constexpr wm_residual kKinds[3] = {WM_RESIDUAL_X, WM_RESIDUAL_Y, WM_RESIDUAL_Z};
-  double by_end[3][3] = {};
+  const past_pose past = state_before(filter_.head1(kReceiverOffset, 0.0));
+  const vec3 error = filter_.head3(kReceiverError);
+  double by_end[3][3] = {}, lasting_m[3] = {};
   const double by_turn[3][3] = {};
-  for (int i = first; i < last && i < 3; i++) {
-    const int row = out->add_row(kKinds[i], p.p_m[i], p.p_m[i] - filter_.nominal().p[i],
-                                 square(i == 2 ? p.sigma_z_m : p.sigma_xy_m));
+  for (int i = 0; i < last; i++) {
+    const double stated_m = i == 2 ? p.sigma_z_m : p.sigma_xy_m;
+    lasting_m[i] = receiver_.sigma_m() * stated_m / p.sigma_xy_m;
+    const int row = out->add_row(kKinds[i], p.p_m[i], p.p_m[i] - past.at.p[i] - lasting_m[i] * error[i],
+                                 square(white_sigma_m(stated_m, params_.gnss)));
     by_end[row][i] = 1.0;
   }
-  add_pose_columns(out, state_before(0.0), {0, 0, 0}, by_end, by_turn);
+  add_pose_columns(out, past, {0, 0, 0}, by_end, by_turn);
+  if (const int state = filter_.at(kReceiverError); state >= 0)
+    for (int i = 0, first = out->add_columns(state, 3); i < last; i++) out->by[i][first + i] = lasting_m[i];
+  if (const int state = filter_.at(kReceiverOffset); state >= 0) {
+    const vec3 v_mps = past.R * filter_.velocity_of(motion_.v_mps());
+    for (int i = 0, column = out->add_columns(state, 1); i < last; i++) out->by[i][column] = -v_mps[i];
+  }
 }
 
 // Azimuth of the x axis ahead, n: dr rotates it by dr x n. False while it points up or down.

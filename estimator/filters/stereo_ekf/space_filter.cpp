@@ -68,6 +68,11 @@ void space_filter::forget(int state, double value, double variance) {
   head_[state] = value;
 }
 
+void space_filter::restart_receiver() {
+  settle();
+  restart(kReceiverError);
+}
+
 vec3 space_filter::head3(int which) const { return at_[which] < 0 ? vec3{0, 0, 0} : vec_of(head_ + at_[which]); }
 
 double space_filter::head1(int which, double off) const { return at_[which] < 0 ? off : head_[at_[which]]; }

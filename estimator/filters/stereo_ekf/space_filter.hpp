@@ -149,6 +149,7 @@ class space_filter {
   // States of one number, for the roll-back of calibration.
   double value(int state) const { return head_[state]; }
   void forget(int state, double value, double variance);
+  void restart_receiver();
   int calibration_begin() const { return movers() + (at_[kRates] >= 0 ? 6 : 0); }
   int calibration_end() const { return first_point_; }
   void inflate_pose(double place_m2, double turn_rad2);

@@ -30,7 +30,9 @@ enum head_state {
   kBearingBias,
   kVelocityLag,  // s: the measured velocity is ahead of the state of velocity by this
   kRateLag,
-  kForceBias,  // m/s2, of the accelerometer
+  kForceBias,       // m/s2, of the accelerometer
+  kReceiverError,   // of positions on each axis, in units of receiver_error's sigma
+  kReceiverOffset,  // s by which positions are older than their stamps
   kHeadStates
 };
 
@@ -116,6 +118,8 @@ inline constexpr head_spec kHeadSpecs[kHeadStates] = {
      &stereo_params::accelerometer_bias_walk,
      nullptr,
      head_use::always},
+    {3, 0, {}, nullptr, nullptr, nullptr, head_use::always},
+    {1, 0, {"gnss.time_offset_s"}, nullptr, nullptr, nullptr, head_use::with_twist},
 };
 
 constexpr int head_width_max() {
@@ -147,6 +151,9 @@ inline void models_of(const wm_stereo_ekf_params &params, head_model out[kHeadSt
                         : kMovedSigma,
               s.walk ? params.*s.walk : 0.0, s.tau_s ? params.*s.tau_s : 0.0};
   }
+  const wm_position_params &gnss = params.gnss;
+  out[kReceiverError] = {gnss.correlated_m != 0.0 ? 1.0 : 0.0, 0.0, gnss.correlated_tau_s};
+  out[kReceiverOffset].sigma = rates ? 0.0 : gnss.time_offset_sigma_s;
 }
 
 }  // namespace wm

@@ -6,6 +6,7 @@
 
 #include "filters/core/calibration_list.hpp"
 #include "filters/core/contract.hpp"
+#include "filters/core/lasting_error.hpp"
 #include "filters/registry.h"
 #include "motion/event_time.hpp"
 #include "motion/motion_params.h"
@@ -140,6 +141,7 @@ void stereo_ekf::init(const wm_stereo_ekf_params &params, const wm_setup &setup)
   for (int i = 0; i < 4; i++) sigma_px_[i] = pixel_sigma(params, rig_, i);
   motion_.init(setup.motion, &setup.wheels, twist_noise_of(params, setup.rig));
   gravity_.init(params.accelerometer_mps2);
+  receiver_.begin();
   head_model models[kHeadStates];
   models_of(params_, models);
   filter_.init(behind.filter, models, params_.points_max + own_map::kCorners * params_.frames_max);
@@ -254,10 +256,13 @@ size_t stereo_ekf::list_counters(wm_counter *out, size_t capacity) const {
 size_t stereo_ekf::list_calibration(wm_calibration_value *out, size_t capacity) const {
   calibration_list list(out, capacity);
   for (int k = 0; k < kHeadStates; k++) {
-    const int first = filter_.at(k);
+    const int first = k == kReceiverOffset && !receiver_.is_used() ? -1 : filter_.at(k);
     for (int i = first; first >= 0 && kHeadSpecs[k].name[0] && i < first + kHeadSpecs[k].width; i++)
       list.add(kHeadSpecs[k].name[i - first], filter_.head(i) + filter_.pending1(i), std::sqrt(filter_.variance(i)));
   }
+  const vec3 error = filter_.head3(kReceiverError);
+  if (const double sigmas = std::sqrt(square(error.x) + square(error.y)); sigmas > kLastingMost)
+    list.add(kLastingErrorName, sigmas, kAbsent);
   return list.count();
 }
 

@@ -6,6 +6,7 @@
 
 #include "filters/core/landmark_evidence.hpp"
 #include "filters/core/lifecycle.hpp"
+#include "filters/core/receiver_error.hpp"
 #include "filters/core/record_list.hpp"
 #include "filters/core/rollback.hpp"
 #include "filters/relocalize/pose_consensus.hpp"
@@ -124,7 +125,8 @@ class stereo_ekf {
   bool point_rows(const wm_stereo &seen, const vec3 &place, double place_sigma_m, int slot, const past_pose &past,
                   row_block *out) const;
   bool sighting_rows(const wm_sighting &s, int landmark, int slot, row_block *out) const;
-  void position_rows(const wm_position &p, int first, int last, row_block *out) const;
+  void depth_rows(const wm_position &p, row_block *out) const;
+  void position_rows(const wm_position &p, int last, row_block *out) const;
   bool heading_rows(const wm_heading &h, row_block *out) const;
   row_block twist_rows(head_state which, const vec3 &measured, const vec3 &slope_per_s, const vec3 &variance,
                        uint32_t axes) const;
@@ -222,6 +224,7 @@ class stereo_ekf {
   space_filter filter_;
   spatial_motion motion_;
   gravity_window gravity_;
+  receiver_error receiver_;
   // Of the gyro, as it was when an axis was lost.
   struct kept_bias {
     wm_time_ns t_ns;

@@ -333,7 +333,7 @@ void test_an_eccentric_turntable_is_found(void) {
 }
 
 void test_gnss_and_its_delay(void) {
-  params.gnss_time_offset_sigma_s = 0.5;
+  params.gnss.time_offset_sigma_s = 0.5;
   fault.gnss_delay_s = 0.3;
   begin();
   drive(150, kPositions);
@@ -343,8 +343,8 @@ void test_gnss_and_its_delay(void) {
 
 // RTK is lost for ten seconds: the receiver falls back to a solution that is half a metre off, and states it.
 void test_positions_of_another_solution_have_an_error_of_their_own(void) {
-  params.gnss_correlated_m = -2;
-  params.gnss_correlated_tau_s = 20;
+  params.gnss.correlated_m = -2;
+  params.gnss.correlated_tau_s = 20;
   fault.gnss_sigma_m = 0.02;
   begin();
   drive(20, kPositions);

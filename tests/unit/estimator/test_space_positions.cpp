@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+// Positions in space: a receiver with an error that lasts, a delay, and solutions of other kinds.
+#include "stereo_scene.hpp"
+
+namespace {
+
+constexpr double kStep_s = 0.02, kTau_s = 20;
+
+// A boat in circles of 8 m at 1.5 m/s; its receiver gives five positions a second.
+struct boat : scene {
+  boat() : scene(10) { begin(); }
+  // `lasting_m`: sigma of an error that wanders; `east_m`: of one that does not.
+  void sail(double seconds, double stated_m, double lasting_m, double east_m = 0) {
+    const double left = std::exp(-0.2 / kTau_s);
+    for (int i = 0; i < static_cast<int>(std::lround(seconds / kStep_s)); i++, step_++) {
+      swim(kStep_s, {1.5, 0, 0}, {0, 0, 0.19});
+      way_.push_back(truth.p);
+      if (step_ % 10 != 9) continue;
+      for (double &error : error_) error = step_ == 9 ? noise() : left * error + std::sqrt(1 - left * left) * noise();
+      const auto late = static_cast<size_t>(std::lround(delay_s / kStep_s));
+      const vec3 then = way_[way_.size() - 1 - std::min(late, way_.size() - 1)];
+      wm_event e = make::position(t_s, then.x + east_m + lasting_m * error_[0] + 0.5 * stated_m * noise(),
+                                  then.y + lasting_m * error_[1] + 0.5 * stated_m * noise(), stated_m);
+      e.as.position.p_m[2] = then.z + lasting_m * error_[2] + 0.5 * stated_m * noise();
+      e.as.position.sigma_z_m = stated_m;
+      TEST_ASSERT_EQUAL(WM_OK, take(e));
+      if (t_s < 20) continue;
+      const wm_estimate now = estimated();
+      const double dx = now.pose_map_base.p_m[0] - truth.p.x, dy = now.pose_map_base.p_m[1] - truth.p.y;
+      const double xx = now.covariance[0], xy = now.covariance[1], yy = now.covariance[7];
+      inside_ += (dx * dx * yy - 2 * dx * dy * xy + dy * dy * xx) / (xx * yy - xy * xy) < 5.991;
+      judged_++;
+    }
+  }
+  wm_estimate estimated() const {
+    wm_estimate out;
+    ekf->estimate(state, &out);
+    return out;
+  }
+  double off() const {
+    const wm_estimate now = estimated();
+    return std::hypot(now.pose_map_base.p_m[0] - truth.p.x, now.pose_map_base.p_m[1] - truth.p.y);
+  }
+  double calibration(const char *name, double *sigma) const {
+    wm_calibration_value values[64];
+    const size_t count = ekf->calibration(state, values, 64);
+    for (size_t i = 0; i < count; i++)
+      if (std::strcmp(values[i].name, name) == 0) {
+        *sigma = values[i].sigma;
+        return values[i].value;
+      }
+    TEST_FAIL_MESSAGE(name);
+    return kAbsent;
+  }
+  double delay_s = 0;
+  double error_[3] = {0, 0, 0};
+  int step_ = 0, inside_ = 0, judged_ = 0;
+  std::vector<vec3> way_;
+};
+
+void test_an_error_that_lasts_is_not_averaged_away(void) {
+  boat b;
+  b.sail(150, 0.5, 1.0);
+  TEST_ASSERT_GREATER_OR_EQUAL(90, 100 * b.inside_ / b.judged_);
+  TEST_ASSERT_LESS_THAN_DOUBLE(1.0, b.off());
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, b.estimated().state);
+}
+
+void test_the_receivers_delay_is_found(void) {
+  boat b;
+  b.delay_s = 0.2;
+  b.sail(100, 0.1, 0.2);
+  double sigma;
+  const double found = b.calibration("gnss.time_offset_s", &sigma);
+  TEST_ASSERT_DOUBLE_WITHIN(0.05, 0.2, found);
+  TEST_ASSERT_DOUBLE_WITHIN(3 * sigma, 0.2, found);
+}
+
+// RTK is lost for ten seconds: the receiver falls back to a solution that is half a metre off, and states it.
+void test_another_solution_has_an_error_of_its_own(void) {
+  boat b;
+  b.sail(20, 0.02, 0.02);
+  b.sail(10, 0.3, 0, 0.5);
+  TEST_ASSERT_LESS_THAN_DOUBLE(2.5, b.off() / std::sqrt(b.estimated().covariance[0]));
+  b.sail(1, 0.02, 0.02);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.05, b.off());
+}
+
+// Nothing of a receiver stands in the calibration of a vehicle without one.
+void test_a_vehicle_without_a_receiver(void) {
+  boat b;
+  wm_calibration_value values[64];
+  const size_t count = b.ekf->calibration(b.state, values, 64);
+  for (size_t i = 0; i < count; i++) TEST_ASSERT_NULL_MESSAGE(std::strstr(values[i].name, "gnss"), values[i].name);
+}
+
+}  // namespace
+
+void setUp(void) {}
+void tearDown(void) {}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(test_an_error_that_lasts_is_not_averaged_away);
+  RUN_TEST(test_the_receivers_delay_is_found);
+  RUN_TEST(test_another_solution_has_an_error_of_its_own);
+  RUN_TEST(test_a_vehicle_without_a_receiver);
+  return UNITY_END();
+}
