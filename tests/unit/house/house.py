@@ -47,7 +47,7 @@ FOLDER_MAY_USE = {
     "vision/markers": SENSING,
     "vision/stereo": SENSING,
     "filters": [],
-    "filters/core": ["math", "memory", "motion", "sensors"],
+    "filters/core": ["", "math", "memory", "motion", "sensors"],
     "filters/planar": ["math", "memory", "motion", "sensors", "filters/core"],
     "filters/relocalize": ["math", "memory", "maps", "sensors", "filters/core"],
     "filters/edge_mcl": FILTER,
