@@ -25,9 +25,9 @@ int map_states(const wm_sighting_params &p) { return p.use_elevation ? 3 : 2; }
 int count_states(const wm_landmark_ekf_params &p, const wm_setup &setup) {
   const wm_sighting_params &s = *setup.sightings;
   return kPoseStates + planar_filter::count_motion_states(setup.motion->states, setup.motion->model) +
-         sensor_slots::count(setup) + (p.gnss.time_offset_sigma_s > 0.0) + 2 * (p.gnss.correlated_m != 0.0) +
-         s.correlated_slots * correlated_slot_of(s).width + map_states(s) * p.map_slots +
-         2 * (s.use_elevation && p.tilt_sigma_rad > 0.0);
+         sensor_slots::count(setup) + (p.gnss.time_offset_sigma_s > 0.0) + (p.heading_bias_sigma_rad > 0.0) +
+         2 * (p.gnss.correlated_m != 0.0) + s.correlated_slots * correlated_slot_of(s).width +
+         map_states(s) * p.map_slots + 2 * (s.use_elevation && p.tilt_sigma_rad > 0.0);
 }
 
 // Variance of a place anywhere among the landmarks, each axis, m2.
@@ -81,6 +81,7 @@ void landmark_ekf::init(const wm_landmark_ekf_params &params, const wm_setup &se
     filter_.set_correlated_position(gnss_error_state_);
     filter_.noise().begin_correlated(square(params.gnss.correlated_m));
   }
+  heading_state_ = add(0.0, params.heading_bias_sigma_rad);
   receiver_.begin();
   tilt_ns_ = WM_TIME_NONE;
   calibration_states_ = filter_.states();
@@ -224,6 +225,8 @@ size_t landmark_ekf::list_calibration(wm_calibration_value *out, size_t capacity
   slots_.list(*setup_, filter_, &list);
   if (gnss_time_state_ >= 0)
     list.add("gnss", "time_offset_s", filter_.value(gnss_time_state_), std::sqrt(filter_.variance(gnss_time_state_)));
+  if (heading_state_ >= 0 && has_heading_)
+    list.add("heading", "bias_rad", filter_.value(heading_state_), std::sqrt(filter_.variance(heading_state_)));
   filter_.noise().list(&list);
   filter_.turn_test().list(&list);
   if (const double sigmas = lasting_error(); sigmas > kLastingMost)

@@ -145,7 +145,8 @@ class landmark_ekf {
   mounted_sensor sensor_[kMaxSensors];
   sensor_slots slots_;
   unsigned components_;  // of expect(): whether the angle scale is a state
-  int gnss_time_state_, gnss_error_state_;
+  int gnss_time_state_, gnss_error_state_, heading_state_;
+  int has_heading_;  // one has come
   receiver_error receiver_;
   state_pool<kErrorSlots> errors_;
   correlated_slot error_;  // a slot of these

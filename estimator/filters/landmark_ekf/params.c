@@ -9,6 +9,9 @@ static const wm_param kParams[] = {
         "bends or is loaded on one side. States with sightings.use.elevation, else unused."),
     F64("states.tilt_tau_s", tilt_tau_s, 2, 0.01, 1e6, "Time after which such a tilt has fallen to 1/e, s."),
     POSITION_STATE_ROWS(gnss),
+    F64("states.heading_bias_sigma_rad", heading_bias_sigma_rad, 0.05, 0, 1,
+        "Start sigma of the constant error of headings, rad: a compass' deviation, the mounting of two antennas. 0: "
+        "off."),
     I32("states.map_slots", map_slots, 8, 0, 16,
         "Landmarks (the last seen ones) whose error on the map, by their sigma_m, is carried as states. 0: the map's "
         "error counts as independent noise of each sighting, and the covariance is too small where one landmark is "

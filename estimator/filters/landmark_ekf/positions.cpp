@@ -94,15 +94,18 @@ wm_status landmark_ekf::fuse_heading(const wm_event &event, record_list records)
   if (!params_.use_heading) return reject(records, r.record, WM_REJECTED_BY_CONFIG);
   observation seen = observation_at(event.t_ns, kHeadingKey, filter_.odom());
   seen.kind = kObservedHeading;
-  seen.bearing_rad = h.heading_rad;
-  seen.sigma_angle_rad = h.sigma_rad;
+  has_heading_ = 1;
+  const double bias_rad = heading_state_ < 0 ? 0.0 : filter_.value(heading_state_);
+  seen.bearing_rad = wrap(h.heading_rad - bias_rad);
+  seen.sigma_angle_rad = std::sqrt(square(h.sigma_rad) + (heading_state_ < 0 ? 0.0 : filter_.variance(heading_state_)));
   buffer_observation(seen);
   if (life_.searching()) {
     search_now(event.t_ns);
     return reject(records, r.record, WM_REJECTED_SEARCHING);
   }
   r.row.add(kHeading, 1.0);
-  r.record.expected = filter_.pose().heading_rad;
+  if (heading_state_ >= 0) r.row.add(heading_state_, 1.0);
+  r.record.expected = wrap(filter_.pose().heading_rad + bias_rad);
   r.innovation = wrap(h.heading_rad - r.record.expected);
   r.noise = square(h.sigma_rad);
   note(event.t_ns, kHeadingKey, fuse(&r, 1, kTwoPi, true, records));

@@ -64,7 +64,7 @@ static const wm_param kParams[] = {
     F64("states.increment_direction_sigma_rad", increment_direction_sigma, 0.02, 0, 1,
         "Sigma of the angle by which that motion is turned, rad: cameras that are not quite parallel. 0: off."),
     F64("states.range_bias_sigma_m", range_bias_sigma, 0.05, 0, 10, "Start sigma of acoustic ranges' bias, m. 0: off."),
-    F64("states.bearing_bias_sigma_rad", bearing_bias_sigma, 0.01, 0, 1,
+    F64("states.bearing_bias_sigma_rad", bearing_bias_sigma, 0.05, 0, 1,
         "Start sigma of the bias of bearings and headings (a compass' deviation), rad. 0: off."),
     F64("states.twist_lag_sigma_s", twist_lag_sigma, 0, 0, 0.2,
         "Start sigma of two time offsets, s: by how much the measured velocity and the measured rates are ahead of the "

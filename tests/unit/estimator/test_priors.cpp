@@ -46,6 +46,12 @@ double sigma_of(const std::string &name) {
   return NAN;
 }
 
+double value_of(const std::string &name) {
+  for (const wm_calibration_value &v : calibration())
+    if (name == v.name) return v.value;
+  return NAN;
+}
+
 // A joystick's command each half second, or what wheels measure of it.
 wm_event driven(int i, bool commands) {
   const double v = 0.3 + 0.1 * (i / 10 % 3), w = 0.4 * (i / 10 % 5) - 0.8;
@@ -206,16 +212,39 @@ void test_a_receivers_lasting_error_falls_with_its_sigma() {
   TEST_ASSERT_DOUBLE_WITHIN(2.0, 0.0, e.pose_map_base.p_m[1]);
 }
 
+// A compass is off by 4 degrees. Positions show it; without them it stays open, and so does the heading.
+void test_a_compass_deviation_is_found_or_stays_open() {
+  for (const bool has_positions : {true, false}) {
+    setup.start.sigma_heading_rad = 0.5;
+    begin();
+    for (int i = 0; i < 600; i++) {
+      const double t_s = 0.1 * i, turned_rad = 0.1 * t_s;
+      const auto noise = [i](uint64_t of) { return wm_random_normal(5, of, static_cast<uint64_t>(i)); };
+      feed(make::twist(t_s, 1.0 + 0.01 * noise(0), 0.1 + 0.005 * noise(1)));
+      if (i % 2 == 0) feed(make::heading(t_s, turned_rad + 0.07 + 0.02 * noise(2), 0.02));
+      if (has_positions && i % 5 == 0)
+        feed(make::position(t_s, 10 * std::sin(turned_rad) + 0.01 * noise(3),
+                            10 - 10 * std::cos(turned_rad) + 0.01 * noise(4), 0.02));
+    }
+    wm_estimate e;
+    ekf->estimate(state.get(), &e);
+    const double off_rad = std::remainder(e.heading_rad - 0.1 * 59.9, 2 * M_PI),
+                 sigma_rad = std::sqrt(e.covariance[35]);
+    TEST_ASSERT_LESS_THAN_DOUBLE(3.0, std::fabs(off_rad) / sigma_rad);
+    if (!has_positions) {
+      TEST_ASSERT_GREATER_THAN_DOUBLE(0.045, sigma_of("heading.bias_rad"));
+      TEST_ASSERT_GREATER_THAN_DOUBLE(0.045, sigma_rad);
+      continue;
+    }
+    TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.07, value_of("heading.bias_rad"));
+    TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.0, off_rad);
+  }
+}
+
 // A robot that stands sees landmark k at `t_s`, `off_rad` beside it.
 void see(double t_s, int k, double off_rad) {
   feed(make::twist(t_s, 0.0, 0.0));
   feed(make::sighting(t_s, k, std::atan2(landmarks[k].p_m[1], landmarks[k].p_m[0]) + off_rad, NAN));
-}
-
-double value_of(const std::string &name) {
-  for (const wm_calibration_value &v : calibration())
-    if (name == v.name) return v.value;
-  return NAN;
 }
 
 // A robot whose place and heading are known; the camera's yaw is open by 0.05 rad.
@@ -291,6 +320,7 @@ int main() {
   RUN_TEST(test_a_vague_receiver_finds_the_robot_too);
   RUN_TEST(test_a_gyros_scale_is_known_from_its_data_sheet);
   RUN_TEST(test_a_receivers_lasting_error_falls_with_its_sigma);
+  RUN_TEST(test_a_compass_deviation_is_found_or_stays_open);
   RUN_TEST(test_an_outlier_among_the_first_sightings_does_not_keep_the_yaw);
   RUN_TEST(test_what_agrees_by_one_landmark_or_not_at_all_leaves_the_yaw);
   RUN_TEST(test_a_yaw_that_many_sightings_confirm_is_kept);
