@@ -270,11 +270,16 @@ static wm_status read_motion6(const wm_yaml_node *motion6, const warner *warn, w
   return WM_OK;
 }
 
-static wm_status read_gnss(const wm_yaml_node *gnss, const warner *warn, double origin[3], wm_error *err) {
-  static const char *const kKeys[] = {"origin", NULL};
+static wm_status read_gnss(const wm_yaml_node *gnss, const warner *warn, calibration *out, wm_error *err) {
+  static const char *const kKeys[] = {"origin", "mounting", NULL};
   TRY(calibration_keys(gnss, kKeys, warn, err));
-  wm_yaml_node node = wm_yaml_get(gnss, "origin");
-  return wm_yaml_there(&node) ? list_in(&node, 3, 3, -1e4, 1e4, origin, NULL, err) : WM_OK;
+  wm_yaml_node origin = wm_yaml_get(gnss, "origin"), mounting = wm_yaml_get(gnss, "mounting");
+  if (wm_yaml_there(&mounting)) {
+    wm_mounting antenna;
+    TRY(calibration_mounting(gnss, NULL, warn, &antenna, err));
+    memcpy(out->rig.antenna_m, antenna.xyz_m, sizeof out->rig.antenna_m);
+  }
+  return wm_yaml_there(&origin) ? list_in(&origin, 3, 3, -1e4, 1e4, out->gnss_origin, NULL, err) : WM_OK;
 }
 
 static wm_status read_imu(const wm_yaml_node *imu, const warner *warn, wm_mounting *out, wm_error *err) {
@@ -301,5 +306,5 @@ wm_status calibration_read(const wm_yaml *doc, const warner *warn, calibration *
   if (out->rig.marker_family[0]) add_marker_cameras(out);
   TRY(read_motion6(&motion6, warn, &out->rig, err));
   TRY(read_imu(&imu, warn, &out->imu, err));
-  return read_gnss(&gnss, warn, out->gnss_origin, err);
+  return read_gnss(&gnss, warn, out, err);
 }

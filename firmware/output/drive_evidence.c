@@ -354,6 +354,12 @@ static int is_skid_track(const wm_assembly *assembly, const wm_calibration_value
   return 0;
 }
 
+// A factor of noise against the stated sigma: of a position's only a share counts as new (noise.gnss_factor).
+static double judged_value(const wm_assembly *assembly, const wm_calibration_value *c) {
+  if (strcmp(c->name, "noise.place_factor") != 0) return c->value;
+  return c->value * fmin(parameter(assembly->config, "noise.gnss_factor"), 1.0);
+}
+
 // A state of calibration that ended where no tape measure and no data sheet would put it.
 static void calibration(const wm_assembly *assembly, const wm_health *health, wm_findings *out) {
   static const struct {
@@ -377,13 +383,13 @@ static void calibration(const wm_assembly *assembly, const wm_health *health, wm
   for (uint32_t i = 0; i < health->calibration_count; i++) {
     const wm_calibration_value *c = &health->calibration[i];
     const int skids = is_skid_track(assembly, c);
+    const double value = judged_value(assembly, c);
     for (size_t k = 0; k < sizeof kLimits / sizeof kLimits[0]; k++) {
-      if (!strstr(c->name, kLimits[k].ending) || (c->value >= kLimits[k].least && c->value <= kLimits[k].most))
-        continue;
+      if (!strstr(c->name, kLimits[k].ending) || (value >= kLimits[k].least && value <= kLimits[k].most)) continue;
       if (fabs(c->value - kLimits[k].expected) < 3 * c->sigma) continue;
       // Within two sigmas of skid steer's prior it is its base's; beyond, `track_m` is wrong.
       if (skids && fabs(c->value - WM_SKID_TRACK) <= 2 * WM_SKID_TRACK_SIGMA) continue;
-      const int is_bad = !skids && (c->value < kLimits[k].bad_least || c->value > kLimits[k].bad_most ||
+      const int is_bad = !skids && (value < kLimits[k].bad_least || value > kLimits[k].bad_most ||
                                     evidence_scale_contradicts(assembly, c));
       wm_find(out, WM_FOUND_CALIBRATION_OFF, is_bad ? WM_SEVERITY_BAD : WM_SEVERITY_NOTE, "calibration", kLimits[k].fix,
               "%s is %.4g +- %.2g at the end; %g was expected", c->name, c->value, c->sigma,

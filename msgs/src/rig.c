@@ -6,7 +6,8 @@
 #include "waymark/bytes.h"
 #include "waymark/codec.h"
 
-#define RIG_VERSION 1
+#define RIG_VERSION 2
+#define RIG_WITHOUT_ANTENNA 1  // read, too
 
 static void fill_nan(double *values, size_t count) {
   for (size_t i = 0; i < count; i++) values[i] = (double)NAN;
@@ -20,6 +21,7 @@ void wm_rig_init(wm_rig *out) {
   fill_nan(out->stereo.sigma_px, 4);
   fill_nan(out->twist6_sigma_v_mps, 3);
   fill_nan(out->twist6_sigma_w_radps, 3);
+  fill_nan(out->antenna_m, 3);
 }
 
 int wm_rig_find_camera(const wm_rig *rig, const char *name) {
@@ -82,6 +84,7 @@ size_t wm_rig_encode(const wm_rig *v, void *out, size_t capacity) {
   wm_put_f64s(&w, v->twist6_sigma_w_radps, 3);
   wm_put_bytes(&w, v->marker_family, sizeof v->marker_family);
   wm_put_f64(&w, v->marker_size_m);
+  wm_put_f64s(&w, v->antenna_m, 3);
   return w.full ? 0 : w.used;
 }
 
@@ -93,7 +96,8 @@ static void check_pair(wm_reader *r, const wm_rig *v) {
 wm_status wm_rig_decode(const void *data, size_t size, wm_rig *out, size_t *used) {
   memset(out, 0, sizeof *out);
   wm_reader r = wm_reader_of(data, size);
-  if (wm_get_u8(&r) != RIG_VERSION) r.bad = 1;
+  const unsigned version = wm_get_u8(&r);
+  if (version != RIG_VERSION && version != RIG_WITHOUT_ANTENNA) r.bad = 1;
   out->camera_count = get_count(&r, WM_CAMERAS_MAX);
   for (uint32_t i = 0; i < out->camera_count && !r.bad; i++) get_camera(&r, &out->cameras[i]);
   out->stereo.left = wm_get_i32(&r);
@@ -106,6 +110,10 @@ wm_status wm_rig_decode(const void *data, size_t size, wm_rig *out, size_t *used
   wm_get_f64s(&r, out->twist6_sigma_w_radps, 3);
   get_name(&r, out->marker_family);
   out->marker_size_m = wm_get_f64(&r);
+  if (version == RIG_WITHOUT_ANTENNA)
+    fill_nan(out->antenna_m, 3);
+  else
+    wm_get_f64s(&r, out->antenna_m, 3);
   *used = r.used;
   return r.bad ? WM_BAD_DATA : WM_OK;
 }

@@ -182,7 +182,7 @@ void find_position(const Scenario &sc, size_t number, Recording &r) {
   double wander[3];
   for (uint64_t i = 0; i < 3; i++) wander[i] = random.normal(Stream::position_wander, 0, 4 * number + i);
   at_its_rate(sc, number, r, [&](uint64_t k, double t_s, wm_time_ns t_ns, wm_time_ns arrival_ns) {
-    const Vector3d p = true_pose(r, t_s).translation();
+    const Vector3d p = true_pose(r, t_s) * (depth ? Vector3d::Zero() : Vector3d(s.xyz_m[0], s.xyz_m[1], s.xyz_m[2]));
     const FeatureDice dice(r.seed, number, k, 0);
     Fix fix{t_ns,
             arrival_ns,

@@ -110,7 +110,7 @@ def prepare(work, root, here, simulate):
         delay_ns = arrival_ns - t_ns
         blob += text
     drives.write(scenario, here, items, blob, seconds)
-    (scenario / "calibration.yaml").write_text(f"gnss: {{origin: {list(ORIGIN)}}}\n")
+    (scenario / "calibration.yaml").write_text(f"gnss: {{origin: {list(ORIGIN)}, mounting: {{xyz_m: [0, 0, 0]}}}}\n")
     (work / "gnss.yaml").write_text(CONFIG)
     (scenario / "robot.yaml").write_text(
         f"{CONFIG}initial_pose: {drives.start_of(recording)}\ncalibration: calibration.yaml\n"

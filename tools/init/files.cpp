@@ -74,6 +74,9 @@ std::string calibration_text(const Robot &robot) {
   if (robot.imu)
     out += "imu: {mounting: " + calibrate::mounting_yaml(robot.imu->mounting) + "}   # " +
            one_line(robot.imu->mounted_by) + "\n";
+  if (robot.gnss && (w.gnss || robot.binds(WM_CAN_LATITUDE)))
+    out += "gnss: {mounting: " + calibrate::mounting_yaml(robot.gnss->mounting) + "}   # the antenna; " +
+           one_line(robot.gnss->mounted_by) + "\n";
   return out;
 }
 

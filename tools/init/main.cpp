@@ -47,9 +47,9 @@ void parse(wm::cli::App *app, Wish *w) {
                   "OpenCV or OCamCalib");
   app->add_option("--sensor", w->sensors, "NAME of a sensor of --sees sightings");
   app->add_option("--urdf", w->urdf, "the robot's URDF: mountings, wheels' radius, track and wheelbase");
-  app->add_option(
-      "--frame", w->frames,
-      "NAME=LINK: the URDF's link of a camera, a sensor or imu; default: NAME, NAME_optical_frame, NAME_link");
+  app->add_option("--frame", w->frames,
+                  "NAME=LINK: the URDF's link of a camera, a sensor, imu or gnss (the antenna); default: NAME, "
+                  "NAME_optical_frame, NAME_link");
   app->add_option("--mounting", w->mountings, "NAME=X,Y,Z,ROLL,PITCH,YAW in m and degrees: instead of a URDF's");
   app->add_option("--tag-layout", w->tag_layout, "WPILib's JSON with the places of AprilTags");
   app->add_option("--tag-family", w->tag_family, "family of the markers; tag36h11");

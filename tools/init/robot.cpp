@@ -244,6 +244,8 @@ void mount(Robot &robot, const Mountings &mountings, std::vector<Imported> &of_c
     }
     if (chain) camera.shift_s = chain->shift_s;
   }
+  std::string gnss_by;
+  if (const auto antenna = mountings.of("gnss", gnss_by)) robot.gnss = RobotSensor{"gnss", *antenna, gnss_by};
   if (robot.wish.imu && imu) robot.imu = RobotSensor{"imu", *imu, imu_by};
   if (robot.wish.imu && !imu)
     robot.guesses.emplace_back(

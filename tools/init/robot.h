@@ -76,7 +76,7 @@ struct Robot {
   std::optional<Urdf> urdf;
   std::vector<RobotCamera> cameras;
   std::vector<RobotSensor> sensors;
-  std::optional<RobotSensor> imu;  // with a known mounting
+  std::optional<RobotSensor> imu, gnss;  // with a known mounting
   std::optional<TagLayout> tags;
   std::map<std::string, std::string> wheels_by;  // key of calibration.yaml's `wheels` -> file of its value
   std::vector<std::string> guesses;              // for people: value, reason, how to check it

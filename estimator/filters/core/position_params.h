@@ -7,6 +7,7 @@
 
 typedef struct wm_position_params {
   double time_offset_sigma_s;
+  double antenna_sigma_m;
   double sigma_factor, sigma_min_m;
   double correlated_m, correlated_tau_s;
 } wm_position_params;
@@ -15,7 +16,11 @@ typedef struct wm_position_params {
 #define POSITION_STATE_ROWS(member)                                                                                   \
   F64("states.gnss_time_offset_sigma_s", member.time_offset_sigma_s, 0.5, 0, 1,                                       \
       "Start sigma of the receiver's time offset, s: its positions are that much older than their stamps. Receivers " \
-      "without a pulse a second are late by up to half a second. 0: off.")
+      "without a pulse a second are late by up to half a second. 0: off."),                                           \
+      F64("states.gnss_antenna_sigma_m", member.antenna_sigma_m, -0.3, -100, 100,                                     \
+          "Start sigma of the antenna's place in base_link on each axis, m, about calibration.yaml's "                \
+          "`gnss: {mounting: {xyz_m}}`, or else about base_link. Turns show it. 0: off. Below 0: 0.02 by a tape "     \
+          "measure where the mounting is given, and of that size where it is not.")
 #define POSITION_NOISE_ROWS(member)                                                                                 \
   F64("noise.gnss_factor", member.sigma_factor, 0.5, 0.01, 100,                                                     \
       "Factor of the position's sigma: the share that is new in each position."),                                   \

@@ -6,6 +6,8 @@
 
 #include "filters/core/position_params.h"
 #include "filters/core/state_pool.hpp"
+#include "math/elementary.hpp"
+#include "waymark/estimator.h"
 #include "waymark/time.h"
 
 namespace wm {
@@ -21,6 +23,19 @@ inline double correlated_sigma_m(double stated_m, const wm_position_params &para
 inline double white_sigma_m(double stated_m, const wm_position_params &params) {
   const double sigma_m = params.sigma_factor * stated_m;
   return sigma_m < params.sigma_min_m ? params.sigma_min_m : sigma_m;
+}
+
+// The antenna's place in base_link, and its sigma on each axis; 0: exact.
+struct antenna {
+  double place_m[3], sigma_m;
+};
+inline constexpr double kTape_m = 0.02;
+inline antenna antenna_of(const wm_setup &setup, const wm_position_params &params) {
+  antenna out = {{0, 0, 0}, params.antenna_sigma_m < 0.0 ? -params.antenna_sigma_m : params.antenna_sigma_m};
+  if (setup.rig == nullptr || !finite(setup.rig->antenna_m[0])) return out;
+  for (int i = 0; i < 3; i++) out.place_m[i] = setup.rig->antenna_m[i];
+  if (params.antenna_sigma_m < 0.0) out.sigma_m = kTape_m;
+  return out;
 }
 
 class receiver_error {

@@ -25,9 +25,10 @@ int map_states(const wm_sighting_params &p) { return p.use_elevation ? 3 : 2; }
 int count_states(const wm_landmark_ekf_params &p, const wm_setup &setup) {
   const wm_sighting_params &s = *setup.sightings;
   return kPoseStates + planar_filter::count_motion_states(setup.motion->states, setup.motion->model) +
-         sensor_slots::count(setup) + (p.gnss.time_offset_sigma_s > 0.0) + (p.heading_bias_sigma_rad > 0.0) +
-         2 * (p.gnss.correlated_m != 0.0) + s.correlated_slots * correlated_slot_of(s).width +
-         map_states(s) * p.map_slots + 2 * (s.use_elevation && p.tilt_sigma_rad > 0.0);
+         sensor_slots::count(setup) + (p.gnss.time_offset_sigma_s > 0.0) + 2 * (p.gnss.antenna_sigma_m != 0.0) +
+         (p.heading_bias_sigma_rad > 0.0) + 2 * (p.gnss.correlated_m != 0.0) +
+         s.correlated_slots * correlated_slot_of(s).width + map_states(s) * p.map_slots +
+         2 * (s.use_elevation && p.tilt_sigma_rad > 0.0);
 }
 
 // Variance of a place anywhere among the landmarks, each axis, m2.
@@ -81,6 +82,10 @@ void landmark_ekf::init(const wm_landmark_ekf_params &params, const wm_setup &se
     filter_.set_correlated_position(gnss_error_state_);
     filter_.noise().begin_correlated(square(params.gnss.correlated_m));
   }
+  const antenna mounted = antenna_of(setup, params.gnss);
+  antenna_state_ = add(0.0, mounted.sigma_m);
+  if (antenna_state_ >= 0) add(0.0, mounted.sigma_m);
+  for (int i = 0; i < 2; i++) antenna_m_[i] = mounted.place_m[i];
   heading_state_ = add(0.0, params.heading_bias_sigma_rad);
   receiver_.begin();
   tilt_ns_ = WM_TIME_NONE;
@@ -225,6 +230,10 @@ size_t landmark_ekf::list_calibration(wm_calibration_value *out, size_t capacity
   slots_.list(*setup_, filter_, &list);
   if (gnss_time_state_ >= 0)
     list.add("gnss", "time_offset_s", filter_.value(gnss_time_state_), std::sqrt(filter_.variance(gnss_time_state_)));
+  static const char *const kAntenna[] = {"antenna_x_m", "antenna_y_m"};
+  for (int i = 0; i < 2 && antenna_state_ >= 0 && receiver_.is_used(); i++)
+    list.add("gnss", kAntenna[i], antenna_m_[i] + filter_.value(antenna_state_ + i),
+             std::sqrt(filter_.variance(antenna_state_ + i)));
   if (heading_state_ >= 0 && has_heading_)
     list.add("heading", "bias_rad", filter_.value(heading_state_), std::sqrt(filter_.variance(heading_state_)));
   filter_.noise().list(&list);

@@ -145,8 +145,9 @@ class landmark_ekf {
   mounted_sensor sensor_[kMaxSensors];
   sensor_slots slots_;
   unsigned components_;  // of expect(): whether the angle scale is a state
-  int gnss_time_state_, gnss_error_state_, heading_state_;
-  int has_heading_;  // one has come
+  int gnss_time_state_, gnss_error_state_, antenna_state_, heading_state_;
+  double antenna_m_[2];  // in base_link, without the states of its error
+  int has_heading_;      // one has come
   receiver_error receiver_;
   state_pool<kErrorSlots> errors_;
   correlated_slot error_;  // a slot of these

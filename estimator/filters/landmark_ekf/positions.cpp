@@ -49,7 +49,13 @@ wm_status landmark_ekf::fuse_position(const wm_event &event, record_list records
   const double correlated_m = correlated_sigma_m(p.sigma_xy_m, params_.gnss);
   decay_gnss_error(event.t_ns, p.sigma_xy_m);
   const past_pose past = pose_before(filter_, gnss_time_state_ < 0 ? 0.0 : filter_.value(gnss_time_state_));
-  observation seen = observation_at(event.t_ns, kPositionKey, compose(filter_.odom(), past.step));
+  const sin_cos h = sincos(past.pose.heading_rad);
+  double arm_m[2];
+  for (int i = 0; i < 2; i++) arm_m[i] = antenna_m_[i] + (antenna_state_ < 0 ? 0.0 : filter_.value(antenna_state_ + i));
+  // Of the antenna against base_link in the map; by the heading it turns.
+  const double off_m[2] = {h.cos * arm_m[0] - h.sin * arm_m[1], h.sin * arm_m[0] + h.cos * arm_m[1]};
+  const wm_pose2 antenna_step = compose(past.step, {arm_m[0], arm_m[1], 0.0});
+  observation seen = observation_at(event.t_ns, kPositionKey, compose(filter_.odom(), antenna_step));
   seen.kind = kObservedPosition;
   seen.place_m[0] = p.p_m[0];
   seen.place_m[1] = p.p_m[1];
@@ -62,9 +68,13 @@ wm_status landmark_ekf::fuse_position(const wm_event &event, record_list records
   residual rows[2];
   for (int k = 0; k < 2; k++) {
     residual &r = rows[k];
-    const double by[3] = {k == 0 ? 1.0 : 0.0, k == 1 ? 1.0 : 0.0, 0.0};
+    const double by[3] = {k == 0 ? 1.0 : 0.0, k == 1 ? 1.0 : 0.0, k == 0 ? -off_m[1] : off_m[0]};
     add_past_pose(&r.row, by, past, gnss_time_state_);
-    double expected = k == 0 ? past.pose.x_m : past.pose.y_m;
+    double expected = (k == 0 ? past.pose.x_m : past.pose.y_m) + off_m[k];
+    if (antenna_state_ >= 0) {
+      r.row.add(antenna_state_, k == 0 ? h.cos : h.sin);
+      r.row.add(antenna_state_ + 1, k == 0 ? -h.sin : h.cos);
+    }
     if (gnss_error_state_ >= 0) {
       r.row.add(gnss_error_state_ + k, 1.0);
       expected += filter_.value(gnss_error_state_ + k);

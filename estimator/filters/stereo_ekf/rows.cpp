@@ -179,25 +179,31 @@ void stereo_ekf::depth_rows(const wm_position &p, row_block *out) const {
   add_pose_columns(out, state_before(0.0), {0, 0, 0}, by_end, by_turn);
 }
 
-// Coordinates below `last` of a receiver's position: of the pose a time offset ago, with the receiver's lasting error.
+// Coordinates below `last` of a receiver's position: of the antenna a time offset ago, with the receiver's lasting
+// error.
 void stereo_ekf::position_rows(const wm_position &p, int last, row_block *out) const {
   static constexpr wm_residual kKinds[3] = {WM_RESIDUAL_X, WM_RESIDUAL_Y, WM_RESIDUAL_Z};
   const past_pose past = state_before(filter_.head1(kReceiverOffset, 0.0));
-  const vec3 error = filter_.head3(kReceiverError);
+  const vec3 error = filter_.head3(kReceiverError), arm = antenna_m_ + filter_.head3(kAntenna);
+  const vec3 place = past.at.p + past.R * arm;
   double by_end[3][3] = {}, lasting_m[3] = {};
   const double by_turn[3][3] = {};
   for (int i = 0; i < last; i++) {
     const double stated_m = i == 2 ? p.sigma_z_m : p.sigma_xy_m;
     lasting_m[i] = receiver_.sigma_m() * stated_m / p.sigma_xy_m;
-    const int row = out->add_row(kKinds[i], p.p_m[i], p.p_m[i] - past.at.p[i] - lasting_m[i] * error[i],
+    const int row = out->add_row(kKinds[i], p.p_m[i], p.p_m[i] - place[i] - lasting_m[i] * error[i],
                                  square(white_sigma_m(stated_m, params_.gnss)));
     by_end[row][i] = 1.0;
   }
-  add_pose_columns(out, past, {0, 0, 0}, by_end, by_turn);
+  add_pose_columns(out, past, arm, by_end, by_turn);
   if (const int state = filter_.at(kReceiverError); state >= 0)
     for (int i = 0, first = out->add_columns(state, 3); i < last; i++) out->by[i][first + i] = lasting_m[i];
+  if (const int state = filter_.at(kAntenna); state >= 0)
+    for (int i = 0, first = out->add_columns(state, 3); i < last; i++)
+      for (int j = 0; j < 3; j++) out->by[i][first + j] = past.R.m[i][j];
   if (const int state = filter_.at(kReceiverOffset); state >= 0) {
-    const vec3 v_mps = past.R * filter_.velocity_of(motion_.v_mps());
+    const vec3 in_body = filter_.velocity_of(motion_.v_mps()) + cross(filter_.rates_of(motion_.w_radps()), arm);
+    const vec3 v_mps = past.R * in_body;
     for (int i = 0, column = out->add_columns(state, 1); i < last; i++) out->by[i][column] = -v_mps[i];
   }
 }

@@ -33,6 +33,7 @@ enum head_state {
   kForceBias,       // m/s2, of the accelerometer
   kReceiverError,   // of positions on each axis, in units of receiver_error's sigma
   kReceiverOffset,  // s by which positions are older than their stamps
+  kAntenna,         // m in base_link, against its mounting
   kHeadStates
 };
 
@@ -120,6 +121,7 @@ inline constexpr head_spec kHeadSpecs[kHeadStates] = {
      head_use::always},
     {3, 0, {}, nullptr, nullptr, nullptr, head_use::always},
     {1, 0, {"gnss.time_offset_s"}, nullptr, nullptr, nullptr, head_use::with_twist},
+    {3, 0, {"gnss.antenna_x_m", "gnss.antenna_y_m", "gnss.antenna_z_m"}, nullptr, nullptr, nullptr, head_use::always},
 };
 
 constexpr int head_width_max() {
@@ -154,6 +156,7 @@ inline void models_of(const wm_stereo_ekf_params &params, head_model out[kHeadSt
   const wm_position_params &gnss = params.gnss;
   out[kReceiverError] = {gnss.correlated_m != 0.0 ? 1.0 : 0.0, 0.0, gnss.correlated_tau_s};
   out[kReceiverOffset].sigma = rates ? 0.0 : gnss.time_offset_sigma_s;
+  out[kAntenna].sigma = gnss.antenna_sigma_m;
 }
 
 }  // namespace wm

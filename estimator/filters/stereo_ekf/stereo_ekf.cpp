@@ -66,6 +66,7 @@ wm_stereo_ekf_params usable(const wm_stereo_ekf_params &params, const stereo_rig
   wm_stereo_ekf_params out = params;
   if (!rig.there) out.points_max = out.increments = 0;
   if (out.points_max == 0) out.frames_max = 0;
+  out.gnss.antenna_sigma_m = antenna_of(setup, params.gnss).sigma_m;
   if (out.camera_rotation_sigma < 0.0) {
     out.camera_rotation_sigma = lasting_error_of(params, rig);
     if (!(out.camera_rotation_tau_s > 0.0)) out.camera_rotation_tau_s = kLasting_s;
@@ -142,6 +143,7 @@ void stereo_ekf::init(const wm_stereo_ekf_params &params, const wm_setup &setup)
   motion_.init(setup.motion, &setup.wheels, twist_noise_of(params, setup.rig));
   gravity_.init(params.accelerometer_mps2);
   receiver_.begin();
+  antenna_m_ = vec_of(antenna_of(setup, params.gnss).place_m);
   head_model models[kHeadStates];
   models_of(params_, models);
   filter_.init(behind.filter, models, params_.points_max + own_map::kCorners * params_.frames_max);
@@ -256,9 +258,13 @@ size_t stereo_ekf::list_counters(wm_counter *out, size_t capacity) const {
 size_t stereo_ekf::list_calibration(wm_calibration_value *out, size_t capacity) const {
   calibration_list list(out, capacity);
   for (int k = 0; k < kHeadStates; k++) {
-    const int first = k == kReceiverOffset && !receiver_.is_used() ? -1 : filter_.at(k);
-    for (int i = first; first >= 0 && kHeadSpecs[k].name[0] && i < first + kHeadSpecs[k].width; i++)
-      list.add(kHeadSpecs[k].name[i - first], filter_.head(i) + filter_.pending1(i), std::sqrt(filter_.variance(i)));
+    const bool is_receivers = k == kReceiverOffset || k == kAntenna;
+    const int first = is_receivers && !receiver_.is_used() ? -1 : filter_.at(k);
+    for (int i = 0; first >= 0 && kHeadSpecs[k].name[0] && i < kHeadSpecs[k].width; i++) {
+      const double about = k == kAntenna ? antenna_m_[i] : 0.0;
+      list.add(kHeadSpecs[k].name[i], about + filter_.head(first + i) + filter_.pending1(first + i),
+               std::sqrt(filter_.variance(first + i)));
+    }
   }
   const vec3 error = filter_.head3(kReceiverError);
   if (const double sigmas = std::sqrt(square(error.x) + square(error.y)); sigmas > kLastingMost)

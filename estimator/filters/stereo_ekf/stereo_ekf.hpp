@@ -225,6 +225,7 @@ class stereo_ekf {
   spatial_motion motion_;
   gravity_window gravity_;
   receiver_error receiver_;
+  vec3 antenna_m_;  // in base_link, without the state of its error
   // Of the gyro, as it was when an axis was lost.
   struct kept_bias {
     wm_time_ns t_ns;

@@ -68,7 +68,7 @@ typedef struct wm_stereo_pair {
 
 #define WM_CAMERAS_MAX 16
 
-// Cameras, noise of the vehicle's twist, and coded markers.
+// Cameras, noise of the vehicle's twist, coded markers, and the receiver's antenna.
 typedef struct wm_rig {
   wm_camera cameras[WM_CAMERAS_MAX];
   uint32_t camera_count;
@@ -76,6 +76,7 @@ typedef struct wm_rig {
   double twist6_sigma_v_mps[3], twist6_sigma_w_radps[3];  // NaN where not given
   char marker_family[WM_NAME_MAX];                        // "" where not given
   double marker_size_m;                                   // outer edge of the black square; NaN where not given
+  double antenna_m[3];                                    // of positions, in base_link; NaN where not given
 } wm_rig;
 
 // Makes a rig without cameras; all other fields are unknown.

@@ -7,6 +7,7 @@
 
 #include "events.hpp"
 #include "filters/core/sensor_slots.hpp"
+#include "math/arc.hpp"
 #include "motion/motion_kind.hpp"
 #include "motion/step.hpp"
 #include "unity.h"
@@ -241,6 +242,36 @@ void test_a_compass_deviation_is_found_or_stays_open() {
   }
 }
 
+// An antenna 0.4 m ahead and 0.2 m to the left, whose mounting is stated or not: turns to both sides show it.
+void test_the_antennas_place_is_found_by_turns() {
+  wm_rig rig;
+  wm_rig_init(&rig);
+  setup.rig = &rig;
+  for (const bool stated : {false, true}) {
+    if (stated) rig.antenna_m[0] = 0.4, rig.antenna_m[1] = 0.2, rig.antenna_m[2] = 1;
+    begin();
+    TEST_ASSERT_DOUBLE_IS_NAN(sigma_of("gnss.antenna_x_m"));  // nothing of a receiver before its first position
+    wm_pose2 truth = {0, 0, 0};
+    for (int i = 0; i < 600; i++) {
+      const double t_s = 0.1 * i, v = 1 + 0.3 * std::sin(0.7 * t_s), w = 0.3 * std::sin(0.4 * t_s);
+      const auto noise = [i](uint64_t of) { return wm_random_normal(6, of, static_cast<uint64_t>(i)); };
+      feed(make::twist(t_s, v + 0.01 * noise(0), w + 0.005 * noise(1)));
+      const wm_pose2 antenna = wm::compose(truth, {0.4, 0.2, 0});
+      if (i % 2 == 0) feed(make::position(t_s, antenna.x_m + 0.01 * noise(3), antenna.y_m + 0.01 * noise(4), 0.02));
+      if (stated && i == 0) TEST_ASSERT_LESS_THAN_DOUBLE(0.0201, sigma_of("gnss.antenna_x_m"));
+      if (i == 599) break;
+      const wm::arc step = wm::make_arc(0.1 * v, 0.1 * w);
+      truth = wm::compose(truth, {step.x_m, step.y_m, step.turn_rad});
+    }
+    wm_estimate e;
+    ekf->estimate(state.get(), &e);
+    TEST_ASSERT_DOUBLE_WITHIN(0.04, truth.x_m, e.pose_map_base.p_m[0]);
+    TEST_ASSERT_DOUBLE_WITHIN(0.04, truth.y_m, e.pose_map_base.p_m[1]);
+    TEST_ASSERT_DOUBLE_WITHIN(0.05, 0.4, value_of("gnss.antenna_x_m"));
+    TEST_ASSERT_DOUBLE_WITHIN(0.05, 0.2, value_of("gnss.antenna_y_m"));
+  }
+}
+
 // A robot that stands sees landmark k at `t_s`, `off_rad` beside it.
 void see(double t_s, int k, double off_rad) {
   feed(make::twist(t_s, 0.0, 0.0));
@@ -321,6 +352,7 @@ int main() {
   RUN_TEST(test_a_gyros_scale_is_known_from_its_data_sheet);
   RUN_TEST(test_a_receivers_lasting_error_falls_with_its_sigma);
   RUN_TEST(test_a_compass_deviation_is_found_or_stays_open);
+  RUN_TEST(test_the_antennas_place_is_found_by_turns);
   RUN_TEST(test_an_outlier_among_the_first_sightings_does_not_keep_the_yaw);
   RUN_TEST(test_what_agrees_by_one_landmark_or_not_at_all_leaves_the_yaw);
   RUN_TEST(test_a_yaw_that_many_sightings_confirm_is_kept);

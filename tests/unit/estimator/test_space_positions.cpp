@@ -6,19 +6,24 @@ namespace {
 
 constexpr double kStep_s = 0.02, kTau_s = 20;
 
-// A boat in circles of 8 m at 1.5 m/s; its receiver gives five positions a second.
+// A boat in circles at 1 to 2 m/s: at one speed a delay would look as an antenna further ahead. Its receiver gives five
+// positions a second.
 struct boat : scene {
-  boat() : scene(10) { begin(); }
+  explicit boat(const vec3 &antenna = {0, 0, 0}, bool is_stated = false) : scene(10), antenna_m(antenna) {
+    if (is_stated) std::memcpy(rig.antenna_m, &antenna, sizeof rig.antenna_m);
+    begin();
+  }
   // `lasting_m`: sigma of an error that wanders; `east_m`: of one that does not.
   void sail(double seconds, double stated_m, double lasting_m, double east_m = 0) {
     const double left = std::exp(-0.2 / kTau_s);
     for (int i = 0; i < static_cast<int>(std::lround(seconds / kStep_s)); i++, step_++) {
-      swim(kStep_s, {1.5, 0, 0}, {0, 0, 0.19});
-      way_.push_back(truth.p);
+      swim(kStep_s, {1.5 + 0.5 * std::sin(0.5 * t_s), 0, 0}, {0, 0, 0.19});
+      way_.push_back(truth);
       if (step_ % 10 != 9) continue;
       for (double &error : error_) error = step_ == 9 ? noise() : left * error + std::sqrt(1 - left * left) * noise();
       const auto late = static_cast<size_t>(std::lround(delay_s / kStep_s));
-      const vec3 then = way_[way_.size() - 1 - std::min(late, way_.size() - 1)];
+      const pose3 before = way_[way_.size() - 1 - std::min(late, way_.size() - 1)];
+      const vec3 then = before.p + matrix_of(before.q) * antenna_m;
       wm_event e = make::position(t_s, then.x + east_m + lasting_m * error_[0] + 0.5 * stated_m * noise(),
                                   then.y + lasting_m * error_[1] + 0.5 * stated_m * noise(), stated_m);
       e.as.position.p_m[2] = then.z + lasting_m * error_[2] + 0.5 * stated_m * noise();
@@ -53,9 +58,10 @@ struct boat : scene {
     return kAbsent;
   }
   double delay_s = 0;
+  vec3 antenna_m;
   double error_[3] = {0, 0, 0};
   int step_ = 0, inside_ = 0, judged_ = 0;
-  std::vector<vec3> way_;
+  std::vector<pose3> way_;
 };
 
 void test_an_error_that_lasts_is_not_averaged_away(void) {
@@ -86,6 +92,23 @@ void test_another_solution_has_an_error_of_its_own(void) {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.05, b.off());
 }
 
+void test_the_antennas_place_is_found_by_turns(void) {
+  boat b({0.5, -0.3, 0});
+  b.sail(100, 0.05, 0.05);
+  double sigma;
+  TEST_ASSERT_DOUBLE_WITHIN(0.06, 0.5, b.calibration("gnss.antenna_x_m", &sigma));
+  TEST_ASSERT_DOUBLE_WITHIN(0.06, -0.3, b.calibration("gnss.antenna_y_m", &sigma));
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.15, b.off());
+}
+
+void test_a_stated_mounting_is_taken(void) {
+  boat b({0.5, -0.3, 1.2}, true);
+  double sigma;
+  b.sail(1, 0.05, 0.05);
+  TEST_ASSERT_DOUBLE_WITHIN(0.03, 1.2, b.calibration("gnss.antenna_z_m", &sigma));
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.021, sigma);
+}
+
 // Nothing of a receiver stands in the calibration of a vehicle without one.
 void test_a_vehicle_without_a_receiver(void) {
   boat b;
@@ -104,6 +127,8 @@ int main(void) {
   RUN_TEST(test_an_error_that_lasts_is_not_averaged_away);
   RUN_TEST(test_the_receivers_delay_is_found);
   RUN_TEST(test_another_solution_has_an_error_of_its_own);
+  RUN_TEST(test_the_antennas_place_is_found_by_turns);
+  RUN_TEST(test_a_stated_mounting_is_taken);
   RUN_TEST(test_a_vehicle_without_a_receiver);
   return UNITY_END();
 }

@@ -363,6 +363,7 @@ static void a_rig_comes_back_and_a_cut_one_is_refused(void) {
   rig.stereo.left = 0;
   rig.stereo.right = 1;
   rig.marker_size_m = 0.2;
+  rig.antenna_m[0] = 0.4, rig.antenna_m[1] = -0.1, rig.antenna_m[2] = 1.5;
   uint8_t bytes[WM_RIG_ENCODED_MAX], again[WM_RIG_ENCODED_MAX];
   size_t used, count = wm_rig_encode(&rig, bytes, sizeof bytes);
   TEST_ASSERT_GREATER_THAN(0, count);
@@ -373,6 +374,10 @@ static void a_rig_comes_back_and_a_cut_one_is_refused(void) {
   TEST_ASSERT_EQUAL(1, wm_rig_find_camera(&back, "r"));
   TEST_ASSERT_EQUAL(-1, wm_rig_find_camera(&back, "x"));
   for (size_t cut = 0; cut < count; cut++) TEST_ASSERT_EQUAL(WM_BAD_DATA, wm_rig_decode(bytes, cut, &back, &used));
+  bytes[0] = 1;  // version 1 had no antenna at its end
+  TEST_ASSERT_EQUAL(WM_OK, wm_rig_decode(bytes, count - sizeof rig.antenna_m, &back, &used));
+  TEST_ASSERT_EQUAL_DOUBLE(0.2, back.marker_size_m);
+  TEST_ASSERT_DOUBLE_IS_NAN(back.antenna_m[0]);
   rig.stereo.right = 2;  // no such camera
   count = wm_rig_encode(&rig, bytes, sizeof bytes);
   TEST_ASSERT_EQUAL(WM_BAD_DATA, wm_rig_decode(bytes, count, &back, &used));
