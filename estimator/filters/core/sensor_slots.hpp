@@ -16,11 +16,12 @@ namespace wm {
 class sensor_slots {
  public:
   // States that the sensors take. Without motion data the default leaves out what only a motion beside the observations
-  // shows: where the sensor looks, and how late it is.
+  // shows: where the sensor looks, and how late it is. An axis of depths is a sensor's that measures depths.
   static int count(const wm_setup &setup) {
     int out = 0;
-    for (const sensor_state_spec &spec : kSensorStateSpecs) out += is_on(setup, spec.row);
-    return out * static_cast<int>(setup.sensor_count);
+    for (int i = 0; i < static_cast<int>(setup.sensor_count); i++)
+      for (const sensor_state_spec &spec : kSensorStateSpecs) out += is_on(setup, i, spec.row);
+    return out;
   }
 
   // add(neutral, sigma, walk, low, high) appends a state to the filter and returns its index. Without a known map, a
@@ -36,7 +37,7 @@ class sensor_slots {
       const bool flight = !known_map && gives_ranges_alone(setup.sensors[sensor]) && s.row == WM_SENSOR_ROW_kRangeScale;
       const double unit = s.row == WM_SENSOR_ROW_kRangeBias ? range_sigma_m : flight ? kFlightScale : 1.0;
       const double sigma = absolute_sigma(p.states.sigma[s.row], unit);
-      return is_on(setup, s.row) ? add(s.neutral, sigma, p.states.walk[s.row], s.low, s.high) : -1;
+      return is_on(setup, sensor, s.row) ? add(s.neutral, sigma, p.states.walk[s.row], s.low, s.high) : -1;
     });
   }
 
@@ -91,8 +92,9 @@ class sensor_slots {
   static bool gives_ranges_alone(const wm_sensor &s) {
     return std::isnan(s.bearing_sigma_rad) && !std::isnan(s.range_sigma_m);
   }
-  static bool is_on(const wm_setup &setup, int row) {
+  static bool is_on(const wm_setup &setup, int sensor, int row) {
     const double sigma = setup.sightings->states.sigma[row];
+    if (sigma < 0.0 && row == WM_SENSOR_ROW_kDepthAxis && !setup.sensors[sensor].range_is_depth) return false;
     const bool shown_by_motion = row == WM_SENSOR_ROW_kYaw || row == WM_SENSOR_ROW_kTimeOffset;
     const bool moves = setup.motion->model != WM_MOTION_CONSTANT_VELOCITY;
     return sigma > 0.0 || (sigma < 0.0 && (moves || !shown_by_motion));

@@ -125,6 +125,7 @@ void test_a_prior_is_a_multiple_of_the_sensors_own_sigma() {
 // range; one that sees nothing cannot observe anything.
 void test_a_state_that_nothing_observes_keeps_its_prior() {
   for (double &sigma : make::sightings.states.sigma) sigma = sigma == 0.0 ? 0.02 : sigma;
+  make::sightings.states.sigma[WM_SENSOR_ROW_kDepthAxis] = 0.02;
   for (double &sigma : motion.states.sigma) sigma = sigma < 0.0 ? -sigma : sigma;
   motion.noise_adapt_log_sigma = 0.0;
   motion.states.wheel_difference_sigma = 0.0;
@@ -150,6 +151,16 @@ void test_a_state_that_nothing_observes_keeps_its_prior() {
       TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(0.01 * before[i].sigma, before[i].sigma, after[i].sigma, name.c_str());
     }
     TEST_ASSERT_TRUE(kept >= (stands ? 13 : 21));
+  }
+}
+
+// The axis of depths is open where a sensor measures depths, and no state of a sensor of distances.
+void test_a_sensor_of_depths_has_an_axis() {
+  for (const int depth : {0, 1}) {
+    sensor.range_is_depth = depth;
+    begin();
+    const double sigma = sigma_of("camera.depth_axis_rad");
+    TEST_ASSERT_EQUAL_DOUBLE(depth ? 0.02 : -1.0, std::isnan(sigma) ? -1.0 : sigma);
   }
 }
 
@@ -347,6 +358,7 @@ int main() {
   RUN_TEST(test_the_kind_gives_the_noise);
   RUN_TEST(test_a_prior_is_a_multiple_of_the_sensors_own_sigma);
   RUN_TEST(test_a_state_that_nothing_observes_keeps_its_prior);
+  RUN_TEST(test_a_sensor_of_depths_has_an_axis);
   RUN_TEST(test_sightings_with_sigmas_leave_the_sensors_priors);
   RUN_TEST(test_a_vague_receiver_finds_the_robot_too);
   RUN_TEST(test_a_gyros_scale_is_known_from_its_data_sheet);
