@@ -128,6 +128,11 @@ def figures(runs, case, recording, config, what=""):
     """One replay and its judgement; `run` is its folder. `what` names a disturbed copy in the results."""
     out, folder = runs.judge(", ".join(filter(None, [case.title(), what])), recording, config, case.options)
     out["run"] = folder
+    # The covariances are those of the frame of the start. An alignment leaves it: of an exact filter 0.82 to 0.90 are inside then
+    # (docs/reports/2026-11-27-mrclam-slam.md).
+    if case.options == SE2 and "initial_pose" in (recording / "recording.yaml").read_text():
+        at_start, _ = runs.judge(", ".join(filter(None, [case.title(), what, "unaligned"])), recording, config)
+        out["nees_inside_95"] = at_start["nees_inside_95"]
     health = json.loads((folder / "health.json").read_text())
     out["landmarks_moved"] = (find(health, "landmarks_moved") or {"count": 0})["count"]
     out["velocity_scale"] = find(health, "motion.velocity_scale")
