@@ -378,6 +378,8 @@ std::vector<dive_scenario> dive_scenarios() {
       {"states.velocity_direction_sigma_rad", 0.05},
       {"states.camera_rotation_sigma_rad", 0.02},
       {"states.camera_place_sigma_m", 0.05},
+      {"states.camera_focal_sigma", 0.01},
+      {"states.camera_centre_sigma_px", 2.0},
       {"states.time_offset_sigma_s", 0.05},
       {"states.range_bias_sigma_m", 0.2},
       {"states.bearing_bias_sigma_rad", 0.05},

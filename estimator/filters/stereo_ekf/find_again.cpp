@@ -74,7 +74,7 @@ void stereo_ekf::look(const wm_stereo &seen) {
   double by[3][4], variance = 0.0;
   wm_innovation unused{};
   if (map_.capacity() == 0 || looked_count_ == kLookedMost || !has_appearance(seen.appearance)) return;
-  if (std::isnan(px[0]) || std::isnan(px[2]) || !rig_.triangulate(px, kDisparityLeast_px, &x, by)) return;
+  if (std::isnan(px[0]) || std::isnan(px[2]) || !rig().triangulate(px, kDisparityLeast_px, &x, by)) return;
   if (!matches_itself(seen, &unused)) return;
   for (const auto &row : by)
     for (int k = 0; k < 4; k++) variance += square(row[k] * sigma_px_[k]);

@@ -18,8 +18,9 @@ constexpr double kNoGate = 1e300;
 }  // namespace
 
 pair_view stereo_ekf::pair() const {
-  return {rig_.fu,         rig_.fv,      rig_.cu,       rig_.cv,
-          rig_.baseline_m, sigma_px_[0], camera_axes(), rig_.place + filter_.head3(kCameraPlace)};
+  const stereo_rig used = rig();
+  return {used.fu,         used.fv,      used.cu,       used.cv,
+          used.baseline_m, sigma_px_[0], camera_axes(), used.place + filter_.head3(kCameraPlace)};
 }
 
 void stereo_ekf::add_track(const wm_stereo &seen, const wm_innovation &blank, record_list records) {

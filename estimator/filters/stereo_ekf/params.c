@@ -57,6 +57,11 @@ static const wm_param kParams[] = {
     F64("states.time_offset_sigma_s", time_offset_sigma, 0.02, 0, 0.2,
         "Start sigma of the pictures' time offset, s: by how much they are older than their stamps. With twist only. "
         "0: off."),
+    F64("states.camera_focal_sigma", camera_focal_sigma, 0, 0, 0.2,
+        "Sigma of the pair's focal lengths, across and down, as a share of calibration.yaml's: of a good calibration "
+        "0.001. For several rounds with slam.key_frames. 0: off."),
+    F64("states.camera_centre_sigma_px", camera_centre_sigma, 0, 0, 100,
+        "Sigma of the pair's principal point, across and down, px. 0: off."),
     F64("states.increment_scale_sigma", increment_scale_sigma, 0.02, 0, 1,
         "Sigma of the share by which motion between two pictures is too long: disparities that are all off by 0.2 px "
         "at "

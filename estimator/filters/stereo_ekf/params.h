@@ -26,6 +26,7 @@ typedef struct wm_stereo_ekf_params {
   double camera_rotation_sigma, camera_rotation_tau_s;
   double camera_place_sigma, camera_place_tau_s;
   double time_offset_sigma;
+  double camera_focal_sigma, camera_centre_sigma;
   double increment_scale_sigma, increment_direction_sigma;
   double range_bias_sigma, bearing_bias_sigma;
   double twist_lag_sigma;

@@ -138,7 +138,7 @@ void stereo_ekf::add_point(const wm_stereo &seen, const wm_innovation &blank, re
   const double px[4] = {seen.left_px[0], seen.left_px[1], seen.right_px[0], seen.right_px[1]};
   vec3 x;
   double by[3][4];
-  if (std::isnan(px[0]) || std::isnan(px[2]) || !rig_.triangulate(px, kDisparityLeast_px, &x, by)) {
+  if (std::isnan(px[0]) || std::isnan(px[2]) || !rig().triangulate(px, kDisparityLeast_px, &x, by)) {
     record.verdict = WM_REJECTED_UNKNOWN_ID;
     records.add(record);
     return;
@@ -160,7 +160,8 @@ void stereo_ekf::add_point(const wm_stereo &seen, const wm_innovation &blank, re
     }
   const past_pose past = state_at_picture();
   const vec3 place = past.at.p + past.R * (rig_.place + filter_.head3(kCameraPlace) + camera_axes() * x);
-  const point_view view = view_point(place, past);
+  point_view view = view_point(place, past);
+  add_lens_columns(x, &view.by);
   const int slot = filter_.point_count();
   filter_.add_point(place, view.by, view.A, noise);
   info_[(size_t)slot] = {picture_ns_, picture_ns_, WM_TIME_NONE, seen.id, 0, kNoFrame, {}, {}};

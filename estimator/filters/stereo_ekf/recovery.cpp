@@ -79,7 +79,7 @@ void stereo_ekf::buffer_observation(const wm_stereo &seen, const wm_landmark &la
   vec3 x;
   double by[3][4];
   if (!params_.recover || std::isnan(px[0]) || std::isnan(px[2])) return;
-  if (!rig_.triangulate(px, kDisparityLeast_px, &x, by)) return;
+  if (!rig().triangulate(px, kDisparityLeast_px, &x, by)) return;
   double variance = square(finite(landmark.sigma_m) ? landmark.sigma_m : 0.0) +
                     square(setup_->sightings->map_sigma_min_m) + square(params_.camera_rotation_sigma * length(x)) +
                     square(params_.camera_place_sigma);

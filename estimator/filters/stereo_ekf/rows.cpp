@@ -42,6 +42,37 @@ stereo_ekf::past_pose stereo_ekf::state_before(double age_s) const {
 
 stereo_ekf::past_pose stereo_ekf::state_at_picture() const { return state_before(filter_.head1(kTimeOffset, 0.0)); }
 
+// The pair with the states of its focal lengths and its principal point.
+stereo_rig stereo_ekf::rig() const {
+  stereo_rig out = rig_;
+  if (const int focal = filter_.at(kCameraFocal); focal >= 0) {
+    out.fu *= filter_.head(focal);
+    out.fv *= filter_.head(focal + 1);
+  }
+  if (const int centre = filter_.at(kCameraCentre); centre >= 0) {
+    out.cu += filter_.head(centre);
+    out.cv += filter_.head(centre + 1);
+  }
+  return out;
+}
+
+// Derivatives of a place in the left camera that four pixels give, x = (b (u - c_u) / d, z (v - c_v) / f_v, f_u b / d),
+// by those states: with the sign of view_point(), whose derivatives are at a fixed place.
+void stereo_ekf::add_lens_columns(const vec3 &x, row_block *out) const {
+  const stereo_rig used = rig();
+  if (const int focal = filter_.at(kCameraFocal); focal >= 0) {
+    const int column = out->add_columns(focal, 2);
+    out->by[1][column] = -x.y / filter_.head(focal);
+    out->by[2][column] = -x.z / filter_.head(focal);
+    out->by[1][column + 1] = x.y / filter_.head(focal + 1);
+  }
+  if (const int centre = filter_.at(kCameraCentre); centre >= 0) {
+    const int column = out->add_columns(centre, 2);
+    out->by[0][column] = x.z / used.fu;
+    out->by[1][column + 1] = x.z / used.fv;
+  }
+}
+
 mat3 stereo_ekf::camera_axes() const {
   return rig_.R_base_optical * matrix_of(turn_by(filter_.head3(kCameraRotation)));
 }
@@ -78,8 +109,12 @@ bool stereo_ekf::point_rows(const wm_stereo &seen, const vec3 &place, double pla
   point_view view = view_point(place, past);
   if (!(view.x.z > kNearest_m)) return false;
   if (slot >= 0) put(&view.by, 0, view.by.add_columns(filter_.point_state(slot), 3), view.A);
+  const int focal_state = filter_.at(kCameraFocal), centre_state = filter_.at(kCameraCentre);
+  const int focal = focal_state >= 0 ? view.by.add_columns(focal_state, 2) : -1;
+  const int centre = centre_state >= 0 ? view.by.add_columns(centre_state, 2) : -1;
   double px[4], by[4][3];
-  rig_.see(view.x, px, by);
+  const stereo_rig used = rig();
+  used.see(view.x, px, by);
   const double observed[4] = {seen.left_px[0], seen.left_px[1], seen.right_px[0], seen.right_px[1]};
   out->columns = view.by.columns;
   out->without_room = view.by.without_room;
@@ -91,6 +126,10 @@ bool stereo_ekf::point_rows(const wm_stereo &seen, const vec3 &place, double pla
                                  square(sigma_px_[k]) + square(place_sigma_m) * slope);
     for (int c = 0; c < out->columns; c++)
       out->by[row][c] = by[k][0] * view.by.by[0][c] + by[k][1] * view.by.by[1][c] + by[k][2] * view.by.by[2][c];
+    const int axis = k & 1;  // across, down
+    if (focal >= 0)
+      out->by[row][focal + axis] = (px[k] - (axis ? used.cv : used.cu)) / filter_.head(focal_state + axis);
+    if (centre >= 0) out->by[row][centre + axis] = 1.0;
   }
   return true;
 }

@@ -29,7 +29,7 @@ namespace wm {
 inline constexpr double kUnknownPlace_m = 1000.0, kUnknownTurn_rad = 1.8;
 
 // Up to kRank rows of one observation: their derivatives by the states of its columns, column after column.
-// The widest block, a stereo point's, has 16 columns: place 3, rotation 3, camera 6, time offset 1, point 3.
+// The widest block, a stereo point's, has 20 columns: place 3, rotation 3, camera 6, time offset 1, lens 4, point 3.
 struct row_block {
   static constexpr int kColumns = 24, kWidest = 3;  // states of a block, and of one cause
   int rows = 0, columns = 0;

@@ -24,6 +24,8 @@ enum head_state {
   kCameraRotation,
   kCameraPlace,
   kTimeOffset,
+  kCameraFocal,       // true over calibrated focal lengths, across and down
+  kCameraCentre,      // px: true less calibrated principal point
   kPictureScale,      // by which the motion between pictures is too long: disparities that are off alike
   kPictureDirection,  // rad, by which it is turned: cameras that are not quite parallel
   kRangeBias,
@@ -106,6 +108,20 @@ inline constexpr head_spec kHeadSpecs[kHeadStates] = {
      &stereo_params::camera_place_tau_s,
      head_use::always},
     {1, 0, {"stereo.time_offset_s"}, &stereo_params::time_offset_sigma, nullptr, nullptr, head_use::with_twist},
+    {2,
+     1,
+     {"stereo.focal_scale_u", "stereo.focal_scale_v"},
+     &stereo_params::camera_focal_sigma,
+     nullptr,
+     nullptr,
+     head_use::always},
+    {2,
+     0,
+     {"stereo.centre_u_px", "stereo.centre_v_px"},
+     &stereo_params::camera_centre_sigma,
+     nullptr,
+     nullptr,
+     head_use::always},
     {1, 0, {}, &stereo_params::increment_scale_sigma, nullptr, nullptr, head_use::always},
     {3, 0, {}, &stereo_params::increment_direction_sigma, nullptr, nullptr, head_use::always},
     {1, 0, {"range.bias_m"}, &stereo_params::range_bias_sigma, nullptr, nullptr, head_use::always},

@@ -119,6 +119,8 @@ class stereo_ekf {
   // rows.cpp
   past_pose state_before(double age_s) const;
   past_pose state_at_picture() const;
+  stereo_rig rig() const;
+  void add_lens_columns(const vec3 &x, row_block *out) const;
   mat3 camera_axes() const;  // of the left camera in base_link, with the state of its rotation
   vec3 in_camera(const vec3 &place, const past_pose &past) const;
   point_view view_point(const vec3 &place, const past_pose &past) const;
