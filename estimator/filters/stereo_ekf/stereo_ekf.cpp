@@ -60,11 +60,13 @@ double lasting_error_of(const wm_stereo_ekf_params &p, const stereo_rig &rig) {
   return excess_px2 > 0.0 ? std::sqrt(excess_px2) / rig.fu : 0.0;
 }
 
-// The parameters with what the setup decides: without a pair of cameras there are no points and no tracks, and without
+// The parameters with what the setup decides: without a pair of cameras points are those of the map, by ranges; without
 // a stream of motion velocity and rates are states, and those of a measured twist are not.
 wm_stereo_ekf_params usable(const wm_stereo_ekf_params &params, const stereo_rig &rig, const wm_setup &setup) {
   wm_stereo_ekf_params out = params;
-  if (!rig.there) out.points_max = out.increments = 0;
+  const auto known = static_cast<int32_t>(setup.landmark_count);
+  if (!rig.there && out.points_max > known) out.points_max = known;
+  if (!rig.there) out.increments = out.frames_max = 0;
   if (out.points_max == 0) out.frames_max = 0;
   out.gnss.antenna_sigma_m = antenna_of(setup, params.gnss).sigma_m;
   if (out.camera_rotation_sigma < 0.0) {

@@ -363,6 +363,35 @@ void test_ranges_depth_and_heading_are_rows_too(void) {
   TEST_ASSERT_EQUAL(WM_REJECTED_SINGULAR, records[0].verdict);
 }
 
+// A vehicle without cameras among four anchors, each 10 cm off on the map: the ranges' errors go on alike.
+void test_a_beacons_error_on_the_map_is_not_averaged_away(void) {
+  scene s;
+  s.set("slam.points", 250);
+  s.rig.stereo.left = s.rig.stereo.right = -1;
+  s.points.clear();
+  s.map.clear();
+  for (int i = 0; i < 4; i++) {
+    const vec3 p = {12 * std::cos(1.6 * i), 12 * std::sin(1.6 * i), i % 2 ? 4.0 : -1.0};
+    s.points.push_back({i + 1, {p.x, p.y, p.z}, 0.1, kAbsent, {}, 0});
+    s.map.push_back(
+        {i + 1, {p.x + 0.1 * s.noise(), p.y + 0.1 * s.noise(), p.z + 0.1 * s.noise()}, 0.1, kAbsent, {}, 0});
+  }
+  s.setup.start.sigma_xy_m = 1;
+  s.begin();
+  double worst = 0;
+  for (int i = 0; i < 600; i++) {
+    s.swim(0.1, {0.5, 0, 0}, {0, 0, 0.2});
+    const wm_landmark &at = s.points[static_cast<size_t>(i % 4)];
+    const double range_m = length(vec_of(at.p_m) - s.truth.p) + 0.05 * s.noise();
+    TEST_ASSERT_EQUAL(WM_OK, s.take(make::sighting(s.t_s, at.id, kAbsent, range_m)));
+    if (i < 100) continue;
+    const wm_estimate e = s.estimate();
+    const double off_m = std::hypot(e.pose_map_base.p_m[0] - s.truth.p.x, e.pose_map_base.p_m[1] - s.truth.p.y);
+    worst = std::max(worst, off_m / std::sqrt(e.covariance[0] + e.covariance[7]));
+  }
+  TEST_ASSERT_LESS_THAN_DOUBLE(2.5, worst);
+}
+
 void test_a_copy_with_points_goes_on_alike(void) {
   scene s;
   s.set("slam.points", 60);
@@ -402,6 +431,7 @@ int main(void) {
   RUN_TEST(test_the_time_of_pictures_is_told_by_a_twist_that_swings_alone);
   RUN_TEST(test_scale_and_bias_of_the_twist_are_found_in_both_predictions);
   RUN_TEST(test_ranges_depth_and_heading_are_rows_too);
+  RUN_TEST(test_a_beacons_error_on_the_map_is_not_averaged_away);
   RUN_TEST(test_a_copy_with_points_goes_on_alike);
   return UNITY_END();
 }
