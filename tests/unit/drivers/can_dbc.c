@@ -136,6 +136,20 @@ static void every_prefix(void) {
   }
 }
 
+// How many letters two names differ by, from both sides alike; names that are too long to compare are beyond any limit.
+static void distances_of_names_are_the_same_from_both_sides(void) {
+  char name[80];
+  memset(name, 'n', sizeof name);
+  for (size_t n = 2; n < sizeof name; n++) {
+    const wm_text whole = {name, n}, shorter = {name + 1, n - 1};
+    const size_t apart = wm_text_distance(whole, shorter, 5);
+    TEST_ASSERT_EQUAL_size_t(apart, wm_text_distance(shorter, whole, 5));
+    if (n <= 32) TEST_ASSERT_EQUAL_size_t(1, apart);  // a DBC's names have 32 letters at most
+  }
+  TEST_ASSERT_EQUAL_size_t(2, wm_text_distance(text_of("speed_lf"), text_of("SPEED_FL"), 5));
+  TEST_ASSERT_EQUAL_size_t(2, wm_text_distance(text_of("SPEED_FL"), text_of("speed_lf"), 1));  // one beyond the limit
+}
+
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(odd_but_right);
@@ -143,6 +157,7 @@ int main(void) {
   RUN_TEST(nothing_in_it);
   RUN_TEST(overlapping_signals_are_makers_wish);
   RUN_TEST(multiplexers_in_a_ring);
+  RUN_TEST(distances_of_names_are_the_same_from_both_sides);
   RUN_TEST(not_text);
   RUN_TEST(every_prefix);
   return UNITY_END();
