@@ -8,10 +8,9 @@
 #include <vector>
 
 #include "drives.hpp"
+#include "lone_monitor.hpp"
 #include "parameter_sweep.hpp"
 #include "unity.h"
-#include "waymark/health.h"
-#include "waymark/monitor.h"
 
 namespace {
 
@@ -159,47 +158,6 @@ void a_turn_with_the_wrong_sign_is_named(void) {
 }
 
 // ── causes, one at a time, by the monitor alone ─────────────────────────────────────────────────────────────────────
-
-// Seconds of an estimator that gives this estimate and refuses or fuses ten sightings a second.
-struct lone {
-  wm_monitor monitor;
-  wm_setup setup{};
-  wm_landmark landmark{};
-  wm_raster map{};
-  wm_estimate estimate{};
-  wm_time_ns now_ns = 0;
-
-  explicit lone(bool has_landmarks, bool has_map = false) {
-    setup.landmarks = &landmark;
-    setup.landmark_count = has_landmarks;
-    map.width_px = map.height_px = 100;
-    map.resolution_m = 0.1;
-    if (has_map) setup.map = &map;
-    wm_monitor_init(&monitor, &setup, 1);
-    estimate.state = WM_STATE_TRACKING;
-    estimate.lost_probability = NAN;
-    for (int axis : {0, 1, 5}) estimate.covariance[wm_cov_index(axis, axis)] = 0.01;
-  }
-  wm_estimate drive(double seconds, wm_verdict verdict) {
-    wm_estimate out = estimate;
-    for (const wm_time_ns until_ns = now_ns + wm_ns_from_seconds(seconds); now_ns < until_ns;
-         now_ns += 100 * WM_NS_PER_MS) {
-      wm_event e{};
-      e.kind = WM_EVENT_SIGHTING;
-      e.t_ns = now_ns;
-      wm_innovation record{};
-      record.residual = WM_RESIDUAL_RANGE;
-      record.verdict = static_cast<uint8_t>(verdict);
-      record.observed = now_ns / (100 * WM_NS_PER_MS) % 2 ? 0.08 : -0.08;
-      record.variance = 0.01;
-      out = estimate;
-      out.t_ns = now_ns;
-      if (wm_monitor_take(&monitor, &e, &record, 1)) wm_monitor_step(&monitor, &out, nullptr, 0);
-      wm_monitor_judge(&monitor, &out);
-    }
-    return out;
-  }
-};
 
 // A car with a receiver: ten seconds of driving straight and a turn by 90 degrees, in turns to the left and to the
 // right. `side` -1: the positions are mirrored.
@@ -513,5 +471,6 @@ int main(void) {
   RUN_TEST(positions_far_from_the_way_are_doubt);
   RUN_TEST(a_found_pose_is_degraded_unless_the_one_before_was_proven);
   RUN_TEST(a_pose_that_fits_after_long_is_a_found_one);
+  run_window_tests();
   return UNITY_END();
 }

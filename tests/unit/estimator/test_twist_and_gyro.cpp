@@ -73,6 +73,24 @@ void test_a_twist_alone_is_as_ever(void) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.1 * 0.98, pose.heading_rad);
 }
 
+// 138 m/s are refused beside a gyro, too: the speed before holds with the noise of what the robot may have done, and
+// the health has it for five seconds.
+void test_a_speed_that_no_robot_reaches_is_refused_beside_a_gyro(void) {
+  const auto rate = [](int i) { return noise(i); };
+  begin();
+  drive(0, 1, 0.5, 0.0, 0.0, rate);
+  TEST_ASSERT_EQUAL_HEX32(0, front.health());
+  const double before_m2 = noise_sum.distance_m2;
+  drive(1, 1.2, 138.0, 0.0, 0.0, rate);
+  TEST_ASSERT_EQUAL_HEX32(WM_MOTION_HEALTH_IMPLAUSIBLE, front.health());
+  drive(1.2, 1.4, 0.5, 0.0, 0.0, rate);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.5 * 1.39, pose.x_m);
+  const double physical_m = 0.5 * 15.0 * 0.2 * 0.2 / std::sqrt(3.0);  // 15 m/s2 either way
+  TEST_ASSERT_GREATER_THAN_DOUBLE(physical_m * physical_m, noise_sum.distance_m2 - before_m2);
+  drive(1.4, 6.5, 0.5, 0.0, 0.0, rate);
+  TEST_ASSERT_EQUAL_HEX32(0, front.health());
+}
+
 // A gyro of 5 Hz is overdue after three of its periods, not after the 0.25 s of quick ones.
 void test_a_slow_gyro_is_overdue_by_its_own_period(void) {
   begin();
@@ -188,6 +206,7 @@ int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_the_turn_is_the_gyros_and_the_way_the_twists);
   RUN_TEST(test_a_twist_alone_is_as_ever);
+  RUN_TEST(test_a_speed_that_no_robot_reaches_is_refused_beside_a_gyro);
   RUN_TEST(test_a_slow_gyro_is_overdue_by_its_own_period);
   RUN_TEST(test_a_silent_gyro_is_replaced_and_taken_up_again);
   RUN_TEST(test_the_twist_is_no_silent_speed_when_a_gyro_comes);
