@@ -104,6 +104,24 @@ void test_a_silent_imu_yields_to_the_logs_rates(void) {
 }
 
 // A velocity that holds while the gyro goes on is not certain for ever.
+// Beside an IMU the log's velocity holds for hold_max_s, and no longer.
+void test_a_velocity_holds_for_its_time_and_no_longer(void) {
+  spatial_source source;
+  source.init(2.0, {0.05, 0.02});
+  spatial_twist now = {{0.5, 0.1, 0.0}, {0.0, 0.0, 0.0}};
+  TEST_ASSERT_TRUE(source.take(velocity_log(0.0, now.v), &now));
+  wm_event e = imu(2.0, {0.0, 0.0, 0.01}, {0.0, 0.0, kG});
+  TEST_ASSERT_TRUE(source.take(e, &now));
+  TEST_ASSERT_EQUAL_DOUBLE(0.5, now.v.x);
+  TEST_ASSERT_EQUAL_DOUBLE(0.1, now.v.y);
+  TEST_ASSERT_EQUAL_DOUBLE(0.01, now.w.z);
+  e.t_ns++;
+  TEST_ASSERT_TRUE(source.take(e, &now));
+  TEST_ASSERT_EQUAL_DOUBLE(0.0, now.v.x);
+  TEST_ASSERT_EQUAL_DOUBLE(0.0, now.v.y);
+  TEST_ASSERT_EQUAL_DOUBLE(0.01, now.w.z);
+}
+
 void test_a_silent_log_beside_an_imu_makes_the_place_uncertain(void) {
   vehicle v(0);
   const auto turning = [](int i) { return vec3{jitter(i), jitter(i), 0.1}; };
@@ -213,6 +231,7 @@ int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_the_rates_are_the_imus_and_the_velocity_the_logs);
   RUN_TEST(test_a_silent_imu_yields_to_the_logs_rates);
+  RUN_TEST(test_a_velocity_holds_for_its_time_and_no_longer);
   RUN_TEST(test_a_silent_log_beside_an_imu_makes_the_place_uncertain);
   RUN_TEST(test_a_stuck_axis_is_found);
   RUN_TEST(test_the_filter_reports_a_stuck_axis);
