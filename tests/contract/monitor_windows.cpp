@@ -8,8 +8,7 @@
 
 namespace {
 
-// A long agreement is no contradiction, and ten times as long makes up for a contradiction: a fault after it counts as
-// ever.
+// Agreement that lasts ten times as long makes up for a contradiction: a fault after it counts as the first one did.
 void what_was_contradicted_is_forgiven_in_time(void) {
   for (const bool once : {false, true}) {
     lone robot(true);
@@ -20,8 +19,8 @@ void what_was_contradicted_is_forgiven_in_time(void) {
   }
 }
 
-// Landmarks of which nothing is known say nothing of the pose: they don't take a doubt back.
-void unknown_landmarks_do_not_take_doubt_back(void) {
+// Sightings of landmarks that the map lacks are no evidence for the pose: they do not lower the doubt.
+void unknown_landmarks_do_not_lower_the_doubt(void) {
   lone robot(true);
   (void)robot.drive(20, WM_FUSED);
   TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, robot.drive(8, WM_REJECTED_GATE).state);
@@ -129,7 +128,7 @@ void a_pose_that_is_found_again_soon_is_on_probation(void) {
 void run_window_tests(void) {
   Unity.TestFile = __FILE__;
   RUN_TEST(what_was_contradicted_is_forgiven_in_time);
-  RUN_TEST(unknown_landmarks_do_not_take_doubt_back);
+  RUN_TEST(unknown_landmarks_do_not_lower_the_doubt);
   RUN_TEST(refused_sightings_are_doubt_beyond_what_chance_gives);
   RUN_TEST(landmarks_of_one_picture_count_as_four_at_most);
   RUN_TEST(positions_five_seconds_apart_count_each);

@@ -262,8 +262,8 @@ void expect_row_of_f(int state, const double (&row)[kMax], double added, const d
     }
 }
 
-// A copy knows what the original does, less what the copying adds; a state that is carried on grows with those it
-// follows.
+// A copied state has the covariances of the original, and the variance that copying adds. A carried one is moved by the
+// states that it depends on.
 void test_a_copied_and_a_carried_state(void) {
   make_busy_filter();
   double p[kMax][kMax] = {}, copied[kMax] = {}, carried[kMax] = {};

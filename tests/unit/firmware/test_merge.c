@@ -229,8 +229,8 @@ static void a_source_that_fell_silent_is_stale_against_its_own_rate(void) {
   TEST_ASSERT_EQUAL(1, wm_merge_is_stale(merge, 1, 2001 * MS));  // never spoke
 }
 
-// A source that never spoke is silent since the run's clock began, whatever time that is.
-static void a_source_that_never_spoke_is_silent_since_the_start(void) {
+// A source without any datum is silent since the run's clock began, whatever time that is.
+static void a_source_without_data_is_silent_since_the_start(void) {
   open_merge((wm_merge_source[]){kMotion, kCamera}, 2);
   TEST_ASSERT_EQUAL_INT64(0, wm_merge_silent_ns(merge, 1, 3600 * WM_NS_PER_S));  // no clock yet
   for (int i = 0; i < 10; i++) arrive(0, 3600 * WM_NS_PER_S + i * 10 * MS, 3600 * WM_NS_PER_S + i * 10 * MS);
@@ -382,7 +382,7 @@ int main(void) {
   RUN_TEST(a_full_queue_drops_the_newest_and_counts);
   RUN_TEST(stamps_from_the_future_and_absurd_ones_are_refused);
   RUN_TEST(a_source_that_fell_silent_is_stale_against_its_own_rate);
-  RUN_TEST(a_source_that_never_spoke_is_silent_since_the_start);
+  RUN_TEST(a_source_without_data_is_silent_since_the_start);
   RUN_TEST(a_slow_source_is_stale_after_ten_of_its_periods);
   RUN_TEST(random_lateness_below_the_bound_gives_exactly_the_sorted_stream);
   RUN_TEST(any_input_comes_out_in_order_and_is_accounted_for);
