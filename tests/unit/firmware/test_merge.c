@@ -89,6 +89,9 @@ static void p99_of_the_lateness(void) {
   arrive(1, 1100 * MS, 1150 * MS);
   TEST_ASSERT_EQUAL_INT64(51 * MS, wm_merge_lateness_p99(merge, 1));
   open_merge((wm_merge_source[]){kMotion, kCamera}, 2);
+  arrive(1, 0, (WM_MERGE_LATENESS_BINS - 2) * MS + 1);  // up to the last bin: the next whole ms
+  TEST_ASSERT_EQUAL_INT64((WM_MERGE_LATENESS_BINS - 1) * MS, wm_merge_lateness_p99(merge, 1));
+  open_merge((wm_merge_source[]){kMotion, kCamera}, 2);
   arrive(1, 0, 2000 * MS);  // beyond the last bin: as it was
   TEST_ASSERT_EQUAL_INT64(2000 * MS, wm_merge_lateness_p99(merge, 1));
   open_merge((wm_merge_source[]){kMotion, kCamera}, 2);
