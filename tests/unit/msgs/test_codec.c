@@ -378,6 +378,27 @@ static void a_rig_comes_back_and_a_cut_one_is_refused(void) {
   TEST_ASSERT_EQUAL(WM_BAD_DATA, wm_rig_decode(bytes, count, &back, &used));
 }
 
+// Of a rig of which nothing is known no number is given, and no camera belongs to the pair.
+static void a_rig_of_which_nothing_is_known_has_no_numbers(void) {
+  wm_rig rig;
+  memset(&rig, 0x55, sizeof rig);
+  wm_rig_init(&rig);
+  TEST_ASSERT_EQUAL(0, rig.camera_count);
+  TEST_ASSERT_EQUAL(-1, rig.stereo.left);
+  TEST_ASSERT_EQUAL(-1, rig.stereo.right);
+  TEST_ASSERT_EQUAL_STRING("", rig.marker_family);
+  TEST_ASSERT_DOUBLE_IS_NAN(rig.stereo.baseline_m);
+  TEST_ASSERT_DOUBLE_IS_NAN(rig.marker_size_m);
+  for (int i = 0; i < 4; i++) {
+    TEST_ASSERT_DOUBLE_IS_NAN(rig.stereo.rectified_px[i]);
+    TEST_ASSERT_DOUBLE_IS_NAN(rig.stereo.sigma_px[i]);
+  }
+  for (int i = 0; i < 3; i++) {
+    TEST_ASSERT_DOUBLE_IS_NAN(rig.twist6_sigma_v_mps[i]);
+    TEST_ASSERT_DOUBLE_IS_NAN(rig.twist6_sigma_w_radps[i]);
+  }
+}
+
 // Each model of a camera, none beside them, and names that fill their room.
 static void cameras_of_a_rig_have_a_model_and_a_name(void) {
   wm_rig rig, back;
@@ -471,6 +492,7 @@ int main(void) {
   RUN_TEST(an_innovation_comes_back_and_unknown_verdicts_do_not);
   RUN_TEST(a_setup_comes_back);
   RUN_TEST(a_rig_comes_back_and_a_cut_one_is_refused);
+  RUN_TEST(a_rig_of_which_nothing_is_known_has_no_numbers);
   RUN_TEST(cameras_of_a_rig_have_a_model_and_a_name);
   RUN_TEST(absent_numbers_of_a_landmark_are_nan_and_keep_the_hash_of_older_logs);
   RUN_TEST(a_landmark_overwrites_all_of_its_memory);
