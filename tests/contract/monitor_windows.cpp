@@ -48,6 +48,17 @@ void refused_sightings_are_doubt_beyond_what_chance_gives(void) {
   TEST_ASSERT_EQUAL(WM_STATE_TRACKING, state_of_refused(8, true));
 }
 
+// Of the mean square of 33 slots 1.5 is as stated, and chi-square exceeds 2 times that with less than 1e-4.
+void innovations_larger_than_stated_are_inconsistent(void) {
+  for (const double sigmas : {1.2, 2.2}) {
+    lone robot(true);
+    const wm_estimate out = robot.observe(
+        20, WM_EVENT_SIGHTING, [&](int step, auto take) { take({record_of(WM_FUSED, step % 2 ? sigmas : -sigmas)}); });
+    TEST_ASSERT_EQUAL(sigmas < 2.0 ? WM_CAUSE_NONE : WM_CAUSE_INCONSISTENT, out.cause);
+    TEST_ASSERT_EQUAL(sigmas < 2.0, out.state == WM_STATE_TRACKING);
+  }
+}
+
 // The state after 20 s of so many landmarks in each picture, all off by so many sigmas.
 uint8_t state_of_pictures(int landmarks, double sigmas) {
   return lone(true)
@@ -130,6 +141,7 @@ void run_window_tests(void) {
   RUN_TEST(what_was_contradicted_is_forgiven_in_time);
   RUN_TEST(unknown_landmarks_do_not_lower_the_doubt);
   RUN_TEST(refused_sightings_are_doubt_beyond_what_chance_gives);
+  RUN_TEST(innovations_larger_than_stated_are_inconsistent);
   RUN_TEST(landmarks_of_one_picture_count_as_four_at_most);
   RUN_TEST(positions_five_seconds_apart_count_each);
   RUN_TEST(without_positions_nothing_is_mirrored);

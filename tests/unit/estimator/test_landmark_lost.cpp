@@ -207,6 +207,29 @@ void test_the_worst_landmark_is_left_out(void) {
     }
 }
 
+// GIVEN three landmarks WHEN so many others come that there is no room for all THEN those not seen for longest make
+// room.
+void test_landmarks_not_seen_for_longest_make_room(void) {
+  const int old = 3;
+  for (const int later : {WM_MONITOR_LANDMARKS - 3, WM_MONITOR_LANDMARKS - 2, WM_MONITOR_LANDMARKS}) {
+    wm_monitor_landmarks seen;
+    wm::landmark_bias_clear(&seen);
+    for (int k = 0; k < 60; k++)
+      for (int id = k < 30 ? 0 : old; id < (k < 30 ? old : old + later); id++) {
+        wm_innovation i{};
+        i.t_ns = make::at(0.3 * k);
+        i.landmark_id = id;
+        i.residual = WM_RESIDUAL_RANGE;
+        i.variance = 1.0;
+        wm::landmark_bias_take(&seen, i);
+      }
+    int kept = 0;
+    for (uint32_t k = 0; k < seen.count; k++) kept += seen.entries[k].id < old;
+    TEST_ASSERT_EQUAL(WM_MONITOR_LANDMARKS, seen.count);
+    TEST_ASSERT_EQUAL(WM_MONITOR_LANDMARKS - later, kept);
+  }
+}
+
 void test_one_that_contradicts_has_moved_and_many_mean_lost(void) {
   wm::landmark_record record[kLandmarks] = {};
   wm::landmark_evidence w;
@@ -488,6 +511,7 @@ int main(void) {
   RUN_TEST(test_an_old_contradiction_is_forgotten);
   RUN_TEST(test_positions_that_contradict_for_long_are_no_multipath);
   RUN_TEST(test_the_worst_landmark_is_left_out);
+  RUN_TEST(test_landmarks_not_seen_for_longest_make_room);
   RUN_TEST(test_one_that_contradicts_has_moved_and_many_mean_lost);
   RUN_TEST(test_one_against_one_is_doubt_not_lost);
   RUN_TEST(test_misfits_that_scatter_say_nothing_those_in_one_place_do);
