@@ -127,6 +127,18 @@ void test_prediction_carries_the_right_derivatives(void) {
   TEST_ASSERT_EQUAL(12, checked);
 }
 
+// What the noise's adaption takes of a row: its derivatives by the pose, and by a position's lasting error where that
+// is a state.
+void test_a_projection_has_the_row_s_part_of_the_pose(void) {
+  make_busy_filter();
+  wm::planar_row row;
+  row.add(0, 0.3), row.add(2, -1.1), row.add(3, 0.7), row.add(4, 0.2);
+  wm::projection projected;
+  filter->project(row, &projected);
+  const double expected[wm::noise_adaption::kBlock] = {0.3, 0.0, -1.1, 0.0, 0.0};
+  for (int i = 0; i < wm::noise_adaption::kBlock; i++) TEST_ASSERT_EQUAL_DOUBLE(expected[i], projected.by[i]);
+}
+
 void test_josephs_form_is_the_plain_one_at_the_best_gain(void) {
   make_busy_filter();
   const int n = filter->states();
@@ -324,6 +336,7 @@ int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_kernels_and_their_scalar_twins_give_the_same_bits);
   RUN_TEST(test_prediction_carries_the_right_derivatives);
+  RUN_TEST(test_a_projection_has_the_row_s_part_of_the_pose);
   RUN_TEST(test_josephs_form_is_the_plain_one_at_the_best_gain);
   RUN_TEST(test_the_second_innovation_by_the_corrected_states);
   RUN_TEST(test_one_number_after_the_other_is_all_at_once);
