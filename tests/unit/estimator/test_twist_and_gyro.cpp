@@ -179,6 +179,27 @@ void test_noise_of_a_holonomic_twist_is_counted_once(void) {
   TEST_ASSERT_DOUBLE_WITHIN(0.08, 1.04, noise_sum.rotation_rad2 / (0.01 * 0.01 * kSeconds));
 }
 
+// GIVEN exact samples of a holonomic drive WHEN one axis changes by 0.4 each 0.1 s THEN the change, whose moment
+// between two samples is unknown, is noise of that axis alone: its square times dt^2 / 12.
+void test_a_change_of_one_axis_is_noise_of_that_axis(void) {
+  for (int axis = 0; axis < 3; axis++) {
+    begin();
+    params.states.drive = WM_DRIVE_HOLONOMIC;
+    params.noise_speed_mps = params.noise_sideways_mps = params.noise_yaw_rate_radps = 0;
+    params.noise_speed_rel = params.noise_sideways_rel = params.noise_side_rel = params.noise_yaw_rate_rel = 0;
+    wm::motion_noise before{};
+    for (int i = 0; i <= 400; i++) {  // the mean square has settled after half of them
+      const double by = i % 2 ? 0.2 : -0.2;
+      feed(make::twist6(0.1 * i, axis == 0 ? 0.5 + by : 0.5, axis == 1 ? 0.5 + by : 0.5, axis == 2 ? by : 0.0));
+      if (i == 200) before = noise_sum;
+    }
+    const double each = 0.4 * 0.4 * 0.1 * 0.1 / 12.0;
+    TEST_ASSERT_DOUBLE_WITHIN(2.0 * each, axis == 0 ? 200 * each : 0.0, noise_sum.distance_m2 - before.distance_m2);
+    TEST_ASSERT_DOUBLE_WITHIN(2.0 * each, axis == 1 ? 200 * each : 0.0, noise_sum.lateral_m2 - before.lateral_m2);
+    TEST_ASSERT_DOUBLE_WITHIN(2.0 * each, axis == 2 ? 200 * each : 0.0, noise_sum.rotation_rad2 - before.rotation_rad2);
+  }
+}
+
 void test_a_turn_on_the_spot_is_no_standstill(void) {
   double rate = 0;
   begin();
@@ -214,6 +235,7 @@ int main(void) {
   RUN_TEST(test_a_stop_does_not_mend_a_stuck_gyro);
   RUN_TEST(test_what_a_stuck_gyro_missed_is_uncertain);
   RUN_TEST(test_noise_of_a_holonomic_twist_is_counted_once);
+  RUN_TEST(test_a_change_of_one_axis_is_noise_of_that_axis);
   RUN_TEST(test_a_turn_on_the_spot_is_no_standstill);
   RUN_TEST(test_commands_keep_their_own_turn_rate);
   return UNITY_END();
