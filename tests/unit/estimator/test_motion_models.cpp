@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The choice of the motion's model: by the data that come, and by what is known to be there before the drive. Counts
-// that come twice, and again after a silence.
+// The choice of the motion's model: by the data that come, and by what is known to be there before the drive. Factors
+// of its noise. Counts that come twice, and again after a silence.
 #include <cmath>
 #include <initializer_list>
 
@@ -210,6 +210,26 @@ void test_a_known_way_in_an_unknown_direction(void) {
   }
 }
 
+// Factors of the variances of way and turn leave the correlation of the two as it is.
+void test_factors_of_the_noise_keep_its_correlation(void) {
+  wm_motion_params params;
+  wm_params_defaults(&wm_motion_params_table, &params);
+  const wm_wheels wheels = make::two_wheels();
+  const wm_motion_calibration c = wm::kNeutralCalibration;
+  const wm::stated_noise none = {NAN, NAN, NAN};
+  wm::motion_input input{};
+  input.model = WM_MOTION_TICKS;
+  input.a = 1.0, input.b = 1.4;
+  const wm::motion_twist twist = wm::twist_of(input, c, wheels, {});
+  const wm::motion_noise plain = wm::noise_of(input, twist, 0.1, params, wheels, c, none, {1.0, 1.0}),
+                         more = wm::noise_of(input, twist, 0.1, params, wheels, c, none, {4.0, 9.0});
+  TEST_ASSERT_GREATER_THAN_DOUBLE(0.0, plain.distance_rotation);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 4.0, more.distance_m2 / plain.distance_m2);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 4.0, more.lateral_m2 / plain.lateral_m2);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 9.0, more.rotation_rad2 / plain.rotation_rad2);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 6.0, more.distance_rotation / plain.distance_rotation);
+}
+
 void count(drive *d, double t_s, double way_m) {
   const double ticks = way_m / kTick;
   d->feed(make::quantities(t_s, {{WM_Q_WHEEL_TICKS_LEFT, ticks}, {WM_Q_WHEEL_TICKS_RIGHT, ticks}}));
@@ -279,6 +299,7 @@ int main(void) {
   RUN_TEST(test_repeated_numbers_that_are_right_are_no_fault);
   RUN_TEST(test_what_may_have_moved_unseen);
   RUN_TEST(test_a_known_way_in_an_unknown_direction);
+  RUN_TEST(test_factors_of_the_noise_keep_its_correlation);
   RUN_TEST(test_a_count_that_comes_twice_counts_once);
   RUN_TEST(test_counts_without_a_sign_take_it_from_the_gear);
   RUN_TEST(test_the_way_is_counted_again_after_a_silence);
