@@ -8,10 +8,9 @@
 #include <vector>
 
 #include "drives.hpp"
+#include "lone_monitor.hpp"
 #include "parameter_sweep.hpp"
 #include "unity.h"
-#include "waymark/health.h"
-#include "waymark/monitor.h"
 
 namespace {
 
@@ -160,57 +159,17 @@ void a_turn_with_the_wrong_sign_is_named(void) {
 
 // ── causes, one at a time, by the monitor alone ─────────────────────────────────────────────────────────────────────
 
-// Seconds of an estimator that gives this estimate and refuses or fuses ten sightings a second.
-struct lone {
-  wm_monitor monitor;
-  wm_setup setup{};
-  wm_landmark landmark{};
-  wm_raster map{};
-  wm_estimate estimate{};
-  wm_time_ns now_ns = 0;
-
-  explicit lone(bool has_landmarks, bool has_map = false) {
-    setup.landmarks = &landmark;
-    setup.landmark_count = has_landmarks;
-    map.width_px = map.height_px = 100;
-    map.resolution_m = 0.1;
-    if (has_map) setup.map = &map;
-    wm_monitor_init(&monitor, &setup, 1);
-    estimate.state = WM_STATE_TRACKING;
-    estimate.lost_probability = NAN;
-    for (int axis : {0, 1, 5}) estimate.covariance[wm_cov_index(axis, axis)] = 0.01;
-  }
-  wm_estimate drive(double seconds, wm_verdict verdict) {
-    wm_estimate out = estimate;
-    for (const wm_time_ns until_ns = now_ns + wm_ns_from_seconds(seconds); now_ns < until_ns;
-         now_ns += 100 * WM_NS_PER_MS) {
-      wm_event e{};
-      e.kind = WM_EVENT_SIGHTING;
-      e.t_ns = now_ns;
-      wm_innovation record{};
-      record.residual = WM_RESIDUAL_RANGE;
-      record.verdict = static_cast<uint8_t>(verdict);
-      record.observed = now_ns / (100 * WM_NS_PER_MS) % 2 ? 0.08 : -0.08;
-      record.variance = 0.01;
-      out = estimate;
-      out.t_ns = now_ns;
-      if (wm_monitor_take(&monitor, &e, &record, 1)) wm_monitor_step(&monitor, &out, nullptr, 0);
-      wm_monitor_judge(&monitor, &out);
-    }
-    return out;
-  }
-};
-
 // A car with a receiver: ten seconds of driving straight and a turn by 90 degrees, in turns to the left and to the
-// right. `side` -1: the positions are mirrored.
-wm_estimate drive_by_positions(double seconds, double side, double v_mps) {
+// right. `side` -1: the positions are mirrored. One comes at each `every`th of ten steps a second.
+wm_estimate drive_by_positions(double seconds, double side, double v_mps, int every = 1) {
   lone robot(false);
   double x_m = 0.0, y_m = 0.0, heading_rad = 0.0;
   wm_estimate out{};
-  for (double t_s = 0.0; t_s < seconds; t_s += 0.1) {
+  for (int step = 0; 0.1 * step < seconds; step++) {
+    const double t_s = 0.1 * step;
     const double w_radps = std::fmod(t_s, 15.0) < 10.0 ? 0.0 : std::fmod(t_s, 45.0) < 30.0 ? 0.314 : -0.314;
     wm_event e{};
-    e.kind = WM_EVENT_POSITION;
+    e.kind = step % every == 0 ? WM_EVENT_POSITION : WM_EVENT_TWIST2;
     e.t_ns = wm_ns_from_seconds(t_s);
     e.as.position.p_m[0] = x_m + 5.0 * std::sin(7.0 * t_s);
     e.as.position.p_m[1] = side * y_m + 5.0 * std::cos(11.0 * t_s);
@@ -227,7 +186,8 @@ wm_estimate drive_by_positions(double seconds, double side, double v_mps) {
     record.residual = WM_RESIDUAL_X;
     record.verdict = WM_FUSED;
     record.variance = 100.0;
-    if (wm_monitor_take(&robot.monitor, &e, &record, 1)) wm_monitor_step(&robot.monitor, &out, nullptr, 0);
+    if (wm_monitor_take(&robot.monitor, &e, &record, step % every == 0))
+      wm_monitor_step(&robot.monitor, &out, nullptr, 0);
     wm_monitor_judge(&robot.monitor, &out);
     heading_rad += w_radps * 0.1;
     x_m += v_mps * std::cos(heading_rad) * 0.1;
@@ -258,6 +218,13 @@ void positions_that_may_be_mirrored_widen_the_covariance(void) {
     TEST_ASSERT_GREATER_THAN_DOUBLE(0.05, chance);
     TEST_ASSERT_LESS_THAN_DOUBLE(1.0, chance);
   }
+}
+
+// A mirror image of fewer than three places fits as well as the way itself. A window of 30 s reaches back less than
+// three times its length: of positions each 44 s it has three, of positions each 45 s two.
+void sparse_positions_show_no_mirror_image(void) {
+  TEST_ASSERT_GREATER_THAN_DOUBLE(1.0, drive_by_positions(200, -1, 10, 440).covariance[0]);
+  TEST_ASSERT_EQUAL_DOUBLE(0.01, drive_by_positions(200, -1, 10, 450).covariance[0]);
 }
 
 // 60 m/s at 0.3 rad/s are 19 m/s2.
@@ -499,6 +466,7 @@ int main(void) {
   RUN_TEST(a_turn_with_the_wrong_sign_is_named);
   RUN_TEST(positions_that_turn_to_the_other_side_are_degraded);
   RUN_TEST(positions_that_may_be_mirrored_widen_the_covariance);
+  RUN_TEST(sparse_positions_show_no_mirror_image);
   RUN_TEST(a_turn_that_no_vehicle_can_drive_is_degraded);
   RUN_TEST(values_far_from_what_is_stated_are_degraded);
   RUN_TEST(lengths_that_contradict_each_other_are_degraded);
@@ -513,5 +481,6 @@ int main(void) {
   RUN_TEST(positions_far_from_the_way_are_doubt);
   RUN_TEST(a_found_pose_is_degraded_unless_the_one_before_was_proven);
   RUN_TEST(a_pose_that_fits_after_long_is_a_found_one);
+  run_window_tests();
   return UNITY_END();
 }

@@ -55,6 +55,19 @@ static void one_raw_value_is_one_gear(void) {
   close_it(&f);
 }
 
+// A refusal lists the names of its own signal: none of the one that was refused before.
+static void names_that_are_no_gears(void) {
+  static const char kNamed[] =
+      "BO_ 256 M: 8 X\n SG_ G : 16|8@1+ (1,0) [0|0] \"\" X\nVAL_ 256 G 0 \"open\" 1 \"closed\" ;\n";
+  const wm_can_binding b = binding(WM_Q_GEAR, "M", "G");
+  for (int round = 0; round < 2; round++) {
+    TEST_ASSERT_EQUAL(WM_BAD_CONFIG, open_with(&f, kNamed, &b, 1));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(f.err.text, "none of the names in VAL_ (\"open\", \"closed\") is a gear"),
+                                 f.err.text);
+    refused(&b, 1, "the DBC has no VAL_ names for this signal; write");
+  }
+}
+
 static void messages_that_are_not_there(void) {
   const wm_can_binding b = binding(WM_Q_VEHICLE_SPEED, "quite_another_name", "A");
   refused(&b, 1, "message 'quite_another_name' is not among the 2 messages of car.dbc");
@@ -122,6 +135,7 @@ int main(void) {
   UNITY_BEGIN();
   RUN_TEST(numbers_that_are_none);
   RUN_TEST(one_raw_value_is_one_gear);
+  RUN_TEST(names_that_are_no_gears);
   RUN_TEST(messages_that_are_not_there);
   RUN_TEST(sums_keep_signs_and_units);
   RUN_TEST(outermost_values_are_no_measurement);

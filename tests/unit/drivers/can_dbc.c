@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // DBC files as they come: what is passed over, what is read across it, and that parts of a file never crash the reader.
+#include <stdio.h>
 #include <stdlib.h>
 
 #include "dbc.h"
@@ -102,6 +103,17 @@ static void overlapping_signals_are_makers_wish(void) {
   wm_dbc_free(dbc);
 }
 
+// A factor is one whole number that a double holds.
+static void factors_that_are_no_numbers(void) {
+  static const char *const kFactors[] = {"1e999", "-1e999", "1-2", "1.2.3", "1e5e5", "e", "."};
+  for (size_t i = 0; i < sizeof kFactors / sizeof kFactors[0]; i++) {
+    char text[120];
+    (void)snprintf(text, sizeof text, "BO_ 1 M: 8 X\n SG_ A : 0|8@1+ (%s,0) [0|0] \"\" X\n", kFactors[i]);
+    TEST_ASSERT_EQUAL_MESSAGE(WM_BAD_CONFIG, wm_dbc_parse(text, strlen(text), "car.dbc", &dbc, &err), kFactors[i]);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(err.text, "car.dbc:2: SG_ A: expected (FACTOR,OFFSET)"), err.text);
+  }
+}
+
 static void multiplexers_in_a_ring(void) {
   load(
       "BO_ 1 M: 8 X\n SG_ A m1M : 0|8@1+ (1,0) [0|0] \"\" X\n SG_ B m1M : 8|8@1+ (1,0) [0|0] \"\" X\n"
@@ -136,13 +148,29 @@ static void every_prefix(void) {
   }
 }
 
+// How many letters two names differ by, from both sides alike; names that are too long to compare are beyond any limit.
+static void distances_of_names_are_the_same_from_both_sides(void) {
+  char name[80];
+  memset(name, 'n', sizeof name);
+  for (size_t n = 2; n < sizeof name; n++) {
+    const wm_text whole = {name, n}, shorter = {name + 1, n - 1};
+    const size_t apart = wm_text_distance(whole, shorter, 5);
+    TEST_ASSERT_EQUAL_size_t(apart, wm_text_distance(shorter, whole, 5));
+    if (n <= 32) TEST_ASSERT_EQUAL_size_t(1, apart);  // a DBC's names have 32 letters at most
+  }
+  TEST_ASSERT_EQUAL_size_t(2, wm_text_distance(text_of("speed_lf"), text_of("SPEED_FL"), 5));
+  TEST_ASSERT_EQUAL_size_t(2, wm_text_distance(text_of("SPEED_FL"), text_of("speed_lf"), 1));  // one beyond the limit
+}
+
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(odd_but_right);
   RUN_TEST(long_names_of_no_message);
   RUN_TEST(nothing_in_it);
   RUN_TEST(overlapping_signals_are_makers_wish);
+  RUN_TEST(factors_that_are_no_numbers);
   RUN_TEST(multiplexers_in_a_ring);
+  RUN_TEST(distances_of_names_are_the_same_from_both_sides);
   RUN_TEST(not_text);
   RUN_TEST(every_prefix);
   return UNITY_END();

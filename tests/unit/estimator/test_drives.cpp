@@ -62,6 +62,19 @@ void test_sideways_has_noise_of_its_own(void) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-6, 2.0 * (speed_mps * speed_mps + slip_mps * slip_mps), filter.covariance(0, 0));
 }
 
+// GIVEN a base that could drive sideways WHEN it stands THEN its noise has the factor of a robot at rest, sideways as
+// well as forwards.
+void test_at_rest_the_noise_sideways_falls_as_well(void) {
+  begin(WM_DRIVE_HOLONOMIC, make::no_wheels(), false);
+  params.noise_speed_mps = params.noise_sideways_mps = 0.04;
+  params.noise_rest_factor = 0.1;
+  double before_m2[2];
+  for (int k = 0; k < 2; k++) before_m2[k] = filter.covariance(k, k);
+  for (int i = 0; i <= 20; i++) filter.move(make::twist6(0.1 * i, 0.0, 0.0, 0.0));
+  for (int k = 0; k < 2; k++)
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 2.0 * 0.004 * 0.004, filter.covariance(k, k) - before_m2[k]);
+}
+
 // GIVEN wheels that roll WHEN a twist has a sideways speed THEN it is used, without a state of its own: the odometry of
 // a rolling base by pictures, or of a base_link that is not on the axle, has it, too.
 void test_a_rolling_base_uses_a_sideways_speed_without_a_scale(void) {
@@ -135,6 +148,7 @@ void tearDown(void) {}
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_sideways_has_noise_of_its_own);
+  RUN_TEST(test_at_rest_the_noise_sideways_falls_as_well);
   RUN_TEST(test_a_rolling_base_uses_a_sideways_speed_without_a_scale);
   RUN_TEST(test_the_sideways_scale_is_found);
   RUN_TEST(test_skid_steer_finds_its_centre_and_its_track);

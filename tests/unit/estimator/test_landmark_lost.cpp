@@ -165,26 +165,69 @@ void test_an_old_contradiction_is_forgotten(void) {
   TEST_ASSERT_GREATER_THAN_DOUBLE(prior + 0.1, evidence.log_odds());
 }
 
-// The worst landmark may have moved; a second one whose innovations have a mean contradicts. Of one alone nothing is
-// left.
+// GIVEN positions that contradict the pose WHEN they do so for twenty seconds THEN that is no multipath, which passes
+// in five: they count more than the one wrong position in twenty by which a single one is explained.
+void test_positions_that_contradict_for_long_are_no_multipath(void) {
+  wm::landmark_evidence evidence;
+  const double prior = -3.0, by_multipath = std::log(1.0 / 0.05);
+  evidence.begin(prior);
+  for (int i = 0; i <= 20; i++) {
+    evidence.note(make::at(i), wm::kPositionKey, wm::landmark_evidence::max_log_bayes_factor(), NAN, 9.0, nullptr);
+    if (i < 3) TEST_ASSERT_LESS_THAN_DOUBLE(by_multipath, evidence.log_odds() - prior);
+  }
+  TEST_ASSERT_GREATER_THAN_DOUBLE(by_multipath + 1.0, evidence.log_odds() - prior);
+}
+
+// Landmarks of which the first `off`, or the last ones, have innovations with this mean.
+bool mean_contradicts(int off, int count, bool last = false, double sigmas = 2.0) {
+  wm_monitor_landmarks seen;
+  wm::landmark_bias_clear(&seen);
+  for (int k = 0; k < 100; k++)
+    for (int id = 0; id < count; id++) {
+      wm_innovation i{};
+      i.t_ns = make::at(0.1 * k);
+      i.landmark_id = id;
+      i.residual = WM_RESIDUAL_RANGE;
+      i.variance = 1.0;
+      i.observed = (last ? count - 1 - id : id) < off ? sigmas : k % 2 ? 0.5 : -0.5;
+      wm::landmark_bias_take(&seen, i);
+    }
+  wm::landmark_bias_test(&seen, make::at(10.0));
+  return wm::landmark_bias_contradicts(seen);
+}
+
+// The worst landmark may have moved, whichever it is; a second one whose innovations have a mean contradicts. Of one
+// alone nothing is left. What was tested before is of no effect.
 void test_the_worst_landmark_is_left_out(void) {
   for (int off = 0; off <= 3; off++)
     for (int count = 1; count <= 3; count++) {
-      wm_monitor_landmarks seen;
-      wm::landmark_bias_clear(&seen);
-      for (int k = 0; k < 100; k++)
-        for (int id = 0; id < count; id++) {
-          wm_innovation i{};
-          i.t_ns = make::at(0.1 * k);
-          i.landmark_id = id;
-          i.residual = WM_RESIDUAL_RANGE;
-          i.variance = 1.0;
-          i.observed = id < off ? 2.0 : k % 2 ? 0.5 : -0.5;
-          wm::landmark_bias_take(&seen, i);
-        }
-      wm::landmark_bias_test(&seen, make::at(10.0));
-      TEST_ASSERT_EQUAL(std::fmin(off, count) >= 2, wm::landmark_bias_contradicts(seen));
+      TEST_ASSERT_TRUE(mean_contradicts(5, 5, false, 3.0));
+      TEST_ASSERT_EQUAL(std::fmin(off, count) >= 2, mean_contradicts(off, count));
+      TEST_ASSERT_EQUAL(std::fmin(off, count) >= 2, mean_contradicts(off, count, true));
     }
+}
+
+// GIVEN three landmarks WHEN so many others come that there is no room for all THEN those not seen for longest make
+// room.
+void test_landmarks_not_seen_for_longest_make_room(void) {
+  const int old = 3;
+  for (const int later : {WM_MONITOR_LANDMARKS - 3, WM_MONITOR_LANDMARKS - 2, WM_MONITOR_LANDMARKS}) {
+    wm_monitor_landmarks seen;
+    wm::landmark_bias_clear(&seen);
+    for (int k = 0; k < 60; k++)
+      for (int id = k < 30 ? 0 : old; id < (k < 30 ? old : old + later); id++) {
+        wm_innovation i{};
+        i.t_ns = make::at(0.3 * k);
+        i.landmark_id = id;
+        i.residual = WM_RESIDUAL_RANGE;
+        i.variance = 1.0;
+        wm::landmark_bias_take(&seen, i);
+      }
+    int kept = 0;
+    for (uint32_t k = 0; k < seen.count; k++) kept += seen.entries[k].id < old;
+    TEST_ASSERT_EQUAL(WM_MONITOR_LANDMARKS, seen.count);
+    TEST_ASSERT_EQUAL(WM_MONITOR_LANDMARKS - later, kept);
+  }
 }
 
 void test_one_that_contradicts_has_moved_and_many_mean_lost(void) {
@@ -466,7 +509,9 @@ int main(void) {
   RUN_TEST(test_three_bearings_give_the_pose);
   RUN_TEST(test_bearings_that_say_nothing_give_no_pose);
   RUN_TEST(test_an_old_contradiction_is_forgotten);
+  RUN_TEST(test_positions_that_contradict_for_long_are_no_multipath);
   RUN_TEST(test_the_worst_landmark_is_left_out);
+  RUN_TEST(test_landmarks_not_seen_for_longest_make_room);
   RUN_TEST(test_one_that_contradicts_has_moved_and_many_mean_lost);
   RUN_TEST(test_one_against_one_is_doubt_not_lost);
   RUN_TEST(test_misfits_that_scatter_say_nothing_those_in_one_place_do);

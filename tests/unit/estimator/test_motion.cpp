@@ -349,6 +349,17 @@ void test_commands_are_obeyed_late(void) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1.0, pose.x_m);
 }
 
+// A velocity that is the estimator's state holds without an end; each second has the noise of its walk alone.
+void test_a_velocity_as_a_state_is_never_overdue(void) {
+  start(make::no_wheels(), WM_MOTION_CONSTANT_VELOCITY);
+  front.set_now(0);
+  front.set_velocity({0.5, 0.0, 0.0});
+  for (int i = 1; i <= 30; i++) advance(i);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 15.0, pose.x_m);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, params.velocity_speed_walk * params.velocity_speed_walk * 30 / 3.0, way_var);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, params.velocity_turn_walk * params.velocity_turn_walk * 30 / 3.0, turn_var);
+}
+
 void test_a_dead_encoder_is_noticed_and_not_taken_for_a_turn(void) {
   start(make::car());
   const double metre = 1000 / (2 * M_PI * 0.3);
@@ -564,6 +575,7 @@ int main(void) {
   RUN_TEST(test_an_unknown_motion_begins_at_the_last_correction);
   RUN_TEST(test_standing_still_shows_the_gyros_bias_and_holds_the_heading);
   RUN_TEST(test_commands_are_obeyed_late);
+  RUN_TEST(test_a_velocity_as_a_state_is_never_overdue);
   RUN_TEST(test_a_dead_encoder_is_noticed_and_not_taken_for_a_turn);
   RUN_TEST(test_a_frozen_counter_is_doubt_not_standstill);
   RUN_TEST(test_a_speed_that_no_robot_reaches_is_refused);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The choice of the motion's model: by the data that come, and by what is known to be there before the drive.
+// The choice of the motion's model: by the data that come, and by what is known to be there before the drive. Factors
+// of its noise. Counts that come twice, and again after a silence.
 #include <cmath>
 #include <initializer_list>
 
@@ -70,7 +71,10 @@ struct drive {
   void feed(const wm_event &e) {
     TEST_ASSERT_EQUAL(WM_OK, front.check(e));
     front.feed(e);
-    front.advance(e.t_ns, wm::kNeutralCalibration,
+    advance(1e-9 * static_cast<double>(e.t_ns));
+  }
+  void advance(double t_s) {
+    front.advance(make::at(t_s), wm::kNeutralCalibration,
                   [this](const wm::motion_segment &s, const wm::motion_twist &t, const wm::motion_noise &) {
                     const wm::arc a = wm::make_arc(t.v * s.dt_s, t.w * s.dt_s);
                     pose = wm::compose(pose, {a.x_m, a.y_m, a.turn_rad});
@@ -206,6 +210,80 @@ void test_a_known_way_in_an_unknown_direction(void) {
   }
 }
 
+// Factors of the variances of way and turn leave the correlation of the two as it is.
+void test_factors_of_the_noise_keep_its_correlation(void) {
+  wm_motion_params params;
+  wm_params_defaults(&wm_motion_params_table, &params);
+  const wm_wheels wheels = make::two_wheels();
+  const wm_motion_calibration c = wm::kNeutralCalibration;
+  const wm::stated_noise none = {NAN, NAN, NAN};
+  wm::motion_input input{};
+  input.model = WM_MOTION_TICKS;
+  input.a = 1.0, input.b = 1.4;
+  const wm::motion_twist twist = wm::twist_of(input, c, wheels, {});
+  const wm::motion_noise plain = wm::noise_of(input, twist, 0.1, params, wheels, c, none, {1.0, 1.0}),
+                         more = wm::noise_of(input, twist, 0.1, params, wheels, c, none, {4.0, 9.0});
+  TEST_ASSERT_GREATER_THAN_DOUBLE(0.0, plain.distance_rotation);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 4.0, more.distance_m2 / plain.distance_m2);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 4.0, more.lateral_m2 / plain.lateral_m2);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 9.0, more.rotation_rad2 / plain.rotation_rad2);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 6.0, more.distance_rotation / plain.distance_rotation);
+}
+
+void count(drive *d, double t_s, double way_m) {
+  const double ticks = way_m / kTick;
+  d->feed(make::quantities(t_s, {{WM_Q_WHEEL_TICKS_LEFT, ticks}, {WM_Q_WHEEL_TICKS_RIGHT, ticks}}));
+}
+
+// GIVEN a bus on which a frame may come twice with one stamp WHEN the robot drives THEN each count counts once, and is
+// as exact as one of its period.
+void test_a_count_that_comes_twice_counts_once(void) {
+  drive d;
+  for (int i = 0; i <= 50; i++)
+    for (int twice = 0; twice < (i > 0 ? 2 : 1); twice++) count(&d, 0.02 * i, 0.02 * i);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1.0, d.pose.x_m);
+  TEST_ASSERT_EQUAL_UINT32(0, d.front.health());
+  double speed_mps, turn_radps;
+  d.front.count_noise(&speed_mps, &turn_radps);
+  const double expected = kTick / (0.02 * std::sqrt(12.0));
+  TEST_ASSERT_DOUBLE_WITHIN(0.01 * expected, expected, speed_mps);
+}
+
+// GIVEN a robot in reverse gear WHEN its counts rise THEN it drives backwards: they have no sign. Where they have
+// fallen before, they have one, and the gear is of no effect.
+void test_counts_without_a_sign_take_it_from_the_gear(void) {
+  for (const bool has_sign : {false, true}) {
+    drive d;
+    double way_m = 0.0;
+    const auto go = [&](double from_s, double each_m) {
+      for (int i = 1; i <= 50; i++) count(&d, from_s + 0.02 * i, way_m += each_m);
+    };
+    go(0.0, has_sign ? -0.02 : 0.02);
+    const double before_m = d.pose.x_m;
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, has_sign ? -0.98 : 0.98, before_m);
+    d.feed(make::quantities(1.0, {{WM_Q_GEAR, -1.0}}));
+    go(1.0, 0.02);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, has_sign ? 1.0 : -1.0, d.pose.x_m - before_m);
+  }
+}
+
+// GIVEN two seconds without counts, in which observations corrected the pose WHEN counts come again THEN from the first
+// one on the way is the counted one, whatever the speed and however often the pose is asked for between two counts.
+void test_the_way_is_counted_again_after_a_silence(void) {
+  drive d;
+  for (int i = 0; i <= 50; i++) count(&d, 0.02 * i, 0.02 * i);
+  d.advance(3.0);
+  count(&d, 3.02, 3.02);
+  const double before_m = d.pose.x_m;
+  double way_m = 3.02;
+  for (int i = 1; i <= 50; i++) {
+    d.advance(3.02 + 0.02 * i - 0.01);
+    way_m += i % 3 ? 0.03 : 0.01;
+    count(&d, 3.02 + 0.02 * i, way_m);
+  }
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, way_m - 3.02, d.pose.x_m - before_m);
+}
+
 }  // namespace
 
 void setUp(void) {}
@@ -221,5 +299,9 @@ int main(void) {
   RUN_TEST(test_repeated_numbers_that_are_right_are_no_fault);
   RUN_TEST(test_what_may_have_moved_unseen);
   RUN_TEST(test_a_known_way_in_an_unknown_direction);
+  RUN_TEST(test_factors_of_the_noise_keep_its_correlation);
+  RUN_TEST(test_a_count_that_comes_twice_counts_once);
+  RUN_TEST(test_counts_without_a_sign_take_it_from_the_gear);
+  RUN_TEST(test_the_way_is_counted_again_after_a_silence);
   return UNITY_END();
 }

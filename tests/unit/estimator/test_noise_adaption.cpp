@@ -3,6 +3,7 @@
 // THEN; all noise is drawn from fixed seeds.
 #include <cmath>
 #include <cstdlib>
+#include <cstring>
 
 #include "events.hpp"
 #include "filters/core/noise_adaption.hpp"
@@ -149,6 +150,195 @@ void expect_consistent(const stated &by, bool has_landmarks, bool lasting = fals
   TEST_ASSERT_GREATER_OR_EQUAL_DOUBLE(0.85, share);
 }
 
+// A linear filter of the pose and of a position's time-correlated error, whose noise has these log factors: what the
+// derivatives of noise_adaption are of.
+struct reference {
+  using adaption = wm::noise_adaption;
+  static constexpr int kN = adaption::kBlock;
+  double log_factor[adaption::kFactors] = {};
+  double x[kN] = {}, p[kN][kN] = {};
+
+  double factor(int k) const { return k < adaption::kFactors ? std::exp(log_factor[k]) : 1.0; }
+  void transform(const double f[kN][kN]) {
+    double moved[kN] = {}, half[kN][kN] = {}, whole[kN][kN] = {};
+    for (int i = 0; i < kN; i++)
+      for (int k = 0; k < kN; k++) {
+        moved[i] += f[i][k] * x[k];
+        for (int j = 0; j < kN; j++) half[i][j] += f[i][k] * p[k][j];
+      }
+    for (int i = 0; i < kN; i++)
+      for (int j = 0; j < kN; j++)
+        for (int k = 0; k < kN; k++) whole[i][j] += half[i][k] * f[j][k];
+    std::memcpy(x, moved, sizeof x);
+    std::memcpy(p, whole, sizeof p);
+  }
+  void move(double x_m, double y_m, double along_m2, double across_m2, double turn_rad2) {
+    double f[kN][kN] = {};
+    for (int i = 0; i < kN; i++) f[i][i] = 1.0;
+    f[0][2] = -y_m, f[1][2] = x_m;
+    transform(f);
+    const double length = std::hypot(x_m, y_m), c = length > 0.0 ? x_m / length : 1.0,
+                 s = length > 0.0 ? y_m / length : 0.0;
+    p[0][0] += factor(adaption::kWay) * (c * c * along_m2 + s * s * across_m2);
+    p[1][1] += factor(adaption::kWay) * (s * s * along_m2 + c * c * across_m2);
+    p[0][1] += factor(adaption::kWay) * c * s * (along_m2 - across_m2);
+    p[1][0] = p[0][1];
+    p[2][2] += factor(adaption::kTurn) * turn_rad2;
+  }
+  void fade(double left, double added_m2) {
+    double f[kN][kN] = {};
+    for (int i = 0; i < kN; i++) f[i][i] = i < adaption::kPose ? 1.0 : left;
+    transform(f);
+    for (int i = adaption::kPose; i < kN; i++) p[i][i] += factor(adaption::kPlace) * added_m2;
+  }
+  void begin_pose(double variance) {
+    for (int i = 0; i < adaption::kPose; i++) {
+      for (int j = 0; j < kN; j++) p[i][j] = p[j][i] = 0.0;
+      p[i][i] = variance;
+      x[i] = 0.0;
+    }
+  }
+  // What the innovation is without noise of its own: h x, its variance, and the gain.
+  double expected(const double h[kN]) const {
+    double sum = 0.0;
+    for (int i = 0; i < kN; i++) sum += h[i] * x[i];
+    return sum;
+  }
+  double variance(const double h[kN], double own, int kind, double gain[kN]) const {
+    double s = factor(kind) * own;
+    for (int i = 0; i < kN; i++) {
+      gain[i] = 0.0;
+      for (int j = 0; j < kN; j++) gain[i] += p[i][j] * h[j];
+      s += h[i] * gain[i];
+    }
+    for (int i = 0; i < kN; i++) gain[i] /= s;
+    return s;
+  }
+  void update(const double h[kN], double own, int kind, double observed) {
+    double gain[kN], f[kN][kN] = {};
+    const double innovation = observed - expected(h);
+    variance(h, own, kind, gain);
+    double kept[kN];
+    std::memcpy(kept, x, sizeof x);
+    for (int i = 0; i < kN; i++)
+      for (int j = 0; j < kN; j++) f[i][j] = (i == j) - gain[i] * h[j];
+    transform(f);
+    for (int i = 0; i < kN; i++) {
+      x[i] = kept[i] + gain[i] * innovation;
+      for (int j = 0; j < kN; j++) p[i][j] += gain[i] * gain[j] * factor(kind) * own;
+    }
+  }
+};
+
+// A drive with a lasting error of the positions, a pose that is set, and updates of which nothing is learned; then one
+// that is. Beside the filter with the stated noise each with one factor more or less: `more`, `less`.
+struct learned_once {
+  using adaption = wm::noise_adaption;
+  static constexpr int kN = adaption::kBlock;
+  static constexpr double kStep = 1e-5;
+  adaption adapted;
+  reference stated, more[adaption::kFactors], less[adaption::kFactors];
+
+  learned_once(double log_sigma) {
+    adapted.init(log_sigma);
+    for (int k = 0; k < adaption::kFactors; k++) more[k].log_factor[k] = kStep, less[k].log_factor[k] = -kStep;
+  }
+  template <class Act>
+  void all(Act act) {
+    act(stated);
+    for (int k = 0; k < adaption::kFactors; k++) act(more[k]), act(less[k]);
+  }
+  void move(double x_m, double y_m, double along_m2, double across_m2, double turn_rad2) {
+    adapted.move(x_m, y_m, along_m2, across_m2, turn_rad2);
+    all([&](reference &r) { r.move(x_m, y_m, along_m2, across_m2, turn_rad2); });
+  }
+  void fade(double left, double added_m2) {
+    adapted.fade_correlated(left, added_m2);
+    all([&](reference &r) { r.fade(left, added_m2); });
+  }
+  void begin_correlated(double variance_m2) {
+    adapted.begin_correlated(variance_m2);
+    all([&](reference &r) {
+      for (int i = adaption::kPose; i < kN; i++) r.p[i][i] = r.factor(adaption::kPlace) * variance_m2;
+    });
+  }
+  void set_pose(double variance) {
+    adapted.restart(false);
+    all([&](reference &r) { r.begin_pose(variance); });
+  }
+  // `sigmas`: the innovation.
+  void update(const double (&h)[kN], double own, int kind, double sigmas) {
+    adaption::row row{};
+    row.variance = stated.variance(h, own, kind, row.gain);
+    row.innovation = sigmas * std::sqrt(row.variance);
+    row.own = own;
+    row.kind = kind;
+    std::memcpy(row.by, h, sizeof row.by);
+    adapted.update(row);
+    const double observed = stated.expected(h) + row.innovation;
+    all([&](reference &r) { r.update(h, own, kind, observed); });
+  }
+  // The maximum a posteriori of the log factors after such an update as the first of which something is learned.
+  void expect_learned(const double (&h)[kN], double own, int kind, double sigmas, double log_sigma) {
+    double gain[kN], share[adaption::kFactors] = {}, by[adaption::kFactors] = {}, expected[adaption::kFactors] = {};
+    const double s = stated.variance(h, own, kind, gain), sigma = std::sqrt(s), prior = log_sigma * log_sigma;
+    double q = 0.0;
+    for (int k = 0; k < adaption::kFactors; k++) {
+      share[k] = (more[k].variance(h, own, kind, gain) - less[k].variance(h, own, kind, gain)) / (2.0 * kStep) / s;
+      by[k] = (more[k].expected(h) - less[k].expected(h)) / (2.0 * kStep) / sigma;
+      q += prior * share[k] * share[k];
+    }
+    double low = -q, high = 3.0;  // u + q/2 (1 - nis exp(-u)) rises from below 0 to above it
+    for (int i = 0; i < 60; i++) {
+      const double u = 0.5 * (low + high);
+      (u + 0.5 * q * (1.0 - sigmas * sigmas * std::exp(-u)) < 0.0 ? low : high) = u;
+    }
+    // Then the mean, with what is left of the variance: C by, C = prior I - prior^2 share share' / (q + 2).
+    double along = 0.0, mean_q = 0.0, mean_gain[adaption::kFactors];
+    for (int k = 0; k < adaption::kFactors; k++) along += prior * share[k] * by[k];
+    for (int k = 0; k < adaption::kFactors; k++) {
+      mean_gain[k] = prior * by[k] - prior * share[k] * along / (q + 2.0);
+      mean_q += by[k] * mean_gain[k];
+    }
+    for (int k = 0; k < adaption::kFactors; k++) {
+      const double least = k == adaption::kPlace ? -10.0 : 0.0;
+      expected[k] = std::fmax(least, prior * share[k] / q * low);
+      expected[k] = std::fmax(least, expected[k] + mean_gain[k] * sigmas / (mean_q + 1.0));
+    }
+    update(h, own, kind, sigmas);
+    for (int k = 0; k < adaption::kFactors; k++)
+      TEST_ASSERT_DOUBLE_WITHIN(1e-5, expected[k], std::log(adapted.scale(k)));
+  }
+};
+
+// GIVEN a drive WHEN an innovation is off by more than its sigma THEN each factor takes its share of it, by the
+// derivatives of the filter's covariance and of its mean: those of a filter whose noise has a little more of the
+// factor.
+void test_each_factor_takes_its_share_of_an_innovation(void) {
+  using adaption = wm::noise_adaption;
+  const double log_sigma = 0.5;
+  for (int kind = 0; kind < adaption::kFactors; kind++)
+    for (double sigmas : {1.7, 2.4, -2.1}) {
+      learned_once drive(log_sigma);
+      drive.set_pose(0.01);
+      drive.begin_correlated(0.3);
+      drive.move(0.5, 0.2, 0.02, 0.005, 0.01);
+      drive.fade(0.9, 0.06);
+      drive.update({0.3, -0.5, 1.0, 0.0, 0.0}, 0.05, adaption::kNone, 1.3);
+      drive.set_pose(0.02);  // what was driven before is of no effect; the error of the positions lasts
+      for (int i = 0; i < 3; i++) {
+        drive.move(0.8, -0.3, 0.03, 0.01, 0.02);
+        drive.fade(0.8, 0.1);
+        drive.update({1.0, 0.0, 0.0, 1.0, 0.0}, 0.2, adaption::kNone, i - 0.7);
+        drive.move(-0.2, 0.9, 0.02, 0.008, 0.015);
+        drive.update({0.0, 1.0, 0.0, 0.0, 1.0}, 0.3, adaption::kNone, 0.4 * i);
+        drive.update({0.3, -0.5, 1.0, 0.0, 0.0}, 0.05, adaption::kNone, 0.9 - i);
+        drive.move(0.0, 0.0, 0.01, 0.01, 0.03);
+      }
+      drive.expect_learned({0.7, 0.4, -0.8, 0.7, 0.4}, 0.1, kind, sigmas, log_sigma);
+    }
+}
+
 // GIVEN positions that are off by four stated sigmas WHEN nothing comes for three time constants of 1000 s THEN what
 // was found of their noise is forgotten by exp(-3).
 void test_what_was_found_is_forgotten(void) {
@@ -204,6 +394,7 @@ void tearDown(void) {}
 
 int main() {
   UNITY_BEGIN();
+  RUN_TEST(test_each_factor_takes_its_share_of_an_innovation);
   RUN_TEST(test_what_was_found_is_forgotten);
   RUN_TEST(test_right_noise_stays_consistent);
   RUN_TEST(test_noise_of_the_motion_stated_four_times_too_small);

@@ -246,6 +246,19 @@ wm_estimate carried_in_space(double from_s, double to_s) {
   return out;
 }
 
+// Of twists that come in time each second of a carried pose adds the white noise of the speed and of the turn rate.
+void test_in_space_a_carried_pose_has_the_noise_of_its_twists(void) {
+  start(make::no_wheels());
+  for (int i = 0; i <= 10; i++) feed_six(0.1 * i, 1.0, 0.0);
+  const wm_estimate out = carried_in_space(0.5, 1.0);
+  const double place_m2 = 0.5 * params.noise_speed_mps * params.noise_speed_mps,
+               rotation_rad2 = 0.5 * params.noise_yaw_rate_radps * params.noise_yaw_rate_radps;
+  for (int i = 0; i < 6; i++) {
+    const double expected = i < 3 ? place_m2 : rotation_rad2;
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9 * expected, expected, out.covariance[wm_cov_index(i, i)]);
+  }
+}
+
 // GIVEN twists in space WHEN they stop THEN the last one holds for hold_max_s, more and more unsure, and no longer.
 void test_a_twist_in_space_does_not_hold_for_ever(void) {
   start(make::no_wheels());
@@ -335,6 +348,7 @@ int main(void) {
   RUN_TEST(test_delayed_counts_begin_a_silence_with_a_steady_speed);
   RUN_TEST(test_a_copy_continues_identically);
   RUN_TEST(test_a_pose_in_space_is_carried_in_space);
+  RUN_TEST(test_in_space_a_carried_pose_has_the_noise_of_its_twists);
   RUN_TEST(test_a_twist_in_space_does_not_hold_for_ever);
   RUN_TEST(test_in_space_a_silence_adds_by_the_time_since_the_correction);
   RUN_TEST(test_a_twist_in_space_that_nothing_reaches_is_refused);

@@ -127,6 +127,18 @@ void test_prediction_carries_the_right_derivatives(void) {
   TEST_ASSERT_EQUAL(12, checked);
 }
 
+// What the noise's adaption takes of a row: its derivatives by the pose, and by a position's lasting error where that
+// is a state.
+void test_a_projection_has_the_row_s_part_of_the_pose(void) {
+  make_busy_filter();
+  wm::planar_row row;
+  row.add(0, 0.3), row.add(2, -1.1), row.add(3, 0.7), row.add(4, 0.2);
+  wm::projection projected;
+  filter->project(row, &projected);
+  const double expected[wm::noise_adaption::kBlock] = {0.3, 0.0, -1.1, 0.0, 0.0};
+  for (int i = 0; i < wm::noise_adaption::kBlock; i++) TEST_ASSERT_EQUAL_DOUBLE(expected[i], projected.by[i]);
+}
+
 void test_josephs_form_is_the_plain_one_at_the_best_gain(void) {
   make_busy_filter();
   const int n = filter->states();
@@ -244,9 +256,43 @@ void test_fading_and_forgetting_keep_the_rest(void) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0.5 * with, filter->covariance(0, 4));
   TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0.5 * with, filter->covariance(4, 0));
   filter->forget(4, 1.0, 0.3);
+  TEST_ASSERT_EQUAL_DOUBLE(1.0, filter->value(4));
   TEST_ASSERT_EQUAL_DOUBLE(0.0, filter->covariance(0, 4));
   TEST_ASSERT_EQUAL_DOUBLE(0.3, filter->variance(4));
   TEST_ASSERT_EQUAL_DOUBLE(other, filter->covariance(0, 1));
+}
+
+// By the whole matrix: P' = F P F' + Q, where F has one row beside the identity's.
+void expect_row_of_f(int state, const double (&row)[kMax], double added, const double (&p)[kMax][kMax]) {
+  const int n = filter->states();
+  for (int i = 0; i < n; i++)
+    for (int j = 0; j < n; j++) {
+      double want = i == state && j == state ? added : 0.0;
+      for (int k = 0; k < n; k++)
+        for (int l = 0; l < n; l++) want += (i == state ? row[k] : i == k) * p[k][l] * (j == state ? row[l] : j == l);
+      TEST_ASSERT_DOUBLE_WITHIN(1e-14, want, filter->covariance(i, j));
+    }
+}
+
+// A copied state has the covariances of the original, and the variance that copying adds. A carried one is moved by the
+// states that it depends on.
+void test_a_copied_and_a_carried_state(void) {
+  make_busy_filter();
+  double p[kMax][kMax] = {}, copied[kMax] = {}, carried[kMax] = {};
+  copy_covariance(p);
+  copied[2] = 1.0;
+  filter->copy_state(4, 2, 0.01);
+  expect_row_of_f(4, copied, 0.01, p);
+  TEST_ASSERT_EQUAL_DOUBLE(filter->value(2), filter->value(4));
+  copy_covariance(p);
+  carried[4] = 1.0, carried[0] = 0.3, carried[5] = -0.8;
+  wm::planar_row row;
+  row.add(0, 0.3);
+  row.add(5, -0.8);
+  const double before = filter->value(4);
+  filter->carry_state(4, row, 0.25, 0.02);
+  expect_row_of_f(4, carried, 0.02, p);
+  TEST_ASSERT_EQUAL_DOUBLE(before + 0.25, filter->value(4));
 }
 
 void test_the_estimate_of_a_drive_has_its_twist(void) {
@@ -290,11 +336,13 @@ int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_kernels_and_their_scalar_twins_give_the_same_bits);
   RUN_TEST(test_prediction_carries_the_right_derivatives);
+  RUN_TEST(test_a_projection_has_the_row_s_part_of_the_pose);
   RUN_TEST(test_josephs_form_is_the_plain_one_at_the_best_gain);
   RUN_TEST(test_the_second_innovation_by_the_corrected_states);
   RUN_TEST(test_one_number_after_the_other_is_all_at_once);
   RUN_TEST(test_standing_still_teaches_the_gyros_bias);
   RUN_TEST(test_the_estimate_of_a_drive_has_its_twist);
+  RUN_TEST(test_a_copied_and_a_carried_state);
   RUN_TEST(test_fading_and_forgetting_keep_the_rest);
   RUN_TEST(test_an_update_of_a_vast_variance_leaves_some);
   return UNITY_END();

@@ -235,6 +235,32 @@ void test_a_velocity_of_its_own(void) {
   TEST_ASSERT_DOUBLE_WITHIN(0.6, 1.0, speed_errors);
 }
 
+// GIVEN a velocity on the map's axes of a robot that turns WHEN its path from a time in the past is asked for THEN it
+// is seen from base_link as it was turned then.
+void test_a_past_path_of_a_velocity_of_its_own(void) {
+  wm_params_defaults(&wm_motion_params_table, &params);
+  params.model = WM_MOTION_CONSTANT_VELOCITY;
+  setup = {};
+  setup.motion = &params;
+  setup.wheels = make::no_wheels();
+  setup.start = {WM_TIME_NONE, {0, 0, 0}, {0, 0, 0, 1}, 1.2, 0.1, 0.1};
+  filter.init(setup, {}, wm::kPoseStates + wm::planar_filter::count_motion_states({}, params.model));
+  filter.move_to(make::at(10.0));
+  const double velocity[3] = {0.8, 0.3, 0.5};
+  for (int k = 0; k < 3; k++) filter.forget(3 + k, velocity[k], 0.01);
+  wm::motion_twist twist{};
+  const wm_pose2 path = filter.path(make::at(8.0), make::at(9.5), &twist);
+  const double then_rad = 1.2 - 2.0 * 0.5;
+  const double ahead = 0.8 * std::cos(then_rad) + 0.3 * std::sin(then_rad),
+               left = 0.3 * std::cos(then_rad) - 0.8 * std::sin(then_rad);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, ahead, twist.v);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, left, twist.u);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.5, twist.w);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 1.5 * ahead, path.x_m);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 1.5 * left, path.y_m);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.75, path.heading_rad);
+}
+
 }  // namespace
 
 void setUp(void) {}
@@ -251,5 +277,6 @@ int main(void) {
   RUN_TEST(test_impossible_increments_are_refused);
   RUN_TEST(test_motion_that_leaves_the_plane);
   RUN_TEST(test_a_velocity_of_its_own);
+  RUN_TEST(test_a_past_path_of_a_velocity_of_its_own);
   return UNITY_END();
 }

@@ -104,6 +104,45 @@ void test_a_silent_imu_yields_to_the_logs_rates(void) {
 }
 
 // A velocity that holds while the gyro goes on is not certain for ever.
+// Beside an IMU the log's velocity holds for hold_max_s, and no longer.
+void test_a_velocity_holds_for_its_time_and_no_longer(void) {
+  spatial_source source;
+  source.init(2.0, {0.05, 0.02});
+  spatial_twist now = {{0.5, 0.1, 0.0}, {0.0, 0.0, 0.0}};
+  TEST_ASSERT_TRUE(source.take(velocity_log(0.0, now.v), &now));
+  wm_event e = imu(2.0, {0.0, 0.0, 0.01}, {0.0, 0.0, kG});
+  TEST_ASSERT_TRUE(source.take(e, &now));
+  TEST_ASSERT_EQUAL_DOUBLE(0.5, now.v.x);
+  TEST_ASSERT_EQUAL_DOUBLE(0.1, now.v.y);
+  TEST_ASSERT_EQUAL_DOUBLE(0.01, now.w.z);
+  e.t_ns++;
+  TEST_ASSERT_TRUE(source.take(e, &now));
+  TEST_ASSERT_EQUAL_DOUBLE(0.0, now.v.x);
+  TEST_ASSERT_EQUAL_DOUBLE(0.0, now.v.y);
+  TEST_ASSERT_EQUAL_DOUBLE(0.01, now.w.z);
+}
+
+// A value that repeats for 0.2 s is chance or a coarse step; one of a moving body that repeats for longer is stuck.
+void test_an_axis_that_repeats_for_a_moment_is_not_stuck(void) {
+  spatial_source source;
+  source.init(2.0, {0.05, 0.02});
+  const auto go = [&](int from, int to, bool repeats) {
+    for (int i = from; i < to; i++) {
+      spatial_twist now = {{0.5, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+      if (i % 10 == 0) source.take(velocity_log(0.01 * i, now.v), &now);
+      const double w = 0.01 * std::sin(i);
+      source.take(imu(0.01 * i, {w, w, repeats ? 0.3 : w}, {w, w, kG + w}), &now);
+    }
+  };
+  go(0, 400, false);
+  go(400, 420, true);
+  TEST_ASSERT_EQUAL_HEX32(0, source.stuck_rates());
+  go(420, 440, true);
+  TEST_ASSERT_EQUAL_HEX32(4, source.stuck_rates());
+  go(440, 441, false);
+  TEST_ASSERT_EQUAL_HEX32(0, source.stuck_rates());
+}
+
 void test_a_silent_log_beside_an_imu_makes_the_place_uncertain(void) {
   vehicle v(0);
   const auto turning = [](int i) { return vec3{jitter(i), jitter(i), 0.1}; };
@@ -213,6 +252,8 @@ int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_the_rates_are_the_imus_and_the_velocity_the_logs);
   RUN_TEST(test_a_silent_imu_yields_to_the_logs_rates);
+  RUN_TEST(test_a_velocity_holds_for_its_time_and_no_longer);
+  RUN_TEST(test_an_axis_that_repeats_for_a_moment_is_not_stuck);
   RUN_TEST(test_a_silent_log_beside_an_imu_makes_the_place_uncertain);
   RUN_TEST(test_a_stuck_axis_is_found);
   RUN_TEST(test_the_filter_reports_a_stuck_axis);

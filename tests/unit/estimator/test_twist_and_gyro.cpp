@@ -73,6 +73,24 @@ void test_a_twist_alone_is_as_ever(void) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.1 * 0.98, pose.heading_rad);
 }
 
+// 138 m/s are refused beside a gyro, too: the speed before holds with the noise of what the robot may have done, and
+// the health has it for five seconds.
+void test_a_speed_that_no_robot_reaches_is_refused_beside_a_gyro(void) {
+  const auto rate = [](int i) { return noise(i); };
+  begin();
+  drive(0, 1, 0.5, 0.0, 0.0, rate);
+  TEST_ASSERT_EQUAL_HEX32(0, front.health());
+  const double before_m2 = noise_sum.distance_m2;
+  drive(1, 1.2, 138.0, 0.0, 0.0, rate);
+  TEST_ASSERT_EQUAL_HEX32(WM_MOTION_HEALTH_IMPLAUSIBLE, front.health());
+  drive(1.2, 1.4, 0.5, 0.0, 0.0, rate);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.5 * 1.39, pose.x_m);
+  const double physical_m = 0.5 * 15.0 * 0.2 * 0.2 / std::sqrt(3.0);  // 15 m/s2 either way
+  TEST_ASSERT_GREATER_THAN_DOUBLE(physical_m * physical_m, noise_sum.distance_m2 - before_m2);
+  drive(1.4, 6.5, 0.5, 0.0, 0.0, rate);
+  TEST_ASSERT_EQUAL_HEX32(0, front.health());
+}
+
 // A gyro of 5 Hz is overdue after three of its periods, not after the 0.25 s of quick ones.
 void test_a_slow_gyro_is_overdue_by_its_own_period(void) {
   begin();
@@ -161,6 +179,27 @@ void test_noise_of_a_holonomic_twist_is_counted_once(void) {
   TEST_ASSERT_DOUBLE_WITHIN(0.08, 1.04, noise_sum.rotation_rad2 / (0.01 * 0.01 * kSeconds));
 }
 
+// GIVEN exact samples of a holonomic drive WHEN one axis changes by 0.4 each 0.1 s THEN the change, whose moment
+// between two samples is unknown, is noise of that axis alone: its square times dt^2 / 12.
+void test_a_change_of_one_axis_is_noise_of_that_axis(void) {
+  for (int axis = 0; axis < 3; axis++) {
+    begin();
+    params.states.drive = WM_DRIVE_HOLONOMIC;
+    params.noise_speed_mps = params.noise_sideways_mps = params.noise_yaw_rate_radps = 0;
+    params.noise_speed_rel = params.noise_sideways_rel = params.noise_side_rel = params.noise_yaw_rate_rel = 0;
+    wm::motion_noise before{};
+    for (int i = 0; i <= 400; i++) {  // the mean square has settled after half of them
+      const double by = i % 2 ? 0.2 : -0.2;
+      feed(make::twist6(0.1 * i, axis == 0 ? 0.5 + by : 0.5, axis == 1 ? 0.5 + by : 0.5, axis == 2 ? by : 0.0));
+      if (i == 200) before = noise_sum;
+    }
+    const double each = 0.4 * 0.4 * 0.1 * 0.1 / 12.0;
+    TEST_ASSERT_DOUBLE_WITHIN(2.0 * each, axis == 0 ? 200 * each : 0.0, noise_sum.distance_m2 - before.distance_m2);
+    TEST_ASSERT_DOUBLE_WITHIN(2.0 * each, axis == 1 ? 200 * each : 0.0, noise_sum.lateral_m2 - before.lateral_m2);
+    TEST_ASSERT_DOUBLE_WITHIN(2.0 * each, axis == 2 ? 200 * each : 0.0, noise_sum.rotation_rad2 - before.rotation_rad2);
+  }
+}
+
 void test_a_turn_on_the_spot_is_no_standstill(void) {
   double rate = 0;
   begin();
@@ -188,6 +227,7 @@ int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_the_turn_is_the_gyros_and_the_way_the_twists);
   RUN_TEST(test_a_twist_alone_is_as_ever);
+  RUN_TEST(test_a_speed_that_no_robot_reaches_is_refused_beside_a_gyro);
   RUN_TEST(test_a_slow_gyro_is_overdue_by_its_own_period);
   RUN_TEST(test_a_silent_gyro_is_replaced_and_taken_up_again);
   RUN_TEST(test_the_twist_is_no_silent_speed_when_a_gyro_comes);
@@ -195,6 +235,7 @@ int main(void) {
   RUN_TEST(test_a_stop_does_not_mend_a_stuck_gyro);
   RUN_TEST(test_what_a_stuck_gyro_missed_is_uncertain);
   RUN_TEST(test_noise_of_a_holonomic_twist_is_counted_once);
+  RUN_TEST(test_a_change_of_one_axis_is_noise_of_that_axis);
   RUN_TEST(test_a_turn_on_the_spot_is_no_standstill);
   RUN_TEST(test_commands_keep_their_own_turn_rate);
   return UNITY_END();

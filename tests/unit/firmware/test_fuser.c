@@ -102,6 +102,8 @@ static void ticks_drive_before_yaw_rate_before_speed_before_twists(void) {
   e.as.quantities.count = 2;
   e.as.quantities.id[1] = WM_Q_YAW_RATE;
   TEST_ASSERT_TRUE(wm_driving_is(&driving, &e));
+  e.as.quantities.count = 1;  // what an event before left behind the last one is none of it
+  TEST_ASSERT_EQUAL(0, wm_driving_is(&driving, &e));
 }
 
 // Like snprintf: how many there would be, of which those that fit are written.
@@ -154,6 +156,27 @@ static void health_has_what_the_estimate_has(void) {
   TEST_ASSERT_EQUAL(5, health.cause_source);
   TEST_ASSERT_EQUAL_DOUBLE(0.75, health.lost_probability);
   TEST_ASSERT_EQUAL(3, health.resets);
+}
+
+// Ten sightings a second, which the estimator fuses, or refuses above 1 rad.
+static const wm_health *health_after_a_minute(double bearing) {
+  static wm_health health;
+  setUp();
+  wm_fuser_watch(&fuser, &(wm_setup){0}, 1u << 1);
+  for (wm_time_ns ms = 0; ms < 60000; ms += 100) {
+    twist(ms, 0);
+    sighting(ms, bearing);
+  }
+  wm_fuser_health(&fuser, &health);
+  return &health;
+}
+
+static void a_pose_whose_observations_are_refused_is_lost(void) {
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, health_after_a_minute(0.5)->state);
+  const wm_health *health = health_after_a_minute(2.0);
+  TEST_ASSERT_EQUAL(WM_STATE_LOST, health->state);
+  TEST_ASSERT_EQUAL(WM_CAUSE_REFUSED, health->cause);
+  TEST_ASSERT_EQUAL(1, health->cause_source);
 }
 
 static wm_status take_points(void *self, const wm_event *e, wm_innovation *out, size_t capacity, size_t *count) {
@@ -271,6 +294,7 @@ int main(void) {
   RUN_TEST(without_a_pose_there_is_no_row);
   RUN_TEST(health_holds_no_more_values_than_it_has_room_for);
   RUN_TEST(health_has_what_the_estimate_has);
+  RUN_TEST(a_pose_whose_observations_are_refused_is_lost);
   RUN_TEST(clouds_are_written_once_a_second);
   RUN_TEST(hypotheses_come_in_sets);
   RUN_TEST(records_have_room_for_points_where_there_are_some);

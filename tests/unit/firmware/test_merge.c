@@ -89,6 +89,9 @@ static void p99_of_the_lateness(void) {
   arrive(1, 1100 * MS, 1150 * MS);
   TEST_ASSERT_EQUAL_INT64(51 * MS, wm_merge_lateness_p99(merge, 1));
   open_merge((wm_merge_source[]){kMotion, kCamera}, 2);
+  arrive(1, 0, (WM_MERGE_LATENESS_BINS - 2) * MS + 1);  // up to the last bin: the next whole ms
+  TEST_ASSERT_EQUAL_INT64((WM_MERGE_LATENESS_BINS - 1) * MS, wm_merge_lateness_p99(merge, 1));
+  open_merge((wm_merge_source[]){kMotion, kCamera}, 2);
   arrive(1, 0, 2000 * MS);  // beyond the last bin: as it was
   TEST_ASSERT_EQUAL_INT64(2000 * MS, wm_merge_lateness_p99(merge, 1));
   open_merge((wm_merge_source[]){kMotion, kCamera}, 2);
@@ -166,6 +169,21 @@ static void a_periodic_source_lets_time_pass_until_its_next_datum(void) {
   TEST_ASSERT_EQUAL_STRING("0/1 10/0 20/0 30/0 40/0 50/0 60/0 70/0 80/0 90/0", final_ms());
 }
 
+// Rows of one frame arrive within 1 ms of each other: until then another one with this stamp, or one before the next
+// period, is taken; from then on there is none.
+static void rows_of_one_frame_arrive_within_a_millisecond(void) {
+  wm_merge_source periodic = kCamera;
+  periodic.period_ns = 100 * MS;
+  open_merge((wm_merge_source[]){periodic}, 1);
+  arrive(0, 0, 5 * MS);
+  wm_merge_advance(merge, 6 * MS - 1);
+  TEST_ASSERT_EQUAL_INT64(0, wm_merge_watermark(merge));
+  TEST_ASSERT_EQUAL(WM_MERGE_TAKEN, arrive(0, 0, 6 * MS - 1));
+  wm_merge_advance(merge, 7 * MS - 1);
+  TEST_ASSERT_EQUAL_INT64(100 * MS, wm_merge_watermark(merge));
+  TEST_ASSERT_EQUAL_STRING("0/0 0/0", final_ms());
+}
+
 static void a_datum_sent_twice_is_fused_once(void) {
   open_merge(&kMotion, 1);
   wm_event e;
@@ -212,6 +230,24 @@ static void a_source_that_fell_silent_is_stale_against_its_own_rate(void) {
   TEST_ASSERT_EQUAL(0, wm_merge_is_stale(merge, 0, 1900 * MS));
   TEST_ASSERT_EQUAL(1, wm_merge_is_stale(merge, 0, 2001 * MS));
   TEST_ASSERT_EQUAL(1, wm_merge_is_stale(merge, 1, 2001 * MS));  // never spoke
+}
+
+// A source without any datum is silent since the run's clock began, whatever time that is.
+static void a_source_without_data_is_silent_since_the_start(void) {
+  open_merge((wm_merge_source[]){kMotion, kCamera}, 2);
+  TEST_ASSERT_EQUAL_INT64(0, wm_merge_silent_ns(merge, 1, 3600 * WM_NS_PER_S));  // no clock yet
+  for (int i = 0; i < 10; i++) arrive(0, 3600 * WM_NS_PER_S + i * 10 * MS, 3600 * WM_NS_PER_S + i * 10 * MS);
+  TEST_ASSERT_EQUAL_INT64(900 * MS, wm_merge_silent_ns(merge, 1, 3600 * WM_NS_PER_S + 900 * MS));
+  TEST_ASSERT_EQUAL_INT64(810 * MS, wm_merge_silent_ns(merge, 0, 3600 * WM_NS_PER_S + 900 * MS));
+  TEST_ASSERT_EQUAL(0, wm_merge_is_stale(merge, 1, 3600 * WM_NS_PER_S + 900 * MS));
+}
+
+// Three data in 4 s are two periods of 2 s: ten of these without a datum are none too many, eleven are.
+static void a_slow_source_is_stale_after_ten_of_its_periods(void) {
+  open_merge(&kCamera, 1);
+  for (int i = 0; i < 3; i++) arrive(0, i * 2000 * MS, i * 2000 * MS);
+  TEST_ASSERT_EQUAL(0, wm_merge_is_stale(merge, 0, 4000 * MS + 20000 * MS));
+  TEST_ASSERT_EQUAL(1, wm_merge_is_stale(merge, 0, 4000 * MS + 22000 * MS));
 }
 
 // ── property: any lateness below the bound gives exactly the sorted stream ──────────────────────────────────────────
@@ -344,10 +380,13 @@ int main(void) {
   RUN_TEST(a_silent_source_costs_its_lateness_and_its_first_datum_after_that_is_fused);
   RUN_TEST(what_is_late_is_counted_and_dropped);
   RUN_TEST(a_periodic_source_lets_time_pass_until_its_next_datum);
+  RUN_TEST(rows_of_one_frame_arrive_within_a_millisecond);
   RUN_TEST(a_datum_sent_twice_is_fused_once);
   RUN_TEST(a_full_queue_drops_the_newest_and_counts);
   RUN_TEST(stamps_from_the_future_and_absurd_ones_are_refused);
   RUN_TEST(a_source_that_fell_silent_is_stale_against_its_own_rate);
+  RUN_TEST(a_source_without_data_is_silent_since_the_start);
+  RUN_TEST(a_slow_source_is_stale_after_ten_of_its_periods);
   RUN_TEST(random_lateness_below_the_bound_gives_exactly_the_sorted_stream);
   RUN_TEST(any_input_comes_out_in_order_and_is_accounted_for);
   return UNITY_END();

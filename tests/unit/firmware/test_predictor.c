@@ -168,6 +168,8 @@ static void old_motion_and_old_fusion_are_said(void) {
   TEST_ASSERT_EQUAL_UINT32(0, p.status_flags);
   TEST_ASSERT_EQUAL(1, wm_predictor_publish(&predictor, 250 * MS, &p));
   TEST_ASSERT_EQUAL_UINT32(WM_PUB_MOTION_STALE, p.status_flags);
+  TEST_ASSERT_EQUAL(1, wm_predictor_publish(&predictor, 300 * MS, &p));  // as old as it may be
+  TEST_ASSERT_EQUAL_UINT32(WM_PUB_MOTION_STALE, p.status_flags);
   TEST_ASSERT_EQUAL(1, wm_predictor_publish(&predictor, 350 * MS, &p));
   TEST_ASSERT_EQUAL_UINT32(WM_PUB_MOTION_STALE | WM_PUB_FUSION_STALE, p.status_flags);
 }

@@ -383,6 +383,27 @@ static void a_rig_comes_back_and_a_cut_one_is_refused(void) {
   TEST_ASSERT_EQUAL(WM_BAD_DATA, wm_rig_decode(bytes, count, &back, &used));
 }
 
+// Of a rig of which nothing is known no number is given, and no camera belongs to the pair.
+static void a_rig_of_which_nothing_is_known_has_no_numbers(void) {
+  wm_rig rig;
+  memset(&rig, 0x55, sizeof rig);
+  wm_rig_init(&rig);
+  TEST_ASSERT_EQUAL(0, rig.camera_count);
+  TEST_ASSERT_EQUAL(-1, rig.stereo.left);
+  TEST_ASSERT_EQUAL(-1, rig.stereo.right);
+  TEST_ASSERT_EQUAL_STRING("", rig.marker_family);
+  TEST_ASSERT_DOUBLE_IS_NAN(rig.stereo.baseline_m);
+  TEST_ASSERT_DOUBLE_IS_NAN(rig.marker_size_m);
+  for (int i = 0; i < 4; i++) {
+    TEST_ASSERT_DOUBLE_IS_NAN(rig.stereo.rectified_px[i]);
+    TEST_ASSERT_DOUBLE_IS_NAN(rig.stereo.sigma_px[i]);
+  }
+  for (int i = 0; i < 3; i++) {
+    TEST_ASSERT_DOUBLE_IS_NAN(rig.twist6_sigma_v_mps[i]);
+    TEST_ASSERT_DOUBLE_IS_NAN(rig.twist6_sigma_w_radps[i]);
+  }
+}
+
 // Each model of a camera, none beside them, and names that fill their room.
 static void cameras_of_a_rig_have_a_model_and_a_name(void) {
   wm_rig rig, back;
@@ -427,6 +448,27 @@ static void absent_numbers_of_a_landmark_are_nan_and_keep_the_hash_of_older_logs
   TEST_ASSERT_EQUAL(WM_BAD_DATA, wm_landmark_decode(bytes, length, &out, &used));
 }
 
+// The same bytes give the same landmark to the last byte of its memory, whatever was there before.
+static void a_landmark_overwrites_all_of_its_memory(void) {
+  const wm_landmark in = {
+      .id = 3, .p_m = {1, 2, 3}, .sigma_m = 4, .yaw_rad = 5, .cov_m2 = {6, 7, 8}, .yaw_sigma_rad = 9};
+  wm_landmark once, again;
+  uint8_t bytes[128];
+  size_t used;
+  const size_t length = wm_landmark_encode(&in, bytes, sizeof bytes);
+  memset(&once, 0x55, sizeof once);
+  memset(&again, 0xAA, sizeof again);
+  TEST_ASSERT_EQUAL(WM_OK, wm_landmark_decode(bytes, length, &once, &used));
+  TEST_ASSERT_EQUAL(WM_OK, wm_landmark_decode(bytes, length, &again, &used));
+  TEST_ASSERT_EQUAL_MEMORY(&once, &again, sizeof once);
+  TEST_ASSERT_EQUAL(3, once.id);
+  for (int i = 0; i < 3; i++) TEST_ASSERT_EQUAL_DOUBLE(1 + i, once.p_m[i]);
+  TEST_ASSERT_EQUAL_DOUBLE(4, once.sigma_m);
+  TEST_ASSERT_EQUAL_DOUBLE(5, once.yaw_rad);
+  for (int i = 0; i < 3; i++) TEST_ASSERT_EQUAL_DOUBLE(6 + i, once.cov_m2[i]);
+  TEST_ASSERT_EQUAL_DOUBLE(9, once.yaw_sigma_rad);
+}
+
 static void the_hash_of_a_map_sees_every_number_and_the_order(void) {
   wm_landmark map[2] = {{.id = 1, .p_m = {1, 2, 0}, .sigma_m = 0.01, .yaw_rad = NAN},
                         {.id = 2, .p_m = {3, 4, 0}, .sigma_m = 0.01, .yaw_rad = NAN}};
@@ -455,8 +497,10 @@ int main(void) {
   RUN_TEST(an_innovation_comes_back_and_unknown_verdicts_do_not);
   RUN_TEST(a_setup_comes_back);
   RUN_TEST(a_rig_comes_back_and_a_cut_one_is_refused);
+  RUN_TEST(a_rig_of_which_nothing_is_known_has_no_numbers);
   RUN_TEST(cameras_of_a_rig_have_a_model_and_a_name);
   RUN_TEST(absent_numbers_of_a_landmark_are_nan_and_keep_the_hash_of_older_logs);
+  RUN_TEST(a_landmark_overwrites_all_of_its_memory);
   RUN_TEST(the_hash_of_a_map_sees_every_number_and_the_order);
   return UNITY_END();
 }

@@ -8,6 +8,7 @@
 #include "waymark/event_fields.h"
 #include "waymark/lcm_messages.h"
 #include "waymark/lcm_streams.h"
+#include "waymark_health_t.h"
 
 void setUp(void) {}
 void tearDown(void) {}
@@ -113,6 +114,31 @@ static void health(void) {
   TEST_ASSERT_EQUAL_MEMORY(&h.sources, &read.sources, 2 * sizeof *h.sources);
   TEST_ASSERT_EQUAL_MEMORY(&h, &read, sizeof h);
   TEST_ASSERT_NOT_NULL(wm_lcm_read_health(bytes, length - 1, &read));
+}
+
+// As many sources, values and counters as there is room for come back; of more, those that have room.
+static void a_full_health(void) {
+  static wm_health h, read;
+  static waymark_health_t m;
+  h = (wm_health){.source_count = WM_HEALTH_SOURCES_MAX,
+                  .calibration_count = WM_HEALTH_CALIBRATION_MAX,
+                  .counter_count = WM_HEALTH_COUNTERS_MAX,
+                  .loops = 21};
+  for (int i = 0; i < WM_HEALTH_SOURCES_MAX; i++) fill(&h.sources[i]);
+  for (int i = 0; i < WM_HEALTH_CALIBRATION_MAX; i++) h.calibration[i].value = i;
+  for (int i = 0; i < WM_HEALTH_COUNTERS_MAX; i++) h.counters[i] = (wm_counter){WM_COUNTER_LANDMARKS, i, 3};
+  const size_t length = wm_lcm_health(&h, bytes, sizeof bytes);
+  TEST_ASSERT_NULL(wm_lcm_read_health(bytes, length, &read));
+  TEST_ASSERT_EQUAL_MEMORY(&h, &read, sizeof h);
+
+  TEST_ASSERT_EQUAL((int)length, waymark_health_t_decode(bytes, 0, (int)length, &m));
+  m.source_count = m.calibration_count = m.counter_count = INT32_MAX;
+  TEST_ASSERT_EQUAL((int)length, waymark_health_t_encode(bytes, 0, sizeof bytes, &m));
+  TEST_ASSERT_NULL(wm_lcm_read_health(bytes, length, &read));
+  TEST_ASSERT_EQUAL(WM_HEALTH_SOURCES_MAX, read.source_count);
+  TEST_ASSERT_EQUAL(WM_HEALTH_CALIBRATION_MAX, read.calibration_count);
+  TEST_ASSERT_EQUAL(WM_HEALTH_COUNTERS_MAX, read.counter_count);
+  TEST_ASSERT_EQUAL_UINT64(21, read.loops);
 }
 
 static void innovation(void) {
@@ -293,6 +319,7 @@ int main(void) {
   UNITY_BEGIN();
   RUN_TEST(pose);
   RUN_TEST(health);
+  RUN_TEST(a_full_health);
   RUN_TEST(innovation);
   RUN_TEST(a_pose_that_is_set);
   RUN_TEST(sigmas_of_a_pose_have_limits);

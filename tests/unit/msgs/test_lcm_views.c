@@ -32,6 +32,12 @@ static void places_arrive_whole(void) {
   TEST_ASSERT_DOUBLE_IS_NAN(heard[0].covariance[0]);
   TEST_ASSERT_EQUAL_DOUBLE(0.25, heard[0].covariance[5]);
   TEST_ASSERT_EQUAL(0, wm_lcm_places(sent, 2, 2, 7, bytes, 100));
+  for (size_t all = 0; all < 3; all++) {  // a list that is whole in one message
+    length = wm_lcm_places(sent, all, all, 7, bytes, sizeof bytes);
+    TEST_ASSERT_NULL(wm_lcm_read_places(bytes, length, &part, heard));
+    TEST_ASSERT_EQUAL(all, part.total);
+    TEST_ASSERT_EQUAL(all, part.count);
+  }
 }
 
 // A short list behind a long one has the same bytes as before it.
