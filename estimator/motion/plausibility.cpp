@@ -62,7 +62,10 @@ plausibility sample_check::check_position(wm_time_ns t_ns, double position_m, do
         const double bound_m = bound * (kSpeedStep_mps + mps2 * s) * s + period_s * std::fabs(r.rate) + 2.0 * tick_m;
         return std::fabs(moved_m - expected_m) <= bound_m;
       },
-      [&](const run &r) { return (position_m - r.value) / seconds(r); });
+      [&](const run &r) {
+        const double s = seconds(r);  // 0: the second count of the first stamp
+        return s > 0.0 ? (position_m - r.value) / s : r.rate;
+      });
 }
 
 }  // namespace wm

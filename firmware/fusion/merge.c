@@ -13,7 +13,7 @@
 typedef struct heap_entry {
   wm_time_ns t_ns;
   uint64_t order;  // motion first, then rank, then the source's own order
-  uint32_t slot;
+  uint32_t slot, source;
 } heap_entry;
 
 typedef struct source_state {
@@ -94,7 +94,8 @@ wm_merge *wm_merge_init(void *memory, const wm_merge_source *sources, size_t sou
 // ── the heap ────────────────────────────────────────────────────────────────────────────────────────────────────────
 
 static int before(const heap_entry *a, const heap_entry *b) {
-  return a->t_ns != b->t_ns ? a->t_ns < b->t_ns : a->order < b->order;
+  if (a->t_ns != b->t_ns) return a->t_ns < b->t_ns;
+  return a->order != b->order ? a->order < b->order : a->source < b->source;
 }
 
 static void sift_up(heap_entry *heap, size_t i) {
@@ -206,7 +207,8 @@ wm_merge_verdict wm_merge_push(wm_merge *self, const wm_event *event) {
   }
   uint32_t slot = self->free_slots[self->capacity - 1 - self->waiting];
   memcpy(self->slots + slot * self->slot_bytes, event, wm_event_bytes(event));
-  self->heap[self->waiting] = (heap_entry){.t_ns = event->t_ns, .order = order_of(s, event->seq), .slot = slot};
+  self->heap[self->waiting] =
+      (heap_entry){.t_ns = event->t_ns, .order = order_of(s, event->seq), .slot = slot, .source = event->source};
   sift_up(self->heap, self->waiting);
   self->waiting++;
   s->waiting++;

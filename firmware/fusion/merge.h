@@ -10,8 +10,9 @@
 // source costs a constant delay, and its first event after the silence is fused. An event older than the watermark at
 // its arrival is late: counted and dropped.
 //
-// Order: t_ns; then motion before observations; then the source's rank; then its own order (seq). The memory is fixed
-// (a binary heap of indices over slots); push and pop cost O(log n) comparisons. One thread.
+// Order: t_ns; then motion before observations; then the source's rank; then its own order (seq); then the source's
+// number. The memory is fixed (a binary heap of indices over slots); push and pop cost O(log n) comparisons. One
+// thread.
 #ifndef WAYMARK_FUSION_MERGE_H
 #define WAYMARK_FUSION_MERGE_H
 

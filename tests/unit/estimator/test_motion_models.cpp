@@ -240,7 +240,7 @@ void count(drive *d, double t_s, double way_m) {
 void test_a_count_that_comes_twice_counts_once(void) {
   drive d;
   for (int i = 0; i <= 50; i++)
-    for (int twice = 0; twice < (i > 0 ? 2 : 1); twice++) count(&d, 0.02 * i, 0.02 * i);
+    for (int twice = 0; twice < 2; twice++) count(&d, 0.02 * i, 0.02 * i);
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1.0, d.pose.x_m);
   TEST_ASSERT_EQUAL_UINT32(0, d.front.health());
   double speed_mps, turn_radps;

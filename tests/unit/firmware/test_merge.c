@@ -112,6 +112,21 @@ static void motion_comes_first_then_the_rank_then_the_file(void) {
 }
 
 // The number of an event within its source has 32 bits: at 1 kHz it wraps after 50 days.
+// Two cameras of one rank whose rows have the same stamps and numbers, the one or the other first.
+static void of_equal_ranks_the_lower_source_comes_first(void) {
+  for (int first = 1; first <= 2; first++) {
+    open_merge((wm_merge_source[]){kMotion, kCamera, kCamera}, 3);
+    for (int i = 0; i < 3; i++) {
+      next_seq = (uint32_t)i;
+      arrive(first, 10 * i * MS, 10 * i * MS);
+      next_seq = (uint32_t)i;
+      arrive(3 - first, 10 * i * MS, 10 * i * MS);
+    }
+    wm_merge_advance(merge, 1000 * MS);
+    TEST_ASSERT_EQUAL_STRING("0/1 0/2 10/1 10/2 20/1 20/2", final_ms());
+  }
+}
+
 static void the_numbers_of_events_wrap(void) {
   open_merge((wm_merge_source[]){kMotion, kCamera}, 2);
   next_seq = UINT32_MAX - 3;
@@ -375,6 +390,7 @@ int main(void) {
   RUN_TEST(newest_first_and_distinct_stamps_are_counted);
   RUN_TEST(p99_of_the_lateness);
   RUN_TEST(motion_comes_first_then_the_rank_then_the_file);
+  RUN_TEST(of_equal_ranks_the_lower_source_comes_first);
   RUN_TEST(the_numbers_of_events_wrap);
   RUN_TEST(events_of_one_stamp_keep_their_order_where_numbers_wrap);
   RUN_TEST(a_silent_source_costs_its_lateness_and_its_first_datum_after_that_is_fused);
