@@ -92,6 +92,13 @@ class landmark_ekf {
   void test_calibration(const sighting_context &at, const residual *rows, int count);
   void decay_tilt(wm_time_ns t_ns);
   void decay_gnss_error(wm_time_ns t_ns, double sigma_m);
+  // The antenna when the position was measured: its heading, its place in base_link, and against base_link in the map.
+  struct antenna_view {
+    sin_cos h;
+    double arm_m[2], off_m[2];
+  };
+  antenna_view view_antenna(const past_pose &past) const;
+  double position_row(int axis, const past_pose &past, const antenna_view &antenna, planar_row *row) const;
   double lasting_error() const;  // of the receiver, over its sigma; 0 where it is no state
 
   // Gates one or two components jointly, weakens or rejects, updates, writes the records. Returns the log Bayes factor

@@ -35,6 +35,32 @@ double landmark_ekf::lasting_error() const {
   return std::sqrt(square(x_m) + square(y_m)) / receiver_.sigma_m();
 }
 
+landmark_ekf::antenna_view landmark_ekf::view_antenna(const past_pose &past) const {
+  const sin_cos h = sincos(past.pose.heading_rad);
+  antenna_view out = {h, {antenna_m_[0], antenna_m_[1]}, {0.0, 0.0}};
+  for (int i = 0; i < 2 && antenna_state_ >= 0; i++) out.arm_m[i] += filter_.value(antenna_state_ + i);
+  out.off_m[0] = h.cos * out.arm_m[0] - h.sin * out.arm_m[1];
+  out.off_m[1] = h.sin * out.arm_m[0] + h.cos * out.arm_m[1];
+  return out;
+}
+
+// Derivatives of the antenna's x (axis 0) or y; returns what is expected there.
+double landmark_ekf::position_row(int axis, const past_pose &past, const antenna_view &antenna, planar_row *row) const {
+  const bool is_x = axis == 0;
+  const double by[3] = {is_x ? 1.0 : 0.0, is_x ? 0.0 : 1.0, is_x ? -antenna.off_m[1] : antenna.off_m[0]};
+  add_past_pose(row, by, past, gnss_time_state_);
+  double expected = (is_x ? past.pose.x_m : past.pose.y_m) + antenna.off_m[axis];
+  if (antenna_state_ >= 0) {
+    row->add(antenna_state_, is_x ? antenna.h.cos : antenna.h.sin);
+    row->add(antenna_state_ + 1, is_x ? -antenna.h.sin : antenna.h.cos);
+  }
+  if (gnss_error_state_ >= 0) {
+    row->add(gnss_error_state_ + axis, 1.0);
+    expected += filter_.value(gnss_error_state_ + axis);
+  }
+  return expected;
+}
+
 wm_status landmark_ekf::fuse_position(const wm_event &event, record_list records) {
   const wm_position &p = event.as.position;
   wm_innovation record = record_of(event, WM_RESIDUAL_X);
@@ -49,12 +75,8 @@ wm_status landmark_ekf::fuse_position(const wm_event &event, record_list records
   const double correlated_m = correlated_sigma_m(p.sigma_xy_m, params_.gnss);
   decay_gnss_error(event.t_ns, p.sigma_xy_m);
   const past_pose past = pose_before(filter_, gnss_time_state_ < 0 ? 0.0 : filter_.value(gnss_time_state_));
-  const sin_cos h = sincos(past.pose.heading_rad);
-  double arm_m[2];
-  for (int i = 0; i < 2; i++) arm_m[i] = antenna_m_[i] + (antenna_state_ < 0 ? 0.0 : filter_.value(antenna_state_ + i));
-  // Of the antenna against base_link in the map; by the heading it turns.
-  const double off_m[2] = {h.cos * arm_m[0] - h.sin * arm_m[1], h.sin * arm_m[0] + h.cos * arm_m[1]};
-  const wm_pose2 antenna_step = compose(past.step, {arm_m[0], arm_m[1], 0.0});
+  const antenna_view antenna = view_antenna(past);
+  const wm_pose2 antenna_step = compose(past.step, {antenna.arm_m[0], antenna.arm_m[1], 0.0});
   observation seen = observation_at(event.t_ns, kPositionKey, compose(filter_.odom(), antenna_step));
   seen.kind = kObservedPosition;
   seen.place_m[0] = p.p_m[0];
@@ -68,17 +90,7 @@ wm_status landmark_ekf::fuse_position(const wm_event &event, record_list records
   residual rows[2];
   for (int k = 0; k < 2; k++) {
     residual &r = rows[k];
-    const double by[3] = {k == 0 ? 1.0 : 0.0, k == 1 ? 1.0 : 0.0, k == 0 ? -off_m[1] : off_m[0]};
-    add_past_pose(&r.row, by, past, gnss_time_state_);
-    double expected = (k == 0 ? past.pose.x_m : past.pose.y_m) + off_m[k];
-    if (antenna_state_ >= 0) {
-      r.row.add(antenna_state_, k == 0 ? h.cos : h.sin);
-      r.row.add(antenna_state_ + 1, k == 0 ? -h.sin : h.cos);
-    }
-    if (gnss_error_state_ >= 0) {
-      r.row.add(gnss_error_state_ + k, 1.0);
-      expected += filter_.value(gnss_error_state_ + k);
-    }
+    const double expected = position_row(k, past, antenna, &r.row);
     r.record = record;
     r.record.residual = k == 0 ? WM_RESIDUAL_X : WM_RESIDUAL_Y;
     r.record.observed = p.p_m[k];
