@@ -99,7 +99,9 @@ def check_files(work):
     magic, _, _, _, size, crc = struct.unpack("<8sQQdQI", data[:44])
     assert magic == b"WMMAP 1\n" and len(data) == 44 + size, "a saved map that is cut"
     assert zlib.crc32(data[:40] + data[44:]) == crc, "a saved map that is damaged"
-    return struct.unpack("<8sIII", data[44:64])[3]
+    # Those that have not been confirmed yet are in the file, and are not taken up (kept_landmark.is_kept of filters/slam/keep.cpp).
+    image = data[44:]
+    return sum(image[56 + 64 * i + 56] for i in range(struct.unpack("<8sIII", image[:20])[3]))
 
 
 def landmarks_of(health):
