@@ -13,6 +13,7 @@ import math
 import pathlib
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -92,9 +93,9 @@ def check_wheels(work):
                                            "sensors: {eye: {mounting: {xyz_m: [0, 0, 0], rpy_deg: [0, 0, 0]}, bearing_sigma_rad: 0.01}}\n")
     (work / "landmarks.csv").write_text("id,x_m,y_m,z_m,sigma_m\n1,10,105,0,0.01\n")
     (work / "wheels.yaml").write_text(WHEELS)
-    run = start(work, "wheels", SECONDS + 3)
+    run = start(work, "wheels")
     subprocess.run([sys.executable, __file__, "publish_wheels"], env={"PYTHONPATH": str(work)}, check=True)
-    lcm_tools.finish(run)
+    stop(run, 0.5)
     replay_both(work, "wheels")
     for what in ("wheels", "wheels-replayed"):
         row = rows(work / what / "trajectory.csv")[-1]
@@ -142,9 +143,9 @@ def publish_space():
 def check_space(work):
     (work / "calibration.yaml").write_text("{}\n")
     (work / "space.yaml").write_text(SPACE)
-    run = start(work, "space", SECONDS + 3)
+    run = start(work, "space")
     subprocess.run([sys.executable, __file__, "publish_space"], env={"PYTHONPATH": str(work)}, check=True)
-    lcm_tools.finish(run)
+    stop(run, 0.5)
     replay_both(work, "space")
     for what in ("space", "space-replayed"):
         trajectory = rows(work / what / "trajectory.csv")
@@ -156,15 +157,22 @@ def check_space(work):
     assert len(rows(work / "space-rec/imu.csv")) > SECONDS * 80
 
 
-def start(work, name, seconds):
-    """A run on the devices, which also records them."""
+def start(work, name):
+    """A run on the devices, which also records them, until stop()."""
     run = subprocess.Popen([lcm_tools.WAYMARK, "run", "--config", work / f"{name}.yaml", "--out", work / name, "--record",
-                            work / f"{name}-rec", "--duration", str(seconds)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+                            work / f"{name}-rec"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     until = time.monotonic() + 5
     while not list((work / f"{name}-rec").glob("*.csv")) and time.monotonic() < until:  # the recorder is a process of its own
         time.sleep(0.05)
     time.sleep(0.7)
     return run
+
+
+def stop(run, after_s):
+    """Ends the run so long after the last message; what it said."""
+    time.sleep(after_s)
+    run.send_signal(signal.SIGINT)
+    return lcm_tools.finish(run)
 
 
 def replay_both(work, name):
@@ -206,9 +214,9 @@ def waymark(*words):
 def check_twist(work):
     (work / "twist.yaml").write_text(CONFIG)
     (work / "calibration.yaml").write_text("imu: {mounting: {rpy_deg: [180, 0, 30]}}\n")
-    run = start(work, "twist", SECONDS + 4)
+    run = start(work, "twist")
     subprocess.run([sys.executable, __file__, "publish"], env={"PYTHONPATH": str(work)}, check=True)
-    out, err = lcm_tools.finish(run)
+    out, err = stop(run, 3)  # silent for longer than 2 s
     assert "no usable motion_t on WAYMARK_MOTION yet" in err, err
     assert "imu_t comes on WAYMARK_GYRO" in err and "no usable imu_t on WAYMARK_GYRO any more" in err, err
     check_pose(rows(work / "twist/trajectory.csv"), "run")
