@@ -22,6 +22,7 @@ def write(library, out):
     where = [word for folder in HEADERS for word in ("--headers-dir", str(folder))]
     subprocess.run(["abidw", *PUBLIC, *where, "--no-elf-needed", "--no-corpus-path", "--no-comp-dir-path", "--no-show-locs", "--out-file",
                     str(out), str(library)], check=True)
+    out.write_text(out.read_text().replace(f"path='{ROOT}/", "path='"))
 
 
 def main():

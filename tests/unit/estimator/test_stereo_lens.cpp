@@ -87,8 +87,8 @@ void test_known_points_calibrate_the_lens(void) {
   TEST_ASSERT_LESS_THAN_DOUBLE(4.0, at.turn_sigmas);
 }
 
-// Points found on the way turn with what the focal length is wrong by: 0.4 % of a turn and a half is 38 mrad. Exact
-// gyros tell the rest.
+// Points found on the way turn with what the focal length is wrong by: 0.4 % of a turn and a half is 38 mrad. With
+// exact gyros the difference shows the focal length.
 void test_points_on_the_way_calibrate_the_lens(void) {
   scene s;
   calibrate_wrongly(&s);
@@ -106,8 +106,8 @@ void test_points_on_the_way_calibrate_the_lens(void) {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.5 * std::fabs(wrong.turn_rad), std::fabs(at.turn_rad));
 }
 
-// A point's place by one picture has the lens' error, and the same picture again says nothing about it: what it expects
-// has the pixels' noise alone, once by the point and once by the picture.
+// A new point's place has the error of the lens. The same picture again has that error, too: its innovation has the
+// pixels' noise alone, once by the point and once by the picture.
 void test_a_new_point_errs_as_the_lens_does(void) {
   scene s;
   s.set("states.camera_focal_sigma", 0.05);
