@@ -58,8 +58,10 @@ static void make_events(wm_time_ns late_ns) {
       e->t_ns = (wm_time_ns)i * (WM_NS_PER_S / FRAME_HZ) + 3 * MS;
       e->arrival_ns = e->t_ns + late_ns;
       double dx = landmarks[k].p_m[0] - x, dy = landmarks[k].p_m[1] - y;
-      e->as.sighting = (wm_sighting){
-          0, (int32_t)k, remainder(atan2(dy, dx) - h, 2 * M_PI), sqrt(dx * dx + dy * dy), NAN, NAN, NAN, NAN};
+      e->as.sighting = wm_sighting_without_numbers();
+      e->as.sighting.landmark_id = (int32_t)k;
+      e->as.sighting.bearing_rad = remainder(atan2(dy, dx) - h, 2 * M_PI);
+      e->as.sighting.range_m = sqrt(dx * dx + dy * dy);
     }
   }
   qsort(events, n, sizeof *events, by_arrival);

@@ -230,9 +230,10 @@ void scene::add_sighting(unsigned sees, int sensor, int landmark, double t_s, bo
     add_marker(sensor, landmark, level, 0.5 * landmark - heading, t_s, wrong);
     return;
   }
-  const double nothing = static_cast<double>(NAN);
   wm_sighting &out = add(WM_EVENT_SIGHTING, t_s)->as.sighting;
-  out = {static_cast<uint16_t>(sensor), 10 + landmark, nothing, nothing, nothing, nothing, nothing, nothing};
+  out = wm_sighting_without_numbers();
+  out.sensor = static_cast<uint16_t>(sensor);
+  out.landmark_id = 10 + landmark;
   if (sees & kBearings) out.bearing_rad = wrapped(bearing + 0.015 * normal() + (wrong ? 0.9 : 0.0));
   if (sees & kRanges)
     out.range_m =
@@ -354,15 +355,11 @@ void dive::add_beacons(const placed &vehicle, double t_s) {
     for (int r = 0; r < 3; r++)
       for (int k = 0; k < 3; k++) body[r] += vehicle.R[k][r] * to[k];
     wm_sighting &s = add(WM_EVENT_SIGHTING, t_s + 0.001 * i)->as.sighting;
-    const double nothing = static_cast<double>(NAN);
-    s = {1,
-         900 + i,
-         std::atan2(body[1], body[0]) + 0.03 + 0.02 * normal(),
-         std::sqrt(length) + 0.1 + 0.05 * normal(),
-         nothing,
-         nothing,
-         nothing,
-         nothing};
+    s = wm_sighting_without_numbers();
+    s.sensor = 1;
+    s.landmark_id = 900 + i;
+    s.bearing_rad = std::atan2(body[1], body[0]) + 0.03 + 0.02 * normal();
+    s.range_m = std::sqrt(length) + 0.1 + 0.05 * normal();
   }
 }
 
