@@ -113,17 +113,15 @@ static void same(const taken *a, const taken *b) {
 #define STEP_NS (20 * WM_NS_PER_MS)
 
 static wm_event sighting_at(int i) {
-  const double nan = (double)NAN, x = 5.0 - 0.01 * i - 0.1, y = i % 2 ? 1.0 : -3.0;
-  return (wm_event){.t_ns = i * STEP_NS,
-                    .arrival_ns = i * STEP_NS + 70 * WM_NS_PER_MS,
-                    .kind = WM_EVENT_SIGHTING,
-                    .as.sighting = {.landmark_id = i % 2 ? 1 : 2,
-                                    .bearing_rad = round(1e6 * atan2(y, x)) / 1e6,
-                                    .range_m = round(1e6 * sqrt(x * x + y * y)) / 1e6,
-                                    .bearing_sigma_rad = nan,
-                                    .range_sigma_m = nan,
-                                    .elevation_rad = nan,
-                                    .elevation_sigma_rad = nan}};
+  const double x = 5.0 - 0.01 * i - 0.1, y = i % 2 ? 1.0 : -3.0;
+  wm_event e = {.t_ns = i * STEP_NS,
+                .arrival_ns = i * STEP_NS + 70 * WM_NS_PER_MS,
+                .kind = WM_EVENT_SIGHTING,
+                .as.sighting = wm_sighting_without_numbers()};
+  e.as.sighting.landmark_id = i % 2 ? 1 : 2;
+  e.as.sighting.bearing_rad = round(1e6 * atan2(y, x)) / 1e6;
+  e.as.sighting.range_m = round(1e6 * sqrt(x * x + y * y)) / 1e6;
+  return e;
 }
 
 static void write_rows(void) {
