@@ -345,9 +345,6 @@ static void wrong_sources(void) {
   refused(HEAD "merge: {horizon_ms: 100}\n",
           "dir/x.yaml:3: merge.horizon_ms: merge.lateness_max_ms (150) is above merge.horizon_ms (100); set "
           "lateness_max_ms to at most 100, or horizon_ms to 150");
-  refused(HEAD "sources: [{name: gpss}]\n",
-          "dir/x.yaml:3: sources[0].name: 'gpss' is unknown; did you mean 'gnss'? (one of: can, motion, motion6, "
-          "increments, ticks, speeds, steering, imu, heading, depth, sightings, markers, stereo, points, gnss)");
   refused(HEAD "sources:\n- {name: gnss}\n- {name: gnss}\n",
           "dir/x.yaml:5: sources[1].name: 'gnss' appears twice (first in line 4)");
   refused(

@@ -14,7 +14,7 @@ typedef struct error_case {
   const char *name;
   const char *file;
   const char *input;
-  const char *message;  // with "rec/" for the recording's folder
+  const char *message;  // with "rec/" for the recording's folder; ", ...)" at its end: the list goes on
 } error_case;
 
 extern const error_case kErrorCases[];  // ends with a case without name

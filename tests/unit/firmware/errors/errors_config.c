@@ -102,6 +102,8 @@ static void run_case(const error_case *c) {
                                                   : run_row(c, &err);
   TEST_ASSERT_NOT_EQUAL_MESSAGE(WM_OK, status, c->name);
   without_folder(err.text, message, sizeof message);
+  const char *more = strstr(c->message, "...)");
+  if (more && strncmp(c->message, message, (size_t)(more - c->message)) == 0) return;
   TEST_ASSERT_EQUAL_STRING_MESSAGE(c->message, message, c->name);
 }
 

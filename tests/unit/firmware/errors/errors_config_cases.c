@@ -68,8 +68,7 @@ const error_case kErrorCases[] = {
      "config/robot.yaml:3: devices.lcm[0]: stream: is missing, e.g. {stream: motion}"},
     {CONFIG, "Stream that LCM does not carry", FILE_, "devices: {lcm: [{stream: imuu}]}\n",
      "config/robot.yaml:3: devices.lcm[0].stream: 'imuu' is unknown; did you mean 'imu'? (one of: motion, motion6, "
-     "ticks, "
-     "speeds, steering, imu, heading, depth, gnss)"},
+     "ticks, ...)"},
     {CONFIG, "Stream over LCM twice", FILE_, "devices:\n  lcm:\n    - {stream: imu}\n    - {stream: imu}\n",
      "config/robot.yaml:6: devices.lcm[1]: the stream 'imu' appears twice (first in line 5)"},
     {CONFIG, "Stream of gpsd and of LCM", FILE_, "devices:\n  lcm: [{stream: gnss}]\n  gpsd: [{latency_ms: 80}]\n",
@@ -82,7 +81,7 @@ const error_case kErrorCases[] = {
      "e.g. bmi160"},
     {CONFIG, "Unknown source", FILE_, "sources: [{name: gpss}]\n",
      "config/robot.yaml:3: sources[0].name: 'gpss' is unknown; did you mean 'gnss'? (one of: can, motion, motion6, "
-     "increments, ticks, speeds, steering, imu, heading, depth, sightings, markers, stereo, points, gnss)"},
+     "...)"},
     {CONFIG, "Source twice", FILE_, "sources:\n  - name: gnss\n  - name: gnss\n",
      "config/robot.yaml:5: sources[1].name: 'gnss' appears twice (first in line 4)"},
     {CONFIG, "Until before from", FILE_, "sources: [{name: gnss, from_s: 30, until_s: 25}]\n",
