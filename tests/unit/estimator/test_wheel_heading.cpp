@@ -121,7 +121,7 @@ void test_a_slip_is_not_believed(void) {
 
 // Slip of one wheel by 1 %, Gauss-Markov over 5 s, as of tyres in bends: twenty times the walk of the difference that
 // is stated. The track keeps what the gyro knows of it, within 2.9 sigma; it is 8.8 sigma off with the stated walk
-// alone. 2.9 sigma, and 8.8 with the stated walk.
+// alone.
 void test_slip_that_lasts_is_no_calibration(void) {
   Car car(true);
   double heading = 0, slip = 0;
