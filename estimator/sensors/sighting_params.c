@@ -47,7 +47,7 @@ static const wm_param kParams[] = {
     // clang-format off
     WM_SENSOR_STATES(ONE, TWO)
     // clang-format on
-    I32("correlated.slots", correlated_slots, 10, 0, 24,
+    I32("correlated.slots", correlated_slots, 16, 0, 24,
         "Pairs of sensor and landmark (the last seen ones) whose time-correlated error is carried as Gauss-Markov "
         "states. 0: no error is time-correlated."),
     F64("correlated.bearing_rad", correlated_bearing_rad, -1, -10, 3,

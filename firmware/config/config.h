@@ -46,6 +46,7 @@ typedef struct wm_source_config {
   char name[WM_SOURCE_NAME_MAX];  // a source's whole name, or what stands before its ':' ("sightings" is each of them)
   int32_t use;                    // 0: not opened
   double lateness_max_ms;         // older than this on the arrival clock is final (and late)
+  int32_t lateness_is_stated;     // 0: it may rise to merge.horizon_ms with the source's data
   double period_ms;               // > 0: no event follows within this time after one
   double ready_after_ms;          // of a detector on recorded pictures: arrival of its observations after the picture's
   int32_t sample_at_next;         // of motion.csv, motion6.csv: a row's values get the stamp of the next row
@@ -100,6 +101,7 @@ typedef struct wm_config {
   wm_motion_params *motion;
   wm_sighting_params *sightings;
   wm_runtime_params runtime;
+  int32_t lateness_is_stated;  // merge.lateness_max_ms
   wm_recording_overrides overrides;
   wm_vision_config vision[WM_VISION_MAX];
   size_t vision_count;

@@ -62,7 +62,8 @@ const config_key kConfigSourceKeys[] = {
      "sensor; a detector under `vision`, or `DETECTOR:CAMERA`."},
     {"use", "true or false", "true", "false: the source is not opened."},
     {"lateness_max_ms", "number from 0 to merge.horizon_ms", "merge.lateness_max_ms",
-     "ms. A datum that arrives later than this after its stamp is late, and dropped."},
+     "ms. A datum that arrives later than this after its stamp is late, and dropped. Where neither this nor "
+     "merge.lateness_max_ms is given, three late data in a row raise it, up to merge.horizon_ms."},
     {"period_ms", "number from 0 to 60000", "0",
      "ms. Above 0: the source sends nothing within this time after a datum, and the merge does not wait for it."},
     {"ready_after_ms", "number from 0 to 60000", "0",

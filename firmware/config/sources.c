@@ -10,8 +10,11 @@
 #include "waymark/text.h"
 
 static wm_source_config defaults(const wm_config *config) {
-  return (wm_source_config){
-      .use = 1, .lateness_max_ms = config->runtime.merge_lateness_max_ms, .from_s = -HUGE_VAL, .until_s = HUGE_VAL};
+  return (wm_source_config){.use = 1,
+                            .lateness_max_ms = config->runtime.merge_lateness_max_ms,
+                            .lateness_is_stated = config->lateness_is_stated,
+                            .from_s = -HUGE_VAL,
+                            .until_s = HUGE_VAL};
 }
 
 static wm_status read_name(const wm_yaml_node *item, const wm_config *config, wm_source_config *out, wm_error *err) {
@@ -85,6 +88,7 @@ static wm_status read_source(const wm_yaml_node *item, const wm_config *config, 
   if (status == WM_OK && wm_yaml_there(&use)) status = wm_yaml_bool(&use, &yes, err);
   out->use = yes;
   if (status == WM_OK) status = number(item, "lateness_max_ms", 0, 60000, &out->lateness_max_ms, err);
+  if (wm_yaml_there(&lateness)) out->lateness_is_stated = 1;
   if (status == WM_OK && wm_yaml_there(&lateness))
     status = check_lateness(&lateness, out->lateness_max_ms, config->runtime.merge_horizon_ms, err);
   if (status == WM_OK) status = number(item, "period_ms", 0, 60000, &out->period_ms, err);
@@ -100,6 +104,7 @@ static wm_status read_source(const wm_yaml_node *item, const wm_config *config, 
 
 wm_status config_read_sources(const wm_yaml_node *root, wm_config *out, wm_error *err) {
   wm_yaml_node lateness = wm_yaml_get(root, "merge.lateness_max_ms"), list = wm_yaml_get(root, "sources");
+  out->lateness_is_stated = wm_yaml_there(&lateness);
   // Where the horizon is set too small, the error is shown there.
   if (!wm_yaml_there(&lateness)) lateness = wm_yaml_get(root, "merge.horizon_ms");
   wm_status status = WM_OK;

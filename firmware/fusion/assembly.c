@@ -28,7 +28,7 @@ static void add_source(wm_assembly *self, wm_source *source) {
   int rank = 0;
   wm_config_source(self->config, source->name, &wanted, &rank);
   if ((size_t)rank == self->config->source_count && source->lateness_max_ms > 0)
-    wanted.lateness_max_ms = source->lateness_max_ms;
+    wanted.lateness_max_ms = source->lateness_max_ms, wanted.lateness_is_stated = 1;
   const char *why_not = reason_to_leave_out(self->config, source, &wanted);
   if (why_not) {
     leave_out(self, source->name, why_not);
@@ -48,6 +48,7 @@ static void add_source(wm_assembly *self, wm_source *source) {
                                .is_motion = source->is_motion,
                                .in_order = source->in_order,
                                .lateness_max_ns = lateness_ns < horizon_ns ? lateness_ns : horizon_ns,
+                               .lateness_most_ns = wanted.lateness_is_stated ? 0 : horizon_ns,
                                .period_ns = ns_from_ms(wanted.period_ms)};
   self->kinds |= source->kinds;
 }

@@ -7,6 +7,9 @@
 
 // Rows of one frame arrive together; a source's next period is excluded only once this has passed since its last row.
 #define FRAME_COMPLETE_NS (1 * WM_NS_PER_MS)
+// So many data in a row beyond a source's bound are its usual way: the bound rises to the latest of them and a tenth
+// more. One that is late by chance delays no pose for good.
+#define LATE_IN_A_ROW 3
 // Bits of an event's number in the order of events: 2^47 at 1 kHz are 4000 years.
 #define NUMBER_BITS 47
 
@@ -23,6 +26,8 @@ typedef struct source_state {
   uint64_t number;  // of the last event: its seq, continued over the wrap of 32 bits; 0: there was none
   uint64_t recent[WM_MERGE_RECENT];  // hashes of the newest data
   uint32_t recent_next;
+  int late_in_a_row;
+  wm_time_ns latest_of_them_ns;
 } source_state;
 
 struct wm_merge {
@@ -176,6 +181,18 @@ static uint64_t order_of(source_state *s, uint32_t seq) {
          (s->number & ((UINT64_C(1) << NUMBER_BITS) - 1));
 }
 
+static void learn_lateness(source_state *s, wm_time_ns lateness_ns) {
+  if (lateness_ns <= s->is.lateness_max_ns || lateness_ns > s->is.lateness_most_ns) {
+    s->late_in_a_row = 0;
+    return;
+  }
+  if (s->late_in_a_row++ == 0 || lateness_ns > s->latest_of_them_ns) s->latest_of_them_ns = lateness_ns;
+  if (s->late_in_a_row < LATE_IN_A_ROW) return;
+  const wm_time_ns with_room_ns = s->latest_of_them_ns + s->latest_of_them_ns / 10;
+  s->is.lateness_max_ns = with_room_ns < s->is.lateness_most_ns ? with_room_ns : s->is.lateness_most_ns;
+  s->late_in_a_row = 0;
+}
+
 wm_merge_verdict wm_merge_push(wm_merge *self, const wm_event *event) {
   source_state *s = &self->sources[event->source];
   wm_merge_counts *counts = &s->counts;
@@ -188,6 +205,7 @@ wm_merge_verdict wm_merge_push(wm_merge *self, const wm_event *event) {
   if (counts->last_arrival_ns == WM_TIME_NONE || event->arrival_ns > counts->last_arrival_ns)
     counts->last_arrival_ns = event->arrival_ns;
   measure_lateness(counts, lateness_ns);
+  learn_lateness(s, lateness_ns);
   if (event->t_ns < self->watermark_ns) {
     counts->late++;
     return WM_MERGE_LATE;
@@ -238,6 +256,10 @@ size_t wm_merge_waiting_of(const wm_merge *self, size_t source) { return self->s
 
 const wm_merge_counts *wm_merge_source_counts(const wm_merge *self, size_t source) {
   return &self->sources[source].counts;
+}
+
+wm_time_ns wm_merge_lateness_max(const wm_merge *self, size_t source) {
+  return self->sources[source].is.lateness_max_ns;
 }
 
 wm_time_ns wm_merge_lateness_p99(const wm_merge *self, size_t source) {

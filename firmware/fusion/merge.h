@@ -28,11 +28,12 @@
 #define WM_MERGE_RECENT 32           // newest data of a source that a new one is compared with
 
 typedef struct wm_merge_source {
-  int rank;                    // order at equal stamps
-  uint8_t is_motion;           // comes first at equal stamps
-  uint8_t in_order;            // its stamps never go back
-  wm_time_ns lateness_max_ns;  // older than this on the arrival clock is final
-  wm_time_ns period_ns;        // > 0: no datum earlier than this after one
+  int rank;                     // order at equal stamps
+  uint8_t is_motion;            // comes first at equal stamps
+  uint8_t in_order;             // its stamps never go back
+  wm_time_ns lateness_max_ns;   // older than this on the arrival clock is final
+  wm_time_ns lateness_most_ns;  // to which that bound rises where the source's data are later; less: it is kept
+  wm_time_ns period_ns;         // > 0: no datum earlier than this after one
 } wm_merge_source;
 
 typedef enum wm_merge_verdict {
@@ -77,6 +78,8 @@ WM_REALTIME wm_time_ns wm_merge_watermark(const wm_merge *self);
 size_t wm_merge_waiting(const wm_merge *self);
 size_t wm_merge_waiting_of(const wm_merge *self, size_t source);
 WM_REALTIME const wm_merge_counts *wm_merge_source_counts(const wm_merge *self, size_t source);
+// The source's bound now: lateness_max_ns, or what it has risen to.
+WM_REALTIME wm_time_ns wm_merge_lateness_max(const wm_merge *self, size_t source);
 // Lateness (arrival minus stamp) that 99 of 100 data keep below, rounded up to a millisecond. 0 before the first.
 WM_REALTIME wm_time_ns wm_merge_lateness_p99(const wm_merge *self, size_t source);
 // On the arrival clock since its last event, or since the start where it has sent none.

@@ -127,7 +127,7 @@ static void source_health(const wm_pipeline *self, size_t i, wm_time_ns now_ns, 
   memcpy(out->refused, fused->refused, sizeof out->refused);
   out->lateness_p99_ns = wm_merge_lateness_p99(self->merge, i);
   out->lateness_worst_ns = merged->lateness_worst_ns;
-  out->lateness_max_ns = self->assembly->sources[i].merge.lateness_max_ns;
+  out->lateness_max_ns = wm_merge_lateness_max(self->merge, i);
   out->newest_ns = merged->newest_ns;
   out->silent_ns = wm_merge_silent_ns(self->merge, i, now_ns);
   const wm_source *source = self->assembly->sources[i].source;

@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "drives.hpp"
@@ -159,6 +160,15 @@ void a_turn_with_the_wrong_sign_is_named(void) {
 
 // ── causes, one at a time, by the monitor alone ─────────────────────────────────────────────────────────────────────
 
+struct plane {
+  double x_m, y_m, heading_rad;
+  void move(double v_mps, double w_radps) {  // for 0.1 s
+    heading_rad += w_radps * 0.1;
+    x_m += v_mps * std::cos(heading_rad) * 0.1;
+    y_m += v_mps * std::sin(heading_rad) * 0.1;
+  }
+};
+
 // A car with a receiver: ten seconds of driving straight and a turn by 90 degrees, in turns to the left and to the
 // right. `side` -1: the positions are mirrored. One comes at each `every`th of ten steps a second.
 wm_estimate drive_by_positions(double seconds, double side, double v_mps, int every = 1) {
@@ -202,6 +212,40 @@ void positions_that_turn_to_the_other_side_are_degraded(void) {
   const wm_estimate mirrored = drive_by_positions(60, -1, 10);
   TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, mirrored.state);
   TEST_ASSERT_EQUAL(WM_CAUSE_TURN, mirrored.cause);
+}
+
+// A minute of turns proves the sign. On the straight behind it the wheels slip: what is reckoned bends to the left, the
+// way to the right, and the mirror image fits better.
+void a_sign_that_is_proven_stays(void) {
+  lone robot(false);
+  plane way{}, place{};
+  wm_estimate out{};
+  for (int step = 0; step < 1100; step++) {
+    const double t_s = 0.1 * step, v_mps = 10.0;
+    const double turn = std::fmod(t_s, 15.0) < 10.0 ? 0.0 : std::fmod(t_s, 45.0) < 30.0 ? 0.314 : -0.314;
+    const double w_radps = t_s < 60.0 ? turn : 0.006, true_w_radps = t_s < 60.0 ? turn : -0.006;
+    wm_event e{};
+    e.kind = WM_EVENT_POSITION;
+    e.t_ns = wm_ns_from_seconds(t_s);
+    e.as.position = {{place.x_m, place.y_m, NAN}, 0.05, NAN};
+    out = robot.estimate;
+    out.t_ns = e.t_ns;
+    out.pose_map_base.p_m[0] = place.x_m;
+    out.pose_map_base.p_m[1] = place.y_m;
+    out.heading_rad = way.heading_rad;
+    out.v_mps[0] = v_mps;
+    out.w_radps[2] = w_radps;
+    wm_innovation record{};
+    record.landmark_id = -1;
+    record.residual = WM_RESIDUAL_X;
+    record.verdict = WM_FUSED;
+    record.variance = 1.0;
+    if (wm_monitor_take(&robot.monitor, &e, &record, true)) wm_monitor_step(&robot.monitor, &out, nullptr, 0);
+    wm_monitor_judge(&robot.monitor, &out);
+    TEST_ASSERT_EQUAL_MESSAGE(WM_STATE_TRACKING, out.state, std::to_string(t_s).c_str());
+    way.move(v_mps, w_radps);
+    place.move(v_mps, true_w_radps);
+  }
 }
 
 // Before it is certain that positions are mirrored, the covariance is that of the mixture with the mirror image of the
@@ -465,6 +509,7 @@ int main(void) {
   RUN_TEST(stereo_ekf_is_degraded_then_lost);
   RUN_TEST(a_turn_with_the_wrong_sign_is_named);
   RUN_TEST(positions_that_turn_to_the_other_side_are_degraded);
+  RUN_TEST(a_sign_that_is_proven_stays);
   RUN_TEST(positions_that_may_be_mirrored_widen_the_covariance);
   RUN_TEST(sparse_positions_show_no_mirror_image);
   RUN_TEST(a_turn_that_no_vehicle_can_drive_is_degraded);

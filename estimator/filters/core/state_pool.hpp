@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A pool of states that are lent to what was seen last: a fixed number of slots, each with a key. A new key takes the
-// slot that was not used for longest.
+// slot that was not used for longest, unless its own key may still need it. Where more keys come round than there are
+// slots, each would else take the slot of the one that comes next, and every use would begin a new error.
 #ifndef WAYMARK_ESTIMATOR_CORE_STATE_POOL_HPP
 #define WAYMARK_ESTIMATOR_CORE_STATE_POOL_HPP
 
@@ -23,6 +24,13 @@ void decay_state(Filter *filter, int state, double left, double variance) {
   if (left < 1.0) filter->fade(state, left, (1.0 - left * left) * variance);
 }
 
+// Variance of an error of variance 1 that all uses within kept_s share, as independent noise of one that comes dt_s
+// after the last: the mean of those uses has a variance of 1 again.
+inline double repeated_variance(double kept_s, double dt_s) {
+  constexpr double kLeast_s = 0.001;  // of two sensors at once
+  return dt_s >= kept_s ? 1.0 : kept_s / (dt_s > kLeast_s ? dt_s : kLeast_s);
+}
+
 template <int kCapacity>
 class state_pool {
  public:
@@ -39,8 +47,9 @@ class state_pool {
     for (int i = 0; i < count_; i++) slot_[i].key = -1, slot_[i].used_ns = WM_TIME_NONE;
   }
 
-  // The slot of `key`; *fresh: it was free or another key's. Null where there are no slots.
-  slot *take(int64_t key, bool *fresh) {
+  // The slot of `key` at t_ns; *fresh: it was free or another key's. Null where there are no slots, and where all
+  // others were used within kept_s.
+  slot *take(int64_t key, wm_time_ns t_ns, double kept_s, bool *fresh) {
     slot *oldest = nullptr;
     for (int i = 0; i < count_; i++) {
       if (slot_[i].key == key) {
@@ -49,19 +58,20 @@ class state_pool {
       }
       if (!oldest || slot_[i].used_ns < oldest->used_ns) oldest = &slot_[i];
     }
-    if (oldest) {
-      oldest->key = key;
-      *fresh = true;
-    }
+    if (!oldest) return nullptr;
+    const bool is_needed = oldest->key >= 0 && wm_seconds_between(oldest->used_ns, t_ns) < kept_s;
+    if (is_needed) return nullptr;
+    oldest->key = key;
+    *fresh = true;
     return oldest;
   }
 
   // Lends `width` states of unit variance to `key`: time-correlated errors (Gauss-Markov, time constant tau_s), carried
-  // on to t_ns. Returns the first state; -1 where there are no slots.
+  // on to t_ns. Returns the first state; -1 where there are none to lend.
   template <class Filter>
-  int lend(Filter *filter, int64_t key, int width, double tau_s, wm_time_ns t_ns) {
+  int lend(Filter *filter, int64_t key, int width, double tau_s, double kept_s, wm_time_ns t_ns) {
     bool fresh;
-    slot *lent = take(key, &fresh);
+    slot *lent = take(key, t_ns, kept_s, &fresh);
     if (!lent) return -1;
     const double left = fresh ? 0.0 : decay_over(lent->used_ns, t_ns, tau_s);
     for (int k = 0; k < width; k++) {

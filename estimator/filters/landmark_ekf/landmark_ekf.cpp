@@ -22,12 +22,22 @@ const char *const kReads[] = {"motion.", "sightings.", nullptr};
 
 int map_states(const wm_sighting_params &p) { return p.use_elevation ? 3 : 2; }
 
+// No more slots than the map has landmarks, and pairs of a sensor and a landmark.
+int map_slots(const wm_landmark_ekf_params &p, const wm_setup &setup) {
+  return p.map_slots < static_cast<int>(setup.landmark_count) ? p.map_slots : static_cast<int>(setup.landmark_count);
+}
+int error_slots(const wm_setup &setup) {
+  const size_t pairs = setup.landmark_count * setup.sensor_count;
+  const int wanted = setup.sightings->correlated_slots;
+  return static_cast<size_t>(wanted) < pairs ? wanted : static_cast<int>(pairs);
+}
+
 int count_states(const wm_landmark_ekf_params &p, const wm_setup &setup) {
   const wm_sighting_params &s = *setup.sightings;
   return kPoseStates + planar_filter::count_motion_states(setup.motion->states, setup.motion->model) +
          sensor_slots::count(setup) + (p.gnss.time_offset_sigma_s > 0.0) + 2 * (p.gnss.antenna_sigma_m != 0.0) +
          (p.heading_bias_sigma_rad > 0.0) + 2 * (p.gnss.correlated_m != 0.0) +
-         s.correlated_slots * correlated_slot_of(s).width + map_states(s) * p.map_slots +
+         error_slots(setup) * correlated_slot_of(s).width + map_states(s) * map_slots(p, setup) +
          2 * (s.use_elevation && p.tilt_sigma_rad > 0.0);
 }
 
@@ -48,7 +58,8 @@ double spread_of(const wm_setup &setup) {
 landmark_ekf::arrays landmark_ekf::place(memory_layout *layout, const wm_landmark_ekf_params &params,
                                          const wm_setup &setup) {
   return {layout->take<double>(planar_filter::doubles(count_states(params, setup))),
-          layout->take<int>(setup.landmark_count), layout->take<landmark_record>(setup.landmark_count)};
+          layout->take<int>(setup.landmark_count), layout->take<landmark_record>(setup.landmark_count),
+          layout->take<wm_time_ns>(setup.landmark_count)};
 }
 
 size_t landmark_ekf::bytes(const wm_landmark_ekf_params &params, const wm_setup &setup, const char **why) {
@@ -91,11 +102,11 @@ void landmark_ekf::init(const wm_landmark_ekf_params &params, const wm_setup &se
   tilt_ns_ = WM_TIME_NONE;
   calibration_states_ = filter_.states();
   error_ = correlated_slot_of(sightings());
-  for (int i = 0; i < sightings().correlated_slots && error_.width > 0; i++) {
+  for (int i = 0; i < error_slots(setup) && error_.width > 0; i++) {
     errors_.add(filter_.states());
     for (int k = 0; k < error_.width; k++) filter_.add_state(0.0, 1.0);
   }
-  for (int i = 0; i < params.map_slots; i++) {
+  for (int i = 0; i < map_slots(params, setup); i++) {
     map_.add(filter_.states());
     for (int k = 0; k < map_states(sightings()); k++) filter_.add_state(0.0, 0.0);
   }
@@ -103,6 +114,8 @@ void landmark_ekf::init(const wm_landmark_ekf_params &params, const wm_setup &se
   if (tilt_state_ >= 0) add(0.0, params.tilt_sigma_rad);
   index_.init(setup.landmarks, setup.landmark_count, behind.order);
   records_.set(behind.records);
+  seen_ns_.set(behind.seen_ns);
+  for (size_t i = 0; i < setup.landmark_count; i++) behind.seen_ns[i] = WM_TIME_NONE;
   std::memset(behind.records, 0, setup.landmark_count * sizeof(landmark_record));
   map_variance_m2_ = spread_of(setup);
   moved_id_ = -1;

@@ -40,7 +40,7 @@ class landmark_ekf {
   uint32_t motion_health() const { return filter_.motion_health(); }
 
  private:
-  static constexpr int kErrorSlots = 24, kMapSlots = 16;  // most of correlated.slots and states.map_slots
+  static constexpr int kErrorSlots = 24, kMapSlots = 24;  // most of correlated.slots and states.map_slots
   static constexpr int kGnssStates = 3;                   // time offset, time-correlated error on each axis
   static constexpr int kMaxCalibration =
       kCalibrationCount + 2 + kMaxSensors * kSensorStates + kGnssStates;  // 2: the wheels' heading
@@ -69,6 +69,7 @@ class landmark_ekf {
   // -1: none.
   struct lent_slots {
     int error, map;
+    double repeated_error, repeated_map;  // variances of those without a slot, as noise, over their own
   };
 
   wm_status fuse_sighting(const wm_event &event, const wm_sighting &s, record_list records);
@@ -140,6 +141,7 @@ class landmark_ekf {
     double *filter;
     int *order;
     landmark_record *records;
+    wm_time_ns *seen_ns;
   };
   const wm_sighting_params &sightings() const { return *setup_->sightings; }
   static arrays place(memory_layout *layout, const wm_landmark_ekf_params &params, const wm_setup &setup);
@@ -147,6 +149,7 @@ class landmark_ekf {
   planar_filter filter_;
   landmark_index index_;
   relative_array<landmark_record> records_;
+  relative_array<wm_time_ns> seen_ns_;  // of each landmark's last sighting; WM_TIME_NONE: none
   const wm_setup *setup_;
   wm_landmark_ekf_params params_;
   mounted_sensor sensor_[kMaxSensors];

@@ -12,10 +12,9 @@ static const wm_param kParams[] = {
     F64("states.heading_bias_sigma_rad", heading_bias_sigma_rad, 0.05, 0, 1,
         "Start sigma of the constant error of headings, rad: a compass' deviation, the mounting of two antennas. 0: "
         "off."),
-    I32("states.map_slots", map_slots, 8, 0, 16,
-        "Landmarks (the last seen ones) whose error on the map, by their sigma_m, is carried as states. 0: the map's "
-        "error counts as independent noise of each sighting, and the covariance is too small where one landmark is "
-        "seen often."),
+    I32("states.map_slots", map_slots, 16, 0, 24,
+        "Landmarks (the last seen ones) whose error on the map, by their sigma_m, is carried as states. That of a "
+        "landmark beyond them counts as noise, the larger the more often it is seen."),
     BOOL("use.position", use_position, 1, "Fuse positions (GNSS)."),
     BOOL("use.heading", use_heading, 1, "Fuse headings."),
     POSITION_NOISE_ROWS(gnss),

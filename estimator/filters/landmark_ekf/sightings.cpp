@@ -13,7 +13,10 @@ constexpr double kOnSensor_m = 0.05;      // nearer to the sensor, a landmark ha
 constexpr double kNear_m = 0.1;           // floor of a distance that an error across the line of sight is divided by
 constexpr double kBeyondRange = 1.5;      // times the sensor's range; beyond, no landmark is associated
 constexpr double kStepsMost = 0.2;        // share of the counts' steps in a row's noise; not swept
-constexpr double kClearlyBest = 0.5;      // of the soft gate: only a fit within this is associated
+// A landmark in view is seen again within kKept_s: it needs its slot. A robot passes it within kVisit_s, over which its
+// error on the map acts the same way. Not swept.
+constexpr double kKept_s = 3.0, kVisit_s = 10.0;
+constexpr double kClearlyBest = 0.5;  // of the soft gate: only a fit within this is associated
 
 // The second-order correction of a sighting for an uncertain position: bias and variance of its expectation
 // [Athans1968]. It matters after seconds of blind driving, with a position uncertain by metres.
@@ -236,12 +239,18 @@ int landmark_ekf::associate_nearest(const sighting_context &at) {
 landmark_ekf::lent_slots landmark_ekf::lend_states(int sensor, int landmark, wm_time_ns t_ns) {
   lent_slots out;
   const int64_t key = static_cast<int64_t>(landmark) * kMaxSensors + sensor;
-  out.error = errors_.lend(&filter_, key, error_.width, sightings().correlated_tau_s, t_ns);
+  const double tau_s = sightings().correlated_tau_s;
+  wm_time_ns &seen_ns = seen_ns_[static_cast<size_t>(landmark)];
+  const double since_s = seen_ns == WM_TIME_NONE ? kVisit_s + tau_s : wm_seconds_between(seen_ns, t_ns);
+  seen_ns = t_ns;
+  out.repeated_error = repeated_variance(2.0 * tau_s, since_s);
+  out.repeated_map = repeated_variance(kVisit_s, since_s);
+  out.error = errors_.lend(&filter_, key, error_.width, tau_s, kKept_s, t_ns);
   out.map = -1;
   const double sigma = map_sigma(landmark);
   if (!(sigma > 0.0)) return out;
   bool fresh;
-  auto *slot = map_.take(landmark, &fresh);
+  auto *slot = map_.take(landmark, t_ns, kKept_s, &fresh);
   if (!slot) return out;
   out.map = slot->state;
   slot->used_ns = t_ns;
@@ -276,18 +285,18 @@ void landmark_ekf::add_errors(const sighting_context &at, const lent_slots &lent
   if (lent.error >= 0 && error_offset >= 0)
     add_state(lent.error + error_offset, error_size);
   else
-    r->noise += square(error_size);
+    r->noise += lent.repeated_error * square(error_size);
   if (lent.map >= 0) {
     add_state(lent.map, -by[kByX]);
     add_state(lent.map + 1, -by[kByY]);
   } else {
-    r->noise += square(map_sigma(at.landmark)) * (square(by[kByX]) + square(by[kByY]));
+    r->noise += lent.repeated_map * square(map_sigma(at.landmark)) * (square(by[kByX]) + square(by[kByY]));
   }
   if (!at.elevation) return;
   if (lent.map >= 0)
     add_state(lent.map + 2, by[kByHeight]);
   else
-    r->noise += square(map_sigma(at.landmark) * by[kByHeight]);
+    r->noise += lent.repeated_map * square(map_sigma(at.landmark) * by[kByHeight]);
   if (tilt_state_ < 0) return;
   add_state(tilt_state_, by[kByBodyRoll]);
   add_state(tilt_state_ + 1, by[kByBodyPitch]);

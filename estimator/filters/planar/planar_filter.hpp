@@ -16,7 +16,7 @@ namespace wm {
 
 // Most states of a planar filter: pose, motion, sixteen fully calibrated sensors and the largest pools of lent states
 // (landmark_ekf asserts it).
-inline constexpr int kMaxStates = 320;
+inline constexpr int kMaxStates = 352;
 
 // Entries of a measurement's Jacobian row (landmark_ekf asserts that they suffice).
 using planar_row = jacobian_row<24>;

@@ -139,6 +139,8 @@ class planar_motion {
   // The kind of the motion has become known, or another one.
   void take_kind();
   // Odometry over one such segment.
+  // Whether a measured turn is more than its noise over kTurn_s and its unknown bias: both have no sign to be tested.
+  bool is_turn(const motion_twist &twist, const motion_noise &noise, double dt_s) const;
   void take_step(const motion_segment &segment, const motion_twist &twist, const motion_noise &noise,
                  const pose_step &step);
   // The first motion state beyond its limit, and the change that brings it back; -1: none. A filter moves the states

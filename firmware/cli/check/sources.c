@@ -107,7 +107,7 @@ static void judge(const wm_assembly *assembly, const wm_assembled_source *s, con
     wm_find(out, WM_FOUND_ROWS_DISORDERED, WM_SEVERITY_BAD, s->name,
             "sort the rows by t_ns; or correct arrival_ns, which has to be of the same clock",
             "rows arrive up to %.1f s after newer ones", (double)facts->latest_ns * 1e-9);
-  } else if (facts->latest_ns > s->merge.lateness_max_ns) {
+  } else if (facts->latest_ns > s->merge.lateness_max_ns && facts->latest_ns > s->merge.lateness_most_ns) {
     char mend[120], with_look[80] = "";
     if (facts->look_ns > 0)
       (void)snprintf(with_look, sizeof with_look, " with the %.0f ms that detection takes on this computer",

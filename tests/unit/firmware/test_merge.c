@@ -174,6 +174,47 @@ static void what_is_late_is_counted_and_dropped(void) {
   TEST_ASSERT_EQUAL_INT64(151 * MS, wm_merge_lateness_p99(merge, 1) - MS);
 }
 
+// Data of a receiver that is 200 ms late, beside motion to `end_ms`: how many are late.
+static uint64_t late_of_a_receiver(wm_time_ns lateness_most_ns, wm_time_ns late_ns, int end_ms) {
+  wm_merge_source receiver = kCamera;
+  receiver.lateness_most_ns = lateness_most_ns;
+  open_merge((wm_merge_source[]){kMotion, receiver}, 2);
+  for (int ms = 0; ms <= end_ms; ms += 10) {
+    arrive(0, ms * MS, ms * MS);
+    if (ms % 200 == 0 && ms * MS >= late_ns) arrive(1, ms * MS - late_ns, ms * MS);
+    (void)final_ms();
+  }
+  return wm_merge_source_counts(merge, 1)->late;
+}
+
+static void the_bound_rises_with_a_source_that_is_usually_late(void) {
+  TEST_ASSERT_EQUAL_UINT64(3, late_of_a_receiver(300 * MS, 200 * MS, 5000));
+  TEST_ASSERT_EQUAL_INT64(220 * MS, wm_merge_lateness_max(merge, 1));  // a tenth more
+  TEST_ASSERT_EQUAL_INT64(150 * MS, wm_merge_lateness_max(merge, 0));
+  TEST_ASSERT_EQUAL_UINT64(3, late_of_a_receiver(205 * MS, 200 * MS, 5000));
+  TEST_ASSERT_EQUAL_INT64(205 * MS, wm_merge_lateness_max(merge, 1));  // no further than it may
+}
+
+static void a_stated_bound_and_a_later_source_keep_their_bound(void) {
+  TEST_ASSERT_EQUAL_UINT64(24, late_of_a_receiver(0, 200 * MS, 4800));
+  TEST_ASSERT_EQUAL_INT64(150 * MS, wm_merge_lateness_max(merge, 1));
+  TEST_ASSERT_EQUAL_UINT64(24, late_of_a_receiver(190 * MS, 200 * MS, 4800));
+  TEST_ASSERT_EQUAL_INT64(150 * MS, wm_merge_lateness_max(merge, 1));
+}
+
+static void what_is_late_by_chance_raises_no_bound(void) {
+  wm_merge_source receiver = kCamera;
+  receiver.lateness_most_ns = 300 * MS;
+  open_merge((wm_merge_source[]){kMotion, receiver}, 2);
+  for (int i = 30; i < 200; i++) {
+    arrive(0, i * 10 * MS, i * 10 * MS);
+    (void)final_ms();
+    if (i % 3) arrive(1, i * 10 * MS - 200 * MS, i * 10 * MS);  // two in a row
+    if (i % 3 == 0) arrive(1, i * 10 * MS - 100 * MS, i * 10 * MS);
+  }
+  TEST_ASSERT_EQUAL_INT64(150 * MS, wm_merge_lateness_max(merge, 1));
+}
+
 static void a_periodic_source_lets_time_pass_until_its_next_datum(void) {
   wm_merge_source periodic = kCamera;
   periodic.period_ns = 100 * MS;
@@ -394,6 +435,9 @@ int main(void) {
   RUN_TEST(the_numbers_of_events_wrap);
   RUN_TEST(events_of_one_stamp_keep_their_order_where_numbers_wrap);
   RUN_TEST(a_silent_source_costs_its_lateness_and_its_first_datum_after_that_is_fused);
+  RUN_TEST(the_bound_rises_with_a_source_that_is_usually_late);
+  RUN_TEST(a_stated_bound_and_a_later_source_keep_their_bound);
+  RUN_TEST(what_is_late_by_chance_raises_no_bound);
   RUN_TEST(what_is_late_is_counted_and_dropped);
   RUN_TEST(a_periodic_source_lets_time_pass_until_its_next_datum);
   RUN_TEST(rows_of_one_frame_arrive_within_a_millisecond);
