@@ -42,8 +42,8 @@ def estimator_tests(*names):
 
 # The folder or file of each room, and its tests, the quickest first.
 ROOMS = {
-    "core": (["estimator/filters/core"], [*estimator_tests(*FILTERS, "edge_mcl", "stereo_ekf"), "test_contract_monitor",
-                                          "test_contract_estimators"]),
+    "core": (["estimator/filters/core"], [*estimator_tests(*FILTERS, "course_and_turn", "landmark_counts", "edge_mcl", "stereo_ekf"),
+                                          "test_contract_monitor", "test_contract_estimators"]),
     "planar": (["estimator/filters/planar"], [*estimator_tests(*FILTERS), "test_contract_estimators"]),
     "motion": (["estimator/motion"], [*estimator_tests(*MOTION), "test_contract_estimators"]),
     "merge": (["firmware/fusion/merge.c", "firmware/fusion/predictor.c", "firmware/fusion/fuser.c"],
