@@ -32,8 +32,8 @@ HANGS, HANGS_S = 10, 30
 
 FILTERS = ["pose_step", "planar", "plane_motion", "odometry", "landmark_ekf", "landmark_elevation", "landmark_lost", "priors", "delays", "wheel_heading",
            "slam", "slam_camera", "slam_lost", "noise_adaption"]
-MOTION = ["motion", "commands", "motion_models", "plane_motion", "drives", "twist_and_gyro", "odometry", "wheel_heading", "delays", "space", "space_imu",
-          "planar", "landmark_ekf"]
+MOTION = ["motion", "commands", "motion_models", "motion_noise", "plane_motion", "drives", "twist_and_gyro", "odometry", "wheel_heading", "delays", "space",
+          "space_imu", "stuck_imu", "silent_parts", "priors", "planar", "landmark_ekf"]
 
 
 def estimator_tests(*names):
