@@ -209,6 +209,21 @@ void test_sideways_noise_of_an_impossible_speed_is_by_distance(void) {
   }
 }
 
+// A velocity that walks: the integral of its walk, q t^3 / 3 on each axis, whatever the input is.
+void test_noise_of_a_velocity_that_walks(void) {
+  wm_motion_params p = only(nullptr, 0.0);
+  p.velocity_speed_walk = 0.5, p.velocity_turn_walk = 0.3;
+  const wm::motion_input input = input_of(WM_MOTION_CONSTANT_VELOCITY, 0.0, 0.0, 0.0, kNone);
+  for (const double dt_s : {0.1, 0.4, 1.7}) {
+    const wm::motion_noise n =
+        wm::noise_of(input, {}, dt_s, p, make::no_wheels(), wm::kNeutralCalibration, kNotStated, {1, 1});
+    const double cubed = dt_s * dt_s * dt_s / 3.0;
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.25 * cubed, n.distance_m2);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.25 * cubed, n.lateral_m2);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.09 * cubed, n.rotation_rad2);
+  }
+}
+
 // Along and across the way, turned to base_link's axes: R diag(along, across) R'.
 void test_noise_on_the_axes_of_a_sideways_drive(void) {
   for (int i = 0; i < 16; i++) {
@@ -452,6 +467,7 @@ int main(void) {
   RUN_TEST(test_noise_by_the_kind_of_the_source);
   RUN_TEST(test_increments_have_their_own_covariance);
   RUN_TEST(test_sideways_noise_of_an_impossible_speed_is_by_distance);
+  RUN_TEST(test_noise_of_a_velocity_that_walks);
   RUN_TEST(test_noise_on_the_axes_of_a_sideways_drive);
   RUN_TEST(test_noise_of_a_turn_about_a_centre);
   RUN_TEST(test_noise_of_changes_between_samples);
