@@ -30,10 +30,10 @@ FLOOR = 0.9
 # A test that takes this many times its usual time, and at least so long, hangs.
 HANGS, HANGS_S = 10, 30
 
-FILTERS = ["pose_step", "planar", "plane_motion", "odometry", "landmark_ekf", "landmark_elevation", "landmark_lost", "priors", "delays", "wheel_heading",
+FILTERS = ["pose_step", "planar", "planar_parts", "plane_motion", "odometry", "landmark_ekf", "landmark_elevation", "landmark_lost", "priors", "delays", "wheel_heading",
            "slam", "slam_camera", "slam_lost", "noise_adaption"]
 MOTION = ["motion", "commands", "motion_models", "motion_noise", "front_end_bounds", "plane_motion", "drives", "twist_and_gyro", "odometry", "wheel_heading", "delays", "space",
-          "space_imu", "stuck_imu", "silent_parts", "priors", "planar", "landmark_ekf"]
+          "space_imu", "stuck_imu", "silent_parts", "priors", "planar", "planar_parts", "landmark_ekf"]
 
 
 def estimator_tests(*names):
