@@ -97,9 +97,9 @@ struct random_drive {
     const double chosen = uniform();
     if (e.state == WM_STATE_TRACKING) {
       if (chosen < (is_good ? 0.003 : 0.01)) e.state = WM_STATE_LOST;
-      if (chosen > 0.999) e.state = WM_STATE_SEARCHING;
+      if (chosen > 0.999) e.state = WM_STATE_SEARCHING, e.resets++;
     } else if (chosen < 0.15) {
-      if (e.state == WM_STATE_SEARCHING || uniform() < 0.7) e.resets++;
+      if (uniform() < 0.7) e.resets++;
       e.state = WM_STATE_TRACKING;
     }
     const double way = uniform();  // below and above 0.05 m/s or rad/s, along each axis

@@ -166,6 +166,8 @@ struct stream {
     const double chance = uniform();
     const auto verdict = [&] { return static_cast<uint8_t>(uniform() < refused ? WM_REJECTED_GATE : WM_FUSED); };
     if (chance < unknown) return {record(WM_RESIDUAL_RANGE, 7, WM_REJECTED_UNKNOWN_ID)};
+    if (chance > 0.97 && unknown > 0.0)
+      return {record(WM_RESIDUAL_RANGE, 7, WM_FUSED), record(WM_RESIDUAL_RANGE, 8, WM_REJECTED_UNKNOWN_ID)};
     if (chance > 0.98) return {record(WM_RESIDUAL_STANDSTILL, -1, WM_FUSED)};
     if (kind == 1) return {record(WM_RESIDUAL_X, -1, verdict()), record(WM_RESIDUAL_Y, -1, verdict())};
     if (kind == 2) return {record(WM_RESIDUAL_HEADING, -1, verdict())};
