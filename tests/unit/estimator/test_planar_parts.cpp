@@ -168,6 +168,30 @@ void test_inflated_mixed_and_scaled_covariances(void) {
       TEST_ASSERT_DOUBLE_WITHIN(1e-12, c.p[i][j] * (i < 3 ? 3.0 : 1.0) * (j < 3 ? 3.0 : 1.0), filter->covariance(i, j));
 }
 
+// Each state in turn: its row and column by the whole matrix, P' = F P F' + Q, and nothing else.
+void test_fading_and_forgetting_touch_one_row_and_column(void) {
+  begin_busy();
+  const int n = filter->states();
+  for (int state = 0; state < n; state++)
+    for (const bool forgets : {false, true}) {
+      begin_busy();
+      const kept a;
+      if (forgets)
+        filter->forget(state, 0.9, 0.03);
+      else
+        filter->fade(state, 0.6, 0.03);
+      const double by = forgets ? 0.0 : 0.6;
+      for (int i = 0; i < n; i++) {
+        TEST_ASSERT_EQUAL_DOUBLE(i != state ? a.x[i] : forgets ? 0.9 : 0.6 * a.x[i], filter->value(i));
+        for (int j = 0; j < n; j++) {
+          const double factor = (i == state ? by : 1.0) * (j == state ? by : 1.0);
+          const double expected = factor * a.p[i][j] + (i == state && j == state ? 0.03 : 0.0);
+          TEST_ASSERT_DOUBLE_WITHIN(1e-15, expected, filter->covariance(i, j));
+        }
+      }
+    }
+}
+
 // A row without states says nothing; an innovation without a positive variance, or of no number, is refused.
 void test_updates_that_are_refused(void) {
   begin_busy();
@@ -203,6 +227,47 @@ void test_the_covariance_of_two_rows(void) {
     }
   TEST_ASSERT_DOUBLE_WITHIN(1e-14, expected, filter->project_onto(a, of_b));
   TEST_ASSERT_DOUBLE_WITHIN(1e-14, own, of_b.variance);
+}
+
+// What the noise's adaption takes of a row beside the pose: its derivatives by a position's lasting error, each axis.
+void test_a_projection_has_the_part_of_a_lasting_error(void) {
+  begin_busy();
+  const int error = filter->add_state(0.0, 0.3), other = filter->add_state(0.0, 0.3),
+            behind = filter->add_state(0.0, 0.3);
+  filter->set_correlated_position(error);
+  wm::planar_row row;
+  row.add(1, 0.4), row.add(3, 9.0), row.add(error, 0.7), row.add(other, -0.2), row.add(behind, 9.0);
+  wm::projection projected;
+  filter->project(row, &projected);
+  const double expected[wm::noise_adaption::kBlock] = {0.0, 0.4, 0.0, 0.7, -0.2};
+  TEST_ASSERT_EQUAL_DOUBLE_ARRAY(expected, projected.by, wm::noise_adaption::kBlock);
+}
+
+// GIVEN twists whose turn has the wrong sign WHEN headings are seen THEN the factor -1 explains them; of a right turn,
+// and of a velocity that is a state, none is listed.
+void test_the_turn_is_tested_by_what_is_seen(void) {
+  for (int how = 0; how < 3; how++) {
+    const int models[] = {WM_MOTION_TWIST, WM_MOTION_TWIST, WM_MOTION_CONSTANT_VELOCITY};
+    begin(make::no_wheels(), models[how]);
+    double listed = 0.0;
+    for (int i = 0; i <= 200; i++) {
+      const double w = 0.2 * sin(0.05 * i), heading = 0.4 + (how == 0 ? -1.0 : 1.0) * 4.0 * (1.0 - cos(0.05 * i)) * 0.1;
+      if (how == 2)
+        filter->move_to(make::at(0.1 * i));
+      else
+        filter->move(make::twist(0.1 * i, 0.5, w));
+      wm::planar_row row;
+      row.add(wm::kHeading, 1.0);
+      wm::projection projected;
+      filter->project(row, &projected);
+      TEST_ASSERT_TRUE(filter->update(projected, wm::wrap(heading - filter->value(wm::kHeading)), 1e-4));
+      wm_calibration_value value{};
+      wm::calibration_list list(&value, 1);
+      filter->turn_test().list(&list);
+      if (list.count() > 0) listed = value.value;
+    }
+    TEST_ASSERT_EQUAL_DOUBLE(how == 0 ? -1.0 : 0.0, listed);
+  }
 }
 
 // GIVEN an update that takes a state beyond its limit THEN it stays at it, and what is correlated with it moves along:
@@ -347,11 +412,50 @@ void test_odometry_counts_ways_and_turns(void) {
     const wm::arc a = wm::make_arc(0.03, -0.04, 0.1 * w);
     odom = wm::compose(odom, {a.x_m, a.y_m, a.turn_rad});
   }
+  wm_estimate e;
+  filter->estimate(&e);
+  TEST_ASSERT_EQUAL_INT64(make::at(4.0), e.t_ns);
+  TEST_ASSERT_EQUAL_DOUBLE(filter->value(2), e.heading_rad);
+  TEST_ASSERT_EQUAL_DOUBLE(-0.4, e.v_mps[1]);
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 2.0, filter->travelled_m());
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1.6, filter->turned_rad());
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, odom.x_m, filter->odom().x_m);
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, odom.y_m, filter->odom().y_m);
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, odom.heading_rad, filter->odom().heading_rad);
+}
+
+// A motion that has been silent for a minute may have gone anywhere since the pose was last corrected, not since the
+// silence began.
+void test_a_silence_adds_by_the_time_since_a_correction(void) {
+  begin(make::no_wheels(), WM_MOTION_TWIST);
+  for (int i = 0; i <= 10; i++) filter->move(make::twist(0.1 * i, 1.5, 0.0));
+  double grown_m2[2];
+  for (int i = 0; i < 2; i++) {
+    filter->move_to(make::at(20.0 + 40.0 * i));
+    const double exact[3][3] = {{1e-6, 0, 0}, {0, 1e-6, 0}, {0, 0, 1e-6}};
+    filter->set_pose({}, exact);
+    filter->move_to(make::at(20.25 + 40.0 * i));
+    grown_m2[i] = filter->variance(0);
+  }
+  TEST_ASSERT_DOUBLE_WITHIN(0.01 * grown_m2[0], grown_m2[0], grown_m2[1]);
+  TEST_ASSERT_DOUBLE_WITHIN(0.02, 1.5 * 0.25, std::sqrt(grown_m2[0]));
+}
+
+// Used memory is as good as new: a filter that is begun again is the same.
+void test_a_filter_that_is_begun_again_is_the_same(void) {
+  begin_busy();
+  const kept first;
+  const double travelled = filter->travelled_m(), turned = filter->turned_rad();
+  const wm_pose2 odom = filter->odom();
+  filter->init(setup, states, wm::kPoseStates + wm::planar_filter::count_motion_states(states));
+  for (int i = 0; i <= 20; i++) filter->move(make::twist(0.1 * i, 1.0 + 0.3 * sin(i), 0.5 * cos(0.7 * i)));
+  for (int i = 0; i < filter->states(); i++) {
+    TEST_ASSERT_EQUAL_DOUBLE(first.x[i], filter->value(i));
+    for (int j = 0; j < filter->states(); j++) TEST_ASSERT_EQUAL_DOUBLE(first.p[i][j], filter->covariance(i, j));
+  }
+  TEST_ASSERT_EQUAL_DOUBLE(travelled, filter->travelled_m());
+  TEST_ASSERT_EQUAL_DOUBLE(turned, filter->turned_rad());
+  TEST_ASSERT_EQUAL_DOUBLE(odom.x_m, filter->odom().x_m);
 }
 
 // The path between two times in the past is that of the poses then.
@@ -391,14 +495,19 @@ int main(void) {
   RUN_TEST(test_the_start_of_the_filter);
   RUN_TEST(test_a_given_covariance_is_its_upper_half);
   RUN_TEST(test_inflated_mixed_and_scaled_covariances);
+  RUN_TEST(test_fading_and_forgetting_touch_one_row_and_column);
   RUN_TEST(test_updates_that_are_refused);
   RUN_TEST(test_the_covariance_of_two_rows);
+  RUN_TEST(test_a_projection_has_the_part_of_a_lasting_error);
+  RUN_TEST(test_the_turn_is_tested_by_what_is_seen);
   RUN_TEST(test_a_state_beyond_its_limit_takes_the_others_along);
   RUN_TEST(test_states_of_sensors_have_limits_and_walk);
   RUN_TEST(test_states_come_and_go_with_the_kind_of_the_motion);
   RUN_TEST(test_rates_without_the_steps_of_counts);
   RUN_TEST(test_the_variance_of_a_measurement_by_counts);
   RUN_TEST(test_odometry_counts_ways_and_turns);
+  RUN_TEST(test_a_silence_adds_by_the_time_since_a_correction);
+  RUN_TEST(test_a_filter_that_is_begun_again_is_the_same);
   RUN_TEST(test_a_past_path_is_that_between_the_poses);
   return UNITY_END();
 }
