@@ -33,7 +33,7 @@ HANGS, HANGS_S = 10, 30
 FILTERS = ["pose_step", "planar", "planar_parts", "plane_motion", "odometry", "landmark_ekf", "landmark_elevation", "landmark_lost", "priors", "delays", "wheel_heading",
            "slam", "slam_camera", "slam_lost", "noise_adaption"]
 MOTION = ["motion", "commands", "motion_models", "motion_noise", "front_end_bounds", "plane_motion", "drives", "twist_and_gyro", "odometry", "wheel_heading", "delays", "space",
-          "space_imu", "stuck_imu", "silent_parts", "priors", "planar", "planar_parts", "landmark_ekf"]
+          "space_imu", "spatial_parts", "stuck_imu", "silent_parts", "priors", "planar", "planar_parts", "landmark_ekf"]
 
 
 def estimator_tests(*names):

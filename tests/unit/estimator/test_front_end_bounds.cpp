@@ -351,6 +351,49 @@ void test_the_sampling_noise_of_a_holonomic_drive_is_never_below_zero(void) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 5.0 * 0.25, turn_var);
 }
 
+// GIVEN samples of one axis that change by 0.4 to and fro WHEN their own noise explains a part of it THEN the rest is
+// noise between samples of that axis: (change^2 - 2 own / dt) dt^2 / 12.
+void test_the_sampling_noise_is_what_the_own_noise_does_not_explain(void) {
+  for (int axis = 0; axis < 3; axis++) {
+    start(make::no_wheels(), WM_MOTION_TWIST);
+    params.twist = WM_TWIST_MEASURED;
+    params.states.drive = WM_DRIVE_HOLONOMIC;
+    params.noise_speed_mps = 0.03, params.noise_sideways_mps = 0.04, params.noise_yaw_rate_radps = 0.05;
+    params.noise_speed_rel = 0.2, params.noise_sideways_rel = 0.3, params.noise_yaw_rate_rel = 0.25;
+    params.noise_side_rel = params.noise_yaw_rate_per_mps = 0.0;
+    front.init(&params, &wheels);
+    const double constant[3] = {0.03, 0.04, 0.05}, rel[3] = {0.2, 0.3, 0.25}, dt_s = 0.1;
+    double value[3] = {0.7, 0.6, 0.5}, before[3] = {};
+    for (int i = 0; i <= 400; i++) {
+      value[axis] = i % 2 ? 0.2 : -0.2;
+      if (i == 391) before[0] = way_var, before[1] = side_var, before[2] = turn_var;
+      feed(make::twist6(dt_s * i, value[0], value[1], value[2]));
+    }
+    const double grown[3] = {way_var - before[0], side_var - before[1], turn_var - before[2]};
+    for (int k = 0; k < 3; k++) {
+      const double own = constant[k] * constant[k] + rel[k] * rel[k] * value[k] * value[k];
+      const double sampled = k == axis ? (0.16 - 2.0 * own / dt_s) * dt_s * dt_s / 12.0 : 0.0;
+      TEST_ASSERT_DOUBLE_WITHIN(1e-6, 10.0 * (own * dt_s + sampled), grown[k]);
+    }
+  }
+}
+
+// The twist of an increment holds until the next one comes, which takes off what was moved by it.
+void test_the_twist_of_an_increment_holds_until_the_next(void) {
+  start(make::no_wheels(), WM_MOTION_INCREMENTS);
+  const double exact[6] = {1e-4, 0, 1e-4, 0, 0, 1e-4};
+  feed(make::increment(0.0, 1.0, {1.0, 0.0, 0.0}, exact));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1.0, pose.x_m);
+  advance(1.5);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1.5, pose.x_m);
+  feed(make::increment(1.0, 2.0, {0.8, 0.0, 0.0}, exact));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1.8, pose.x_m);
+  advance(2.25);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 2.0, pose.x_m);
+  const wm::motion_twist t = front.twist_at(make::at(2.25), calibration);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.8, t.v);
+}
+
 }  // namespace
 
 void setUp(void) {}
@@ -370,5 +413,7 @@ int main(void) {
   RUN_TEST(test_the_actuators_table);
   RUN_TEST(test_how_far_off_the_plane_is_off);
   RUN_TEST(test_the_sampling_noise_of_a_holonomic_drive_is_never_below_zero);
+  RUN_TEST(test_the_sampling_noise_is_what_the_own_noise_does_not_explain);
+  RUN_TEST(test_the_twist_of_an_increment_holds_until_the_next);
   return UNITY_END();
 }
