@@ -242,11 +242,11 @@ void test_noise_of_a_silence_in_space(void) {
   motion.init(&p, &wheels, {});
   motion.feed(twist6(0.0, {{1, 0, 0}, {}}));
   motion.feed(twist6(0.1, {{1, 0, 0}, {}}));
-  double place[3] = {}, turn[3] = {}, expected = 0.0;
+  double place[3] = {}, turn[3] = {};
   motion.walk(make::at(0.1), make::at(1.1), [&](const spatial_step &s) {
     for (int i = 0; i < 3; i++) place[i] += s.place_m2[i], turn[i] += s.turn_rad2[i];
   });
-  expected = 0.09 * (1.0 - cube(0.2)) / 3.0;
+  const double expected = 0.09 * (1.0 - cube(0.2)) / 3.0;
   for (int i = 0; i < 3; i++) {
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, expected, place[i]);
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, expected, turn[i]);
