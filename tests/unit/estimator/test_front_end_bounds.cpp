@@ -157,6 +157,58 @@ void test_a_refused_sensor_leaves_its_own_part_open(void) {
   check_refusal("counts", WM_MOTION_TICKS, make::two_wheels(), counts(0.0), counts(3.0), true, true);
 }
 
+// GIVEN a good sample half a second ago WHEN the next one differs by a little less than a robot can change in that
+// time, or by a little more THEN it is taken, or refused: 3 m/s and 15 m/s2, 6 rad/s and 30 rad/s2, for each sensor.
+void test_each_sensor_follows_within_its_limits(void) {
+  const auto of = [](int sensor, double t_s, double value) {
+    if (sensor == 0) return make::quantities(t_s, {{WM_Q_VEHICLE_SPEED, value}, {WM_Q_YAW_RATE, 0.0}});
+    if (sensor == 1) return make::quantities(t_s, {{WM_Q_VEHICLE_SPEED, 0.0}, {WM_Q_YAW_RATE, value}});
+    if (sensor == 2) return make::twist(t_s, value, 0.0);
+    if (sensor == 3) return make::twist(t_s, 0.0, value);
+    return make::twist6(t_s, 0.0, value, 0.0);
+  };
+  for (int sensor = 0; sensor < 5; sensor++)
+    for (const double share : {0.99, -0.99, 1.01, -1.01}) {
+      start(make::car(), sensor < 2 ? int{WM_MOTION_SPEED_YAW_RATE} : int{WM_MOTION_TWIST});
+      const bool turns = sensor == 1 || sensor == 3;
+      const double limit = turns ? 6.0 + 30.0 * 0.5 : 3.0 + 15.0 * 0.5;
+      feed(of(sensor, 0.0, 0.0));
+      feed(of(sensor, 0.5, 0.0));
+      feed(of(sensor, 1.0, share * limit));
+      TEST_ASSERT_EQUAL(std::fabs(share) > 1.0, (front.health() & WM_MOTION_HEALTH_IMPLAUSIBLE) != 0);
+    }
+}
+
+// While samples are refused the robot may have accelerated since the last good one: 15 m/s2, evenly distributed,
+// (15^2 / 12) t^4, and the speed itself is not known.
+void test_a_refusal_counts_from_the_last_good_sample(void) {
+  for (const bool refused : {false, true}) {
+    start(make::car(), WM_MOTION_SPEED_YAW_RATE);
+    params.noise_speed_mps = params.noise_speed_rel = 0.0;
+    for (int i = 0; i <= 10; i++) feed(make::quantities(0.1 * i, {{WM_Q_VEHICLE_SPEED, 2.0}, {WM_Q_YAW_RATE, 0.0}}));
+    const double before = way_var;
+    for (int i = 11; i <= 13; i++)
+      feed(make::quantities(0.1 * i, {{WM_Q_VEHICLE_SPEED, refused ? 120.0 : 2.0}, {WM_Q_YAW_RATE, 0.0}}));
+    // The first refusal is known at its stamp, 0.1 s after the good one; until 0.3 s the noise is open.
+    const double expected = 225.0 / 12.0 * (std::pow(0.3, 4) - std::pow(0.1, 4)) + 4.0 * 0.2;
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, refused ? expected : 0.0, way_var - before);
+  }
+}
+
+// What fell silent is said of sources with parts alone: not of increments, nor of a velocity that is a state.
+void test_which_models_can_be_silent(void) {
+  const double exact[6] = {1e-4, 0, 1e-4, 0, 0, 1e-4};
+  const int models[] = {WM_MOTION_INCREMENTS, WM_MOTION_CONSTANT_VELOCITY, WM_MOTION_SPEED_YAW_RATE};
+  for (const int model : models) {
+    start(make::no_wheels(), model);
+    for (int i = 0; i <= 50; i++) feed(make::quantities(0.02 * i, {{WM_Q_VEHICLE_SPEED, 1.0}, {WM_Q_YAW_RATE, 0.0}}));
+    for (int i = 1; i <= 10; i++) feed(make::increment(0.9 + 0.2 * i, 1.1 + 0.2 * i, {0.2, 0, 0}, exact));
+    const bool has_parts = model == WM_MOTION_SPEED_YAW_RATE;
+    TEST_ASSERT_EQUAL(has_parts, (front.health() & WM_MOTION_HEALTH_TURN_SILENT) != 0);
+    TEST_ASSERT_EQUAL(has_parts, (front.health() & WM_MOTION_HEALTH_SPEED_SILENT) != 0);
+  }
+}
+
 // ── sample_check ────────────────────────────────────────────────────────────────────────────────────────────────────
 
 using wm::plausibility;
@@ -405,6 +457,9 @@ int main(void) {
   RUN_TEST(test_every_part_of_a_twist_has_its_limit);
   RUN_TEST(test_stamps_and_increments_that_can_not_be);
   RUN_TEST(test_a_refused_sensor_leaves_its_own_part_open);
+  RUN_TEST(test_each_sensor_follows_within_its_limits);
+  RUN_TEST(test_a_refusal_counts_from_the_last_good_sample);
+  RUN_TEST(test_which_models_can_be_silent);
   RUN_TEST(test_levels_follow_within_step_and_rate);
   RUN_TEST(test_another_level_replaces_the_trusted_one);
   RUN_TEST(test_positions_follow_their_speed);

@@ -66,6 +66,14 @@ void test_an_estimate_without_a_time_is_carried_nowhere(void) {
   TEST_ASSERT_EQUAL(WM_NOT_FOUND, wm_odometry_carry(odom, &fused, make::at(1), &out, nullptr));
 }
 
+// Of a fast bus a second is remembered, too.
+void test_a_second_of_a_fast_bus_is_remembered(void) {
+  start(make::no_wheels());
+  for (int i = 0; i <= 3000; i++) feed(make::twist(0.001 * i, 1.0, 0.0));
+  assert_pose(2.01, 0, 0, pose_at(2.01));
+  assert_pose(2.5005, 0, 0, pose_at(2.5005));
+}
+
 // The covariance of a carried pose in the plane: J P J' by the start's heading, and noise along and across the way's
 // middle heading; a turn's noise is spread evenly over the way.
 void expect_carried(const wm_estimate &from, const wm_estimate &out, double along, double across, double turn) {
@@ -437,6 +445,7 @@ int main(void) {
   RUN_TEST(test_half_a_circle_by_twists);
   RUN_TEST(test_extrapolates_with_the_held_twist_but_not_for_ever);
   RUN_TEST(test_an_estimate_without_a_time_is_carried_nowhere);
+  RUN_TEST(test_a_second_of_a_fast_bus_is_remembered);
   RUN_TEST(test_a_pose_is_carried_by_its_own_velocity);
   RUN_TEST(test_a_carried_pose_has_the_noise_between_its_times);
   RUN_TEST(test_a_time_too_old_or_before_any_motion_is_not_found);

@@ -234,6 +234,24 @@ void test_noise_of_a_step_on_each_axis(void) {
   }
 }
 
+// A planar twist, and what wheels and a gyro give, are motion in space without other components.
+void test_planar_motion_in_space(void) {
+  const wm_motion_params p = parameters();
+  const wm_wheels wheels = make::no_wheels();
+  for (const bool twists : {false, true}) {
+    spatial_motion motion;
+    motion.init(&p, &wheels, {});
+    for (int i = 0; i <= 20; i++)
+      motion.feed(twists ? make::twist(0.05 * i, 0.7, -0.3)
+                         : make::quantities(0.05 * i, {{WM_Q_VEHICLE_SPEED, 0.7}, {WM_Q_YAW_RATE, -0.3}}));
+    const double expected[6] = {0.7, 0, 0, 0, 0, -0.3};
+    for (int i = 0; i < 3; i++) {
+      TEST_ASSERT_EQUAL_DOUBLE(expected[i], motion.v_mps()[i]);
+      TEST_ASSERT_EQUAL_DOUBLE(expected[3 + i], motion.w_radps()[i]);
+    }
+  }
+}
+
 // Over a silence velocity and rates walk by 0.3 per sqrt(s).
 void test_noise_of_a_silence_in_space(void) {
   const wm_motion_params p = parameters();
@@ -397,6 +415,7 @@ int main(void) {
   RUN_TEST(test_what_refused_samples_leave_open);
   RUN_TEST(test_the_motion_since_some_time_ago);
   RUN_TEST(test_noise_of_a_step_on_each_axis);
+  RUN_TEST(test_planar_motion_in_space);
   RUN_TEST(test_noise_of_a_silence_in_space);
   RUN_TEST(test_what_a_stuck_axis_has_missed);
   RUN_TEST(test_a_body_stands_by_the_mean_of_its_log);
