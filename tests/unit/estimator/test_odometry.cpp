@@ -66,6 +66,33 @@ void test_an_estimate_without_a_time_is_carried_nowhere(void) {
   TEST_ASSERT_EQUAL(WM_NOT_FOUND, wm_odometry_carry(odom, &fused, make::at(1), &out, nullptr));
 }
 
+// Each pose of the last second is the one that was the newest at its time, at the stamps of the twists and between
+// them, though each twist is another one; so are its twist and its noise.
+void test_poses_of_the_past_are_what_they_were(void) {
+  start(make::no_wheels());
+  wm_odom_point was[201], between[201];
+  for (int i = 0; i <= 200; i++) {
+    feed(make::twist6(0.01 * i, 1.0 + 0.3 * sin(i), 0.2 * cos(2 * i), 1.5 * sin(0.7 * i)));
+    TEST_ASSERT_EQUAL(WM_OK, wm_odometry_at(odom, make::at(0.01 * i), &was[i]));
+    TEST_ASSERT_EQUAL(WM_OK, wm_odometry_at(odom, make::at(0.01 * i + 0.004), &between[i]));
+  }
+  for (int i = 101; i < 200; i++)
+    for (const bool at_stamp : {true, false}) {
+      const wm_odom_point &expected = at_stamp ? was[i] : between[i];
+      wm_odom_point p;
+      TEST_ASSERT_EQUAL(WM_OK, wm_odometry_at(odom, make::at(0.01 * i + (at_stamp ? 0.0 : 0.004)), &p));
+      assert_pose(expected.pose_odom_base.x_m, expected.pose_odom_base.y_m, expected.pose_odom_base.heading_rad,
+                  p.pose_odom_base);
+      TEST_ASSERT_DOUBLE_WITHIN(1e-12, expected.v_mps, p.v_mps);
+      TEST_ASSERT_DOUBLE_WITHIN(1e-12, expected.side_mps, p.side_mps);
+      TEST_ASSERT_DOUBLE_WITHIN(1e-12, expected.w_radps, p.w_radps);
+      if (!at_stamp) continue;
+      TEST_ASSERT_DOUBLE_WITHIN(1e-12, expected.along_var_m2, p.along_var_m2);
+      TEST_ASSERT_DOUBLE_WITHIN(1e-12, expected.across_var_m2, p.across_var_m2);
+      TEST_ASSERT_DOUBLE_WITHIN(1e-12, expected.heading_var_rad2, p.heading_var_rad2);
+    }
+}
+
 // Of a fast bus a second is remembered, too.
 void test_a_second_of_a_fast_bus_is_remembered(void) {
   start(make::no_wheels());
@@ -445,6 +472,7 @@ int main(void) {
   RUN_TEST(test_half_a_circle_by_twists);
   RUN_TEST(test_extrapolates_with_the_held_twist_but_not_for_ever);
   RUN_TEST(test_an_estimate_without_a_time_is_carried_nowhere);
+  RUN_TEST(test_poses_of_the_past_are_what_they_were);
   RUN_TEST(test_a_second_of_a_fast_bus_is_remembered);
   RUN_TEST(test_a_pose_is_carried_by_its_own_velocity);
   RUN_TEST(test_a_carried_pose_has_the_noise_between_its_times);
