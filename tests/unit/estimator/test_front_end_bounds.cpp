@@ -195,6 +195,43 @@ void test_a_refusal_counts_from_the_last_good_sample(void) {
   }
 }
 
+// GIVEN a lost frame, as the counter says WHEN the next one comes after two periods THEN its jump of 6 cm is no doubt:
+// counter and stamp agree. One that comes after one period is refused.
+void test_a_lost_frame_is_no_doubt_where_the_stamp_agrees(void) {
+  constexpr double kTick = 2 * M_PI * 0.1 / 1000;
+  for (const bool agrees : {true, false}) {
+    start(make::two_wheels());
+    for (int i = 0; i <= 45; i++) {
+      if (agrees && i == 40) continue;
+      const double count = (0.02 * i + (i > 40 ? 0.06 : 0.0)) / kTick;
+      wm_event e = make::quantities(0.02 * i, {{WM_Q_WHEEL_TICKS_LEFT, count}, {WM_Q_WHEEL_TICKS_RIGHT, count}});
+      e.as.quantities.lost_before = i == 41;
+      feed(e);
+      if (i == 41) TEST_ASSERT_EQUAL(!agrees, (front.health() & WM_MOTION_HEALTH_IMPLAUSIBLE) != 0);
+    }
+  }
+}
+
+// Beside a gyro and beside a steering the counts give the distance, too: as positions, whatever comes between them.
+void test_counts_beside_a_gyro_or_a_steering_are_positions(void) {
+  constexpr double kTick = 2 * M_PI * 0.3 / 1000;
+  const int models[] = {WM_MOTION_SPEED_YAW_RATE, WM_MOTION_ACKERMANN};
+  for (const int model : models) {
+    start(make::car(), model);
+    double way_m = 0.0;
+    for (int i = 0; i <= 100; i++) {
+      if (i % 3 == 1) advance(0.02 * i - 0.007);
+      if (i > 0) way_m += 0.01 + 0.008 * std::sin(i);
+      feed(make::quantities(0.02 * i, {{WM_Q_ROAD_WHEEL, 0.0},
+                                       {WM_Q_YAW_RATE, 1e-9 * (i % 2)},
+                                       {WM_Q_WHEEL_TICKS_LEFT, way_m / kTick},
+                                       {WM_Q_WHEEL_TICKS_RIGHT, way_m / kTick}}));
+    }
+    TEST_ASSERT_EQUAL(model, front.model());
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, way_m, pose.x_m);
+  }
+}
+
 // What fell silent is said of sources with parts alone: not of increments, nor of a velocity that is a state.
 void test_which_models_can_be_silent(void) {
   const double exact[6] = {1e-4, 0, 1e-4, 0, 0, 1e-4};
@@ -357,7 +394,7 @@ void test_how_far_off_the_plane_is_off(void) {
   for (const bool stated : {false, true})
     for (int axis = 0; axis < 3; axis++)
       for (const double sign : {-1.0, 1.0})
-        for (int how = 0; how < 5; how++) {
+        for (int how = 0; how < 6; how++) {  // too short, too little, to the other side, interrupted; long enough
           const wm_wheels w = make::no_wheels();
           wm_rig rig;
           wm_rig_init(&rig);
@@ -373,18 +410,17 @@ void test_how_far_off_the_plane_is_off(void) {
           const double rise = std::hypot(stated ? 0.3 : 0.04, 0.03 * 1.3);  // at 1.3 m/s
           const double roll = std::hypot(stated ? 0.05 : 0.03, 0.02), pitch = std::hypot(stated ? 0.08 : 0.03, 0.02);
           const double sigma = axis == 0 ? rise : axis == 1 ? roll : pitch;
-          const double seconds = how == 0 ? 1.9 : 2.1, sigmas = how == 1 ? 2.99 : 3.01;
-          for (int i = 0; i <= 40; i++) {
-            wm_event e = make::twist6(0.1 * i, 1.2, -0.5, 0.0);
-            const bool turns_back = how == 2 && i == 10;
-            double value = 0.1 * i <= seconds + 1e-6 ? sign * sigmas * sigma : 0.0;
-            if (turns_back) value = how == 2 ? -value : 0.0;
+          const double seconds = how == 0 ? 1.875 : how == 5 ? 2.0 : 2.125, sigmas = how == 1 ? 2.99 : 3.01;
+          for (int i = 0; i <= 32; i++) {
+            wm_event e = make::twist6(0.125 * i, 1.2, -0.5, 0.0);
+            double value = 0.125 * i <= seconds ? sign * sigmas * sigma : 0.0;
+            if (how == 2 && i == 10) value = -value;
             if (how == 3 && i == 10) value = 0.0;
             (axis == 0 ? e.as.twist6.v_mps[2] : e.as.twist6.w_radps[axis - 1]) = value;
             TEST_ASSERT_EQUAL(WM_OK, f.check(e));
             f.feed(e);
           }
-          TEST_ASSERT_EQUAL(how == 4, (f.health() & WM_MOTION_HEALTH_NOT_PLANAR) != 0);
+          TEST_ASSERT_EQUAL(how >= 4, (f.health() & WM_MOTION_HEALTH_NOT_PLANAR) != 0);
         }
 }
 
@@ -459,6 +495,8 @@ int main(void) {
   RUN_TEST(test_a_refused_sensor_leaves_its_own_part_open);
   RUN_TEST(test_each_sensor_follows_within_its_limits);
   RUN_TEST(test_a_refusal_counts_from_the_last_good_sample);
+  RUN_TEST(test_a_lost_frame_is_no_doubt_where_the_stamp_agrees);
+  RUN_TEST(test_counts_beside_a_gyro_or_a_steering_are_positions);
   RUN_TEST(test_which_models_can_be_silent);
   RUN_TEST(test_levels_follow_within_step_and_rate);
   RUN_TEST(test_another_level_replaces_the_trusted_one);
