@@ -357,6 +357,23 @@ void test_the_source_of_the_speed(void) {
   }
 }
 
+// Counts of wheels of which radius, ticks or track are not known are no motion.
+void test_counts_of_unknown_wheels_are_no_motion(void) {
+  for (int which = 0; which < 6; which++) {
+    wm_wheels w = make::two_wheels();
+    if (which == 1) w.ticks_per_turn = 0.0;
+    if (which == 2) w.ticks_per_turn = -1000.0;
+    if (which == 3) w.ticks_per_turn = NAN;
+    if (which == 4) w.radius_m = NAN;
+    if (which == 5) w.track_m = NAN;
+    start(w);
+    for (int i = 0; i <= 50; i++)
+      feed(make::quantities(0.02 * i, {{WM_Q_WHEEL_TICKS_LEFT, 10.0 * i}, {WM_Q_WHEEL_TICKS_RIGHT, 10.0 * i}}));
+    TEST_ASSERT_EQUAL(which == 0 ? int{WM_MOTION_TICKS} : int{WM_MOTION_AUTO}, front.model());
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, which == 0 ? 500.0 * 2 * M_PI * 0.1 / 1000 : 0.0, pose.x_m);
+  }
+}
+
 // The road wheel's angle by the actuator's table: straight between two points, held beyond the ends.
 void test_the_actuators_table(void) {
   wm_wheels w = make::car();
@@ -503,6 +520,7 @@ int main(void) {
   RUN_TEST(test_positions_follow_their_speed);
   RUN_TEST(test_positions_from_elsewhere_are_a_new_run);
   RUN_TEST(test_the_source_of_the_speed);
+  RUN_TEST(test_counts_of_unknown_wheels_are_no_motion);
   RUN_TEST(test_the_actuators_table);
   RUN_TEST(test_how_far_off_the_plane_is_off);
   RUN_TEST(test_the_sampling_noise_of_a_holonomic_drive_is_never_below_zero);

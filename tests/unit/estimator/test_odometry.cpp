@@ -81,6 +81,7 @@ void test_poses_of_the_past_are_what_they_were(void) {
       const wm_odom_point &expected = at_stamp ? was[i] : between[i];
       wm_odom_point p;
       TEST_ASSERT_EQUAL(WM_OK, wm_odometry_at(odom, make::at(0.01 * i + (at_stamp ? 0.0 : 0.004)), &p));
+      TEST_ASSERT_EQUAL_INT64(expected.t_ns, p.t_ns);
       assert_pose(expected.pose_odom_base.x_m, expected.pose_odom_base.y_m, expected.pose_odom_base.heading_rad,
                   p.pose_odom_base);
       TEST_ASSERT_DOUBLE_WITHIN(1e-12, expected.v_mps, p.v_mps);

@@ -93,6 +93,23 @@ void test_how_long_a_twist_holds(void) {
   }
 }
 
+// The first sample has no period; each further one that is no gap gives it. Three are kept, the newest first; one of
+// the same stamp replaces the newest.
+void test_the_samples_that_are_kept(void) {
+  spatial_history history;
+  history.init({0.2, 2.0, 1, 0.0, 0.0});
+  const double stamps[] = {0.1, 0.15, 0.25, 0.25, 0.6, 0.7};
+  const int samples[] = {1, 2, 3, 3, 3, 3};
+  const double periods[] = {0.02, 0.05, 0.1, 0.1, 0.1, 0.1}, before[] = {0.0, 0.1, 0.15, 0.15, 0.25, 0.6};
+  for (int i = 0; i < 6; i++) {
+    TEST_ASSERT_TRUE(history.feed(make::at(stamps[i]), {{1.0 * i, 0, 0}, {}}));
+    TEST_ASSERT_EQUAL(samples[i], history.samples());
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, periods[i], history.period_s());
+    TEST_ASSERT_EQUAL_DOUBLE(i, history.sample(0).twist.v.x);
+    if (i > 0) TEST_ASSERT_EQUAL_INT64(make::at(before[i]), history.sample(1).t_ns);
+  }
+}
+
 // Over a gap the mean of both ends, whose walk is known at both: T^3 / 12; after a gap for which nothing holds, half of
 // the newer one. Where a gap is not bridged the first has held.
 void test_what_is_assumed_over_a_gap(void) {
@@ -372,6 +389,31 @@ void test_the_walk_of_a_held_velocity(void) {
   }
 }
 
+// The period of the twists is their mean one, with a gain of a sixteenth; after a silence longer than hold_max_s
+// neither a period nor a change of velocity is taken from it.
+void test_the_period_and_the_change_of_twists(void) {
+  spatial_source source;
+  source.init(2.0, {0.05, 0.015});
+  double t_s = 0.0, period_s = 0.0;
+  spatial_twist before{};
+  for (int i = 0; i < 40; i++) {
+    const double dt_s = i == 30 ? 2.5 : i < 20 ? 0.1 : 0.3;
+    t_s += dt_s;
+    const spatial_twist twist = {{0.1 * i, -0.2 * i, 0.3}, {0.01 * i, 0, 0.02 * i * i}};
+    spatial_twist now = twist;
+    (void)source.take(twist6(t_s, twist), &now);
+    if (i == 0) before = twist;
+    if (i == 1) period_s = dt_s;
+    if (i > 1 && dt_s < 2.0) period_s += (dt_s - period_s) / 16.0;
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, period_s, source.twist_period_s());
+    for (int k = 0; k < 3; k++) {
+      TEST_ASSERT_DOUBLE_WITHIN(1e-12, dt_s < 2.0 ? twist.v[k] - before.v[k] : 0.0, source.velocity_change()[k]);
+      TEST_ASSERT_DOUBLE_WITHIN(1e-12, dt_s < 2.0 ? twist.w[k] - before.w[k] : 0.0, source.rate_change()[k]);
+    }
+    before = twist;
+  }
+}
+
 // Rates are an IMU's with three axes that are not older than a quarter of a second, a force likewise; each event says
 // what is fresh.
 void test_which_values_are_fresh(void) {
@@ -411,6 +453,7 @@ int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_each_axis_is_held_against_its_own);
   RUN_TEST(test_how_long_a_twist_holds);
+  RUN_TEST(test_the_samples_that_are_kept);
   RUN_TEST(test_what_is_assumed_over_a_gap);
   RUN_TEST(test_what_refused_samples_leave_open);
   RUN_TEST(test_the_motion_since_some_time_ago);
@@ -420,6 +463,7 @@ int main(void) {
   RUN_TEST(test_what_a_stuck_axis_has_missed);
   RUN_TEST(test_a_body_stands_by_the_mean_of_its_log);
   RUN_TEST(test_the_walk_of_a_held_velocity);
+  RUN_TEST(test_the_period_and_the_change_of_twists);
   RUN_TEST(test_which_values_are_fresh);
   return UNITY_END();
 }
