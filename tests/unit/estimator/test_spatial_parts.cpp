@@ -340,6 +340,26 @@ void test_what_a_stuck_axis_has_missed(void) {
     }
 }
 
+// GIVEN a gyro that has fallen silent WHEN the log has no rates THEN each axis turns by 0.1 rad per sqrt(s) that
+// nothing measures; with the log's rates nothing is unmeasured.
+void test_turns_that_nothing_measures(void) {
+  const wm_motion_params p = parameters();
+  const wm_wheels wheels = make::no_wheels();
+  for (const bool has_rates : {false, true}) {
+    spatial_motion motion;
+    motion.init(&p, &wheels, {});
+    const spatial_twist log = {{0.5, 0, 0}, {0, 0, has_rates ? 0.01 : 0.0}};
+    for (int i = 0; i <= 200; i++) {
+      if (i % 10 == 0) motion.feed(twist6(0.01 * i, log));
+      if (i < 100) motion.feed(imu(0.01 * i, {noise_of(i, 0), noise_of(i, 1), noise_of(i, 2)}, {0, 0, 9.8}));
+    }
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, has_rates ? 0.0 : 0.03, motion.unmeasured_turn_rad2ps(make::at(2.0)));
+    motion.walk(make::at(2.0), make::at(2.1), [&](const spatial_step &s) {
+      for (int i = 0; i < 3; i++) TEST_ASSERT_DOUBLE_WITHIN(1e-9, has_rates ? 0.0 : 0.001, s.turn_rad2[i]);
+    });
+  }
+}
+
 // A log whose rates jitter about none stands by its mean: a coarse gyro that shows one value then is alive. A log that
 // turns steadily does not stand.
 void test_a_body_stands_by_the_mean_of_its_log(void) {
@@ -461,6 +481,7 @@ int main(void) {
   RUN_TEST(test_planar_motion_in_space);
   RUN_TEST(test_noise_of_a_silence_in_space);
   RUN_TEST(test_what_a_stuck_axis_has_missed);
+  RUN_TEST(test_turns_that_nothing_measures);
   RUN_TEST(test_a_body_stands_by_the_mean_of_its_log);
   RUN_TEST(test_the_walk_of_a_held_velocity);
   RUN_TEST(test_the_period_and_the_change_of_twists);
