@@ -267,6 +267,11 @@ void test_the_turn_is_tested_by_what_is_seen(void) {
       if (list.count() > 0) listed = value.value;
     }
     TEST_ASSERT_EQUAL_DOUBLE(how == 0 ? -1.0 : 0.0, listed);
+    filter->init(setup, states, wm::kPoseStates + wm::planar_filter::count_motion_states(states, models[how]));
+    wm_calibration_value value{};
+    wm::calibration_list list(&value, 1);
+    filter->turn_test().list(&list);  // begun again, nothing is known of it
+    TEST_ASSERT_EQUAL(0, list.count());
   }
 }
 

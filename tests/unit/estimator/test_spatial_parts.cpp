@@ -340,6 +340,41 @@ void test_what_a_stuck_axis_has_missed(void) {
     }
 }
 
+// A turn that was missed evenly over a way bends it to the sides: a third of its square times the way's.
+void test_a_missed_turn_bends_the_way(void) {
+  const wm_motion_params p = parameters();
+  const wm_wheels wheels = make::no_wheels();
+  for (int axis = 0; axis < 3; axis++) {
+    spatial_motion motion;
+    motion.init(&p, &wheels, {});
+    const spatial_twist log = {{0.4, 0.2, 0.1}, {0.2, -0.3, 0.4}};
+    vec3 last{};
+    double before[3] = {}, after[3] = {}, turned[3] = {}, value = 0.0;
+    bool is_found = false;
+    for (int i = 0; i < 1200 && !is_found; i++) {
+      const double t_s = 0.01 * i;
+      if (i % 10 == 0) motion.feed(twist6(t_s, log));
+      vec3 w = {0.05 * noise_of(i, 0), 0.05 * noise_of(i, 1), 0.05 * noise_of(i, 2)};
+      if (i == 1000) value = last[axis];
+      if (i >= 1000) w[axis] = value;
+      last = w;
+      motion.feed(imu(t_s, w, {noise_of(i, 3), noise_of(i, 4), 9.8 + noise_of(i, 5)}));
+      is_found = motion.source().stuck_rates() != 0;
+      motion.walk(make::at(t_s), make::at(t_s + 1e-4), [&](const spatial_step &s) {
+        for (int k = 0; k < 3; k++)
+          (is_found ? after : before)[k] = s.place_m2[k], turned[k] = is_found ? s.turn_rad2[k] : 0.0;
+      });
+    }
+    TEST_ASSERT_TRUE(is_found);
+    for (int k = 0; k < 3; k++) {
+      TEST_ASSERT_EQUAL(k == axis, turned[k] > 1e-4);
+      TEST_ASSERT_EQUAL(k != axis, after[k] > before[k] + 1e-6);
+    }
+    const int side = axis == 0 ? 1 : 0, other = 3 - axis - side;
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6 * after[side], after[side] - before[side], after[other] - before[other]);
+  }
+}
+
 // GIVEN a gyro that has fallen silent WHEN the log has no rates THEN each axis turns by 0.1 rad per sqrt(s) that
 // nothing measures; with the log's rates nothing is unmeasured.
 void test_turns_that_nothing_measures(void) {
@@ -481,6 +516,7 @@ int main(void) {
   RUN_TEST(test_planar_motion_in_space);
   RUN_TEST(test_noise_of_a_silence_in_space);
   RUN_TEST(test_what_a_stuck_axis_has_missed);
+  RUN_TEST(test_a_missed_turn_bends_the_way);
   RUN_TEST(test_turns_that_nothing_measures);
   RUN_TEST(test_a_body_stands_by_the_mean_of_its_log);
   RUN_TEST(test_the_walk_of_a_held_velocity);
