@@ -406,6 +406,23 @@ void test_the_variance_of_a_measurement_by_counts(void) {
   TEST_ASSERT_EQUAL_DOUBLE(0.0, filter->count_variance(make::at(0.95), by, 0.3));
 }
 
+// GIVEN a velocity that is a state WHEN nothing is seen for long THEN the heading is as unsure as any heading, pi^2 /
+// 3, and no more; below that its variance is what was added.
+void test_an_unseen_heading_is_as_unsure_as_any(void) {
+  for (const double added : {0.5, 100.0}) {
+    begin(make::no_wheels(), WM_MOTION_CONSTANT_VELOCITY);
+    filter->move_to(0);
+    filter->inflate_pose(0.0, added);
+    const double heading = filter->value(2), place = filter->variance(0);
+    filter->move_to(1);
+    TEST_ASSERT_EQUAL_DOUBLE(heading, filter->value(2));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, std::fmin(0.01 + added, M_PI * M_PI / 3.0), filter->variance(2));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, place, filter->variance(0));
+    filter->move_to(make::at(200.0));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, M_PI * M_PI / 3.0, filter->variance(2));
+  }
+}
+
 // Odometry by the motion alone: the way with its sideways part, the turns of either sense, odom from its own origin.
 void test_odometry_counts_ways_and_turns(void) {
   begin(make::no_wheels(), WM_MOTION_TWIST);
@@ -510,6 +527,7 @@ int main(void) {
   RUN_TEST(test_states_come_and_go_with_the_kind_of_the_motion);
   RUN_TEST(test_rates_without_the_steps_of_counts);
   RUN_TEST(test_the_variance_of_a_measurement_by_counts);
+  RUN_TEST(test_an_unseen_heading_is_as_unsure_as_any);
   RUN_TEST(test_odometry_counts_ways_and_turns);
   RUN_TEST(test_a_silence_adds_by_the_time_since_a_correction);
   RUN_TEST(test_a_filter_that_is_begun_again_is_the_same);
