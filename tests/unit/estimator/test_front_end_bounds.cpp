@@ -246,6 +246,59 @@ void test_which_models_can_be_silent(void) {
   }
 }
 
+// Without limits nothing is refused.
+void test_without_limits_nothing_is_refused(void) {
+  constexpr double kTick = 2 * M_PI * 0.1 / 1000;
+  start(make::two_wheels());
+  params.limits_mps2 = params.limits_radps2 = 0.0;
+  for (int i = 0; i <= 50; i++) {
+    const double count = (0.02 * i + (i == 40 ? 0.7 : 0.0)) / kTick;
+    feed(make::quantities(0.02 * i, {{WM_Q_WHEEL_TICKS_LEFT, count}, {WM_Q_WHEEL_TICKS_RIGHT, count}}));
+    TEST_ASSERT_EQUAL_UINT32(0, front.health());
+  }
+  TEST_ASSERT_DOUBLE_WITHIN(1e-6, 1.0, pose.x_m);
+}
+
+// A base that stands shows the bias of its twists' turn rate; one that turns on the spot, or creeps, does not stand.
+void test_when_twists_stand(void) {
+  const struct {
+    double v, u, w;
+    bool stands;
+  } rows[] = {{0.0, 0.0, 0.4, true},
+              {0.4, 0.0, 0.4, true},
+              {0.0, 0.0, 1.5, false},
+              {1.5, 0.0, 0.4, false},
+              {0.0, 1.5, 0.4, false}};
+  for (const auto &row : rows) {
+    start(make::no_wheels(), WM_MOTION_TWIST);
+    params.twist = WM_TWIST_MEASURED;
+    double rate = 0.0;
+    for (int i = 0; i <= 50; i++)
+      feed(make::twist6(0.1 * i, row.v * params.standstill_speed_mps, row.u * params.standstill_speed_mps,
+                        row.w * params.standstill_yaw_rate_radps));
+    TEST_ASSERT_EQUAL(row.stands, front.standstill_yaw_rate(&rate));
+    if (row.stands) TEST_ASSERT_EQUAL_DOUBLE(row.w * params.standstill_yaw_rate_radps, rate);
+  }
+}
+
+// The wheel of a dead encoder rolls like the other one, from the last count on, too.
+void test_a_dead_encoders_wheel_rolls_like_the_other_one(void) {
+  constexpr double kTick = 2 * M_PI * 0.1 / 1000;
+  for (const bool left_is_dead : {false, true}) {
+    start(make::two_wheels(), WM_MOTION_TICKS);
+    for (int i = 0; i <= 1000; i++) {
+      const double count = 0.02 * i / kTick, dead = 0.02 * std::fmin(i, 100.0) / kTick;
+      feed(make::quantities(0.02 * i, {{WM_Q_WHEEL_TICKS_LEFT, left_is_dead ? dead : count},
+                                       {WM_Q_WHEEL_TICKS_RIGHT, left_is_dead ? count : dead}}));
+    }
+    TEST_ASSERT_EQUAL_UINT32(left_is_dead ? WM_MOTION_HEALTH_ENCODER_LEFT_DEAD : WM_MOTION_HEALTH_ENCODER_RIGHT_DEAD,
+                             front.health());
+    const wm::motion_twist t = front.twist_at(make::at(20.0), calibration);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 1.0, t.v);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.0, t.w);
+  }
+}
+
 // ── sample_check ────────────────────────────────────────────────────────────────────────────────────────────────────
 
 using wm::plausibility;
@@ -515,6 +568,9 @@ int main(void) {
   RUN_TEST(test_a_lost_frame_is_no_doubt_where_the_stamp_agrees);
   RUN_TEST(test_counts_beside_a_gyro_or_a_steering_are_positions);
   RUN_TEST(test_which_models_can_be_silent);
+  RUN_TEST(test_without_limits_nothing_is_refused);
+  RUN_TEST(test_when_twists_stand);
+  RUN_TEST(test_a_dead_encoders_wheel_rolls_like_the_other_one);
   RUN_TEST(test_levels_follow_within_step_and_rate);
   RUN_TEST(test_another_level_replaces_the_trusted_one);
   RUN_TEST(test_positions_follow_their_speed);

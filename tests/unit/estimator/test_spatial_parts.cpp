@@ -349,7 +349,7 @@ void test_a_missed_turn_bends_the_way(void) {
     motion.init(&p, &wheels, {});
     const spatial_twist log = {{0.4, 0.2, 0.1}, {0.2, -0.3, 0.4}};
     vec3 last{};
-    double before[3] = {}, after[3] = {}, turned[3] = {}, value = 0.0;
+    double before[3] = {}, after[3] = {}, turned[3] = {}, value = 0.0, since_s = 0.0;
     bool is_found = false;
     for (int i = 0; i < 1200 && !is_found; i++) {
       const double t_s = 0.01 * i;
@@ -360,6 +360,7 @@ void test_a_missed_turn_bends_the_way(void) {
       last = w;
       motion.feed(imu(t_s, w, {noise_of(i, 3), noise_of(i, 4), 9.8 + noise_of(i, 5)}));
       is_found = motion.source().stuck_rates() != 0;
+      since_s = 0.01 * (i - 999);
       motion.walk(make::at(t_s), make::at(t_s + 1e-4), [&](const spatial_step &s) {
         for (int k = 0; k < 3; k++)
           (is_found ? after : before)[k] = s.place_m2[k], turned[k] = is_found ? s.turn_rad2[k] : 0.0;
@@ -371,7 +372,9 @@ void test_a_missed_turn_bends_the_way(void) {
       TEST_ASSERT_EQUAL(k != axis, after[k] > before[k] + 1e-6);
     }
     const int side = axis == 0 ? 1 : 0, other = 3 - axis - side;
-    TEST_ASSERT_DOUBLE_WITHIN(1e-6 * after[side], after[side] - before[side], after[other] - before[other]);
+    const double bent_m2 = dot(log.v, log.v) * since_s * since_s * turned[axis] / 3.0;
+    TEST_ASSERT_DOUBLE_WITHIN(1e-3 * bent_m2, bent_m2, after[side] - before[side]);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-3 * bent_m2, bent_m2, after[other] - before[other]);
   }
 }
 
