@@ -428,6 +428,18 @@ void test_priors_of_the_terms(void) {
       }
 }
 
+// By default each term is a state where the motion has it, and nowhere else: no model gets one that it does not use.
+void test_by_default_the_kind_decides(void) {
+  wm_motion_params p;
+  wm_params_defaults(&wm_motion_params_table, &p);
+  for (const auto &row : kStates)
+    for (int term = 0; term < wm::kCalibrationCount; term++) {
+      const bool acts = row.terms[term] != '.';
+      const std::string what = std::string(row.terms) + ", term " + std::to_string(term);
+      TEST_ASSERT_EQUAL_MESSAGE(acts, wm::is_state(p.states.sigma[term], term, row.kind), what.c_str());
+    }
+}
+
 // Commands repeat until they change: more than a fifth of the moving rows equal the one before. A decision comes each
 // 64 moving rows; of a run only the first eight repetitions count.
 void test_commands_are_told_by_their_repetitions(void) {
@@ -477,6 +489,7 @@ int main(void) {
   RUN_TEST(test_terms_that_are_states_by_the_kind);
   RUN_TEST(test_terms_that_may_become_states);
   RUN_TEST(test_priors_of_the_terms);
+  RUN_TEST(test_by_default_the_kind_decides);
   RUN_TEST(test_commands_are_told_by_their_repetitions);
   return UNITY_END();
 }
