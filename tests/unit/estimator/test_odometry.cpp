@@ -97,8 +97,18 @@ void test_poses_of_the_past_are_what_they_were(void) {
     }
 }
 
-// Of a fast bus a second is remembered, too.
+// Of a fast bus a second is remembered, too: a point each 4 ms, and the newest event. Each point is found from its own
+// time on.
 void test_a_second_of_a_fast_bus_is_remembered(void) {
+  start(make::no_wheels());
+  wm_pose2 was{};
+  for (int i = 0; i <= 400; i++) {
+    feed(make::twist(0.001 * i, 1.0 + 0.5 * sin(i), 2.0 * cos(0.6 * i)));
+    if (i % 4 == 0) was = pose_at(0.001 * i);
+    const wm_pose2 found = pose_at(0.001 * (i - i % 4));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, was.x_m, found.x_m);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, was.heading_rad, found.heading_rad);
+  }
   start(make::no_wheels());
   for (int i = 0; i <= 3000; i++) feed(make::twist(0.001 * i, 1.0, 0.0));
   assert_pose(2.01, 0, 0, pose_at(2.01));
