@@ -235,11 +235,12 @@ void test_counts_beside_a_gyro_or_a_steering_are_positions(void) {
 // What fell silent is said of sources with parts alone: not of increments, nor of a velocity that is a state.
 void test_which_models_can_be_silent(void) {
   const double exact[6] = {1e-4, 0, 1e-4, 0, 0, 1e-4};
-  const int models[] = {WM_MOTION_INCREMENTS, WM_MOTION_CONSTANT_VELOCITY, WM_MOTION_SPEED_YAW_RATE};
+  const int models[] = {WM_MOTION_AUTO, WM_MOTION_INCREMENTS, WM_MOTION_CONSTANT_VELOCITY, WM_MOTION_SPEED_YAW_RATE};
   for (const int model : models) {
     start(make::no_wheels(), model);
     for (int i = 0; i <= 50; i++) feed(make::quantities(0.02 * i, {{WM_Q_VEHICLE_SPEED, 1.0}, {WM_Q_YAW_RATE, 0.0}}));
     for (int i = 1; i <= 10; i++) feed(make::increment(0.9 + 0.2 * i, 1.1 + 0.2 * i, {0.2, 0, 0}, exact));
+    if (model == WM_MOTION_AUTO) TEST_ASSERT_EQUAL(WM_MOTION_INCREMENTS, front.model());
     const bool has_parts = model == WM_MOTION_SPEED_YAW_RATE;
     TEST_ASSERT_EQUAL(has_parts, (front.health() & WM_MOTION_HEALTH_TURN_SILENT) != 0);
     TEST_ASSERT_EQUAL(has_parts, (front.health() & WM_MOTION_HEALTH_SPEED_SILENT) != 0);
