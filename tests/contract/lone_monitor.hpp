@@ -67,3 +67,7 @@ struct lone {
 
 // Tests of the monitor's windows and counts (monitor_windows.cpp).
 void run_window_tests(void);
+// Of a source's windows (monitor_sources.cpp).
+void run_source_tests(void);
+// Of what it counts from step to step (monitor_ledger.cpp).
+void run_ledger_tests(void);

@@ -527,5 +527,7 @@ int main(void) {
   RUN_TEST(a_found_pose_is_degraded_unless_the_one_before_was_proven);
   RUN_TEST(a_pose_that_fits_after_long_is_a_found_one);
   run_window_tests();
+  run_source_tests();
+  run_ledger_tests();
   return UNITY_END();
 }

@@ -30,10 +30,10 @@ FLOOR = 0.9
 # A test that takes this many times its usual time, and at least so long, hangs.
 HANGS, HANGS_S = 10, 30
 
-FILTERS = ["pose_step", "planar", "plane_motion", "odometry", "landmark_ekf", "landmark_elevation", "landmark_lost", "priors", "delays", "wheel_heading",
+FILTERS = ["pose_step", "planar", "planar_parts", "plane_motion", "odometry", "landmark_ekf", "landmark_elevation", "landmark_lost", "priors", "delays", "wheel_heading",
            "slam", "slam_camera", "slam_lost", "noise_adaption"]
-MOTION = ["motion", "commands", "motion_models", "plane_motion", "drives", "twist_and_gyro", "odometry", "wheel_heading", "delays", "space", "space_imu",
-          "planar", "landmark_ekf"]
+MOTION = ["motion", "commands", "motion_models", "motion_noise", "front_end_bounds", "plane_motion", "drives", "twist_and_gyro", "odometry", "wheel_heading", "delays", "space",
+          "space_imu", "spatial_parts", "stuck_imu", "silent_parts", "priors", "planar", "planar_parts", "landmark_ekf"]
 
 
 def estimator_tests(*names):
@@ -42,8 +42,8 @@ def estimator_tests(*names):
 
 # The folder or file of each room, and its tests, the quickest first.
 ROOMS = {
-    "core": (["estimator/filters/core"], [*estimator_tests(*FILTERS, "edge_mcl", "stereo_ekf"), "test_contract_monitor",
-                                          "test_contract_estimators"]),
+    "core": (["estimator/filters/core"], [*estimator_tests(*FILTERS, "course_and_turn", "landmark_counts", "edge_mcl", "stereo_ekf"),
+                                          "test_contract_monitor", "test_contract_estimators"]),
     "planar": (["estimator/filters/planar"], [*estimator_tests(*FILTERS), "test_contract_estimators"]),
     "motion": (["estimator/motion"], [*estimator_tests(*MOTION), "test_contract_estimators"]),
     "merge": (["firmware/fusion/merge.c", "firmware/fusion/predictor.c", "firmware/fusion/fuser.c"],

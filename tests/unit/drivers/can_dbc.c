@@ -114,6 +114,18 @@ static void factors_that_are_no_numbers(void) {
   }
 }
 
+// Of two lists of a signal's names the last one holds.
+static void names_that_are_stated_twice(void) {
+  load(
+      "BO_ 1 M: 8 X\n SG_ A : 0|8@1+ (1,0) [0|0] \"\" X\n"
+      "VAL_ 1 A 0 \"off\" 1 \"on\" 2 \"error\";\nVAL_ 1 A 7 \"seven\" 8 \"eight\";\n");
+  const dbc_signal *a = signal_of(1, 0, "A");
+  TEST_ASSERT_EQUAL_UINT(2, a->value_count);
+  TEST_ASSERT_EQUAL_INT64(7, dbc->values[a->first_value].raw);
+  TEST_ASSERT_EQUAL_INT64(8, dbc->values[a->first_value + 1].raw);
+  wm_dbc_free(dbc);
+}
+
 static void multiplexers_in_a_ring(void) {
   load(
       "BO_ 1 M: 8 X\n SG_ A m1M : 0|8@1+ (1,0) [0|0] \"\" X\n SG_ B m1M : 8|8@1+ (1,0) [0|0] \"\" X\n"
@@ -169,6 +181,7 @@ int main(void) {
   RUN_TEST(nothing_in_it);
   RUN_TEST(overlapping_signals_are_makers_wish);
   RUN_TEST(factors_that_are_no_numbers);
+  RUN_TEST(names_that_are_stated_twice);
   RUN_TEST(multiplexers_in_a_ring);
   RUN_TEST(distances_of_names_are_the_same_from_both_sides);
   RUN_TEST(not_text);

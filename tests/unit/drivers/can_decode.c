@@ -358,6 +358,34 @@ static void what_only_looks_like_a_counter(void) {
   close_it(&f);
 }
 
+// A signal that is bound is none, whichever part of a sum it is: it may do what it wants.
+static void a_bound_signal_is_no_counter(void) {
+  for (int part = 0; part < 2; part++) {
+    wm_can_binding b = binding(WM_Q_WHEEL_TICKS_LEFT, "W", part ? "V" : "ALIVE_COUNTER");
+    b.signal_count = 2;
+    (void)snprintf(b.signal[1], sizeof b.signal[1], "%s", part ? "ALIVE_COUNTER" : "V");
+    open_one(&f,
+             "BO_ 257 W: 3 X\n SG_ V : 0|16@1+ (1,0) [0|0] \"\" X\n"
+             " SG_ ALIVE_COUNTER : 16|8@1+ (1,0) [0|255] \"\" X\n",
+             b);
+    for (unsigned i = 0; i < 60; i++) (void)count((i < 40 ? i : 40 + 7 * i) & 0xFF);
+    TEST_ASSERT_EQUAL_UINT64(0, f.counts.lost + f.counts.frozen);
+    close_it(&f);
+  }
+}
+
+// A decoder gives the quantities that are bound, and no others.
+static void one_quantity_alone(void) {
+  for (int quantity = 0; quantity < WM_Q_COUNT; quantity++) {
+    wm_can_binding b = binding(quantity, "W", "V");
+    if (open_with(&f, "BO_ 257 W: 3 X\n SG_ V : 0|16@1+ (1,0) [0|0] \"\" X\nVAL_ 257 V 0 \"P\" 1 \"R\" 2 \"D\";\n", &b,
+                  1) != WM_OK)
+      continue;
+    TEST_ASSERT_EQUAL_HEX32(UINT32_C(1) << quantity, wm_can_decoder_quantities(f.decoder));
+    close_it(&f);
+  }
+}
+
 // ── what is no value, what is no frame ──────────────────────────────────────────────────────────────────────────────
 
 static void no_value(void) {
@@ -439,6 +467,8 @@ int main(void) {
   RUN_TEST(frozen_counter);
   RUN_TEST(counters_that_leave_a_value_out);
   RUN_TEST(what_only_looks_like_a_counter);
+  RUN_TEST(a_bound_signal_is_no_counter);
+  RUN_TEST(one_quantity_alone);
   RUN_TEST(no_value);
   RUN_TEST(what_is_not_decoded);
   RUN_TEST(several_quantities_and_ids);

@@ -28,6 +28,37 @@ void test_a_command_is_obeyed_with_a_response(void) {
   }
 }
 
+// The speed obeys as the turn does: from one command to the next it goes on from where it was.
+void test_the_speed_obeys_with_the_same_response(void) {
+  for (int cuts : {1, 7}) {
+    start_commands(0.4, 0.0);
+    double speed = 0.2, way = 0.0;
+    const double commands[] = {0.2, 0.6, -0.1, 0.3};
+    for (int k = 0; k < 4; k++) {
+      feed(make::twist(0.3 * k, commands[k], 0.0));
+      for (int i = 1; i <= cuts; i++) advance(0.3 * k + 0.3 * i / cuts);
+      const double left = std::exp(-0.75), gap = speed - commands[k];
+      way += commands[k] * 0.3 + gap * 0.4 * (1.0 - left);
+      speed = commands[k] + gap * left;
+      TEST_ASSERT_DOUBLE_WITHIN(1e-7, way, pose.x_m);
+      TEST_ASSERT_DOUBLE_WITHIN(1e-6, speed, front.twist_at(make::at(0.3 * (k + 1)), calibration).v);
+    }
+  }
+}
+
+// A turn slows the speed by slowdown w^2, to a stand, not beyond it; forwards and backwards.
+void test_a_turn_slows_down_to_a_stand(void) {
+  wm_motion_calibration c = wm::kNeutralCalibration;
+  c.value[WM_TURN_SLOWDOWN] = 0.5;
+  for (const double v : {-0.4, -0.1, 0.0, 0.1, 0.4})
+    for (const double w : {-0.6, 0.2}) {
+      const wm::motion_twist t = wm::twist_of_command({v, 0.0, w}, {}, c, NAN);
+      const double size = std::fmax(std::fabs(v) - 0.5 * w * w, 0.0);
+      TEST_ASSERT_DOUBLE_WITHIN(1e-12, v < 0.0 ? -size : size, t.v);
+      TEST_ASSERT_DOUBLE_WITHIN(1e-12, w, t.w);
+    }
+}
+
 // A rise is late, a fall is not: each pulse loses onset times its height. A turn to the other side falls, then rises.
 void test_short_turns_are_obeyed_in_part(void) {
   for (double before : {0.0, 0.3}) {
@@ -127,6 +158,8 @@ void tearDown(void) {}
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_a_command_is_obeyed_with_a_response);
+  RUN_TEST(test_the_speed_obeys_with_the_same_response);
+  RUN_TEST(test_a_turn_slows_down_to_a_stand);
   RUN_TEST(test_short_turns_are_obeyed_in_part);
   RUN_TEST(test_gentle_turns_have_the_largest_radius);
   RUN_TEST(test_a_change_of_command_is_doubted);

@@ -284,6 +284,53 @@ void test_the_way_is_counted_again_after_a_silence(void) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, way_m - 3.02, d.pose.x_m - before_m);
 }
 
+// A count after 0.7 periods has a speed of its own; one after 0.4 is one of a burst, whose speed is that since the
+// count before the last one.
+void test_the_speed_of_an_early_count(void) {
+  for (const double share : {0.7, 0.4}) {
+    drive d(WM_MOTION_TICKS);
+    for (int i = 0; i <= 50; i++) count(&d, 0.02 * i, 0.02 * i);
+    const double early_s = 0.02 * share;
+    count(&d, 1.0 + early_s, 1.0 + 2.0 * early_s);  // at 2 m/s
+    const double expected = share > 0.5 ? 2.0 : (0.02 + 2.0 * early_s) / (0.02 + early_s);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, expected, d.front.twist_at(make::at(1.0 + early_s), wm::kNeutralCalibration).v);
+  }
+}
+
+// GIVEN wheels whose speed was refused and that then fall silent WHEN another speed goes on THEN the refusal is over
+// after hold_max_s: the way is as sure as without it.
+void test_a_refusal_ends_with_its_sensor(void) {
+  double grown_m2[2];
+  for (const bool refused : {false, true}) {
+    wm_motion_params params;
+    wm_params_defaults(&wm_motion_params_table, &params);
+    params.model = WM_MOTION_SPEED_YAW_RATE;
+    const wm_wheels car = make::car();
+    wm::motion_front_end front;
+    front.init(&params, &car);
+    double way_m2 = 0.0, before_m2 = 0.0;
+    const auto feed = [&](const wm_event &e) {
+      front.feed(e);
+      front.advance(e.t_ns, wm::kNeutralCalibration,
+                    [&](const wm::motion_segment &, const wm::motion_twist &, const wm::motion_noise &n) {
+                      way_m2 += n.distance_m2;
+                    });
+    };
+    for (int i = 0; i <= 300; i++) {
+      const double t_s = 0.02 * i;
+      const double wheels_mps = refused && i == 50 ? 120.0 : 2.0;
+      if (i < 50 || (refused && i == 50))
+        feed(make::quantities(t_s,
+                              {{WM_Q_WHEEL_SPEED_REAR_LEFT, wheels_mps}, {WM_Q_WHEEL_SPEED_REAR_RIGHT, wheels_mps}}));
+      feed(make::quantities(t_s + 0.002, {{WM_Q_VEHICLE_SPEED, 2.0}}));
+      feed(make::quantities(t_s + 0.005, {{WM_Q_YAW_RATE, 1e-3 * (i % 3)}}));
+      if (i == 250) before_m2 = way_m2;
+    }
+    grown_m2[refused] = way_m2 - before_m2;
+  }
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9 + 1e-6 * grown_m2[0], grown_m2[0], grown_m2[1]);
+}
+
 }  // namespace
 
 void setUp(void) {}
@@ -303,5 +350,7 @@ int main(void) {
   RUN_TEST(test_a_count_that_comes_twice_counts_once);
   RUN_TEST(test_counts_without_a_sign_take_it_from_the_gear);
   RUN_TEST(test_the_way_is_counted_again_after_a_silence);
+  RUN_TEST(test_the_speed_of_an_early_count);
+  RUN_TEST(test_a_refusal_ends_with_its_sensor);
   return UNITY_END();
 }

@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "events.hpp"
+#include "math/arc.hpp"
 #include "math/se2.hpp"
 #include "math/se3.hpp"
 #include "motion/motion_params.h"
@@ -63,6 +64,151 @@ void test_an_estimate_without_a_time_is_carried_nowhere(void) {
   params.model = WM_MOTION_CONSTANT_VELOCITY;
   TEST_ASSERT_EQUAL(WM_OK, wm_odometry_init(odom, &params, &wheels));
   TEST_ASSERT_EQUAL(WM_NOT_FOUND, wm_odometry_carry(odom, &fused, make::at(1), &out, nullptr));
+}
+
+// Each pose of the last second is the one that was the newest at its time, at the stamps of the twists and between
+// them, though each twist is another one; so are its twist and its noise.
+void test_poses_of_the_past_are_what_they_were(void) {
+  start(make::no_wheels());
+  wm_odom_point was[201], between[201];
+  for (int i = 0; i <= 200; i++) {
+    feed(make::twist6(0.01 * i, 1.0 + 0.3 * sin(i), 0.2 * cos(2 * i), 1.5 * sin(0.7 * i)));
+    TEST_ASSERT_EQUAL(WM_OK, wm_odometry_at(odom, make::at(0.01 * i), &was[i]));
+    TEST_ASSERT_EQUAL(WM_OK, wm_odometry_at(odom, make::at(0.01 * i + 0.004), &between[i]));
+  }
+  for (int i = 101; i < 200; i++)
+    for (const bool at_stamp : {true, false}) {
+      const wm_odom_point &expected = at_stamp ? was[i] : between[i];
+      wm_odom_point p;
+      TEST_ASSERT_EQUAL(WM_OK, wm_odometry_at(odom, make::at(0.01 * i + (at_stamp ? 0.0 : 0.004)), &p));
+      TEST_ASSERT_EQUAL_INT64(expected.t_ns, p.t_ns);
+      assert_pose(expected.pose_odom_base.x_m, expected.pose_odom_base.y_m, expected.pose_odom_base.heading_rad,
+                  p.pose_odom_base);
+      TEST_ASSERT_DOUBLE_WITHIN(1e-12, expected.v_mps, p.v_mps);
+      TEST_ASSERT_DOUBLE_WITHIN(1e-12, expected.side_mps, p.side_mps);
+      TEST_ASSERT_DOUBLE_WITHIN(1e-12, expected.w_radps, p.w_radps);
+      // Noise grows evenly from one to the next.
+      const auto noise = [&](double wm_odom_point::*of) {
+        return was[i].*of + (at_stamp ? 0.0 : 0.4) * (was[i + 1].*of - was[i].*of);
+      };
+      TEST_ASSERT_DOUBLE_WITHIN(1e-10, noise(&wm_odom_point::along_var_m2), p.along_var_m2);
+      TEST_ASSERT_DOUBLE_WITHIN(1e-10, noise(&wm_odom_point::across_var_m2), p.across_var_m2);
+      TEST_ASSERT_DOUBLE_WITHIN(1e-10, noise(&wm_odom_point::heading_var_rad2), p.heading_var_rad2);
+    }
+}
+
+// Of a fast bus a second is remembered, too: a point each 4 ms, and the newest event. Each point is found from its own
+// time on.
+void test_a_second_of_a_fast_bus_is_remembered(void) {
+  start(make::no_wheels());
+  wm_pose2 was{};
+  for (int i = 0; i <= 400; i++) {
+    feed(make::twist(0.001 * i, 1.0 + 0.5 * sin(i), 2.0 * cos(0.6 * i)));
+    if (i % 4 == 0) was = pose_at(0.001 * i);
+    const wm_pose2 found = pose_at(0.001 * (i - i % 4));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, was.x_m, found.x_m);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, was.heading_rad, found.heading_rad);
+  }
+  start(make::no_wheels());
+  for (int i = 0; i <= 3000; i++) feed(make::twist(0.001 * i, 1.0, 0.0));
+  assert_pose(2.01, 0, 0, pose_at(2.01));
+  assert_pose(2.5005, 0, 0, pose_at(2.5005));
+}
+
+// The covariance of a carried pose in the plane: J P J' by the start's heading, and noise along and across the way's
+// middle heading; a turn's noise is spread evenly over the way.
+void expect_carried(const wm_estimate &from, const wm_estimate &out, double along, double across, double turn) {
+  const double dx = out.pose_map_base.p_m[0] - from.pose_map_base.p_m[0],
+               dy = out.pose_map_base.p_m[1] - from.pose_map_base.p_m[1];
+  const double middle = from.heading_rad + 0.5 * (out.heading_rad - from.heading_rad), c = cos(middle), s = sin(middle);
+  const double j[3][3] = {{1, 0, -dy}, {0, 1, dx}, {0, 0, 1}};
+  const double noise[3][3] = {{along * c * c + across * s * s + turn * dy * dy / 3,
+                               (along - across) * c * s - turn * dx * dy / 3, -turn * dy / 2},
+                              {0, along * s * s + across * c * c + turn * dx * dx / 3, turn * dx / 2},
+                              {0, 0, turn}};
+  const int at[3] = {0, 1, 5};
+  for (int a = 0; a < 3; a++)
+    for (int b = a; b < 3; b++) {
+      double expected = noise[a][b];
+      for (int k = 0; k < 3; k++)
+        for (int l = 0; l < 3; l++) expected += j[a][k] * from.covariance[wm_cov_index(at[k], at[l])] * j[b][l];
+      TEST_ASSERT_DOUBLE_WITHIN(1e-9 + 1e-6 * fabs(expected), expected, out.covariance[wm_cov_index(at[a], at[b])]);
+      TEST_ASSERT_EQUAL_DOUBLE(out.covariance[wm_cov_index(at[a], at[b])], out.covariance[wm_cov_index(at[b], at[a])]);
+    }
+}
+
+wm_estimate somewhere(double t_s) {
+  wm_estimate e{};
+  e.t_ns = make::at(t_s);
+  e.dof = 3;
+  e.pose_map_base.p_m[0] = 3.0, e.pose_map_base.p_m[1] = -2.0;
+  e.heading_rad = 0.7;
+  const double p[3][3] = {{0.04, 0.01, -0.005}, {0.01, 0.03, 0.004}, {-0.005, 0.004, 0.01}};
+  const int at[3] = {0, 1, 5};
+  for (int a = 0; a < 3; a++)
+    for (int b = 0; b < 3; b++) e.covariance[wm_cov_index(at[a], at[b])] = p[a][b];
+  return e;
+}
+
+// GIVEN no motion data WHEN a pose is carried on THEN it goes by its own velocity, which walks; a pose of the future
+// goes back by it, and is no less sure than it was. Odom stays.
+void test_a_pose_is_carried_by_its_own_velocity(void) {
+  start(make::no_wheels());
+  params.model = WM_MOTION_CONSTANT_VELOCITY;
+  TEST_ASSERT_EQUAL(WM_OK, wm_odometry_init(odom, &params, &wheels));
+  wm_estimate fused = somewhere(1.0);
+  fused.v_mps[0] = 0.8, fused.v_mps[1] = -0.3, fused.w_radps[2] = 0.5;
+  for (const double dt_s : {0.3, 0.6, -0.2}) {
+    wm_estimate out;
+    wm_odom_point point;
+    TEST_ASSERT_EQUAL(WM_OK, wm_odometry_carry(odom, &fused, make::at(1.0 + dt_s), &out, &point));
+    const wm::arc a = wm::make_arc(0.8 * dt_s, -0.3 * dt_s, 0.5 * dt_s);
+    const wm_pose2 end = wm::compose(wm_pose2{3.0, -2.0, 0.7}, {a.x_m, a.y_m, a.turn_rad});
+    assert_pose(end.x_m, end.y_m, end.heading_rad,
+                {out.pose_map_base.p_m[0], out.pose_map_base.p_m[1], out.heading_rad});
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, std::sin(0.5 * end.heading_rad), out.pose_map_base.q_xyzw[2]);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, std::cos(0.5 * end.heading_rad), out.pose_map_base.q_xyzw[3]);
+    const double grown = std::fmax(dt_s * dt_s * dt_s / 3.0, 0.0), walk = params.velocity_speed_walk,
+                 turn = params.velocity_turn_walk;
+    expect_carried(fused, out, walk * walk * grown, walk * walk * grown, turn * turn * grown);
+    const double twist[3] = {out.v_mps[0], out.v_mps[1], out.w_radps[2]}, expected[3] = {0.8, -0.3, 0.5};
+    TEST_ASSERT_EQUAL_DOUBLE_ARRAY(expected, twist, 3);
+    const double of_odom[3] = {point.v_mps, point.side_mps, point.w_radps};
+    TEST_ASSERT_EQUAL_DOUBLE_ARRAY(expected, of_odom, 3);
+    assert_pose(0, 0, 0, point.pose_odom_base);
+    TEST_ASSERT_EQUAL_INT64(make::at(1.0 + dt_s), out.t_ns);
+    TEST_ASSERT_EQUAL_INT64(make::at(1.0 + dt_s), point.t_ns);
+  }
+}
+
+// GIVEN twists of a base that drives sideways WHEN a pose is carried between, at and behind them THEN mean, covariance
+// and twist are those of the motion's accumulated noise at both ends.
+void test_a_carried_pose_has_the_noise_between_its_times(void) {
+  start(make::no_wheels());
+  params.noise_hold_mps2 = params.noise_hold_radps2 = 0.0;
+  TEST_ASSERT_EQUAL(WM_OK, wm_odometry_init(odom, &params, &wheels));
+  for (int i = 0; i <= 100; i++) feed(make::twist6(0.01 * i, 0.8, i < 50 ? 0.3 : 0.1, 0.9));
+  const double times[][2] = {{0.20, 0.80}, {0.203, 0.807}, {0.5, 0.5}, {0.8, 1.1}, {1.05, 1.15}};
+  for (const auto &t : times) {
+    wm_odom_point a, b, got;
+    TEST_ASSERT_EQUAL(WM_OK, wm_odometry_at(odom, make::at(t[0]), &a));
+    TEST_ASSERT_EQUAL(WM_OK, wm_odometry_at(odom, make::at(t[1]), &b));
+    const wm_estimate fused = somewhere(t[0]);
+    wm_estimate out;
+    TEST_ASSERT_EQUAL(WM_OK, wm_odometry_carry(odom, &fused, make::at(t[1]), &out, &got));
+    const wm_pose2 end = wm::compose(wm_pose2{3.0, -2.0, 0.7}, wm::between(a.pose_odom_base, b.pose_odom_base));
+    assert_pose(end.x_m, end.y_m, end.heading_rad,
+                {out.pose_map_base.p_m[0], out.pose_map_base.p_m[1], out.heading_rad});
+    expect_carried(fused, out, b.along_var_m2 - a.along_var_m2, b.across_var_m2 - a.across_var_m2,
+                   b.heading_var_rad2 - a.heading_var_rad2);
+    // Noise per second of constant twists; the same between two points as at them.
+    const double w2 = params.noise_yaw_rate_radps * params.noise_yaw_rate_radps + 0.03 * 0.9 * 0.03 * 0.9;
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, w2 * (t[1] - t[0]), b.heading_var_rad2 - a.heading_var_rad2);
+    TEST_ASSERT_EQUAL_DOUBLE(0.8, out.v_mps[0]);
+    TEST_ASSERT_EQUAL_DOUBLE(t[1] > 0.501 ? 0.1 : 0.3, out.v_mps[1]);
+    TEST_ASSERT_EQUAL_DOUBLE(0.9, out.w_radps[2]);
+    TEST_ASSERT_EQUAL_DOUBLE(b.pose_odom_base.x_m, got.pose_odom_base.x_m);
+  }
 }
 
 void test_a_time_too_old_or_before_any_motion_is_not_found(void) {
@@ -172,15 +318,19 @@ void test_unknown_motion_begins_at_the_fused_pose(void) {
 // A bus delays some counts: the last two stamps, 14.7 ms apart, would make a speed 36 % too high. A silence of 0.3 s
 // goes on by the steady one. The own speed of 80 ms, a third off, is left.
 void test_delayed_counts_begin_a_silence_with_a_steady_speed(void) {
-  start(make::two_wheels());
   const double late_s[] = {0.0, 0.0006, -0.0004, 0.003, -0.0023};
-  for (int i = 0; i <= 54; i++)
-    feed(make::quantities(0.02 * i + late_s[i % 5],
-                          {{WM_Q_WHEEL_TICKS_LEFT, 28.0 * i}, {WM_Q_WHEEL_TICKS_RIGHT, 28.0 * i}}));
-  const double newest_s = 0.02 * 54 + late_s[4], at_rest = pose_at(newest_s).x_m, mps = at_rest / newest_s;
-  TEST_ASSERT_DOUBLE_WITHIN(0.4 * mps * 0.08, mps * 0.08, pose_at(newest_s + 0.08).x_m - at_rest);
-  const double late_m = pose_at(newest_s + 0.3).x_m - pose_at(newest_s + 0.08).x_m;
-  TEST_ASSERT_DOUBLE_WITHIN(0.05 * mps * 0.22, mps * 0.22, late_m);
+  for (const bool has_gyro : {false, true}) {
+    start(make::two_wheels());
+    for (int i = 0; i <= 54; i++) {
+      const double t_s = 0.02 * i + late_s[i % 5];
+      if (has_gyro) feed(make::quantities(t_s, {{WM_Q_YAW_RATE, 1e-9 * (i % 2)}}));
+      feed(make::quantities(t_s, {{WM_Q_WHEEL_TICKS_LEFT, 28.0 * i}, {WM_Q_WHEEL_TICKS_RIGHT, 28.0 * i}}));
+    }
+    const double newest_s = 0.02 * 54 + late_s[4], at_rest = pose_at(newest_s).x_m, mps = at_rest / newest_s;
+    TEST_ASSERT_DOUBLE_WITHIN(0.4 * mps * 0.08, mps * 0.08, pose_at(newest_s + 0.08).x_m - at_rest);
+    const double late_m = pose_at(newest_s + 0.3).x_m - pose_at(newest_s + 0.08).x_m;
+    TEST_ASSERT_DOUBLE_WITHIN(0.05 * mps * 0.22, mps * 0.22, late_m);
+  }
 }
 
 void test_a_copy_continues_identically(void) {
@@ -340,6 +490,10 @@ int main(void) {
   RUN_TEST(test_half_a_circle_by_twists);
   RUN_TEST(test_extrapolates_with_the_held_twist_but_not_for_ever);
   RUN_TEST(test_an_estimate_without_a_time_is_carried_nowhere);
+  RUN_TEST(test_poses_of_the_past_are_what_they_were);
+  RUN_TEST(test_a_second_of_a_fast_bus_is_remembered);
+  RUN_TEST(test_a_pose_is_carried_by_its_own_velocity);
+  RUN_TEST(test_a_carried_pose_has_the_noise_between_its_times);
   RUN_TEST(test_a_time_too_old_or_before_any_motion_is_not_found);
   RUN_TEST(test_calibration_holds_from_now_on_and_nothing_jumps);
   RUN_TEST(test_twists_are_commands_as_long_as_the_estimator_takes_them_so);

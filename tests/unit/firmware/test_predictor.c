@@ -118,6 +118,42 @@ static void a_move_of_map_against_odom_is_announced_once(void) {
   TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.1, p.last_jump_rad);
 }
 
+// A move is a jump beyond its bounds, not at them.
+static void a_move_as_large_as_the_bounds_is_no_jump(void) {
+  wm_predictor_params params = kParams;
+  params.jump_m = 0.125;
+  params.jump_rad = 0.0625;
+  const struct {
+    double x_m, heading_rad;
+    uint32_t jumps;
+  } rows[] = {{0.125, 0.0, 0}, {0.0, 0.0625, 0}, {0.1251, 0.0, 1}, {0.0, 0.0626, 1}, {0.0, -0.0626, 1}};
+  for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+    wm_published p;
+    tearDown();
+    setUp();
+    wm_predictor_init(&predictor, &params, odometry);
+    move(0, 0, 0);
+    fuse(0, 0, 0, 0, 0);
+    TEST_ASSERT_EQUAL(1, wm_predictor_publish(&predictor, 20 * MS, &p));
+    fuse(1, rows[i].x_m, 0, rows[i].heading_rad, 0);
+    TEST_ASSERT_EQUAL(1, wm_predictor_publish(&predictor, 40 * MS, &p));
+    TEST_ASSERT_EQUAL_UINT32(rows[i].jumps, p.jumps);
+  }
+}
+
+// Whatever the memory held before: the same message.
+static void a_message_overwrites_all_of_its_memory(void) {
+  static wm_published messages[2];
+  memset(&messages[1], 0xff, sizeof messages[1]);
+  for (int ms = 0; ms <= 100; ms += 10) move(ms, 1, 0.5);
+  fuse(50, 3, 4, 0.3, 0);
+  for (int i = 0; i < 2; i++) {
+    wm_predictor copy = predictor;
+    TEST_ASSERT_EQUAL(1, wm_predictor_publish(&copy, 120 * MS, &messages[i]));
+  }
+  TEST_ASSERT_EQUAL_MEMORY(&messages[0], &messages[1], sizeof messages[0]);
+}
+
 static void a_pose_set_anew_is_announced_however_small_the_move(void) {
   wm_published p;
   move(0, 0, 0);
@@ -190,6 +226,8 @@ int main(void) {
   RUN_TEST(stamps_rise_strictly);
   RUN_TEST(odom_is_turned_into_the_map);
   RUN_TEST(a_move_of_map_against_odom_is_announced_once);
+  RUN_TEST(a_move_as_large_as_the_bounds_is_no_jump);
+  RUN_TEST(a_message_overwrites_all_of_its_memory);
   RUN_TEST(a_pose_set_anew_is_announced_however_small_the_move);
   RUN_TEST(counts_of_resets_and_jumps_wrap);
   RUN_TEST(pictures_are_told_the_pose_or_the_motion_alone);

@@ -124,6 +124,25 @@ static void a_sighting_with_an_elevation_sigma_of_zero_has_no_elevation(void) {
   TEST_ASSERT_TRUE(wm_sighting_has_elevation(&read[1]));
 }
 
+// So many sightings as a message has room for, and no count beyond it.
+static void counts_of_sightings_beyond_the_room_are_refused(void) {
+  char sensor[WM_NAME_MAX];
+  wm_time_ns t_ns;
+  static wm_sighting read[WM_LCM_OBSERVATIONS_MAX];
+  static waymark_observations_t m;
+  m.t_ns = 1;
+  for (int i = 0; i < WM_LCM_OBSERVATIONS_MAX; i++) m.range_m[i] = 1;
+  const int32_t counts[] = {0, WM_LCM_OBSERVATIONS_MAX, -1, WM_LCM_OBSERVATIONS_MAX + 1, INT32_MIN, INT32_MAX};
+  for (size_t i = 0; i < sizeof counts / sizeof counts[0]; i++) {
+    size_t count = 99;
+    m.count = counts[i];
+    const int length = waymark_observations_t_encode(bytes, 0, sizeof bytes, &m);
+    const char *why = wm_lcm_read_sightings(bytes, (size_t)length, sensor, &t_ns, read, &count);
+    TEST_ASSERT_EQUAL_STRING(i < 2 ? NULL : "count is not in 0 to 64", why);
+    TEST_ASSERT_EQUAL_size_t(i < 2 ? (size_t)counts[i] : 0, count);
+  }
+}
+
 // By the table: what travels arrives, the rest is absent.
 static void each_number_of_a_sighting_arrives(void) {
   wm_event sent = {.t_ns = 1, .kind = WM_EVENT_SIGHTING, .as.sighting = {.landmark_id = 7}};
@@ -240,6 +259,7 @@ int main(void) {
   RUN_TEST(health_arrives_with_its_sources);
   RUN_TEST(the_largest_health_fits);
   RUN_TEST(names_from_a_stranger_cannot_write_to_a_terminal);
+  RUN_TEST(counts_of_sightings_beyond_the_room_are_refused);
   RUN_TEST(each_number_of_a_sighting_arrives);
   RUN_TEST(a_sighting_with_an_elevation_sigma_of_zero_has_no_elevation);
   RUN_TEST(every_value_of_an_enum_has_its_constant);

@@ -89,6 +89,20 @@ static void landmarks_are_read_as_they_were_sent(void) {
   TEST_ASSERT_DOUBLE_IS_NAN(heard[0].cov_m2[0]);
 }
 
+// A map of which nothing is known yet is an empty list, not a wrong one.
+static void an_empty_map_is_a_map(void) {
+  wm_landmark heard[WM_LCM_LANDMARKS_MAX];
+  wm_lcm_part part = {1, 2, 3, 4};
+  static waymark_map_t m;
+  m.t_ns = 9;
+  const int length = waymark_map_t_encode(bytes, 0, sizeof bytes, &m);
+  TEST_ASSERT_NULL(wm_lcm_read_map(bytes, (size_t)length, &part, heard));
+  TEST_ASSERT_EQUAL_INT64(9, part.t_ns);
+  TEST_ASSERT_EQUAL_size_t(0, part.total);
+  TEST_ASSERT_EQUAL_size_t(0, part.first);
+  TEST_ASSERT_EQUAL_size_t(0, part.count);
+}
+
 static void counts_beyond_the_room_are_refused(void) {
   wm_landmark heard[WM_LCM_LANDMARKS_MAX];
   wm_place places[WM_LCM_PLACES_MAX];
@@ -112,6 +126,7 @@ int main(void) {
   RUN_TEST(lists_forget_the_one_before);
   RUN_TEST(a_map_arrives_in_parts);
   RUN_TEST(landmarks_are_read_as_they_were_sent);
+  RUN_TEST(an_empty_map_is_a_map);
   RUN_TEST(counts_beyond_the_room_are_refused);
   return UNITY_END();
 }
