@@ -96,8 +96,10 @@ static void frames_that_are_all_250_ms_late_change_nothing(void) { compare_late(
 static void a_single_frame_250_ms_late_changes_nothing(void) { compare_late(one_in_nine_250, kConfig300); }
 
 static void what_is_too_late_is_counted_and_the_number_that_is_told_would_do(void) {
+  char stated[192], config[256];
+  (void)snprintf(stated, sizeof stated, "%smerge: {lateness_max_ms: 150}\n", kConfig);
   small_recording_write("rec", &(small_recording){.seconds = 10, .late_ns = all_200});
-  replay_into("rec", kConfig, "run", &report);
+  replay_into("rec", stated, "run", &report);
   const wm_source_health *eye = source("sightings:eye");
   TEST_ASSERT_GREATER_THAN(100, eye->received);
   TEST_ASSERT_EQUAL_UINT64(eye->received, eye->late);
@@ -107,11 +109,19 @@ static void what_is_too_late_is_counted_and_the_number_that_is_told_would_do(voi
     if (report.findings.at[i].id == WM_FOUND_DATA_LATE)
       number = strstr(report.findings.at[i].fix, "`lateness_max_ms: ");
   TEST_ASSERT_NOT_NULL(number);
-  char config[256];
-  (void)snprintf(config, sizeof config, "%ssources:\n  - {name: sightings, lateness_max_ms: %d}\n", kConfig,
+  (void)snprintf(config, sizeof config, "%ssources:\n  - {name: sightings, lateness_max_ms: %d}\n", stated,
                  atoi(number + strlen("`lateness_max_ms: ")));
   replay_into("rec", config, "mended", &report);
   TEST_ASSERT_EQUAL_UINT64(0, source("sightings:eye")->late);
+}
+
+static void where_no_bound_is_stated_three_late_data_raise_it(void) {
+  small_recording_write("rec", &(small_recording){.seconds = 10, .late_ns = all_200});
+  replay_into("rec", kConfig, "run", &report);
+  const wm_source_health *eye = source("sightings:eye");
+  TEST_ASSERT_GREATER_THAN(100, eye->received);
+  TEST_ASSERT_EQUAL_UINT64(3, eye->late);
+  TEST_ASSERT_EQUAL_INT64(220 * MS, eye->lateness_max_ns);
 }
 
 static void landmarks_that_moved_are_told(void) {
@@ -291,6 +301,7 @@ int main(void) {
   RUN_TEST(a_single_frame_250_ms_late_changes_nothing);
   RUN_TEST(landmarks_that_moved_are_told);
   RUN_TEST(what_is_too_late_is_counted_and_the_number_that_is_told_would_do);
+  RUN_TEST(where_no_bound_is_stated_three_late_data_raise_it);
   RUN_TEST(the_first_datum_after_a_silence_is_fused);
   RUN_TEST(silence_costs_the_published_pose_nothing);
   RUN_TEST(every_datum_is_accounted_for);
