@@ -159,7 +159,8 @@ static const wm_param kParams[] = {
         "radii. The ticks then measure the heading, too, which bounds the random walk of the gyro's noise. 0: off. Two "
         "wheels of 1 % each."),
     F64("states.wheel_difference_walk", states.wheel_difference_walk, 0.00001, 0, 1,
-        "Random walk of that state per sqrt(m): tyres warm up, loads move."),
+        "Random walk of that state per sqrt(m): tyres warm up, loads move. Where it is above 0, slip that lasts raises "
+        "it, by a factor of 1000 at most."),
 };
 
 const wm_param_table wm_motion_params_table = {kParams, sizeof kParams / sizeof kParams[0], sizeof(params), NULL};
