@@ -92,13 +92,23 @@ def python_types(work):
     return waymark
 
 
+def wait_for_listener(seconds=20):
+    """Until some program has a socket on LCM's port: a busy computer takes a second and more to start one."""
+    port = f":{int(URL.rsplit(':', 1)[1].split('?')[0]):04X}"
+    until = time.monotonic() + seconds
+    while not any(line.split()[1].endswith(port) for line in pathlib.Path("/proc/net/udp").read_text().splitlines()[1:]):
+        assert time.monotonic() < until, "nothing listens on LCM's port"
+        time.sleep(0.01)
+
+
 def check_logger(work):
     import lcm
     waymark = python_types(work)
     log = work / "lcm.log"
     logger = subprocess.Popen(["lcm-logger", "-q", "-f", f"--lcm-url={URL}", log])
     try:
-        time.sleep(0.5)
+        wait_for_listener()
+        time.sleep(0.5)  # its own test of the network
         finish(run(work / "recording", work / "config.yaml", work / "heard"))
         time.sleep(0.5)
     finally:
