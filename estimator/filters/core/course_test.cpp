@@ -98,7 +98,8 @@ void test_mirror(course *self) {
       self->mirror_way_m[k] = middle[k];
       self->mirror_place_m[k] = middle[k + 2];
     }
-    // A sign stays as it is: once it is proven right, a window that says otherwise is nearly straight, and slipped.
+    // A sign does not change during a drive. After it was proven right, slip on a nearly straight way may contradict
+    // it.
     if (n >= kWindows[0] && self->nats > kAlarm_log && self->least_nats > -kAlarm_log) self->is_mirrored = 1;
   }
 }

@@ -98,8 +98,8 @@ struct turns {
   }
 };
 
-// GIVEN drives whose turns count so many times what is measured WHEN innovations come THEN a factor is listed exactly
-// when the likelihood ratio of a filter with that factor says so: not earlier, not later, and no longer than that.
+// In each drive the true turn is the measured one times a factor. The factor is listed exactly while the likelihood
+// ratio of a filter with that factor is above its limit.
 void test_a_factor_is_listed_when_its_filter_explains_the_innovations(void) {
   wm_random random = {11, 1, 0};
   const auto normal = [&] { return wm_random_next_normal(&random); };

@@ -195,8 +195,8 @@ void test_a_refusal_counts_from_the_last_good_sample(void) {
   }
 }
 
-// GIVEN a lost frame, as the counter says WHEN the next one comes after two periods THEN its jump of 6 cm is no doubt:
-// counter and stamp agree. One that comes after one period is refused.
+// The counter shows a lost frame. The next one comes after two periods: counter and stamp agree, and its jump of 6 cm
+// is accepted. After one period it is refused.
 void test_a_lost_frame_is_no_doubt_where_the_stamp_agrees(void) {
   constexpr double kTick = 2 * M_PI * 0.1 / 1000;
   for (const bool agrees : {true, false}) {
@@ -232,7 +232,7 @@ void test_counts_beside_a_gyro_or_a_steering_are_positions(void) {
   }
 }
 
-// What fell silent is said of sources with parts alone: not of increments, nor of a velocity that is a state.
+// A silent part is reported for sources that have parts. Increments and a velocity as a state have none.
 void test_which_models_can_be_silent(void) {
   const double exact[6] = {1e-4, 0, 1e-4, 0, 0, 1e-4};
   const int models[] = {WM_MOTION_AUTO, WM_MOTION_INCREMENTS, WM_MOTION_CONSTANT_VELOCITY, WM_MOTION_SPEED_YAW_RATE};

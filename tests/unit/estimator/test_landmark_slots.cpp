@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Errors of the map: a robot that sees more landmarks than there are states for their errors is no more certain of its
-// place than the map is. And what a straight tells of a turn's sign: nothing.
+// place than the map is. A straight is no evidence of a turn's sign.
 #include <cmath>
 #include <cstdio>
 #include <memory>

@@ -192,7 +192,7 @@ void test_fading_and_forgetting_touch_one_row_and_column(void) {
     }
 }
 
-// A row without states says nothing; an innovation without a positive variance, or of no number, is refused.
+// A row without states has no effect. An innovation without a positive variance, or that is not finite, is refused.
 void test_updates_that_are_refused(void) {
   begin_busy();
   wm::planar_row nothing, row;

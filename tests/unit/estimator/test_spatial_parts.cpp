@@ -152,8 +152,8 @@ void test_what_refused_samples_leave_open(void) {
   TEST_ASSERT_EQUAL_DOUBLE(0.0, walk(history, 1.2, 1.3).refused_s4);
 }
 
-// The pose some time ago is the one that was there, with its twist; ahead the newest twist goes on. Older than what is
-// remembered is told.
+// The pose some time ago is the one that was there, with its twist; ahead the newest twist goes on. A
+// pose that is older than the memory is reported.
 void test_the_motion_since_some_time_ago(void) {
   spatial_history history;
   history.init({0.2, 2.0, 1, 0.0, 0.0});
@@ -494,8 +494,7 @@ void test_the_period_and_the_change_of_twists(void) {
   }
 }
 
-// Rates are an IMU's with three axes that are not older than a quarter of a second, a force likewise; each event says
-// what is fresh.
+// Rates are fresh for a quarter of a second after an IMU with three axes sent them, and so is the force.
 void test_which_values_are_fresh(void) {
   const wm_quantity axes[6] = {WM_Q_ROLL_RATE,      WM_Q_PITCH_RATE,     WM_Q_YAW_RATE,
                                WM_Q_ACCELERATION_X, WM_Q_ACCELERATION_Y, WM_Q_ACCELERATION_Z};
