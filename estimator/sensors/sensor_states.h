@@ -17,7 +17,7 @@ extern "C" {
 // ONE(state, key, unit, name, neutral, low, high, WALK or CONSTANT, initial, most, text)
 // TWO(state, second, key, unit, name, second name, neutral, low, high, ..., initial, most, text): two states, one sigma
 // `low` and `high`: beyond these an update is cut, since the model no longer holds; `initial` and `most`: of the sigma
-// parameter, below 0: only for sightings that state no sigmas of their own, and as the text says. Defaults are what a
+// parameter, below 0: not for sightings whose sigmas are complete (slam.hpp), and as the text says. Defaults are what a
 // tape measure and a data sheet leave open; the mounting's yaw is flat from 0.05 to 0.1.
 // clang-format off
 #define WM_SENSOR_STATES(ONE, TWO) \
@@ -39,7 +39,8 @@ extern "C" {
       "Below 0: see range_bias_sigma_m.") \
   ONE(kRangeBias, "range_bias", "_m", "range_bias_m", 0, -100, 100, CONSTANT, -0.5, 10, \
       "Start sigma of each sensor's range bias, m. 0: off. Below 0: that multiple of the sensor's range sigma. " \
-      "States below 0 act on sightings that state no sigmas of their own; who states these has calibrated the sensor.") \
+      "In slam states below 0 act on no sightings with sigmas of their own that are bearings alone, or whose motion " \
+      "comes with covariances.") \
   ONE(kRangeScale, "range_scale", "", "range_scale", 1, 0.1, 10, WALK, -0.05, 1, \
       "Start sigma of each sensor's range scale about 1. 0: off. Needs ranges of many lengths beside a range bias. " \
       "Below 0: see range_bias_sigma_m; in slam not for coded markers, whose printed size is a standard of length.") \

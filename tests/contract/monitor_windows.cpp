@@ -134,6 +134,24 @@ void a_pose_that_is_found_again_soon_is_on_probation(void) {
   }
 }
 
+// GIVEN innovations of one sign, smaller than their sigma, WHEN they last for a minute THEN on a given map the pose is
+// lost, and on a map that the filter makes it is degraded, with a place that is known to some metres. One that was lost
+// by larger ones is degraded again when these are all that is left.
+void a_bias_on_a_map_of_its_own_degrades(void) {
+  const auto biased = [](lone *robot, double sigmas) {
+    return robot->observe(60, WM_EVENT_SIGHTING, [&](int, auto take) { take({record_of(WM_FUSED, sigmas)}); });
+  };
+  lone given(true), own(false);
+  TEST_ASSERT_EQUAL(WM_STATE_LOST, biased(&given, 0.9).state);
+  const wm_estimate bent = biased(&own, 0.9);
+  TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, bent.state);
+  TEST_ASSERT_EQUAL(WM_CAUSE_BIASED, bent.cause);
+  TEST_ASSERT_LESS_THAN_DOUBLE(9.0, bent.covariance[0]);
+  TEST_ASSERT_EQUAL(WM_STATE_LOST, biased(&own, 3.0).state);
+  (void)biased(&own, 0.9);
+  TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, biased(&own, 0.9).state);
+}
+
 }  // namespace
 
 void run_window_tests(void) {
@@ -142,6 +160,7 @@ void run_window_tests(void) {
   RUN_TEST(unknown_landmarks_do_not_lower_the_doubt);
   RUN_TEST(refused_sightings_are_doubt_beyond_what_chance_gives);
   RUN_TEST(innovations_larger_than_stated_are_inconsistent);
+  RUN_TEST(a_bias_on_a_map_of_its_own_degrades);
   RUN_TEST(landmarks_of_one_picture_count_as_four_at_most);
   RUN_TEST(positions_five_seconds_apart_count_each);
   RUN_TEST(without_positions_nothing_is_mirrored);

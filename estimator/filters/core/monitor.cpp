@@ -38,6 +38,10 @@ constexpr double kStated = 1.5;        // innovations' variance over the stated 
 // Doubt. It needs 10 s of contradiction for LOST; fitting observations take it back at a third of that rate, since a
 // wrong pose fits by chance in between. It stays below 30 s, so that a pose that fits again is back within a minute.
 constexpr double kLostAfter_s = 10.0, kFitRate = 1.0 / 3.0, kMostDoubt_s = 30.0;
+// A mean of innovations within their gates and their variance bends a map that the filter makes itself, and the pose on
+// it by no more than they are off: degraded, not lost. dlr-a with the covariances of its source: ranges and way differ
+// by a tenth, and the map is right to 0.2 m.
+constexpr double kMostMild_s = 3.0;
 // A run that was contradicted for long has a fault that no search finds, such as a mirrored map, and fits by chance now
 // and then. Beyond kExcused_s each further kSuspect_s of contradiction count as much as all fitting ones: they weigh
 // less by that. Half of the time is doubt of a pose that is found then. Ten times as long without doubt makes up for
@@ -344,16 +348,18 @@ bool test_landmarks(wm_monitor *self, wm_time_ns t_ns) {
   return true;
 }
 
-// The sources' tests. Returns whether one contradicts; *fits: one fits.
-bool test_sources(wm_monitor *self, wm_time_ns t_ns, bool *fits) {
+// The sources' tests. Returns whether one contradicts; *fits: one fits; *mild: none does more than bend a map.
+bool test_sources(wm_monitor *self, wm_time_ns t_ns, bool *fits, bool *mild) {
   bool contradicts = false;
   *fits = false;
+  *mild = !self->is_map_known && !self->has_positions;
   self->is_unsupported = 0;
   for (int32_t i = 0; i < WM_MONITOR_SOURCES; i++) {
     source &s = self->sources[i];
     const verdict_of_source v = test(s, t_ns, self->contradicted_s > kExcused_s);
     s.cause = static_cast<uint8_t>(v.cause);
     *fits = *fits || v.fits;
+    *mild = *mild && (v.cause == WM_CAUSE_NONE || v.cause == WM_CAUSE_BIASED);
     if (v.cause != WM_CAUSE_NONE && !contradicts) {
       contradicts = true;
       self->cause = v.cause;
@@ -373,13 +379,16 @@ void count_contradicted(wm_monitor *self, bool contradicts, bool fits, double dt
   if (fits && !contradicts && self->doubt_s <= 0.0) sum = larger(sum - kForgiveRate * dt_s, 0.0);
 }
 
-void count_doubt(wm_monitor *self, bool contradicts, bool fits, double dt_s) {
+void count_doubt(wm_monitor *self, bool contradicts, bool fits, bool is_mild, double dt_s) {
   if (contradicts) {
     self->is_probation = 0;
     self->fitted_s = larger(self->fitted_s - dt_s, 0.0);
     // Where another source fits, either may be wrong: degraded, not lost.
-    const double most_s = fits ? kLostAfter_s : kMostDoubt_s;
-    if (self->doubt_s < most_s) self->doubt_s = self->doubt_s + dt_s < most_s ? self->doubt_s + dt_s : most_s;
+    const double most_s = is_mild ? kMostMild_s : fits ? kLostAfter_s : kMostDoubt_s;
+    if (self->doubt_s < most_s)
+      self->doubt_s = self->doubt_s + dt_s < most_s ? self->doubt_s + dt_s : most_s;
+    else if (is_mild)
+      self->doubt_s = larger(self->doubt_s - kFitRate * dt_s, most_s);
     return;
   }
   if (!fits) return;
@@ -489,14 +498,15 @@ void wm_monitor_step(wm_monitor *self, const wm_estimate *e, const wm_calibratio
   self->was_lost = is_lost;
   self->lost_s = is_lost ? self->lost_s + dt_s : 0.0;
   if (!self->is_map_known) wm::widen_box(self, e->pose_map_base.p_m[0], e->pose_map_base.p_m[1]);
-  bool fits;
+  bool fits, is_mild;
   const bool is_noisy = wm::test_calibration(self, calibration, count);
   const bool is_turned = wm::test_turn(self, calibration, count);
   const bool are_biased = wm::test_landmarks(self, e->t_ns);
-  const bool contradicts = wm::test_sources(self, e->t_ns, &fits) || is_noisy || is_turned || are_biased;
+  const bool others = is_noisy || is_turned || are_biased;
+  const bool contradicts = wm::test_sources(self, e->t_ns, &fits, &is_mild) || others;
   wm::count_contradicted(self, contradicts, fits && !self->was_lost, dt_s);
   wm::count_proof(self, *e, contradicts, fits && !self->was_lost, dt_s);
-  wm::count_doubt(self, contradicts, fits && !self->was_lost, dt_s);
+  wm::count_doubt(self, contradicts, fits && !self->was_lost, is_mild && !others, dt_s);
   // Without a map every identity is unknown; that is a matter of the configuration.
   if (e->state != WM_STATE_DEAD_RECKONING || !self->is_map_known) self->is_unsupported = 0;
   self->silent = e->state == WM_STATE_DEAD_RECKONING ? wm::silent_source(*self, e->t_ns) : -1;

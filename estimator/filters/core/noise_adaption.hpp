@@ -43,10 +43,8 @@ class noise_adaption {
   bool is_on() const { return log_sigma_ > 0.0; }
   // The variance's factor; 1 without adaption.
   double scale(int k) const { return scale_[k]; }
-  // Of a measurement with this sigma; `stated`: by the measurement itself, which holds.
-  source source_of(int kind, double sigma, bool stated) const {
-    return stated ? source{kNone, square(sigma)} : source{kind, square(sigma) * scale_[kind]};
-  }
+  // Of a measurement with this sigma.
+  source source_of(int kind, double sigma) const { return {kind, square(sigma) * scale_[kind]}; }
 
   // The pose moved by (x_m, y_m), with the adapted noise along, across and of the turn.
   void move(double x_m, double y_m, double along_m2, double across_m2, double turn_rad2);

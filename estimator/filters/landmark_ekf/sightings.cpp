@@ -272,8 +272,8 @@ void landmark_ekf::decay_tilt(wm_time_ns t_ns) {
 void landmark_ekf::add_errors(const sighting_context &at, const lent_slots &lent, const double by[kCauses],
                               int error_offset, double error_size, residual *r) const {
   const int sensor = at.s->sensor;
-  add_past_pose(&r->row, by, at.past, slots_.at(sensor, kTimeOffset, at.reading.stated));
-  slots_.add_to(&r->row, sensor, by, at.reading.stated);
+  add_past_pose(&r->row, by, at.past, slots_.at(sensor, kTimeOffset));
+  slots_.add_to(&r->row, sensor, by);
   // The steps' errors of successive rows are not independent: no evidence of the motion's noise.
   const double steps = filter_.count_variance(at.past.t_ns, by, at.past.pose.heading_rad);
   r->noise += steps;
@@ -325,7 +325,7 @@ int landmark_ekf::sighting_rows(const sighting_context &at, const expected_sight
   if (at.reading.bearing) {
     residual &r = rows[count++];
     r.record.expected = 0.0;
-    r.source = filter_.noise().source_of(noise_adaption::kBearings, at.reading.bearing_sigma_rad, at.reading.stated);
+    r.source = filter_.noise().source_of(noise_adaption::kBearings, at.reading.bearing_sigma_rad);
     r.noise = r.source.own + square(sightings().lateral_sigma_m / distance) + second.bearing_variance;
     add_errors(at, lent, e.bearing_by, error_.bearing, correlated_bearing(sightings(), at.reading, distance), &r);
     finish_row(WM_RESIDUAL_BEARING, s.bearing_rad, e.bearing_rad + second.bearing_rad, record, &r);
@@ -333,7 +333,7 @@ int landmark_ekf::sighting_rows(const sighting_context &at, const expected_sight
   if (at.reading.range) {
     residual &r = rows[count++];
     r.record.expected = 0.0;
-    r.source = filter_.noise().source_of(noise_adaption::kRanges, at.reading.range_sigma_m, at.reading.stated);
+    r.source = filter_.noise().source_of(noise_adaption::kRanges, at.reading.range_sigma_m);
     r.noise = r.source.own + square(sightings().range_sigma_rel * e.range_m) + second.range_variance;
     add_errors(at, lent, e.range_by, error_.range, correlated_range(sightings(), at.reading, e.range_m), &r);
     finish_row(WM_RESIDUAL_RANGE, s.range_m, e.range_m + second.range_m, record, &r);

@@ -79,6 +79,8 @@ class planar_motion {
   void set_motion_state(const wm_motion_states &states, int i, int state);
   // The states of a constant velocity are `first` and those behind it.
   void set_velocity_states(int first);
+  // Whether the motion comes with covariances (motion_kind.hpp), or may yet.
+  bool is_calibrated() const { return kind_ == kKindCalibrated || (kind_ == kKindUnknown && !has_velocity()); }
   bool has_velocity() const { return front_.model() == WM_MOTION_CONSTANT_VELOCITY; }
   // The velocity in the robot's axes at a heading.
   planar_twist velocity_at(double heading_rad) const;
@@ -138,9 +140,9 @@ class planar_motion {
   }
   // The kind of the motion has become known, or another one.
   void take_kind();
-  // Odometry over one such segment.
   // Whether a measured turn is more than its noise over kTurn_s and its unknown bias: both have no sign to be tested.
   bool is_turn(const motion_twist &twist, const motion_noise &noise, double dt_s) const;
+  // Odometry over one such segment.
   void take_step(const motion_segment &segment, const motion_twist &twist, const motion_noise &noise,
                  const pose_step &step);
   // The first motion state beyond its limit, and the change that brings it back; -1: none. A filter moves the states

@@ -69,7 +69,7 @@ void slam::take_waiting(const context &newest) {
     at.record.sensor = s.sensor;
     at.record.observed = one.bearing_rad;
     at.past = look_back(one.sensor);
-    (void)take_sighting(at, s, read_sighting(s, sensor_[one.sensor], sightings()), find_landmark(one.id));
+    (void)take_sighting(at, s, reading_of(s), find_landmark(one.id));
   }
 }
 

@@ -38,6 +38,7 @@ struct joint_layout {
 
 class joint_state : public planar_motion {
  public:
+  using planar_motion::is_calibrated;
   static constexpr int kMaxRobot = 192;             // capacity of states beside landmarks
   static constexpr int kRows = half_update::kRows;  // of one correction
 

@@ -20,6 +20,15 @@ double clutter_volume(const sighting_reading &r) {
 
 }  // namespace
 
+// Who states covariances of the odometry and of the sightings has a model of all errors. So has a detector of lines,
+// whose bearings state their sigmas: while distances are unknown, rays would bend the mounting and the clock.
+slam::reading slam::reading_of(const wm_sighting &s) const {
+  reading r = read_sighting(s, sensor_[s.sensor], sightings());
+  const bool stated = (!r.bearing || finite(s.bearing_sigma_rad)) && (!r.range || finite(s.range_sigma_m));
+  r.complete = stated && (!r.range || joint_.is_calibrated());
+  return r;
+}
+
 // Distance on the floor by a range that may be a depth.
 double slam::distance_of(const wm_sighting &s) const {
   const mounted_sensor &sensor = sensor_[s.sensor];
@@ -41,11 +50,11 @@ wm_status slam::fuse_sighting(const wm_event &event, record_list records) {
   if (status != WM_OK) return refuse(records, at.record, status);
   status = begin_observation(event.t_ns);
   if (status != WM_OK) return status;
-  const reading r = read_sighting(s, sensor_[s.sensor], sightings());
+  const reading r = reading_of(s);
   if (!r.bearing && !r.range) return reject(records, at.record, WM_REJECTED_BY_CONFIG);
   if (s.range_m > sensor_[s.sensor].max_range_m) return reject(records, at.record, WM_REJECTED_OUT_OF_RANGE);
 
-  if (r.range) note_range(s.sensor, r.stated);
+  if (r.range) note_range(s.sensor, r.complete);
   begin_picture(s.sensor, event.t_ns);
   at.past = look_back(s.sensor);
   int landmark;
@@ -156,8 +165,8 @@ wm_verdict slam::expect_sighting(const wm_sighting &s, const reading &r, const p
                        int error_offset, double error_size) {
     const int i = out->count++;
     joint_row &row = out->row[i];
-    add_past_pose(&row, by, past, slots_.at(s.sensor, kTimeOffset, r.stated));
-    slots_.add_to(&row, s.sensor, by, r.stated);
+    add_past_pose(&row, by, past, slots_.at(s.sensor, kTimeOffset, r.complete));
+    slots_.add_to(&row, s.sensor, by, r.complete);
     if (error_state >= 0 && error_offset >= 0) {
       row.add(error_state + error_offset, error_size);
       expected += error_size * joint_.value(error_state + error_offset);
@@ -262,9 +271,9 @@ void slam::fuse_known(const context &at, const wm_sighting &s, const reading &r,
 }
 
 slam::line_bearing slam::line_bearing_of(const wm_sighting &s, const reading &r) const {
-  const bool none = r.stated && sightings().correlated_bearing_rad < 0.0;
+  const bool none = r.complete && sightings().correlated_bearing_rad < 0.0;
   return {s.bearing_rad, s.bearing_sigma_rad, r.bearing_sigma_rad,
-          none ? 0.0 : correlated_bearing(sightings(), r.bearing_sigma_rad), r.stated};
+          none ? 0.0 : correlated_bearing(sightings(), r.bearing_sigma_rad), r.complete};
 }
 
 // A sighting of a landmark that is not on the map.

@@ -156,8 +156,8 @@ void slam::init(const wm_slam_params &params, const wm_setup &setup) {
   start_again();
 }
 
-// The default's scale of ranges acts from the first range on that states no sigma. A marker has a printed size, and who
-// states sigmas has calibrated the sensor: these are standards of length, at the neutral scale.
+// The default's scale of ranges acts from the first range on whose sigma is not complete. A marker has a printed size,
+// and complete sigmas are of a calibrated sensor: these are standards of length, at the neutral scale.
 void slam::note_range(int sensor, bool is_standard) {
   const unsigned bit = 1u << sensor;
   const int slot = slots_.at(sensor, kRangeScale);

@@ -155,7 +155,7 @@ class slam {
   // A bearing without a range. Its sigma as it came, and as it counts.
   struct line_bearing {
     double bearing_rad, given_sigma_rad, sigma_rad, correlated_rad;
-    bool stated;
+    bool complete;
   };
   // A marker in levelled axes along the sensor's yaw.
   struct marker_reading {
@@ -255,7 +255,7 @@ class slam {
   // bearing_only.cpp
   int clone_state(int clone) const { return first_clone_ + 3 * clone; }
   int ray_state(const bearing_tracks::track &track) const { return first_ray_ + 2 * tracks_.index(track); }
-  int keep_clone(const context &at, bool stated);
+  int keep_clone(const context &at, bool complete);
   wm_verdict track_bearing(const context &at, const line_bearing &seen);
   bool join_line(const context &at, const bearing_tracks::track &track);
   bearing_tracks::track *current_ray(const context &at);
@@ -271,6 +271,7 @@ class slam {
   void forget_tracks();
 
   // annulus.cpp
+  reading reading_of(const wm_sighting &s) const;
   double distance_of(const wm_sighting &s) const;
   wm_verdict follow_annulus(const context &at, const wm_sighting &s, const reading &r);
   wm_verdict begin_annulus(const context &at, const wm_sighting &s, const reading &r);

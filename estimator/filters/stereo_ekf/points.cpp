@@ -127,10 +127,12 @@ bool stereo_ekf::grows_fast(double depth_m) const {
 }
 
 bool stereo_ekf::is_landmark(const wm_stereo &seen) const {
-  const double sigma = std::sqrt(square(sigma_px_[0]) + square(sigma_px_[2]));
-  const double disparity = seen.left_px[0] - seen.right_px[0];
   if (params_.points_max == 0 || (params_.increments && !has_room())) return false;
-  return !params_.increments || (disparity > sigma / kNearShare && !grows_fast(rig_.fu * rig_.baseline_m / disparity));
+  if (!params_.increments) return true;
+  const double disparity = seen.left_px[0] - seen.right_px[0];
+  const double growth = length(filter_.moved().p) * disparity / (rig_.fu * rig_.baseline_m);
+  const double variance = square(sigma_px_[0]) + square(sigma_px_[2]) + 2.0 * square(kDrift_px * growth);
+  return disparity > std::sqrt(variance) / kNearShare && growth < kGrowthMost;
 }
 
 void stereo_ekf::add_point(const wm_stereo &seen, const wm_innovation &blank, record_list records) {

@@ -164,19 +164,32 @@ void test_a_sensor_of_depths_has_an_axis() {
   }
 }
 
-// Who states the sigmas of each sighting has calibrated the sensor.
-void test_sightings_with_sigmas_leave_the_sensors_priors() {
+// A sigma says how noisy a sighting is, whether the sensor's calibration has it or each sighting: mounting, clock and
+// scale are open either way.
+void test_sightings_with_sigmas_are_as_those_of_a_sensor_with_them() {
+  std::vector<wm_calibration_value> by[2];
+  wm_estimate end[2];
   for (const bool stated : {false, true}) {
+    sensor.bearing_sigma_rad = stated ? 1.0 : 0.01;
+    sensor.range_sigma_m = 0.1;
     begin();
-    const double before = sigma_of("camera.range_bias_m");
     for (int i = 0; i < 100; i++) {
-      wm_event e = make::sighting(0.1 * i, i % 2, i % 2 ? 1.19 : 0.0, i % 2 ? 5.385 : 5.0);
+      wm_event e = make::sighting(0.1 * i, i % 2, i % 2 ? 1.25 : 0.06, i % 2 ? 5.385 : 5.0);
       if (stated) e.as.sighting.bearing_sigma_rad = 0.01, e.as.sighting.range_sigma_m = 0.1;
-      feed(make::twist(0.1 * i, 0.0, 0.0));
+      feed(make::twist(0.1 * i, 0.1, 0.1));
       feed(e);
     }
-    TEST_ASSERT_EQUAL(stated, sigma_of("camera.range_bias_m") == before);
+    by[stated] = calibration();
+    ekf->estimate(state.get(), &end[stated]);
   }
+  TEST_ASSERT_EQUAL_size_t(by[0].size(), by[1].size());
+  for (size_t i = 0; i < by[0].size(); i++) {
+    TEST_ASSERT_EQUAL_STRING(by[0][i].name, by[1][i].name);
+    TEST_ASSERT_EQUAL_DOUBLE(by[0][i].value, by[1][i].value);
+    TEST_ASSERT_EQUAL_DOUBLE(by[0][i].sigma, by[1][i].sigma);
+  }
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.04, sigma_of("camera.yaw_rad"));  // the prior has 0.05
+  TEST_ASSERT_EQUAL_DOUBLE(end[0].pose_map_base.p_m[0], end[1].pose_map_base.p_m[0]);
 }
 
 // The limit of a found place follows the positions that find it: a receiver of 10 m finds what one of 1 m does.
@@ -359,7 +372,7 @@ int main() {
   RUN_TEST(test_a_prior_is_a_multiple_of_the_sensors_own_sigma);
   RUN_TEST(test_a_state_that_nothing_observes_keeps_its_prior);
   RUN_TEST(test_a_sensor_of_depths_has_an_axis);
-  RUN_TEST(test_sightings_with_sigmas_leave_the_sensors_priors);
+  RUN_TEST(test_sightings_with_sigmas_are_as_those_of_a_sensor_with_them);
   RUN_TEST(test_a_vague_receiver_finds_the_robot_too);
   RUN_TEST(test_a_gyros_scale_is_known_from_its_data_sheet);
   RUN_TEST(test_a_receivers_lasting_error_falls_with_its_sigma);
