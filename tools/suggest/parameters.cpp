@@ -65,7 +65,7 @@ constexpr Row kRows[] = {
     {"slam", "markers.sigma_rel", Kind::kNoise, 0.005},
     {"slam", "markers.bearing_sigma_rad", Kind::kNoise, 0.001},
     {"slam", "markers.heading_sigma_rad", Kind::kNoise, 0.02},
-    {"stereo_ekf", "noise.pixel_px", Kind::kNoise, 0.5},
+    // No noise.pixel_px: tracks of a street drift alike, and the likelihood shows the noise of one picture alone.
     {"stereo_ekf", "noise.v_mps", Kind::kNoise, 0.03},
     {"stereo_ekf", "noise.w_radps", Kind::kNoise, 0.01},
     {"stereo_ekf", "constant_velocity.v_walk", Kind::kNoise, 2},
