@@ -4,7 +4,7 @@
 recordings and on simulated worlds, most without pictures. A table, not a gate: rows that miss a bar name it. Skips (77)
 where the recordings are not there.
 
-    defaults.py BIN_DIR SOURCE_DIR DATA_DIR [--only WORD[,WORD]] [--set KEY=VALUE] [--json] [--out FOLDER]
+    defaults.py BIN_DIR SOURCE_DIR DATA_DIR [--only WORD[,WORD]] [--rendered] [--set KEY=VALUE] [--json] [--out FOLDER]
 
 --set changes a key of the plain configurations, as `sightings.gate.hard=1000`: a trial of another default on all of them."""
 import json
@@ -45,12 +45,14 @@ SPACE = ("seabed-points", "starry-night-stereo")
 
 
 class Case:
-    """A recording or world, an estimator, the configurations that compete with its defaults, and its own bars."""
+    """A recording or world, an estimator, the configurations that compete with its defaults, and its own bars. `drive`:
+    motion.drive, where it is not differential. `rendered`: its pictures take minutes."""
 
     def __init__(self, name, estimator, best, options=(), detector=None, by_hand=None, world=False, covariances=False,
-                 **bars):
+                 drive=None, rendered=False, **bars):
         self.name, self.estimator, self.best, self.options, self.detector = name, estimator, best, options, detector
-        self.by_hand, self.world, self.covariances, self.bars = by_hand, world, covariances, bars
+        self.by_hand, self.world, self.covariances, self.bars = by_hand, world or rendered, covariances, bars
+        self.drive, self.rendered = drive, rendered
 
     def title(self):
         return f"{self.name} {self.estimator}" + (" covariances" if self.covariances else "")
@@ -94,6 +96,19 @@ CASES = [
     Case("seabed-points", "stereo_ekf", SPACE, world=True),
     Case("seabed-acoustic", "stereo_ekf", SPACE, world=True),
     Case("seabed-slam", "stereo_ekf", SPACE, world=True),
+    Case("seabed-imu", "stereo_ekf", ("seabed-imu",), world=True),
+    Case("seabed-rounds", "stereo_ekf", ("seabed-rounds",), world=True),
+    Case("loops-commands", "slam", ("loops-landmarks",), SE2, world=True),
+    Case("car-gnss", "landmark_ekf", ("car", "robot"), world=True),
+    Case("yard-rtk", "landmark_ekf", ("robot",), world=True),
+    Case("yard-imu", "landmark_ekf", ("yard-imu",), world=True),
+    Case("yard-holonomic", "landmark_ekf", ("yard-holonomic",), world=True, drive="holonomic"),
+    Case("yard-skid", "landmark_ekf", ("yard-skid",), world=True, drive="skid_steer"),
+    *(Case(f"corridor-{i}", "edge_mcl", ("corridor",), detector="edges", rendered=True) for i in ("easy", "hard")),
+    *(Case(f"office-{i}", "slam", ("office",), SE2, detector="apriltag", rendered=True) for i in ("easy", "hard")),
+    *(Case(f"hall-{i}", "slam", ("hall",), SIM2, detector="lines", rendered=True) for i in ("easy", "hard")),
+    *(Case(f"seabed-{i}", "stereo_ekf", ("seabed",), detector="stereo", rendered=True) for i in ("easy", "hard")),
+    Case("crossing-hard", "landmark_ekf", ("crossing",), detector="landmarks", rendered=True),
 ]
 
 
@@ -156,6 +171,8 @@ def plain(case, settings=()):
     lines = ["format: waymark-config/1", f"estimator: {case.estimator}"]
     if case.detector:
         lines.append(f"vision: {{{case.detector}: {{}}}}")
+    if case.drive:
+        settings = (f"motion.drive={case.drive}", *settings)
     tree = {}
     for setting in settings:
         key, value = setting.split("=", 1)
@@ -220,7 +237,7 @@ def judge(runs, bin_dir, source, data, case, settings, scratch):
     refused = {}
 
     def run(name, text=None):
-        config = source / "config" / ("robot.yaml" if name == "robot" else f"datasets/{name}.yaml")
+        config = source / "config" / (f"{name}.yaml" if name in ("robot", "car") else f"datasets/{name}.yaml")
         if text is not None:
             config = folder / f"{name}.yaml"
             config.write_text(text)
@@ -259,11 +276,12 @@ COLUMNS = (("position_rmse_m", 4, 8), ("best_position_rmse_m", 4, 8), ("ratio", 
 def main():
     parser = replays.parser(__doc__, "cases whose title contains one of these words")
     bench.out_option(parser)
+    parser.add_argument("--rendered", action="store_true", help="also worlds whose pictures take minutes")
     options = parser.parse_args()
     if not options.data_dir.is_dir():
         print(f"{options.data_dir}: no recordings here")
         return 77
-    cases = [c for c in CASES if replays.is_chosen(options, c.title())]
+    cases = [c for c in CASES if replays.is_chosen(options, c.title()) and (options.rendered or not c.rendered)]
     if not options.json:
         print(f"{'recording or world, estimator':34} " + " ".join(f"{name:>{width}}" for name, (_, _, width) in zip(HEADINGS, COLUMNS))
               + "  best configuration; bars missed")

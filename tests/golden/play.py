@@ -37,7 +37,8 @@ class Heard:
     def __init__(self, work, name):
         self.log = work / f"{name}.lcm"
         self.logger = subprocess.Popen(["lcm-logger", "-q", "-f", f"--lcm-url={lcm_tools.URL}", self.log])
-        time.sleep(1)
+        lcm_tools.wait_for_listener()
+        time.sleep(0.5)  # its own test of the network
 
     def end(self):
         time.sleep(0.5)
