@@ -99,6 +99,7 @@ class landmark_ekf {
     double arm_m[2], off_m[2];
   };
   antenna_view view_antenna(const past_pose &past) const;
+  void widen_delay(past_pose *past, double bend_m[2]) const;
   double position_row(int axis, const past_pose &past, const antenna_view &antenna, planar_row *row) const;
   double lasting_error() const;  // of the receiver, over its sigma; 0 where it is no state
 

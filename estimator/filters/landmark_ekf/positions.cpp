@@ -10,6 +10,8 @@ namespace {
 // A false position lies anywhere in a square of this side, m. An order of magnitude, not swept: a factor of 10 is 2.3
 // nats.
 constexpr double kClutterPlace_m = 200.0;
+// A delay is linear in the way while its sigma is less: a robot begins to drive in a tenth of a second. Not swept.
+constexpr double kLinearDelay_s = 0.1;
 
 }  // namespace
 
@@ -61,6 +63,23 @@ double landmark_ekf::position_row(int axis, const past_pose &past, const antenna
   return expected;
 }
 
+// Where the delay is uncertain, its derivatives are those of the chord over two sigmas: a robot that may have stood
+// then, or driven, has neither's derivative [Julier2004]. bend_m: by how much the chord's middle is off the way.
+void landmark_ekf::widen_delay(past_pose *past, double bend_m[2]) const {
+  bend_m[0] = bend_m[1] = 0.0;
+  if (gnss_time_state_ < 0) return;
+  const double sigma_s = std::sqrt(filter_.variance(gnss_time_state_)), age_s = filter_.value(gnss_time_state_);
+  if (sigma_s < kLinearDelay_s || !filter_.is_path_known(filter_.now_ns() - wm_ns_from_seconds(age_s + sigma_s)))
+    return;
+  const wm_pose2 earlier = pose_before(filter_, age_s + sigma_s).pose,
+                 later = pose_before(filter_, age_s - sigma_s).pose;
+  past->age_by[0] = (earlier.x_m - later.x_m) / (2.0 * sigma_s);
+  past->age_by[1] = (earlier.y_m - later.y_m) / (2.0 * sigma_s);
+  past->age_by[2] = wrap(earlier.heading_rad - later.heading_rad) / (2.0 * sigma_s);
+  bend_m[0] = 0.5 * (earlier.x_m + later.x_m) - past->pose.x_m;
+  bend_m[1] = 0.5 * (earlier.y_m + later.y_m) - past->pose.y_m;
+}
+
 wm_status landmark_ekf::fuse_position(const wm_event &event, record_list records) {
   const wm_position &p = event.as.position;
   wm_innovation record = record_of(event, WM_RESIDUAL_X);
@@ -74,7 +93,9 @@ wm_status landmark_ekf::fuse_position(const wm_event &event, record_list records
   const double sigma = white_sigma_m(p.sigma_xy_m, params_.gnss);
   const double correlated_m = correlated_sigma_m(p.sigma_xy_m, params_.gnss);
   decay_gnss_error(event.t_ns, p.sigma_xy_m);
-  const past_pose past = pose_before(filter_, gnss_time_state_ < 0 ? 0.0 : filter_.value(gnss_time_state_));
+  past_pose past = pose_before(filter_, gnss_time_state_ < 0 ? 0.0 : filter_.value(gnss_time_state_));
+  double bend_m[2];
+  widen_delay(&past, bend_m);
   const antenna_view antenna = view_antenna(past);
   const wm_pose2 antenna_step = compose(past.step, {antenna.arm_m[0], antenna.arm_m[1], 0.0});
   observation seen = observation_at(event.t_ns, kPositionKey, compose(filter_.odom(), antenna_step));
@@ -90,7 +111,7 @@ wm_status landmark_ekf::fuse_position(const wm_event &event, record_list records
   residual rows[2];
   for (int k = 0; k < 2; k++) {
     residual &r = rows[k];
-    const double expected = position_row(k, past, antenna, &r.row);
+    const double expected = position_row(k, past, antenna, &r.row) + bend_m[k];
     r.record = record;
     r.record.residual = k == 0 ? WM_RESIDUAL_X : WM_RESIDUAL_Y;
     r.record.observed = p.p_m[k];
@@ -98,6 +119,7 @@ wm_status landmark_ekf::fuse_position(const wm_event &event, record_list records
     r.innovation = p.p_m[k] - expected;
     r.noise = square(sigma) * filter_.noise().scale(noise_adaption::kPlace);
     r.source = {noise_adaption::kPlace, r.noise};
+    r.noise += 2.0 * square(bend_m[k]);
   }
   note(event.t_ns, kPositionKey, fuse(rows, 2, square(kClutterPlace_m), true, records));
   return WM_OK;

@@ -47,6 +47,8 @@ class planar_motion {
   // Motion from `from_ns` to `to_ns` (which may be later or earlier than now), as seen from its beginning; *twist is
   // that at `from_ns`.
   wm_pose2 path(wm_time_ns from_ns, wm_time_ns to_ns, motion_twist *twist) const;
+  // Whether the path is known back to t_ns; before, the robot would seem to stand.
+  bool is_path_known(wm_time_ns t_ns) const { return has_velocity() || front_.reaches(t_ns, calibration_); }
 
   const planar_twist &twist() const { return twist_; }  // now, by the motion until now
   const wm_motion_calibration &calibration() const { return calibration_; }
