@@ -16,9 +16,9 @@ extern "C" {
 
 // ONE(state, key, unit, name, neutral, low, high, WALK or CONSTANT, initial, most, text)
 // TWO(state, second, key, unit, name, second name, neutral, low, high, ..., initial, most, text): two states, one sigma
-// `low` and `high`: beyond these an update is cut, since the model no longer holds; `initial` and `most`: of the sigma
-// parameter, below 0: not for sightings whose sigmas are complete (slam.hpp), and as the text says. Defaults are what a
-// tape measure and a data sheet leave open; the mounting's yaw is flat from 0.05 to 0.1.
+// `low` and `high`: an update is cut there, since the model no longer holds. `initial` and `most` are of the sigma
+// parameter. A value below 0 means what the text says; slam ignores the state for complete sigmas (slam::reading_of).
+// Defaults are what a tape measure and a data sheet leave open. The mounting's yaw is flat from 0.05 to 0.1.
 // clang-format off
 #define WM_SENSOR_STATES(ONE, TWO) \
   ONE(kYaw, "sensor_yaw", "_rad", "yaw_rad", 0, -3.2, 3.2, WALK, -0.05, 3.2, \

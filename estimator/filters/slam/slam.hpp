@@ -234,6 +234,8 @@ class slam {
            double heading_variance);
 
   // sightings.cpp
+  reading reading_of(const wm_sighting &s) const;
+  double distance_of(const wm_sighting &s) const;
   wm_status fuse_sighting(const wm_event &event, record_list records);
   bool takes_unidentified(int sensor) const;
   void note_identity(int sensor, bool named);
@@ -271,8 +273,6 @@ class slam {
   void forget_tracks();
 
   // annulus.cpp
-  reading reading_of(const wm_sighting &s) const;
-  double distance_of(const wm_sighting &s) const;
   wm_verdict follow_annulus(const context &at, const wm_sighting &s, const reading &r);
   wm_verdict begin_annulus(const context &at, const wm_sighting &s, const reading &r);
   void weigh_members(const context &at, const wm_sighting &s, const reading &r, int first);

@@ -164,8 +164,8 @@ void test_a_sensor_of_depths_has_an_axis() {
   }
 }
 
-// A sigma says how noisy a sighting is, whether the sensor's calibration has it or each sighting: mounting, clock and
-// scale are open either way.
+// A sigma is the noise of a sighting, in the sensor's calibration or in each sighting. Mounting, clock and scale are
+// states either way.
 void test_sightings_with_sigmas_are_as_those_of_a_sensor_with_them() {
   std::vector<wm_calibration_value> by[2];
   wm_estimate end[2];
