@@ -385,6 +385,7 @@ void motion_front_end::push_input(wm_time_ns t_ns, double a, double b, bool doub
   input.kind = beside_gyro ? kKindSteering : kind();
   input.beside_gyro = beside_gyro || twist_stands_in();
   input.doubtful = doubtful;
+  input.by_counts = ticks_drive();
   mark_refused(&input);
   note_ages(&input);
   note_steady(&input);

@@ -38,7 +38,7 @@ struct motion_input {
   uint8_t beside_gyro;   // the turn rate is not the gyro's, which is silent or stuck
   uint8_t uncounted;     // no count gives the distance until the next input's t_ns
   uint8_t holonomic;     // of a twist: the drive moves sideways
-  uint8_t unused[1];
+  uint8_t by_counts;     // the speed is that of wheel counters
   uint8_t model;     // wm_motion_model; AUTO: nothing known yet
   uint8_t standing;  // the robot is known to stand
   uint8_t doubtful;  // of a frozen counter, a dead encoder

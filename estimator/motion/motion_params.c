@@ -32,10 +32,12 @@ static const wm_param kParams[] = {
          "that. "
          "skid_steer: wheels or tracks that slip in turns; its centre of rotation and its effective track are states."),
     F64("noise.speed_mps", noise_speed_mps, 0.02, 0, 10,
-        "White noise of the speed, m/s per sqrt(s): slip and play at walking pace."),
+        "White noise of the speed, m/s per sqrt(s): slip and play at walking pace. Not of wheel counters: see "
+        "ticks_per_sqrt_m."),
     F64("noise.speed_rel", noise_speed_rel, -1, -1, 2,
         "White noise of the speed relative to the speed, per sqrt(s); variances are added. "
-        "Below 0: 0.06 of commands, 0.03 of a measured twist or with steering, 0.02 with a yaw rate."),
+        "Below 0: 0.06 of commands, 0.03 of a measured twist or with steering, 0.02 with a yaw rate, 0.007 of wheel "
+        "counters beside one."),
     F64("noise.yaw_rate_radps", noise_yaw_rate_radps, -1, -1, 10,
         "White noise of the turn rate, rad/s per sqrt(s). "
         "Below 0: 0.02 of commands, 0.004 of a yaw rate's sensor, else 0.01."),
@@ -55,7 +57,8 @@ static const wm_param kParams[] = {
     F64("noise.rest_factor", noise_rest_factor, 0.22, 0, 1,
         "Factor of the constant noises while speed and turn rate are zero: a robot at rest stays."),
     F64("noise.ticks_per_sqrt_m", noise_ticks_per_sqrt_m, 0.005, 0, 1,
-        "Noise of a wheel's distance by its ticks, m per sqrt(m) (uneven floor, slip)."),
+        "Noise of a wheel's distance by its ticks, m per sqrt(m) (uneven floor, slip); of the way, where a yaw rate or "
+        "steering gives the turn, by the square root of 2 less."),
     F64("noise.steering_rad", noise_steering_rad, 0.005, 0, 1,
         "White noise of the road wheel's angle, rad per sqrt(s): play and the table's error between its points."),
     F64("noise.adapt_log_sigma", noise_adapt_log_sigma, 1.4, 0, 10,

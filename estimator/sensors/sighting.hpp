@@ -22,7 +22,8 @@ inline double absolute_sigma(double parameter, double sigma) {
 // Which components of a sighting are fused, and how noisy they are.
 struct sighting_reading {
   bool bearing, range;
-  bool complete;  // its sigmas have all of its errors: by default none of the sensor come on top
+  bool complete;     // its sigmas have all of its errors: by default none of the sensor come on top
+  bool independent;  // in time: by default no error that lasts comes on top
   double bearing_sigma_rad, range_sigma_m;
 };
 
@@ -31,7 +32,7 @@ inline sighting_reading read_sighting(const wm_sighting &s, const mounted_sensor
   sighting_reading r;
   r.bearing = !std::isnan(s.bearing_rad) && params.use_bearing;
   r.range = !std::isnan(s.range_m) && params.use_range;
-  r.complete = false;
+  r.complete = r.independent = false;
   r.bearing_sigma_rad = params.bearing_sigma_factor *
                         first_number(s.bearing_sigma_rad, sensor.bearing_sigma_rad, params.bearing_sigma_default_rad);
   r.range_sigma_m =
@@ -45,14 +46,14 @@ inline double correlated_bearing(const wm_sighting_params &p, double sigma_rad) 
   return p.correlated_slots > 0 ? absolute_sigma(p.correlated_bearing_rad, sigma_rad) : 0.0;
 }
 inline double correlated_bearing(const wm_sighting_params &p, const sighting_reading &r, double distance_m) {
-  if (p.correlated_slots == 0 || (r.complete && p.correlated_bearing_rad < 0.0)) return 0.0;
+  if (p.correlated_slots == 0 || (r.independent && p.correlated_bearing_rad < 0.0)) return 0.0;
   return std::sqrt(square(correlated_bearing(p, r.bearing_sigma_rad)) + square(p.correlated_lateral_m / distance_m));
 }
 inline double correlated_range(const wm_sighting_params &p, double sigma_m) {
   return p.correlated_slots > 0 ? absolute_sigma(p.correlated_range_m, sigma_m) : 0.0;
 }
 inline double correlated_range(const wm_sighting_params &p, const sighting_reading &r, double range_m) {
-  if (p.correlated_slots == 0 || (r.complete && p.correlated_range_m < 0.0)) return 0.0;
+  if (p.correlated_slots == 0 || (r.independent && p.correlated_range_m < 0.0)) return 0.0;
   return std::sqrt(square(correlated_range(p, r.range_sigma_m)) + square(p.correlated_range_rel * range_m));
 }
 

@@ -33,7 +33,7 @@ Scenario scenario;
 Recording made;
 wm_run_report report;
 
-constexpr double kGoldenX = 29.100666971, kGoldenY = 31.081914698, kGoldenHeading = 1.571746215;
+constexpr double kGoldenX = 29.100622783, kGoldenY = 31.081818031, kGoldenHeading = 1.571750744;
 constexpr uint64_t kGoldenLeft = 590, kGoldenRight = 332;
 
 std::string root() { return std::getenv("WM_SOURCE_DIR"); }

@@ -21,11 +21,13 @@ double clutter_volume(const sighting_reading &r) {
 }  // namespace
 
 // Who states covariances of the odometry and of the sightings has a model of all errors. So has a detector of lines,
-// whose bearings state their sigmas: while distances are unknown, rays would bend the mounting and the clock.
+// whose bearings state their sigmas: while distances are unknown, rays would bend the mounting and the clock. An edge
+// is found beside its place for as long as it is seen alike, so these bearings have errors that last.
 slam::reading slam::reading_of(const wm_sighting &s) const {
   reading r = read_sighting(s, sensor_[s.sensor], sightings());
   const bool stated = (!r.bearing || finite(s.bearing_sigma_rad)) && (!r.range || finite(s.range_sigma_m));
   r.complete = stated && (!r.range || joint_.is_calibrated());
+  r.independent = r.complete && r.range;
   return r;
 }
 
@@ -271,7 +273,7 @@ void slam::fuse_known(const context &at, const wm_sighting &s, const reading &r,
 }
 
 slam::line_bearing slam::line_bearing_of(const wm_sighting &s, const reading &r) const {
-  const bool none = r.complete && sightings().correlated_bearing_rad < 0.0;
+  const bool none = r.independent && sightings().correlated_bearing_rad < 0.0;
   return {s.bearing_rad, s.bearing_sigma_rad, r.bearing_sigma_rad,
           none ? 0.0 : correlated_bearing(sightings(), r.bearing_sigma_rad), r.complete};
 }

@@ -46,8 +46,7 @@ static const wm_param kParams[] = {
     F64("states.camera_rotation_sigma_rad", camera_rotation_sigma, -1, -1, 1,
         "Sigma of the rotation of the camera pair against calibration.yaml's mounting, about each axis, rad. 0: off. "
         "Below 0: what a pixel's sigma has beyond a detector's 1 px, over the focal length, with a time constant of 2 "
-        "s "
-        "where camera_rotation_tau_s is 0."),
+        "s; without such an excess 0.003, with 20 s. camera_rotation_tau_s above 0 is in place of these."),
     F64("states.camera_rotation_tau_s", camera_rotation_tau_s, 0, 0, 1e6,
         "Time constant of that rotation as a Gauss-Markov process, s: play of a mounting, shutters and clocks that "
         "differ a little. 0: it is constant."),

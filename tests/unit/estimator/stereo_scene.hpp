@@ -53,10 +53,10 @@ struct scene {
     set("noise.v_mps", 0.02);
     set("noise.w_radps", 0.003);
     // What is exact here is no state; a test switches on what it examines.
-    for (const char *off :
-         {"states.rate_bias_sigma_radps", "states.velocity_scale_sigma", "states.rate_scale_sigma",
-          "states.twist_axes_sigma_rad", "states.velocity_direction_sigma_rad", "states.time_offset_sigma_s",
-          "states.range_bias_sigma_m", "increments.on", "slam.points", "states.bearing_bias_sigma_rad"})
+    for (const char *off : {"states.rate_bias_sigma_radps", "states.velocity_scale_sigma", "states.rate_scale_sigma",
+                            "states.twist_axes_sigma_rad", "states.velocity_direction_sigma_rad",
+                            "states.time_offset_sigma_s", "states.range_bias_sigma_m", "increments.on", "slam.points",
+                            "states.bearing_bias_sigma_rad", "states.camera_rotation_sigma_rad"})
       set(off, 0);
     for (int i = 0; i < count; i++) {
       const auto draw = [i](uint64_t k) { return wm_random_normal(11, k, static_cast<uint64_t>(i)); };

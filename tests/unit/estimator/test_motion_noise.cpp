@@ -83,6 +83,9 @@ expected_noise of_rates(const wm::motion_input &input, const wm::motion_twist &t
   const double turn2 = turn_is_stated ? stated.rotation_rad2 : square(p.noise_yaw_rate_radps);
   expected_noise n;
   n.along = white2 * slow_factor + square(p.noise_speed_rel * speed);
+  // Of counts: half a wheel's variance, by the distance.
+  if (input.by_counts && !unknown)
+    n.along = 0.5 * square(p.noise_ticks_per_sqrt_m) * speed + square(p.noise_speed_rel * speed);
   n.across = is_stated ? side2 * slow_factor : 0.0;
   if (own_axes) {
     n.along = white2 * slow_factor + square(p.noise_speed_rel * t.v) + square(p.noise_side_rel * t.u);
@@ -141,12 +144,13 @@ void test_each_term_of_the_noise_is_its_formula(void) {
     for (const int model : models)
       for (const auto &motion : kMotions)
         for (int doubt = 0; doubt < kDoubts; doubt++)
-          for (int more = 0; more < 6; more++) {
+          for (int more = 0; more < 7; more++) {
             const bool has_side = model != WM_MOTION_TICKS && model != WM_MOTION_ACKERMANN;
             wm::motion_input input = input_of(model, motion[0], has_side ? motion[1] : 0.0, motion[2], doubt);
             input.holonomic = more & 1 && model >= WM_MOTION_TWIST;
             input.counted = more == 2;
             input.standing = more == 3 && doubt == kNone;
+            input.by_counts = more == 6 && (model == WM_MOTION_SPEED_YAW_RATE || model == WM_MOTION_ACKERMANN);
             const std::string what = std::string(k < std::size(kTerms) ? kTerms[k].name : "none") + ", model " +
                                      std::to_string(model) + ", doubt " + std::to_string(doubt);
             check_noise(input, doubt, only(k < std::size(kTerms) ? kTerms + k : nullptr, 0.07),
@@ -178,6 +182,27 @@ void test_noise_by_the_kind_of_the_source(void) {
       TEST_ASSERT_EQUAL_DOUBLE(own == 2 ? 0.5 : row.rate, n.yaw_rate_radps);
       TEST_ASSERT_EQUAL_DOUBLE(own == 3 ? 0.25 : row.rate_rel, n.yaw_rate_rel);
     }
+}
+
+// GIVEN the defaults THEN a way by counts beside a yaw rate is known to 6 mm after 1 m at walking pace, and to 22 cm
+// after 100 m at 10 m/s; that of a speedometer to 3 and 64 cm. An impossible speed counts as 30 m/s.
+void test_noise_of_a_counted_way(void) {
+  wm_motion_params p;
+  wm_params_defaults(&wm_motion_params_table, &p);
+  const auto sigma_m = [&](double speed, double way_m, bool by_counts) {
+    wm::motion_input input = input_of(WM_MOTION_SPEED_YAW_RATE, speed, 0.0, 0.0, kNone);
+    input.kind = wm::kKindGyro;
+    input.by_counts = by_counts;
+    const wm::motion_twist t = wm::twist_of(input, wm::kNeutralCalibration, make::two_wheels(), {});
+    return std::sqrt(
+        wm::noise_of(input, t, way_m / speed, p, make::two_wheels(), wm::kNeutralCalibration, kNotStated, {1, 1})
+            .distance_m2);
+  };
+  TEST_ASSERT_DOUBLE_WITHIN(1e-4, 0.0061, sigma_m(0.5, 1.0, true));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-3, 0.2242, sigma_m(10.0, 100.0, true));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-3, 0.0316, sigma_m(0.5, 1.0, false));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-3, 0.6356, sigma_m(10.0, 100.0, false));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-4, 0.0385, sigma_m(1e6, 1.0, true));
 }
 
 // An increment's own covariance, as a rate, is that of the segment's time; without one, or in doubt, it is the model's.
@@ -477,6 +502,7 @@ int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_each_term_of_the_noise_is_its_formula);
   RUN_TEST(test_noise_by_the_kind_of_the_source);
+  RUN_TEST(test_noise_of_a_counted_way);
   RUN_TEST(test_increments_have_their_own_covariance);
   RUN_TEST(test_sideways_noise_of_an_impossible_speed_is_by_distance);
   RUN_TEST(test_noise_of_a_velocity_that_walks);
