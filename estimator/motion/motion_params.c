@@ -57,8 +57,8 @@ static const wm_param kParams[] = {
     F64("noise.rest_factor", noise_rest_factor, 0.22, 0, 1,
         "Factor of the constant noises while speed and turn rate are zero: a robot at rest stays."),
     F64("noise.ticks_per_sqrt_m", noise_ticks_per_sqrt_m, 0.005, 0, 1,
-        "Noise of a wheel's distance by its ticks, m per sqrt(m) (uneven floor, slip); of the way, where a yaw rate or "
-        "steering gives the turn, by the square root of 2 less."),
+        "Noise of a wheel's distance by its ticks, m per sqrt(m) (uneven floor, slip). The way, where a "
+        "yaw rate or steering gives the turn, has this divided by sqrt(2)."),
     F64("noise.steering_rad", noise_steering_rad, 0.005, 0, 1,
         "White noise of the road wheel's angle, rad per sqrt(s): play and the table's error between its points."),
     F64("noise.adapt_log_sigma", noise_adapt_log_sigma, 1.4, 0, 10,

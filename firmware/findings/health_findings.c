@@ -135,7 +135,7 @@ const char *wm_cause_text(unsigned cause) {
                                                      "has unknown identities",
                                                      "is silent",
                                                      "does not reach the pose",
-                                                     "turn to the other side than the motion, or by a fraction of it"};
+                                                     "turns to the other side than the motion, or by a fraction of it"};
   return cause < WM_CAUSE_COUNT ? kTexts[cause] : "";
 }
 

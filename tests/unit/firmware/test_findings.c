@@ -195,7 +195,7 @@ static void the_cause_of_a_lost_or_degraded_drive_is_named(void) {
       {WM_STATE_DEGRADED, WM_CAUSE_UNKNOWN, 0, WM_FOUND_POSE_DOUBTFUL, "eye", "has unknown identities"},
       {WM_STATE_DEGRADED, WM_CAUSE_LOST_AGAIN, -1, WM_FOUND_POSE_DOUBTFUL, "observations",
        "contradicted the last pose; the one found since is on probation"},
-      {WM_STATE_DEGRADED, WM_CAUSE_TURN, -1, WM_FOUND_POSE_DOUBTFUL, "observations", "turn to the other side"}};
+      {WM_STATE_DEGRADED, WM_CAUSE_TURN, -1, WM_FOUND_POSE_DOUBTFUL, "observations", "turns to the other side"}};
   for (size_t i = 0; i < sizeof kDrives / sizeof kDrives[0]; i++) {
     drive_in(kDrives[i].state, kDrives[i].cause, kDrives[i].source, 1000);
     TEST_ASSERT_EQUAL(1, found.count);
