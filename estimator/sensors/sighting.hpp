@@ -47,7 +47,9 @@ inline double correlated_bearing(const wm_sighting_params &p, double sigma_rad) 
 }
 inline double correlated_bearing(const wm_sighting_params &p, const sighting_reading &r, double distance_m) {
   if (p.correlated_slots == 0 || (r.independent && p.correlated_bearing_rad < 0.0)) return 0.0;
-  return std::sqrt(square(correlated_bearing(p, r.bearing_sigma_rad)) + square(p.correlated_lateral_m / distance_m));
+  // Of bearings alone that state their sigmas: an edge has no breadth.
+  const double lateral_m = r.complete ? 0.0 : p.correlated_lateral_m;
+  return std::sqrt(square(correlated_bearing(p, r.bearing_sigma_rad)) + square(lateral_m / distance_m));
 }
 inline double correlated_range(const wm_sighting_params &p, double sigma_m) {
   return p.correlated_slots > 0 ? absolute_sigma(p.correlated_range_m, sigma_m) : 0.0;

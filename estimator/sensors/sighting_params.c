@@ -53,8 +53,9 @@ static const wm_param kParams[] = {
     F64("correlated.bearing_rad", correlated_bearing_rad, -1, -10, 3,
         "Sigma of a bearing's time-correlated error, rad. 0: none. Below 0: that multiple of the bearing's sigma; flat "
         "from 0.5 to 1."),
-    F64("correlated.lateral_m", correlated_lateral_m, 0.01, 0, 10,
-        "Sigma of the time-correlated error across the line of sight, m; the variances are added."),
+    F64("correlated.lateral_m", correlated_lateral_m, 0.02, 0, 10,
+        "Sigma of the time-correlated error across the line of sight, m; the variances are added. Not in slam of "
+        "bearings alone that state their sigmas: an edge has no breadth."),
     F64("correlated.range_m", correlated_range_m, -0.5, -10, 100,
         "Sigma of a range's time-correlated error, m. Below 0: that multiple of the range's sigma."),
     F64("correlated.range_rel", correlated_range_rel, 0.01, 0, 1,

@@ -12,6 +12,7 @@
 #include "filters/slam/params.h"
 #include "math/arc.hpp"
 #include "motion/motion_params.h"
+#include "sensors/sighting.hpp"
 #include "unity.h"
 #include "waymark/estimator.h"
 #include "waymark/random.h"
@@ -275,6 +276,22 @@ void test_errors_that_last_though_a_sigma_is_stated(void) {
   }
 }
 
+// A bearing's error that lasts: by default as large as its sigma and a landmark's breadth at that distance. An edge
+// that states its sigma has no breadth; where a motion with covariances and ranges state all errors, there is none.
+void test_the_error_that_lasts_of_a_bearing(void) {
+  wm_sighting_params p;
+  wm_params_defaults(&wm_sighting_params_table, &p);
+  wm::sighting_reading r{};
+  r.bearing_sigma_rad = 0.003;
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, std::hypot(0.003, 0.02 / 4.0), wm::correlated_bearing(p, r, 4.0));
+  r.complete = true;
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.003, wm::correlated_bearing(p, r, 4.0));
+  r.independent = true;
+  TEST_ASSERT_EQUAL_DOUBLE(0.0, wm::correlated_bearing(p, r, 4.0));
+  p.correlated_bearing_rad = 0.001;
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.001, wm::correlated_bearing(p, r, 4.0));
+}
+
 double counted(wm_counter_kind kind) {
   wm_counter counters[16];
   const size_t n = slam->counters(state, counters, 16);
@@ -311,6 +328,7 @@ int main(void) {
   RUN_TEST(test_lost_lines_are_found_again);
   RUN_TEST(test_more_lines_than_rays);
   RUN_TEST(test_errors_that_last_though_a_sigma_is_stated);
+  RUN_TEST(test_the_error_that_lasts_of_a_bearing);
   RUN_TEST(test_the_time_offset_is_not_the_counts_age);
   RUN_TEST(test_a_robot_that_is_turned_by_hand_keeps_its_map);
   std::free(state);
