@@ -39,15 +39,15 @@ struct motion_input {
   uint8_t uncounted;     // no count gives the distance until the next input's t_ns
   uint8_t holonomic;     // of a twist: the drive moves sideways
   uint8_t by_counts;     // the speed is that of wheel counters
-  uint8_t model;     // wm_motion_model; AUTO: nothing known yet
-  uint8_t standing;  // the robot is known to stand
-  uint8_t doubtful;  // of a frozen counter, a dead encoder
-  uint8_t stale;     // set by walk(): held for longer than hold_max
-  uint8_t counted;   // by the counts or the increment at its end: true until then, however long
-  uint8_t command;   // a twist that is a command
-  uint8_t kind;      // motion_kind
-  uint8_t refused;   // kRefusedSpeed, kRefusedTurn: samples of it are refused, and this is the last plausible one
-  double refused_s;  // at t_ns: for how long
+  uint8_t model;         // wm_motion_model; AUTO: nothing known yet
+  uint8_t standing;      // the robot is known to stand
+  uint8_t doubtful;      // of a frozen counter, a dead encoder
+  uint8_t stale;         // set by walk(): held for longer than hold_max
+  uint8_t counted;       // by the counts or the increment at its end: true until then, however long
+  uint8_t command;       // a twist that is a command
+  uint8_t kind;          // motion_kind
+  uint8_t refused;       // kRefusedSpeed, kRefusedTurn: samples of it are refused, and this is the last plausible one
+  double refused_s;      // at t_ns: for how long
 };
 
 // Of commands (commands.hpp): rises of the speed and of the turn rate per s, and by how much a drive by radius turns
