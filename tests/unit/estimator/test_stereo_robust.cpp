@@ -296,8 +296,7 @@ void test_pixel_errors_that_last_are_expected_of_a_large_sigma(void) {
   TEST_ASSERT_LESS_THAN_DOUBLE(1.5, nees);
 }
 
-// GIVEN a mounting that is off by 0.2 degrees about each axis WHEN the configuration says nothing of it THEN the
-// covariance holds.
+// GIVEN a mounting that is off by 0.2 degrees about each axis WHEN no key is set THEN the covariance holds.
 void test_a_mounting_that_is_off_is_expected_by_default(void) {
   double nees = 0;  // of the rotation: its square over the sum of the variances
   const int drives = 8, steps = 200;
