@@ -163,6 +163,12 @@ inline void *begun(const wm_estimator &estimator, const void *params, const wm_s
   return nullptr;
 }
 
+// Gives an event to `predict` or to `correct`, by its kind.
+inline wm_status feed(const wm_estimator &estimator, void *state, const wm_event &e) {
+  size_t innovations = 0;
+  return wm_event_is_motion(&e) ? estimator.predict(state, &e) : estimator.correct(state, &e, nullptr, 0, &innovations);
+}
+
 }  // namespace make
 
 #endif

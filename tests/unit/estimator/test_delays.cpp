@@ -25,11 +25,7 @@ wm_landmark landmarks[3];
 wm_setup setup;
 std::unique_ptr<void, void (*)(void *)> state(nullptr, std::free);
 
-void feed(const wm_event &e) {
-  const bool moves = e.kind == WM_EVENT_TWIST2 || e.kind == WM_EVENT_QUANTITIES;
-  size_t count = 0;
-  TEST_ASSERT_EQUAL(WM_OK, moves ? ekf->predict(state.get(), &e) : ekf->correct(state.get(), &e, nullptr, 0, &count));
-}
+void feed(const wm_event &e) { TEST_ASSERT_EQUAL(WM_OK, make::feed(*ekf, state.get(), e)); }
 
 wm_calibration_value found(const std::string &name) {
   std::vector<wm_calibration_value> out(64);

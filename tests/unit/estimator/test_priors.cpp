@@ -28,11 +28,7 @@ void begin() {
   TEST_ASSERT_NOT_NULL(state.get());
 }
 
-void feed(const wm_event &e) {
-  const bool moves = e.kind == WM_EVENT_TWIST2 || e.kind == WM_EVENT_QUANTITIES;
-  size_t count = 0;
-  TEST_ASSERT_EQUAL(WM_OK, moves ? ekf->predict(state.get(), &e) : ekf->correct(state.get(), &e, nullptr, 0, &count));
-}
+void feed(const wm_event &e) { TEST_ASSERT_EQUAL(WM_OK, make::feed(*ekf, state.get(), e)); }
 
 std::vector<wm_calibration_value> calibration() {
   std::vector<wm_calibration_value> out(64);
