@@ -261,6 +261,7 @@ void test_counts_after_a_silence(void) {
         }
         TEST_ASSERT_DOUBLE_WITHIN(looked ? 0.04 : 1e-9, looked ? before_m + 1.04 : 6.01, pose.x_m);
         if (looked || model != WM_MOTION_TICKS) TEST_ASSERT_GREATER_THAN_DOUBLE(0.25, turn_var - still_var);
+        if (!looked && !gyro_first) TEST_ASSERT_LESS_THAN_DOUBLE(0.05, way_var);
       }
 }
 
