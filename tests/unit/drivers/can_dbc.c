@@ -88,6 +88,13 @@ static void long_names_of_no_message(void) {
   wm_dbc_free(dbc);
 }
 
+// A list of new symbols without a name, before the first message.
+static void a_message_right_behind_an_empty_list(void) {
+  load("NS_ :\nBO_ 291 WHEELS: 8 ESP\n SG_ SPEED : 0|16@1+ (1,0) [0|0] \"\" X\n");
+  TEST_ASSERT_NOT_NULL(wm_dbc_find(dbc, dbc_key(291, 0)));
+  wm_dbc_free(dbc);
+}
+
 static void nothing_in_it(void) {
   load("");
   TEST_ASSERT_EQUAL_size_t(0, dbc->message_count);
@@ -178,6 +185,7 @@ int main(void) {
   UNITY_BEGIN();
   RUN_TEST(odd_but_right);
   RUN_TEST(long_names_of_no_message);
+  RUN_TEST(a_message_right_behind_an_empty_list);
   RUN_TEST(nothing_in_it);
   RUN_TEST(overlapping_signals_are_makers_wish);
   RUN_TEST(factors_that_are_no_numbers);

@@ -401,6 +401,14 @@ static void no_value(void) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 300,
                             value_of(&f, "c 101#3075"));  // outside of the range: makers' ranges are wrong too often
   close_it(&f);
+  open_one(&f,
+           "BO_ 257 W: 3 X\n SG_ V : 0|16@1- (0.01,0) [0|0] \"m/s\" X\n"
+           "VAL_ 257 V -2 \"Error\" -32768 \"Invalid\" -32769 \"SNA\";\n",
+           binding(WM_Q_VEHICLE_SPEED, "W", "V"));
+  TEST_ASSERT_EQUAL(WM_BAD_DATA, feed(&f, "c 101#FEFF"));
+  TEST_ASSERT_EQUAL(WM_BAD_DATA, feed(&f, "c 101#0080"));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 327.67, value_of(&f, "c 101#FF7F"));  // -32769 has more bits
+  close_it(&f);
 }
 
 static void what_is_not_decoded(void) {

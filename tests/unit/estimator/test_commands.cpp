@@ -56,6 +56,10 @@ void test_a_turn_slows_down_to_a_stand(void) {
       const double size = std::fmax(std::fabs(v) - 0.5 * w * w, 0.0);
       TEST_ASSERT_DOUBLE_WITHIN(1e-12, v < 0.0 ? -size : size, t.v);
       TEST_ASSERT_DOUBLE_WITHIN(1e-12, w, t.w);
+      double by = 0.0;
+      for (int i = 0; i < t.count; i++)
+        if (t.index[i] == WM_TURN_SLOWDOWN) by += t.v_by[i];
+      TEST_ASSERT_DOUBLE_WITHIN(1e-12, size > 0.0 ? (v < 0.0 ? w * w : -w * w) : 0.0, by);
     }
 }
 

@@ -358,6 +358,25 @@ void test_what_was_found_is_forgotten(void) {
   TEST_ASSERT_DOUBLE_WITHIN(0.01 * found, found * std::exp(-3.0), std::log(adaption.scale(wm::noise_adaption::kPlace)));
 }
 
+// GIVEN factors that were found WHEN they are dropped THEN the next ones begin at 1, as of a filter that begins.
+void test_dropped_factors_begin_anew(void) {
+  using adaption = wm::noise_adaption;
+  adaption used, fresh;
+  used.init(1.0);
+  fresh.init(1.0);
+  adaption::row row{};
+  row.innovation = 4.0;
+  row.variance = row.own = 1.0;
+  row.kind = adaption::kPlace;
+  for (int i = 0; i < 20; i++) used.update(row);
+  TEST_ASSERT_GREATER_THAN_DOUBLE(1.5, used.scale(adaption::kPlace));
+  used.restart(true);
+  TEST_ASSERT_EQUAL_DOUBLE(1.0, used.scale(adaption::kPlace));
+  used.update(row);
+  fresh.update(row);
+  TEST_ASSERT_EQUAL_DOUBLE(fresh.scale(adaption::kPlace), used.scale(adaption::kPlace));
+}
+
 void test_right_noise_stays_consistent() {
   expect_consistent({}, true);
   expect_consistent({}, false);
@@ -396,6 +415,7 @@ int main() {
   UNITY_BEGIN();
   RUN_TEST(test_each_factor_takes_its_share_of_an_innovation);
   RUN_TEST(test_what_was_found_is_forgotten);
+  RUN_TEST(test_dropped_factors_begin_anew);
   RUN_TEST(test_right_noise_stays_consistent);
   RUN_TEST(test_noise_of_the_motion_stated_four_times_too_small);
   RUN_TEST(test_noise_of_the_motion_stated_four_times_too_large);

@@ -41,8 +41,9 @@ struct Car {
     states.sigma[wm::kTrackScale] = 0.01;
     states.wheel_difference_sigma = with_wheels ? 0.0141 : 0.0;
     states.wheel_difference_walk = 0.00001;
-    filter->init(setup, states, wm::kPoseStates + wm::planar_filter::count_motion_states(states));
+    begin();
   }
+  void begin() { filter->init(setup, states, wm::kPoseStates + wm::planar_filter::count_motion_states(states)); }
 
   // One step of 10 ms; the right wheel is larger than stated by `difference`.
   void step(double v, double w, double bias, double difference, double slip_m = 0) {
@@ -107,6 +108,17 @@ void test_the_heading_by_the_counts_begins_with_their_rounding(void) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-6 * rounding, rounding,
                             car.filter->variance(heading) - car.filter->variance(wm::kHeading));
   TEST_ASSERT_EQUAL_DOUBLE(car.filter->variance(wm::kHeading), car.filter->covariance(heading, wm::kHeading));
+}
+
+// Its variance grows by walk^2 a metre of the way, here without a gyro of use.
+void test_the_difference_of_the_wheels_walks_with_the_way(void) {
+  Car car(true);
+  car.motion.noise_yaw_rate_radps = 1e3;
+  car.states.wheel_difference_walk = 0.001;
+  car.begin();
+  for (int i = 0; i < 2000; i++) car.step(5.0, 0, 0, 0);
+  const double sigma = named(car, "motion.wheel_difference").sigma;
+  TEST_ASSERT_DOUBLE_WITHIN(2e-6, 0.0141 * 0.0141 + 1e-6 * 100.0, sigma * sigma);
 }
 
 void test_a_slip_is_not_believed(void) {
@@ -215,6 +227,7 @@ int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_the_gyro_tells_the_wheels_and_the_wheels_hold_the_heading);
   RUN_TEST(test_the_heading_by_the_counts_begins_with_their_rounding);
+  RUN_TEST(test_the_difference_of_the_wheels_walks_with_the_way);
   RUN_TEST(test_a_slip_is_not_believed);
   RUN_TEST(test_slip_that_lasts_is_no_calibration);
   RUN_TEST(test_steps_of_the_counts_are_no_turn);

@@ -255,6 +255,12 @@ static void hypotheses_come_in_sets(void) {
                 (wm_output){put_cloud, NULL});
   particle_count = 0;
   const size_t most = sizeof fuser.listed / sizeof fuser.listed[0];
+  hypothesis_count = WM_HYPOTHESES_MAX + 50, hypotheses_seen = 0;
+  points(0);
+  TEST_ASSERT_EQUAL_STRING("C0:0/0 H0:100 H0:50 ", said);
+  said[0] = '\0';
+  wm_fuser_init(&fuser, &clouds, &state, wm_driving_choose(WM_EVENT_BIT(WM_EVENT_TWIST2), 0),
+                (wm_output){put_cloud, NULL});
   hypothesis_count = most + 100, hypotheses_seen = 0;
   points(0);
   char expected[4096] = "C0:0/0 ";

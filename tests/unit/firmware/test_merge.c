@@ -23,7 +23,7 @@ static const wm_merge_source kCamera = {.rank = 1, .in_order = 1, .lateness_max_
 static void open_merge(const wm_merge_source *sources, size_t count) {
   size_t slot = wm_merge_slot_bytes(WM_EVENT_BIT(WM_EVENT_TWIST2));
   TEST_ASSERT_LESS_OR_EQUAL(sizeof memory, wm_merge_bytes(count, QUEUE, slot));
-  memset(memory, 0, sizeof memory);
+  memset(memory, 0xA5, sizeof memory);  // it may hold anything
   merge = wm_merge_init(memory, sources, count, QUEUE, slot, 300 * MS);
 }
 

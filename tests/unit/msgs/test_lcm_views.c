@@ -58,7 +58,7 @@ static void a_map_arrives_in_parts(void) {
     sent[i].id = i;
     sent[i].p_m[0] = i * 0.5;
     covariance[i][1] = -i;
-    covariance[i][3] = (double)NAN;
+    covariance[i][3] = i % 2 ? 0.0625 : (double)NAN;
   }
   size_t seen = 0;
   for (size_t first = 0; first < 300; first += WM_LCM_LANDMARKS_MAX) {
@@ -70,7 +70,10 @@ static void a_map_arrives_in_parts(void) {
     for (size_t i = 0; i < part.count; i++) {
       TEST_ASSERT_EQUAL(first + i, heard[i].id);
       TEST_ASSERT_EQUAL_DOUBLE(-(double)(first + i), heard[i].cov_m2[1]);
-      TEST_ASSERT_DOUBLE_IS_NAN(heard[i].yaw_sigma_rad);
+      if ((first + i) % 2)
+        TEST_ASSERT_EQUAL_DOUBLE(0.25, heard[i].yaw_sigma_rad);
+      else
+        TEST_ASSERT_DOUBLE_IS_NAN(heard[i].yaw_sigma_rad);
       seen++;
     }
   }
