@@ -59,7 +59,8 @@ typedef struct wm_merge wm_merge;
 size_t wm_merge_bytes(size_t source_count, size_t queue_events, size_t slot_bytes);
 // Bytes of a slot for events of these kinds (bits).
 size_t wm_merge_slot_bytes(uint32_t kinds);
-// `memory` is 16-byte aligned, zeroed and wm_merge_bytes long. `horizon_ns` is how far in the future a stamp may lie.
+// `memory` is 16-byte aligned and wm_merge_bytes long; what it holds is overwritten. `horizon_ns` is how far in the
+// future a stamp may lie.
 wm_merge *wm_merge_init(void *memory, const wm_merge_source *sources, size_t source_count, size_t queue_events,
                         size_t slot_bytes, wm_time_ns horizon_ns);
 

@@ -39,7 +39,7 @@ ODOMETRY = "format: waymark-config/1\nestimator: odometry\n"
 TICKS = CONFIG.replace("\nmotion:\n", "\nmotion:\n  model: ticks\n")
 NO_START = {"recording.yaml": lambda w: re.sub(r"vehicle:\n.*\n", "", w)}
 
-# finding, changes of files, configuration, further options
+# finding, changes of files, configuration, further options; what its fix contains, where one finding has several
 MADE = [
     ("likely-cause", {"calibration.yaml": text("rpy_deg: [0, 0, 0]", "rpy_deg: [0, 0, 180]")}, CONFIG, []),
     ("observations-refused", {"calibration.yaml": text("rpy_deg: [0, 0, 0]", "rpy_deg: [0, 0, 180]")}, CONFIG, ["--quick"]),
@@ -52,6 +52,10 @@ MADE = [
     ("identities-unknown", {"sightings.csv": each(id=lambda i: int(i) + 100)}, CONFIG, ["--quick"]),
     ("rows-skipped", {"sightings.csv": each(bearing_rad=math.degrees)}, CONFIG, ["--quick"]),
     ("clocks-apart", {"sightings.csv": replays.each_row(lambda r: r.update({n: str(int(r[n]) - 10**18) for n in ("t_ns", "arrival_ns")}))}, CONFIG, ["--quick"]),
+    ("clocks-apart", {"sightings.csv": replays.each_row(lambda r: r.update(arrival_ns=str(int(r["t_ns"]) - 10**9)))}, CONFIG, ["--quick"], "arrival_ns"),
+    ("no-data", {"sightings.csv": replays.each_row(lambda r: r.update(t_ns=f"{int(r['t_ns']) / 1e9:.6f}"))}, CONFIG, ["--quick"], "1e9"),
+    ("rows-skipped", {"sightings.csv": replays.each_row(lambda r: r.update(range_m="0") if r["id"] in "123" else None)}, CONFIG, ["--quick"], "Leave a field empty"),
+    ("source-silent", {"sightings.csv": lambda w: "\n".join(w.splitlines()[:len(w.splitlines()) // 2]) + "\n"}, CONFIG, ["--quick"], "stop early"),
     ("rate-implausible", {"can.log": lambda w: re.sub(r"^\((\d+\.\d+)\)", lambda m: f"({1.7e9 + (float(m[1]) - 1.7e9) * 1e-4:.6f})", w, flags=re.M)}, CONFIG, ["--quick"]),
     ("rows-disordered", {"sightings.csv": lambda w: "\n".join([w.splitlines()[0], *reversed(w.splitlines()[1:])]) + "\n"}, CONFIG, ["--quick"]),
     ("sensor-unknown", {"sightings.csv": text(",front,", ",frnt,")}, CONFIG, ["--quick"]),
@@ -94,15 +98,15 @@ def main():
         for made_by in ([], ["--quick"]):
             config.write_text(CONFIG)
             failures += [f"the good robot: {f['id']}: {f['text']}" for f in check(bin_dir, config, folder / "good", made_by)]
-        for identifier, changes, configuration, options in MADE:
-            recording = folder / identifier
+        for number, (identifier, changes, configuration, options, *fix) in enumerate(MADE):
+            recording = folder / str(number)
             recording.mkdir()
             for file in (folder / "good").iterdir():
                 content = file.read_text()
                 (recording / file.name).write_text(changes[file.name](content) if file.name in changes else content)
             config.write_text(configuration)
             found = check(bin_dir, config, recording, options)
-            mine = [f for f in found if f["id"] == identifier]
+            mine = [f for f in found if f["id"] == identifier and (not fix or fix[0] in f["fix"])]
             print(f"{'good' if mine else 'BAD '} {identifier}: {mine[0]['text'] if mine else [f['id'] for f in found]}")
             if not mine:
                 failures.append(f"{identifier} is not made")

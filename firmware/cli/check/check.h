@@ -80,6 +80,7 @@ typedef struct source_facts {
   wm_time_ns first_ns, last_ns;
   uint64_t stamps;                                     // that differ from the one before
   wm_time_ns latest_ns;                                // largest lateness, with look_ns
+  uint64_t ahead;                                      // that arrive before their stamp, and are not used
   wm_time_ns look_ns;                                  // time of detection on this computer; 0 for other sources
   uint64_t sightings, unknown_landmarks, bare_ranges;  // bare_ranges: without a bearing
   uint64_t ranges, far_ranges;                         // far: beyond the sensor's max_range_m, and not used

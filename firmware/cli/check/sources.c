@@ -13,20 +13,22 @@ static int is_landmark(const wm_setup *setup, int32_t id) {
   return 0;
 }
 
-static void take(source_facts *facts, const wm_setup *setup, const wm_event *event) {
+static void take(source_facts *facts, const wm_assembly *assembly, const wm_event *event) {
   if (facts->events++ == 0) facts->first_ns = event->t_ns;
   facts->stamps += facts->last_ns != event->t_ns;
   facts->last_ns = event->t_ns;
   wm_time_ns late_ns;
-  if (!__builtin_sub_overflow(event->arrival_ns, event->t_ns, &late_ns) && late_ns > facts->latest_ns)
-    facts->latest_ns = late_ns;
+  if (!__builtin_sub_overflow(event->arrival_ns, event->t_ns, &late_ns)) {
+    if (late_ns > facts->latest_ns) facts->latest_ns = late_ns;
+    facts->ahead += (double)late_ns < -1e6 * assembly->config->runtime.merge_horizon_ms;
+  }
   int32_t id = event->kind == WM_EVENT_SIGHTING ? event->as.sighting.landmark_id
                : event->kind == WM_EVENT_MARKER ? event->as.marker.id
                                                 : -1;
   if (id < 0) return;
   facts->bare_ranges += event->kind == WM_EVENT_SIGHTING && isnan(event->as.sighting.bearing_rad);
   facts->sightings++;
-  facts->unknown_landmarks += !is_landmark(setup, id);
+  facts->unknown_landmarks += !is_landmark(&assembly->setup, id);
 }
 
 static void take_range(source_facts *facts, const wm_setup *setup, const wm_event *event) {
@@ -38,17 +40,27 @@ static void take_range(source_facts *facts, const wm_setup *setup, const wm_even
 
 static uint64_t of_hundred(uint64_t part, uint64_t whole) { return whole > 0 ? part * 100 / whole : 0; }
 
+// What mends rows that can't be read, by the first of them.
+static const char *mend_rows(const wm_source *source) {
+  const wm_source_counts *c = &source->counts;
+  const char *stamp = strstr(c->first_problem, "_ns: ");
+  if (stamp && strchr(stamp, '.') && strstr(stamp, "is not a whole number"))
+    return "are the stamps in seconds? t_ns and arrival_ns are whole nanoseconds: multiply by 1e9";
+  if (strstr(c->first_problem, "_rad: ") && c->not_finite > c->malformed)
+    return "are the angles in degrees? The column is in radians: multiply by 0.0174533 (pi/180)";
+  if (strstr(c->first_problem, "is outside of what can be"))
+    return "is it in the unit of the column's name? Leave a field empty where nothing was measured";
+  return source->is_motion ? "the DBC and what is on the bus are not the same; or the file is damaged"
+                           : "the file is damaged, or its columns differ from its first line";
+}
+
 static void counted(const wm_assembled_source *s, const source_facts *facts, wm_findings *out) {
   const wm_source_counts *c = &s->source->counts;
   const uint64_t skipped = c->malformed + c->not_finite, all = facts->events + skipped;
-  if (c->first_problem[0]) {
-    const int is_angle = strstr(c->first_problem, "_rad: ") && c->not_finite > c->malformed;
+  if (c->first_problem[0])
     wm_find(out, WM_FOUND_ROWS_SKIPPED, of_hundred(skipped, all) >= 5 ? WM_SEVERITY_BAD : WM_SEVERITY_NOTE, s->name,
-            is_angle ? "are the angles in degrees? The column is in radians: multiply by 0.0174533 (pi/180)"
-            : s->source->is_motion ? "the DBC and what is on the bus are not the same; or the file is damaged"
-                                   : "the file is damaged, or its columns differ from its first line",
-            "%s (%" PRIu64 " like it, %" PRIu64 " of 100)", c->first_problem, skipped, of_hundred(skipped, all));
-  }
+            mend_rows(s->source), "%s (%" PRIu64 " like it, %" PRIu64 " of 100)", c->first_problem, skipped,
+            of_hundred(skipped, all));
   if (of_hundred(c->lost, facts->events + c->lost) >= 1)
     wm_find(out, WM_FOUND_DATA_MISSING, WM_SEVERITY_NOTE, s->name,
             "a bus or a recorder that is too slow: look at its load and at `waymark doctor`",
@@ -62,6 +74,11 @@ static void counted(const wm_assembled_source *s, const source_facts *facts, wm_
     wm_find(out, WM_FOUND_ROWS_DISORDERED, WM_SEVERITY_NOTE, s->name,
             "the recorder's clock was set, or two recordings were put together",
             "%" PRIu64 " of 100 are older than the one before", of_hundred(c->out_of_order, all));
+  if (of_hundred(facts->ahead, all) >= 1)
+    wm_find(out, WM_FOUND_CLOCKS_APART, of_hundred(facts->ahead, all) >= 5 ? WM_SEVERITY_BAD : WM_SEVERITY_NOTE,
+            s->name, "arrival_ns has to be of the clock of t_ns, and later; or leave the column out",
+            "%" PRIu64 " of 100 arrive before their stamp (arrival_ns is less than t_ns) and are not used",
+            of_hundred(facts->ahead, all));
 }
 
 // Of distinct stamps. The fastest sensor of a robot, a gyro, gives 8000 samples a second.
@@ -97,8 +114,9 @@ static void judge(const wm_assembly *assembly, const wm_assembled_source *s, con
                   wm_findings *out) {
   if (facts->events == 0) {
     const char *why = s->source->counts.first_problem;
-    wm_find(out, WM_FOUND_NO_DATA, WM_SEVERITY_BAD, s->name, "record again, or leave it out (`use: false`)",
-            "holds no datum%s%s", why[0] ? ": " : "", why);
+    wm_find(out, WM_FOUND_NO_DATA, WM_SEVERITY_BAD, s->name,
+            why[0] ? mend_rows(s->source) : "record again, or leave it out (`use: false`)", "holds no datum%s%s",
+            why[0] ? ": " : "", why);
     return;
   }
   counted(s, facts, out);
@@ -150,6 +168,23 @@ static double overlap(double a0, double a1, double b0, double b1) {
 // A source whose time span has little in common with that of the motion has stamps of another clock or unit.
 #define OVERLAP_MIN 0.5
 
+// A tenth of the drive without a source is worth a note; a sensor's start takes some seconds.
+#define SILENT_SHARE 0.1
+#define SILENT_MIN_S 5.0
+
+static void silent_at_an_end(const char *name, const source_facts *facts, const source_facts *motion,
+                             wm_findings *out) {
+  const double whole_s = wm_seconds_between(motion->first_ns, motion->last_ns);
+  const double silent_s[2] = {wm_seconds_between(motion->first_ns, facts->first_ns),
+                              wm_seconds_between(facts->last_ns, motion->last_ns)};
+  for (int end = 0; end < 2; end++)
+    if (silent_s[end] > SILENT_MIN_S && silent_s[end] > SILENT_SHARE * whole_s)
+      wm_find(out, WM_FOUND_SOURCE_SILENT, WM_SEVERITY_NOTE, name,
+              "did its program start late or stop early, or was its file cut?",
+              "silent for the %s %.1f s of %.1f s of motion", end ? "last" : "first", silent_s[end], whole_s)
+          ->size = silent_s[end];
+}
+
 static void spans(const source_data *self, size_t i, const source_facts *motion, wm_findings *out) {
   static const struct {
     double factor;
@@ -159,7 +194,10 @@ static void spans(const source_data *self, size_t i, const source_facts *motion,
   const char *name = self->assembly->sources[i].name;
   const double m0 = (double)motion->first_ns, m1 = (double)motion->last_ns;
   const double t0 = (double)f->first_ns, t1 = (double)f->last_ns;
-  if (overlap(t0, t1, m0, m1) >= OVERLAP_MIN) return;
+  if (overlap(t0, t1, m0, m1) >= OVERLAP_MIN) {
+    silent_at_an_end(name, f, motion, out);
+    return;
+  }
   for (size_t k = 0; k < sizeof kUnits / sizeof kUnits[0]; k++)
     if (overlap(t0 * kUnits[k].factor, t1 * kUnits[k].factor, m0, m1) >= OVERLAP_MIN) {
       char mend[160];
@@ -189,7 +227,7 @@ void source_data_init(source_data *self, const wm_assembly *assembly) {
 }
 
 void source_data_take(source_data *self, const wm_event *event) {
-  take(&self->facts[event->source], &self->assembly->setup, event);
+  take(&self->facts[event->source], self->assembly, event);
   take_range(&self->facts[event->source], &self->assembly->setup, event);
   motion_data_take(&self->motion, event);
   course_data_take(&self->course, event);
