@@ -41,7 +41,11 @@ Plan plan_from_occupancy(const std::string &map_yaml) {
   out.origin_x_m = origin[0], out.origin_y_m = origin[1], out.origin_yaw_rad = origin[2];
   const double occupied = number("occupied_thresh", 0.65), free = number("free_thresh", 0.196);
   const bool negate = number("negate", 0) != 0;
-  out.picture = load_picture(fs::path(map_yaml).parent_path() / image);
+  try {
+    out.picture = load_picture(fs::path(map_yaml).parent_path() / image);
+  } catch (const Failure &failure) {
+    throw Failure(map_yaml + ": image: " + failure.what());
+  }
   out.unknown.resize(out.picture.pixels.size());
   for (size_t i = 0; i < out.unknown.size(); i++) {
     const double shade = out.picture.pixels[i] / 255.0, wall = negate ? shade : 1 - shade;
