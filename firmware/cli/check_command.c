@@ -205,6 +205,17 @@ __attribute__((format(printf, 5, 6))) static void name_cause(checked *self, cons
   wm_find(self->found, WM_FOUND_LIKELY_CAUSE, severity, "cause", fix, "%s%s", what, more);
 }
 
+// Where a counter or a gyro stands, nothing else is to blame, unless its signal is read from a wrong place.
+static size_t suspects_of(const checked *self, const wm_assembly *assembly, const suspect_files *files,
+                          suspect list[SUSPECTS_MAX]) {
+  const size_t count = suspects_list(assembly, files, self->seen, list);
+  if (!wm_findings_has(self->found, WM_FOUND_MOTION_SENSOR, "can")) return count;
+  size_t kept = 0;
+  for (size_t i = 0; i < count; i++)
+    if (list[i].kind == SUSPECT_NONE || list[i].kind == SUSPECT_SIGNAL) list[kept++] = list[i];
+  return kept;
+}
+
 // The usual mistakes, one after the other, undone: which of them explains the observations?
 static void try_suspects(checked *self, const wm_assembly *assembly, double recorded_s) {
   static suspect list[SUSPECTS_MAX];
@@ -219,7 +230,7 @@ static void try_suspects(checked *self, const wm_assembly *assembly, double reco
                             .dir = self->dir,
                             .files = &files,
                             .suspects = list,
-                            .count = suspects_list(assembly, &files, self->seen, list),
+                            .count = suspects_of(self, assembly, &files, list),
                             .ids = &self->ids,
                             .drive_s = drive_s,
                             .recorded_s = recorded_s,

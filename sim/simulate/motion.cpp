@@ -68,8 +68,8 @@ Path6 swum_path(const Rounds &r, uint64_t seed) {
     xyz[1] = radius * wm::sin(a);
     xyz[2] = r.height_m + 0.5 * r.wobble_m * wm::sin(2 * a + dive);
   };
-  constexpr double kStep_s = 2.5;
-  const int last = std::max(4, static_cast<int>(std::ceil(r.duration_s / kStep_s)));
+  constexpr double kKnot_s = 2.5;
+  const int last = std::max(4, static_cast<int>(std::ceil(r.duration_s / kKnot_s)));
   std::vector<Knot6> knots;
   double yaw = 0;
   for (int i = 0; i <= last; i++) {

@@ -61,6 +61,8 @@ MADE = [
     ("sensor-unknown", {"sightings.csv": text(",front,", ",frnt,")}, CONFIG, ["--quick"]),
     ("misspelt-name", {"sightings.csv": lambda w: w.replace("bearing_rad", "bearing", 1)}, CONFIG, ["--quick"]),
     ("data-unused", {}, TICKS, ["--quick"]),
+    ("motion-sensor", {"can.log": lambda w: re.sub(r"100#\w{8}", "100#00000000", w)}, CONFIG, [], "encoder"),
+    ("motion-sensor", {"can.log": lambda w: re.sub(r"101#\w+", "101#0A00", w)}, CONFIG, ["--quick"], "gyro"),
     ("sensors-disagree", {"can-signals.yaml": text("signal: GYRO_Z", "signal: GYRO_Z, scale: -1")}, CONFIG, ["--quick"]),
 ]
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Motion over CAN: other units than in the binding, wrong signs, messages that never arrive. Found by comparing two
 // sensors of the same motion.
+#include <inttypes.h>
 #include <math.h>
 #include <string.h>
 
@@ -170,6 +171,30 @@ static void speeds(const motion_data *self, wm_findings *out) {
       ->size = ratio;
 }
 
+static int stands(const motion_data *self, unsigned q) {
+  return self->count[q] >= PAIRS_MIN && self->most[q] == self->least[q];
+}
+
+// A counter that stands while the other one counts a turn of its wheel, and a gyro that shows the same while the wheels
+// turn the robot.
+static void dead(const motion_data *self, wm_findings *out) {
+  for (unsigned q = WM_Q_WHEEL_TICKS_LEFT; q <= WM_Q_WHEEL_TICKS_RIGHT; q++) {
+    const unsigned other = WM_Q_WHEEL_TICKS_LEFT + WM_Q_WHEEL_TICKS_RIGHT - q;
+    const double counted = self->most[other] - self->least[other];
+    if (stands(self, q) && counted > fabs(self->wheels->ticks_per_turn))
+      wm_find(out, WM_FOUND_MOTION_SENSOR, WM_SEVERITY_BAD, ABOUT,
+              "look at the encoder and its cable, and at the signal's place in the DBC",
+              "%s is %.10g in all of its %" PRIu64 " data, while %s counts %.10g", wm_quantity_name(q), self->last[q],
+              self->count[q], wm_quantity_name(other), counted);
+  }
+  const agreement *a = &self->turn_ticks;
+  if (stands(self, WM_Q_YAW_RATE) && a->count >= PAIRS_MIN && sqrt(a->bb / (double)a->count) > TURN_RMS_MIN)
+    wm_find(out, WM_FOUND_MOTION_SENSOR, WM_SEVERITY_BAD, ABOUT,
+            "look at the gyro, and at the signal's place in the DBC",
+            "yaw_rate is %.10g rad/s in all of its %" PRIu64 " data, while the wheels turn the robot",
+            self->last[WM_Q_YAW_RATE], self->count[WM_Q_YAW_RATE]);
+}
+
 void motion_data_judge(const motion_data *self, uint32_t bound, wm_findings *out) {
   for (unsigned q = 0; q < WM_Q_COUNT; q++)
     if (((bound >> q) & 1u) && self->count[q] == 0)
@@ -177,6 +202,7 @@ void motion_data_judge(const motion_data *self, uint32_t bound, wm_findings *out
               "look at message and bus in can-signals.yaml, and at what candump receives",
               "%s is bound, but no frame with a value of it came", wm_quantity_name(q));
   ranges(self, out);
+  dead(self, out);
   track(self, out);
   turns(&self->turn_wheels, "the difference of the wheels' speeds", out);
   turns(&self->turn_ticks, "the difference of the wheels' ticks", out);
