@@ -55,10 +55,10 @@ static presence presence_of(const wm_can_decoder *self, const bound_signal *s, c
 
 // The fastest of two rates in a row: one alone may be a damaged frame's.
 static void note_rate(tick_rates *r, int64_t step, wm_time_ns t_ns) {
-  r->ticks += step;
+  r->ticks += (double)step;
   const wm_time_ns over_ns = t_ns - r->since_ns;
   if (over_ns < RATE_OVER_NS) return;
-  const double rate = (double)r->ticks / ((double)over_ns * 1e-9);
+  const double rate = r->ticks / ((double)over_ns * 1e-9);
   r->up = fmax(r->up, fmin(rate, r->before));
   r->down = fmax(r->down, fmin(-rate, -r->before));
   r->before = rate;

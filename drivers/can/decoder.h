@@ -19,9 +19,9 @@ typedef struct bound_selector {
 typedef struct tick_rates {
   wm_time_ns last_ns, period_ns;  // of the newest count; between the two before, 0: unknown
   wm_time_ns since_ns;            // a rate is that of the ticks since then
-  int64_t ticks;
-  double before;    // the rate before
-  double up, down;  // the fastest rates so far in either direction, 0 or above
+  double ticks;                   // may be beyond 64 bits where a counter of 64 bits is damaged
+  double before;                  // the rate before
+  double up, down;                // the fastest rates so far in either direction, 0 or above
 } tick_rates;
 
 typedef struct bound_signal {
