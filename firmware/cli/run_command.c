@@ -5,6 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <sys/statvfs.h>
 
 #include "cli/commands.h"
 #include "cli/options.h"
@@ -210,6 +211,46 @@ static wm_status run_once(const opened *with, const char *record_dir, const wm_r
   return recorded;
 }
 
+// A disk with less than this has no room for the files of another part of a run.
+#define OUT_FREE_MB 1
+
+static int has_room(const char *folder) {
+  char parent[WM_PATH_MAX + 16];
+  (void)snprintf(parent, sizeof parent, "%s", folder);
+  char *slash = strrchr(parent, '/');
+  if (slash) slash[slash == parent] = '\0';
+  struct statvfs disk;
+  return statvfs(slash ? parent : ".", &disk) != 0 ||
+         (uint64_t)disk.f_bavail * disk.f_frsize >= OUT_FREE_MB * UINT64_C(1000000);
+}
+
+// What goes wrong with the files of one part of a run is told at its end, and localization continues.
+typedef struct trouble {
+  wm_status status;
+  wm_error first;
+} trouble;
+
+static void remember(trouble *self, wm_status status, const wm_error *err) {
+  if (status == WM_OK) return;
+  char line[sizeof err->text + 40];
+  (void)snprintf(line, sizeof line, "%s. Localization continues", err->text);
+  print_note(NULL, line);
+  if (self->status == WM_OK) *self = (trouble){status, *err};
+}
+
+// The folder of a part; NULL where there is none, or no room for it.
+static const char *folder_of(const arguments *args, int part, int puts_aside, char *out, size_t capacity,
+                             trouble *so_far) {
+  if (!args->run.out_dir) return NULL;
+  (void)snprintf(out, capacity, "%s.%d", args->run.out_dir, part);
+  wm_error err = {0};
+  wm_status status =
+      has_room(out) ? WM_OK : wm_fail(&err, WM_IO, "%s: not written, the disk is full: free some of it", out);
+  if (status == WM_OK && puts_aside) status = put_run_aside(out, NULL, &err);
+  remember(so_far, status, &err);
+  return status == WM_OK ? out : NULL;
+}
+
 static int run(const arguments *args) {
   static opened now;
   static reloading reload;
@@ -225,11 +266,13 @@ static int run(const arguments *args) {
   options.reload_asked = args->recording ? NULL : &reload_asked;
   catch_signals();
   const int puts_aside = !args->force && args->run.out_max_mb <= 0 && args->run.out_dir;
+  trouble so_far = {0};
   wm_status status = WM_OK;
   if (puts_aside)
     status = put_run_aside(options.out_dir, args->recording ? wm_recording_name(now.recording) : NULL, &err);
   if (status == WM_OK) status = run_once(&now, args->record, &options, &report, &err);
-  for (int part = 2; status == WM_OK && report.wants_restart; part++) {
+  for (int part = 2; report.wants_restart; part++) {
+    remember(&so_far, status, &err);
     close_all(&now);
     now = reload.next;
     options.start = NULL;
@@ -238,13 +281,12 @@ static int run(const arguments *args) {
       options.start = &start;
     }
     // A log and a recording hold one configuration each.
-    (void)snprintf(out_dir, sizeof out_dir, "%s.%d", args->run.out_dir ? args->run.out_dir : "", part);
-    if (args->run.out_dir) options.out_dir = out_dir;
-    if (puts_aside) status = put_run_aside(options.out_dir, NULL, &err);
+    options.out_dir = folder_of(args, part, puts_aside, out_dir, sizeof out_dir, &so_far);
     (void)snprintf(record_dir, sizeof record_dir, "%s.%d", args->record ? args->record : "", part);
-    if (status == WM_OK) status = run_once(&now, args->record ? record_dir : NULL, &options, &report, &err);
+    status = run_once(&now, args->record ? record_dir : NULL, &options, &report, &err);
   }
   close_all(&now);
+  if (status == WM_OK && so_far.status != WM_OK) return complain(&so_far.first);
   return status == WM_OK ? EXIT_DONE : complain(&err);
 }
 
