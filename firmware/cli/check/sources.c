@@ -180,7 +180,7 @@ static void silent_at_an_end(const char *name, const source_facts *facts, const 
   for (int end = 0; end < 2; end++)
     if (silent_s[end] > SILENT_MIN_S && silent_s[end] > SILENT_SHARE * whole_s)
       wm_find(out, WM_FOUND_SOURCE_SILENT, WM_SEVERITY_NOTE, name,
-              "did its program start late or stop early, or was its file cut?",
+              "was there nothing to see, did its program start late or stop early, or was its file cut?",
               "silent for the %s %.1f s of %.1f s of motion", end ? "last" : "first", silent_s[end], whole_s)
           ->size = silent_s[end];
 }
