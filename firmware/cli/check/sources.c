@@ -81,13 +81,15 @@ static void counted(const wm_assembled_source *s, const source_facts *facts, wm_
             of_hundred(facts->ahead, all));
 }
 
+// A source of fewer data has no rate.
+#define EVENTS_MIN 20
 // Of distinct stamps. The fastest sensor of a robot, a gyro, gives 8000 samples a second.
 #define RATE_MAX_HZ 20000.0
 
 static void rate(const wm_assembled_source *s, const source_facts *facts, wm_findings *out) {
   const double seconds = wm_seconds_between(facts->first_ns, facts->last_ns);
-  if (facts->events < 20 || facts->stamps < 2 || seconds <= 0) {
-    if (facts->events >= 20 && s->source->is_motion)
+  if (facts->events < EVENTS_MIN || facts->stamps < 2 || seconds <= 0) {
+    if (facts->events >= EVENTS_MIN && s->source->is_motion)
       wm_find(out, WM_FOUND_RATE_IMPLAUSIBLE, WM_SEVERITY_BAD, s->name, NULL,
               "all of its %" PRIu64 " data have the same stamp", facts->events);
     return;
@@ -177,7 +179,7 @@ static void silent_at_an_end(const char *name, const source_facts *facts, const 
   const double whole_s = wm_seconds_between(motion->first_ns, motion->last_ns);
   const double silent_s[2] = {wm_seconds_between(motion->first_ns, facts->first_ns),
                               wm_seconds_between(facts->last_ns, motion->last_ns)};
-  for (int end = 0; end < 2; end++)
+  for (int end = 0; facts->events >= EVENTS_MIN && end < 2; end++)
     if (silent_s[end] > SILENT_MIN_S && silent_s[end] > SILENT_SHARE * whole_s)
       wm_find(out, WM_FOUND_SOURCE_SILENT, WM_SEVERITY_NOTE, name,
               "was there nothing to see, did its program start late or stop early, or was its file cut?",
