@@ -224,7 +224,8 @@ static int has_room(const char *folder) {
          (uint64_t)disk.f_bavail * disk.f_frsize >= OUT_FREE_MB * UINT64_C(1000000);
 }
 
-// What goes wrong with the files of one part of a run is told at its end, and localization continues.
+// Faults of the files of earlier parts of a run. Localization continues; the exit code and the last line report the
+// first.
 typedef struct trouble {
   wm_status status;
   wm_error first;

@@ -40,7 +40,7 @@ static void take_range(source_facts *facts, const wm_setup *setup, const wm_even
 
 static uint64_t of_hundred(uint64_t part, uint64_t whole) { return whole > 0 ? part * 100 / whole : 0; }
 
-// What mends rows that can't be read, by the first of them.
+// The fix for rows that can't be read, by the first of them.
 static const char *mend_rows(const wm_source *source) {
   const wm_source_counts *c = &source->counts;
   const char *stamp = strstr(c->first_problem, "_ns: ");
