@@ -22,7 +22,8 @@ extern "C" {
 // clang-format off
 #define WM_SENSOR_STATES(ONE, TWO) \
   ONE(kYaw, "sensor_yaw", "_rad", "yaw_rad", 0, -3.2, 3.2, WALK, -0.05, 3.2, \
-      "Start sigma of each sensor's mounting yaw about calibration.yaml's, rad. 0: off. Below 0: see range_bias_sigma_m.") \
+      "Start sigma of each sensor's mounting yaw about calibration.yaml's, rad. 0: off. Below 0: see range_bias_sigma_m; " \
+      "in slam 0.005 where ranges, bearings and the motion come with covariances.") \
   TWO(kMountX, kMountY, "sensor_xy", "_m", "x_m", "y_m", 0, -100, 100, CONSTANT, 0, 10, \
       "Start sigma of each sensor's place on the robot about calibration.yaml's, forwards and sideways, m. 0: off.") \
   TWO(kRoll, kPitch, "sensor_tilt", "_rad", "roll_rad", "pitch_rad", 0, -1, 1, CONSTANT, 0, 1, \

@@ -49,8 +49,10 @@ class sensor_slots {
     return -1;
   }
   bool is_by_default(int state) const { return by_default_[state]; }
-  // `complete`: of a sighting whose sigmas have all of its errors, on which states of a default do not act.
-  int at(int sensor, int state, bool complete) const { return complete && by_default_[state] ? -1 : at(sensor, state); }
+  // `exact`: states, by bit, that are at their neutral value unless a parameter states their sigma.
+  int at(int sensor, int state, unsigned exact) const {
+    return (exact >> state & 1u) && by_default_[state] ? -1 : at(sensor, state);
+  }
 
   // The errors as value(slot) gives them; neutral where the state is off.
   template <class Value>
@@ -63,9 +65,9 @@ class sensor_slots {
 
   // Adds the derivatives by all of a sensor's errors but the time offset to a Jacobian row. `by`: by sighting_cause.
   template <class Row>
-  void add_to(Row *row, int sensor, const double by[kCauses], bool complete = false) const {
+  void add_to(Row *row, int sensor, const double by[kCauses], unsigned exact = 0) const {
     for (int k = 0; k < kSensorStates; k++)
-      if (k != kTimeOffset) row->add(at(sensor, k, complete), by[kBySensor + k]);
+      if (k != kTimeOffset) row->add(at(sensor, k, exact), by[kBySensor + k]);
   }
 
   // The motion's lag has become a state, and the observations show its sum with the time offsets alone: what these have

@@ -32,7 +32,7 @@ constexpr int kMaxMisfits = 6;  // in a row: the ray was not that landmark's; no
 }  // namespace
 
 // The sensor's pose in map at the sighting, as a clone in the state. All bearings of a picture share one.
-int slam::keep_clone(const context &at, bool complete) {
+int slam::keep_clone(const context &at, unsigned exact) {
   const wm_time_ns now = joint_.now_ns();
   const int there = tracks_.find_clone(at.sensor, now);
   if (there >= 0) return there;
@@ -44,8 +44,8 @@ int slam::keep_clone(const context &at, bool complete) {
   const double by[3][6] = {{1, 0, -lever_y, 0, h.cos, -h.sin}, {0, 1, lever_x, 0, h.sin, h.cos}, {0, 0, 1, 1, 0, 0}};
   joint_row rows[3];
   for (int k = 0; k < 3; k++) {
-    add_past_pose(&rows[k], by[k], at.past, slots_.at(at.sensor, kTimeOffset, complete));
-    rows[k].add(slots_.at(at.sensor, kYaw, complete), by[k][3]);
+    add_past_pose(&rows[k], by[k], at.past, slots_.at(at.sensor, kTimeOffset, exact));
+    rows[k].add(slots_.at(at.sensor, kYaw, exact), by[k][3]);
     rows[k].add(slots_.at(at.sensor, kMountX), by[k][4]);
     rows[k].add(slots_.at(at.sensor, kMountY), by[k][5]);
   }
@@ -84,7 +84,7 @@ wm_verdict slam::track_bearing(const context &at, const line_bearing &seen) {
     if (dx * dx + dy * dy < square(params_.line_step_m)) return WM_REJECTED_SEARCHING;
   }
   const double sigma = std::sqrt(square(seen.sigma_rad) + square(seen.correlated_rad));
-  const int clone = keep_clone(at, seen.complete);
+  const int clone = keep_clone(at, seen.exact);
   tracks_.add(track, clone, seen.bearing_rad, sigma, params_.line_poses);
   if (track->count < 3 || !join_line(at, *track)) return WM_REJECTED_SEARCHING;
   bearing_tracks::end(track);
@@ -132,7 +132,7 @@ bool slam::join_line(const context &at, const bearing_tracks::track &track) {
 wm_verdict slam::begin_ray(const context &at, const line_bearing &seen) {
   bearing_tracks::track *track = tracks_.begin(at.id, at.sensor, joint_.now_ns());
   if (!track) return WM_REJECTED_SEARCHING;
-  const int clone = keep_clone(at, seen.complete);
+  const int clone = keep_clone(at, seen.exact);
   tracks_.add(track, clone, seen.bearing_rad, seen.sigma_rad, 1);
   const int state = ray_state(*track), error_state = lend(at);
   joint_row row;
@@ -176,8 +176,8 @@ wm_verdict slam::expect_ray(const context &at, const bearing_tracks::track &trac
   const double by[3] = {-inverse * gx, -inverse * gy, inverse * (gx * lever_y - gy * lever_x) - 1.0};
   const sin_cos h = sincos(at.past.pose.heading_rad);
   joint_row &row = out->row[0];
-  add_past_pose(&row, by, at.past, slots_.at(at.sensor, kTimeOffset, seen.complete));
-  row.add(slots_.at(at.sensor, kYaw, seen.complete), -1.0);
+  add_past_pose(&row, by, at.past, slots_.at(at.sensor, kTimeOffset, seen.exact));
+  row.add(slots_.at(at.sensor, kYaw, seen.exact), -1.0);
   row.add(slots_.at(at.sensor, kMountX), by[0] * h.cos + by[1] * h.sin);
   row.add(slots_.at(at.sensor, kMountY), by[1] * h.cos - by[0] * h.sin);
   row.add(anchor, inverse * gx);

@@ -31,6 +31,9 @@ slam::reading slam::reading_of(const wm_sighting &s) const {
   return r;
 }
 
+// The default states that do not act on a complete sighting, by bit. The mounting's yaw does where ranges show it.
+unsigned slam::exact_states(const reading &r) { return !r.complete ? 0u : r.independent ? ~(1u << kYaw) : ~0u; }
+
 // Distance on the floor by a range that may be a depth.
 double slam::distance_of(const wm_sighting &s) const {
   const mounted_sensor &sensor = sensor_[s.sensor];
@@ -57,6 +60,7 @@ wm_status slam::fuse_sighting(const wm_event &event, record_list records) {
   if (s.range_m > sensor_[s.sensor].max_range_m) return reject(records, at.record, WM_REJECTED_OUT_OF_RANGE);
 
   if (r.range) note_range(s.sensor, r.complete);
+  if (r.independent) narrow_yaw(s.sensor);
   begin_picture(s.sensor, event.t_ns);
   at.past = look_back(s.sensor);
   int landmark;
@@ -167,8 +171,8 @@ wm_verdict slam::expect_sighting(const wm_sighting &s, const reading &r, const p
                        int error_offset, double error_size) {
     const int i = out->count++;
     joint_row &row = out->row[i];
-    add_past_pose(&row, by, past, slots_.at(s.sensor, kTimeOffset, r.complete));
-    slots_.add_to(&row, s.sensor, by, r.complete);
+    add_past_pose(&row, by, past, slots_.at(s.sensor, kTimeOffset, exact_states(r)));
+    slots_.add_to(&row, s.sensor, by, exact_states(r));
     if (error_state >= 0 && error_offset >= 0) {
       row.add(error_state + error_offset, error_size);
       expected += error_size * joint_.value(error_state + error_offset);
@@ -275,7 +279,7 @@ void slam::fuse_known(const context &at, const wm_sighting &s, const reading &r,
 slam::line_bearing slam::line_bearing_of(const wm_sighting &s, const reading &r) const {
   const bool none = r.independent && sightings().correlated_bearing_rad < 0.0;
   return {s.bearing_rad, s.bearing_sigma_rad, r.bearing_sigma_rad,
-          none ? 0.0 : correlated_bearing(sightings(), r.bearing_sigma_rad), r.complete};
+          none ? 0.0 : correlated_bearing(sightings(), r.bearing_sigma_rad), exact_states(r)};
 }
 
 // A sighting of a landmark that is not on the map.

@@ -155,7 +155,7 @@ class slam {
   // A bearing without a range. Its sigma as it came, and as it counts.
   struct line_bearing {
     double bearing_rad, given_sigma_rad, sigma_rad, correlated_rad;
-    bool complete;
+    unsigned exact;  // states of the sensor, as sensor_slots::at()
   };
   // A marker in levelled axes along the sensor's yaw.
   struct marker_reading {
@@ -186,6 +186,7 @@ class slam {
   static arrays place(memory_layout *out, const wm_slam_params &params, const wm_setup &setup);
   static int lasting_states(const wm_slam_params &params, const wm_setup &setup);  // pose and calibration
   void note_range(int sensor, bool is_standard);
+  void narrow_yaw(int sensor);
   bool has_standard() const;
   void follow_scale();
   bool sees_many() const { return outliers_.before >= kManyBearings; }  // in the picture before
@@ -235,6 +236,7 @@ class slam {
 
   // sightings.cpp
   reading reading_of(const wm_sighting &s) const;
+  static unsigned exact_states(const reading &r);
   double distance_of(const wm_sighting &s) const;
   wm_status fuse_sighting(const wm_event &event, record_list records);
   bool takes_unidentified(int sensor) const;
@@ -257,7 +259,7 @@ class slam {
   // bearing_only.cpp
   int clone_state(int clone) const { return first_clone_ + 3 * clone; }
   int ray_state(const bearing_tracks::track &track) const { return first_ray_ + 2 * tracks_.index(track); }
-  int keep_clone(const context &at, bool complete);
+  int keep_clone(const context &at, unsigned exact);
   wm_verdict track_bearing(const context &at, const line_bearing &seen);
   bool join_line(const context &at, const bearing_tracks::track &track);
   bearing_tracks::track *current_ray(const context &at);
@@ -358,6 +360,7 @@ class slam {
   int32_t nameless_[kSlamSensors];  // sightings, none of them with an identity; -1: one had
   sensor_slots slots_;
   unsigned components_;                  // of expect(): whether the angle scale is a state
+  unsigned calibrated_;                  // sensors, by bit, with ranges and complete sigmas
   unsigned standards_, scaled_;          // sensors, by bit, whose ranges came: without a scale, with the default's
   int stamp_state_[kSlamSensors];        // error of the newest picture's stamp; -1: off
   wm_time_ns picture_ns_[kSlamSensors];  // that stamp

@@ -56,6 +56,47 @@ void test_an_eccentric_turntable_is_found(void) {
 
 void test_taken_for_level_it_bends_the_map(void) { TEST_ASSERT_GREATER_THAN_DOUBLE(0.06, worst_of_leaning(0)); }
 
+// Motion, bearings and ranges with sigmas of their own, by a camera that is turned by so much. States by default.
+void drive_calibrated(double seconds, double camera_rad) {
+  for (int k = 0; k < WM_SENSOR_ROWS; k++) make::sightings.states.sigma[k] = 0.0;
+  make::sightings.states.sigma[WM_SENSOR_ROW_kYaw] = -0.05;
+  begin();
+  const double dt = 0.1, covariance[6] = {1e-6, 0, 1e-6, 0, 0, 1e-6};
+  const wm::arc step = wm::make_arc(0.5 * dt, 0.25 * dt);
+  for (double until = now_s + seconds; now_s < until; now_s += dt) {
+    truth = wm::compose(truth, {step.x_m, step.y_m, step.turn_rad});
+    const wm_pose2 felt = {step.x_m + gauss(1e-3), step.y_m + gauss(1e-3), step.turn_rad + gauss(1e-3)};
+    const wm_event moved = make::increment(now_s, now_s + dt, felt, covariance);
+    TEST_ASSERT_EQUAL(WM_OK, slam->predict(state, &moved));
+    const wm_pose2 eye = wm::compose(truth, {0.2, 0, camera_rad});
+    for (int i = 0; i < kCount; i++) {
+      const double dx = place[i][0] - eye.x_m, dy = place[i][1] - eye.y_m;
+      const double bearing = wm::wrap(wm::atan2(dy, dx) - eye.heading_rad);
+      if (std::fabs(bearing) > 1.2) continue;
+      wm_event seen = make::sighting(now_s + dt, 10 + i, bearing + gauss(0.01), std::hypot(dx, dy) + gauss(0.03));
+      seen.as.sighting.bearing_sigma_rad = 0.01;
+      seen.as.sighting.range_sigma_m = 0.03;
+      see(seen);
+    }
+  }
+}
+
+// Who states all sigmas has calibrated the mounting to 0.3 degrees: a state of that sigma. Wrong by ten of these it is
+// found nevertheless.
+void test_a_calibrated_mounting_is_a_state_of_0_3_degrees(void) {
+  double sigma_rad;
+  drive_calibrated(0.1, 0.0);
+  calibrated("camera.yaw_rad", &sigma_rad);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-4, 0.005, sigma_rad);
+  make_room();
+  drive_calibrated(120, 0.05);
+  const double yaw_rad = calibrated("camera.yaw_rad", &sigma_rad);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.002, sigma_rad);
+  TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.05, yaw_rad);
+  size_t found;
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.1, worst_landmark(&found));
+}
+
 // A turn of 0.25 rad/s and a stamp that is off by 0.2 s: 0.05 rad.
 void test_stamps_that_scatter_matter_where_it_turns(void) {
   double variance[2];
@@ -131,6 +172,7 @@ int main(void) {
   RUN_TEST(test_a_camera_that_leans_is_found_by_how_high_markers_seem_to_hang);
   RUN_TEST(test_a_second_camera_that_sees_the_same_markers_has_its_own_tilt);
   RUN_TEST(test_an_eccentric_turntable_is_found);
+  RUN_TEST(test_a_calibrated_mounting_is_a_state_of_0_3_degrees);
   RUN_TEST(test_taken_for_level_it_bends_the_map);
   RUN_TEST(test_stamps_that_scatter_matter_where_it_turns);
   RUN_TEST(test_a_late_stamp_turns_all_bearings_alike);
