@@ -23,7 +23,7 @@ extern "C" {
 #define WM_SENSOR_STATES(ONE, TWO) \
   ONE(kYaw, "sensor_yaw", "_rad", "yaw_rad", 0, -3.2, 3.2, WALK, -0.05, 3.2, \
       "Start sigma of each sensor's mounting yaw about calibration.yaml's, rad. 0: off. Below 0: see range_bias_sigma_m; " \
-      "in slam 0.005 where ranges, bearings and the motion come with covariances.") \
+      "in slam at most 0.005 where ranges, bearings and the motion come with covariances.") \
   TWO(kMountX, kMountY, "sensor_xy", "_m", "x_m", "y_m", 0, -100, 100, CONSTANT, 0, 10, \
       "Start sigma of each sensor's place on the robot about calibration.yaml's, forwards and sideways, m. 0: off.") \
   TWO(kRoll, kPitch, "sensor_tilt", "_rad", "roll_rad", "pitch_rad", 0, -1, 1, CONSTANT, 0, 1, \
@@ -37,11 +37,11 @@ extern "C" {
       "sideways, over the encoder's radius. A rotating laser's bearings err by -x sin(bearing) + y cos(bearing). 0: off.") \
   ONE(kTimeOffset, "sensor_time_offset", "_s", "time_offset_s", 0, -5, 5, CONSTANT, -0.1, 1, \
       "Start sigma of each sensor's time offset, s: its sightings are that much older than their stamps. 0: off. " \
-      "Below 0: see range_bias_sigma_m.") \
+      "Below 0: of that size; in slam at most 0.02 where bearings alone come with sigmas, or all with covariances.") \
   ONE(kRangeBias, "range_bias", "_m", "range_bias_m", 0, -100, 100, CONSTANT, -0.5, 10, \
       "Start sigma of each sensor's range bias, m. 0: off. Below 0: that multiple of the sensor's range sigma. " \
-      "In slam states below 0 act on no sightings with sigmas of their own that are bearings alone, or whose motion " \
-      "comes with covariances.") \
+      "In slam states below 0, but for the time offset and the yaw, do not act where bearings alone come with sigmas, " \
+      "or all with covariances.") \
   ONE(kRangeScale, "range_scale", "", "range_scale", 1, 0.1, 10, WALK, -0.05, 1, \
       "Start sigma of each sensor's range scale about 1. 0: off. Needs ranges of many lengths beside a range bias. " \
       "Below 0: see range_bias_sigma_m; in slam not for coded markers, whose printed size is a standard of length.") \

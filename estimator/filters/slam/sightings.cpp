@@ -21,8 +21,8 @@ double clutter_volume(const sighting_reading &r) {
 }  // namespace
 
 // Who states covariances of the odometry and of the sightings has a model of all errors. So has a detector of lines,
-// whose bearings state their sigmas: while distances are unknown, rays would bend the mounting and the clock. An edge
-// is found beside its place for as long as it is seen alike, so these bearings have errors that last.
+// whose bearings state their sigmas: while distances are unknown, rays would bend the mounting. An edge is found beside
+// its place for as long as it is seen alike, so these bearings have errors that last.
 slam::reading slam::reading_of(const wm_sighting &s) const {
   reading r = read_sighting(s, sensor_[s.sensor], sightings());
   const bool stated = (!r.bearing || finite(s.bearing_sigma_rad)) && (!r.range || finite(s.range_sigma_m));
@@ -31,8 +31,12 @@ slam::reading slam::reading_of(const wm_sighting &s) const {
   return r;
 }
 
-// The default states that do not act on a complete sighting, by bit. The mounting's yaw does where ranges show it.
-unsigned slam::exact_states(const reading &r) { return !r.complete ? 0u : r.independent ? ~(1u << kYaw) : ~0u; }
+// The default states that do not act on a complete sighting, by bit. The clock's does, and where ranges show it, the
+// mounting's yaw.
+unsigned slam::exact_states(const reading &r) {
+  if (!r.complete) return 0u;
+  return ~(1u << kTimeOffset) & ~(r.independent ? 1u << kYaw : 0u);
+}
 
 // Distance on the floor by a range that may be a depth.
 double slam::distance_of(const wm_sighting &s) const {
@@ -60,7 +64,7 @@ wm_status slam::fuse_sighting(const wm_event &event, record_list records) {
   if (s.range_m > sensor_[s.sensor].max_range_m) return reject(records, at.record, WM_REJECTED_OUT_OF_RANGE);
 
   if (r.range) note_range(s.sensor, r.complete);
-  if (r.independent) narrow_yaw(s.sensor);
+  if (r.complete) note_calibrated(s.sensor);
   begin_picture(s.sensor, event.t_ns);
   at.past = look_back(s.sensor);
   int landmark;
