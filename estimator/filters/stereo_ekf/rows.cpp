@@ -227,7 +227,7 @@ void stereo_ekf::position_rows(const wm_position &p, int last, row_block *out) c
   const vec3 place = past.at.p + past.R * arm;
   double by_end[3][3] = {}, lasting_m[3] = {};
   const double by_turn[3][3] = {};
-  for (int i = 0; i < last; i++) {
+  for (int i = 0; i < last && i < 3; i++) {
     const double stated_m = i == 2 ? p.sigma_z_m : p.sigma_xy_m;
     lasting_m[i] = receiver_.sigma_m() * stated_m / p.sigma_xy_m;
     const int row = out->add_row(kKinds[i], p.p_m[i], p.p_m[i] - place[i] - lasting_m[i] * error[i],
