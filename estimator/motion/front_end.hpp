@@ -122,7 +122,6 @@ class motion_front_end {
   void count_noise(double *speed_mps, double *turn_rate_radps) const;
   // Variances of the way and of the rotation at `t_ns` by the steps of the newest counts; 0 where no counts drive.
   void count_variances(wm_time_ns t_ns, double *way_m2, double *turn_rad2) const;
-  bool carried_rounding(wm_time_ns t_ns, double left_right_m[2]) const;
   // The last event counted a wheel, and the distance is the counted one.
   bool counted() const {
     return ticks_drive() && !counts_wrapped() && (wheel_[0].t_ns == fed_ns_ || wheel_[1].t_ns == fed_ns_);

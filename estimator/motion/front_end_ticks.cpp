@@ -193,18 +193,6 @@ void motion_front_end::count_variances(wm_time_ns t_ns, double *way_m2, double *
   *turn_rad2 = share * square(turn_rate_radps * period_s);
 }
 
-// How far the wheels have come since the count before the newest by the rounding of these two, now that the newest
-// count's speed carries them on. False: a pose at t_ns is not carried on.
-bool motion_front_end::carried_rounding(wm_time_ns t_ns, double left_right_m[2]) const {
-  const tick_wheel &left = wheel_[0];
-  if (model_ != WM_MOTION_TICKS || health_ != 0 || left.before_ns == WM_TIME_NONE) return false;
-  const double since_s = wm_seconds_between(left.t_ns, now_ns_);
-  if (t_ns <= left.t_ns || since_s < 0.0 || since_s > kCarriedPeriods * left.period_s) return false;
-  for (int i = 0; i < 2; i++)
-    left_right_m[i] = (wheel_[i].speed_mps - wheel_[i].steady_mps) * (since_s + left.period_s);
-  return true;
-}
-
 // The counts' own speed holds for some periods, then the steady one.
 void motion_front_end::note_steady(motion_input *input) const {
   if (!ticks_drive() || input->doubtful || input->refused || wheel_[0].t_ns == WM_TIME_NONE) return;

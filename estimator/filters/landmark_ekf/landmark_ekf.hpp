@@ -48,7 +48,7 @@ class landmark_ekf {
 
   static_assert(kMaxSensors * kSensorStates <= kMaxSensorStates);
   // Pose, sensor, time-correlated error, landmark, tilt.
-  static_assert(kPoseStates + kSensorStates + 1 + 3 + 2 <= planar_row::kMax);
+  static_assert(kPoseStates + kSensorStates + 2 + 3 + 2 <= planar_row::kMax);
 
   // A sighting on its way to the update: what is fused of it, of which landmark, and the pose at its time.
   struct sighting_context {

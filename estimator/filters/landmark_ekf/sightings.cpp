@@ -274,7 +274,6 @@ void landmark_ekf::add_errors(const sighting_context &at, const lent_slots &lent
   const int sensor = at.s->sensor;
   add_past_pose(&r->row, by, at.past, slots_.at(sensor, kTimeOffset));
   slots_.add_to(&r->row, sensor, by);
-  filter_.leave_rounding(at.past.t_ns, by[2] - by[0] * at.past.lever_y + by[1] * at.past.lever_x, &r->row);
   // The steps' errors of successive rows are not independent: no evidence of the motion's noise.
   const double steps = filter_.count_variance(at.past.t_ns, by, at.past.pose.heading_rad);
   r->noise += steps;

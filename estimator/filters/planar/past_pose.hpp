@@ -17,6 +17,8 @@ struct past_pose {
   double age_by[3];         // of x, y, heading by the time offset: minus the twist, without the steps of counts
   double stamp_by[3];       // the same by the error of one stamp, from the low-passed twist
   double lag_by[3];         // the same by the motion's lag, where the pose now is given
+  double rounding_by;       // of the heading by the track's scale, by the rounding of counts
+  int track_slot;           // state of the track's scale; -1: none
   int lag_slot;             // state of the lag; -1: none
   int stamp_slot;           // state of the error of this measurement's stamp; -1: none
 };
@@ -65,17 +67,24 @@ past_pose pose_before(const Filter &filter, double age_s) {
   const sin_cos h = sincos(out.pose.heading_rad);
   put_age(filter.steady(there), h, out.age_by);
   put_age(filter.low_passed(there), h, out.stamp_by);
+  out.rounding_by = filter.rounding_by_track();
+  out.track_slot = out.rounding_by != 0.0 ? filter.motion_state(kTrackScale) : -1;
   out.lag_slot = filter.motion_state(kLag);
   if (out.lag_slot >= 0) put_lag(filter.twist(), present.heading_rad, there, h, &out);
   return out;
 }
 
-// Turns derivatives by the past pose's x, y, heading into those by the present pose and by the time offset.
+// Turns derivatives by the past pose's x, y, heading into those by the present pose and by the time offset. The
+// rounding of the last counts is taken out of the derivative by the track's scale, which is in the heading's
+// correlation with it. An observed heading has the same rounding: their product would be a bias (errors in variables),
+// with 256 ticks a turn of up to 8 sigma.
 template <class Row>
 void add_past_pose(Row *row, const double by[3], const past_pose &past, int time_offset_slot) {
   row->add(kX, by[0]);
   row->add(kY, by[1]);
-  row->add(kHeading, by[2] - by[0] * past.lever_y + by[1] * past.lever_x);
+  const double by_heading = by[2] - by[0] * past.lever_y + by[1] * past.lever_x;
+  row->add(kHeading, by_heading);
+  row->add(past.track_slot, by_heading * past.rounding_by);
   row->add(time_offset_slot, product(by, past.age_by));
   if (past.lag_slot >= 0) row->add(past.lag_slot, product(by, past.lag_by));
   row->add(past.stamp_slot, product(by, past.stamp_by));

@@ -62,20 +62,9 @@ class planar_motion {
   // Variance of a measurement by the steps of the counts that give the pose at `t_ns`, which may lie ahead of them;
   // `by`: its derivatives by x, y and heading. It is no process noise: a later pose does not have it.
   double count_variance(wm_time_ns t_ns, const double by[3], double heading_rad) const;
-  // Takes the rounding of the last counts out of the derivatives of a row by the wheels' scales and the track's, which
-  // are in the heading's correlation with these states. The heading at t_ns, carried on by the newest count's speed, has
-  // the same rounding: the product would be a bias (errors in variables) of 2 to 5 sigma with 256 ticks a turn.
-  // `by_heading`: the row's derivative by the heading now.
-  template <class Row>
-  void leave_rounding(wm_time_ns t_ns, double by_heading, Row *row) const {
-    double carried_m[2];
-    if (!front_.carried_rounding(t_ns, carried_m)) return;
-    const double *scale = calibration_.value, by_way = by_heading / (front_.wheels().track_m * scale[kTrackScale]);
-    row->add(motion_state_[kLeftScale], by_way * carried_m[0]);
-    row->add(motion_state_[kRightScale], -by_way * carried_m[1]);
-    const double more_m = scale[kRightScale] * carried_m[1] - scale[kLeftScale] * carried_m[0];
-    row->add(motion_state_[kTrackScale], by_way * more_m / scale[kTrackScale]);
-  }
+  // What the rounding of the last counts has turned, over the track's scale: the derivative of the heading by that
+  // state has it. 0 where the wheels' difference is not the turn.
+  double rounding_by_track() const;
   // The next motion input is overdue.
   bool is_overdue() const { return front_.is_overdue(now_ns()); }
   wm_pose2 odom() const { return odom_; }  // motion alone, by the calibration as it was at each time
