@@ -64,7 +64,7 @@ wm_status slam::fuse_sighting(const wm_event &event, record_list records) {
   if (s.range_m > sensor_[s.sensor].max_range_m) return reject(records, at.record, WM_REJECTED_OUT_OF_RANGE);
 
   if (r.range) note_range(s.sensor, r.complete);
-  if (r.complete) note_calibrated(s.sensor);
+  if (r.complete) note_calibrated(s.sensor, exact_states(r));
   begin_picture(s.sensor, event.t_ns);
   at.past = look_back(s.sensor);
   int landmark;

@@ -180,14 +180,12 @@ void slam::note_range(int sensor, bool is_standard) {
 }
 
 // A calibrated sensor is nearly as stated. Taken as exact, a yaw that is 3 degrees off would bend the whole map.
-void slam::note_calibrated(int sensor) {
-  const unsigned bit = 1u << sensor;
-  if (calibrated_ & bit) return;
-  calibrated_ |= bit;
+void slam::note_calibrated(int sensor, unsigned exact) {
   const auto narrow = [&](int state, double sigma) {
-    const int slot = slots_.at(sensor, state);
-    const bool is_wider = slot >= 0 && slots_.is_by_default(state) && joint_.variance(slot) > square(sigma);
-    if (is_wider) joint_.forget(slot, 0.0, square(sigma));
+    const int slot = slots_.at(sensor, state, exact);
+    if (slot < 0 || !slots_.is_by_default(state)) return;
+    const double start = absolute_sigma(sightings().states.sigma[kSensorStateSpecs[state].row], 1.0);
+    if (joint_.variance(slot) >= square(start)) joint_.forget(slot, 0.0, square(sigma));
   };
   narrow(kYaw, kCalibratedYaw_rad);
   narrow(kTimeOffset, kCalibratedOffset_s);

@@ -186,7 +186,7 @@ class slam {
   static arrays place(memory_layout *out, const wm_slam_params &params, const wm_setup &setup);
   static int lasting_states(const wm_slam_params &params, const wm_setup &setup);  // pose and calibration
   void note_range(int sensor, bool is_standard);
-  void note_calibrated(int sensor);
+  void note_calibrated(int sensor, unsigned exact);
   bool has_standard() const;
   void follow_scale();
   bool sees_many() const { return outliers_.before >= kManyBearings; }  // in the picture before
@@ -360,7 +360,6 @@ class slam {
   int32_t nameless_[kSlamSensors];  // sightings, none of them with an identity; -1: one had
   sensor_slots slots_;
   unsigned components_;                  // of expect(): whether the angle scale is a state
-  unsigned calibrated_;                  // sensors, by bit, whose sigmas were complete
   unsigned standards_, scaled_;          // sensors, by bit, whose ranges came: without a scale, with the default's
   int stamp_state_[kSlamSensors];        // error of the newest picture's stamp; -1: off
   wm_time_ns picture_ns_[kSlamSensors];  // that stamp

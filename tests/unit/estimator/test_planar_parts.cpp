@@ -344,8 +344,8 @@ void test_states_come_and_go_with_the_kind_of_the_motion(void) {
   TEST_ASSERT_GREATER_OR_EQUAL(0, filter->motion_state(wm::kSpeedScale));
 }
 
-// Twists without the steps of counts, of a robot by counts with and without a gyro: the low-pass of 0.1 s, and with a
-// dead band of a count's noise. Where counts give neither speed nor turn the twist is as it is.
+// Twists without the steps of counts, of a robot by counts with and without a gyro: the low-pass of 0.1 s, of 0.3 s for
+// turns, and with a dead band of a count's noise. Where counts give neither speed nor turn the twist is as it is.
 void test_rates_without_the_steps_of_counts(void) {
   constexpr double kTick_m = 2 * M_PI * 0.1 / 1000, kEach_s = 0.02;
   for (const int model : {WM_MOTION_TICKS, WM_MOTION_SPEED_YAW_RATE, WM_MOTION_TWIST}) {
@@ -366,10 +366,11 @@ void test_rates_without_the_steps_of_counts(void) {
             {{WM_Q_YAW_RATE, 0.3 + 0.01 * (i % 3)}, {WM_Q_WHEEL_TICKS_LEFT, left}, {WM_Q_WHEEL_TICKS_RIGHT, right}}));
       else
         filter->move(make::quantities(t_s, {{WM_Q_WHEEL_TICKS_LEFT, left}, {WM_Q_WHEEL_TICKS_RIGHT, right}}));
-      const double v_sigma = i < 2 ? 0.0 : wheel_mps / std::sqrt(2.0), share = kEach_s / (kEach_s + 0.1);
+      const double v_sigma = i < 2 ? 0.0 : wheel_mps / std::sqrt(2.0);
       if (i == 0) continue;
-      v.step(filter->twist().v, share, v_sigma);
-      w.step(filter->twist().w, share, model == WM_MOTION_TICKS ? wheel_mps * std::sqrt(2.0) / 0.5 * (i >= 2) : 0.0);
+      v.step(filter->twist().v, kEach_s / (kEach_s + 0.1), v_sigma);
+      w.step(filter->twist().w, kEach_s / (kEach_s + 0.3),
+             model == WM_MOTION_TICKS ? wheel_mps * std::sqrt(2.0) / 0.5 * (i >= 2) : 0.0);
     }
     const wm::planar_twist given = {7.0, 8.0, 9.0}, low = filter->low_passed(given), band = filter->steady(given);
     const bool counts = model != WM_MOTION_TWIST, turns = model == WM_MOTION_TICKS;
@@ -377,6 +378,7 @@ void test_rates_without_the_steps_of_counts(void) {
     TEST_ASSERT_DOUBLE_WITHIN(1e-3, turns ? w.smooth : 9.0, low.w);
     TEST_ASSERT_DOUBLE_WITHIN(0.02, counts ? v.banded : 7.0, band.v);
     TEST_ASSERT_DOUBLE_WITHIN(0.1, turns ? w.banded : 9.0, band.w);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-3, turns ? 0.3 * (w.smooth - w.twice) : 0.0, filter->rounding_by_track());
     TEST_ASSERT_EQUAL_DOUBLE(8.0, low.u);
     TEST_ASSERT_EQUAL_DOUBLE(8.0, band.u);
     if (counts) TEST_ASSERT_GREATER_THAN_DOUBLE(1e-4, std::fabs(band.v - low.v));
