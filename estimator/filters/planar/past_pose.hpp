@@ -70,7 +70,7 @@ past_pose pose_before(const Filter &filter, double age_s) {
   out.rounding_by = filter.rounding_by_track();
   out.track_slot = out.rounding_by != 0.0 ? filter.motion_state(kTrackScale) : -1;
   out.lag_slot = filter.motion_state(kLag);
-  if (out.lag_slot >= 0) put_lag(filter.twist(), present.heading_rad, there, h, &out);
+  if (out.lag_slot >= 0) put_lag(filter.twist(), filter.twist_heading_rad(), there, h, &out);
   return out;
 }
 

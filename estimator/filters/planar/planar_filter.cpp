@@ -97,7 +97,7 @@ void planar_filter::move_to(wm_time_ns t_ns) {
 }
 
 void planar_filter::propagate(const motion_segment &piece, const motion_twist &twist, const motion_noise &noise) {
-  const pose_step step = make_pose_step(piece, twist, noise, x()[kHeading], twist_, motion_state_);
+  const pose_step step = make_pose_step(piece, twist, noise, x()[kHeading], twist_, twist_heading_rad_, motion_state_);
   // Rows: T = F P, in place. Rows 0 and 1 need the old row 2, so it comes last.
   double *rows[3] = {p(), p() + stride_, p() + 2 * stride_};
   for (int r = 0; r < 3; r++)
@@ -119,7 +119,7 @@ void planar_filter::propagate(const motion_segment &piece, const motion_twist &t
   x()[kX] += step.x_m;
   x()[kY] += step.y_m;
   x()[kHeading] = wrap(x()[kHeading] + step.turn_rad);
-  take_step(piece, twist, noise, step);
+  take_step(piece, twist, noise, step, x()[kHeading]);
 }
 
 void planar_filter::project(const planar_row &row, projection *out) const {

@@ -32,7 +32,7 @@ void planar_motion::init_motion(const wm_setup &setup) {
   for (steady_rate &rate : steady_) rate.restart(0.0);
   noise_.init(0.0);
   turn_test_.init();
-  heading_rad_ = 0.0;
+  heading_rad_ = twist_heading_rad_ = 0.0;
   sensor_states_ = 0;
 }
 
@@ -108,7 +108,7 @@ bool planar_motion::is_turn(const motion_twist &twist, const motion_noise &noise
 }
 
 void planar_motion::take_step(const motion_segment &segment, const motion_twist &twist, const motion_noise &noise,
-                              const pose_step &step) {
+                              const pose_step &step, double heading_end_rad) {
   noise_.move(step.x_m, step.y_m, noise.adapted_distance_m2, noise.adapted_lateral_m2, noise.adapted_rotation_rad2);
   if (!has_velocity()) turn_test_.move(step.x_m, step.y_m, is_turn(twist, noise, segment.dt_s) ? step.turn_rad : 0.0);
   odom_ = compose(odom_, step.body);
@@ -119,6 +119,7 @@ void planar_motion::take_step(const motion_segment &segment, const motion_twist 
   else
     twist_ = segment.input.command ? segment.end : twist;
   heading_rad_ += step.turn_rad;
+  twist_heading_rad_ = heading_end_rad;
   double v_sigma, w_sigma;
   front_.count_noise(&v_sigma, &w_sigma);
   steady_[0].step(twist_.v, segment.dt_s / (segment.dt_s + kSteadySpeed_s), v_sigma);

@@ -50,7 +50,8 @@ class planar_motion {
   // Whether the path is known back to t_ns; before, the robot would seem to stand.
   bool is_path_known(wm_time_ns t_ns) const { return has_velocity() || front_.reaches(t_ns, calibration_); }
 
-  const planar_twist &twist() const { return twist_; }  // now, by the motion until now
+  const planar_twist &twist() const { return twist_; }             // now, by the motion until now
+  double twist_heading_rad() const { return twist_heading_rad_; }  // of its end, before later corrections
   const wm_motion_calibration &calibration() const { return calibration_; }
   uint32_t motion_health() const { return front_.health(); }
   uint64_t motion_outliers() const { return front_.outliers(); }
@@ -149,7 +150,7 @@ class planar_motion {
   bool is_turn(const motion_twist &twist, const motion_noise &noise, double dt_s) const;
   // Odometry over one such segment.
   void take_step(const motion_segment &segment, const motion_twist &twist, const motion_noise &noise,
-                 const pose_step &step);
+                 const pose_step &step, double heading_end_rad);
   // The first motion state beyond its limit, and the change that brings it back; -1: none. A filter moves the states
   // that are correlated with it along: the projection on the limit by the covariance [Simon2010].
   int beyond_limit(const double *states, double *back) const;
@@ -179,8 +180,9 @@ class planar_motion {
   wm_time_ns start_ns_;
   wm_pose2 odom_;
   double travelled_m_, turned_rad_;
-  planar_twist twist_;     // of the last segment
-  steady_rate steady_[2];  // of its v and w
+  planar_twist twist_;        // of the last segment
+  double twist_heading_rad_;  // at its end, as it was predicted
+  steady_rate steady_[2];     // of its v and w
   noise_adaption noise_;
   turn_check turn_test_;
   double heading_rad_;  // only where has_velocity()

@@ -68,7 +68,8 @@ pose_step make_velocity_step(double dt, const motion_twist &twist, const motion_
 }  // namespace
 
 pose_step make_pose_step(const motion_segment &segment, const motion_twist &twist, const motion_noise &noise,
-                         double heading_rad, const planar_twist &before, const int motion_state[kMotionStates]) {
+                         double heading_rad, const planar_twist &before, double before_heading_rad,
+                         const int motion_state[kMotionStates]) {
   const double dt = segment.dt_s;
   if (segment.input.model == WM_MOTION_CONSTANT_VELOCITY)
     return make_velocity_step(dt, twist, noise, heading_rad, motion_state);
@@ -101,15 +102,16 @@ pose_step make_pose_step(const motion_segment &segment, const motion_twist &twis
     if (state >= 0) add_column(state, twist.v_by[i] * dt, twist.u_by[i] * dt, twist.w_by[i] * dt);
   }
   // More lag: the interval contains more of the inputs before it, at its beginning, which rotates all that follows, and
-  // less of the last ones.
+  // less of the last ones. The two cancel from interval to interval.
   const int lag = motion_state[kLag];
   if (lag >= 0 && (segment.first || segment.last)) {
     const planar_twist &end = segment.input.command ? segment.end : twist;
     add_column(lag, segment.last ? -end.v : 0.0, segment.last ? -end.u : 0.0, segment.last ? -end.w : 0.0);
     if (segment.first) {
+      const sin_cos b = sincos(before_heading_rad);
       double *by = out.by[out.columns - 1];
-      by[0] += h.cos * before.v - dy * before.w - h.sin * before.u;
-      by[1] += h.sin * before.v + dx * before.w + h.cos * before.u;
+      by[0] += b.cos * before.v - dy * before.w - b.sin * before.u;
+      by[1] += b.sin * before.v + dx * before.w + b.cos * before.u;
       by[2] += before.w;
     }
   }

@@ -159,7 +159,8 @@ void joint_state::wander(double dt_s) {
 
 // Time update of P_rr and P_rm alone [FengND].
 void joint_state::propagate(const motion_segment &piece, const motion_twist &twist, const motion_noise &noise) {
-  const pose_step step = make_pose_step(piece, twist, noise, value(kHeading), twist_, motion_state_);
+  const pose_step step =
+      make_pose_step(piece, twist, noise, value(kHeading), twist_, twist_heading_rad_, motion_state_);
   const half_covariance cov = p();
   const int robot = layout_.robot_states;
   // Rows of T = F P over the robot's own states, where the columns of F lie on both sides of the diagonal ...
@@ -188,7 +189,7 @@ void joint_state::propagate(const motion_segment &piece, const motion_twist &twi
   mean[kX] += step.x_m;
   mean[kY] += step.y_m;
   mean[kHeading] = wrap(mean[kHeading] + step.turn_rad);
-  take_step(piece, twist, noise, step);
+  take_step(piece, twist, noise, step, value(kHeading));
 }
 
 void joint_state::list_motion_states(calibration_list *list) const {

@@ -344,6 +344,31 @@ void test_states_come_and_go_with_the_kind_of_the_motion(void) {
   TEST_ASSERT_GREATER_OR_EQUAL(0, filter->motion_state(wm::kSpeedScale));
 }
 
+// More lag moves the pose back by the twist, on the axes on which it was predicted. Corrections of the heading since do
+// not change that: else the lag and a sensor's time offset would not be observed as their sum alone.
+void test_corrections_of_the_heading_tell_nothing_of_the_lag(void) {
+  for (double &sigma : states.sigma) sigma = 0.0;
+  states.sigma[WM_LAG] = 0.2;
+  params.twist = WM_TWIST_COMMANDS;
+  begin(make::no_wheels());
+  const int lag = filter->motion_state(wm::kLag);
+  for (int i = 0; i <= 250; i++) {
+    filter->move(make::twist(0.04 * i, i < 25 ? 0.0 : 0.5, 0.0));
+    if (i % 25 != 0) continue;
+    wm::planar_row row;
+    row.add(wm::kHeading, 1.0);
+    wm::projection projected;
+    filter->project(row, &projected);
+    TEST_ASSERT_TRUE(filter->update(projected, 0.1, 1e-4));
+  }
+  filter->move(make::twist(10.04, 0.5, 0.0));
+  TEST_ASSERT_GREATER_THAN_DOUBLE(0.7, filter->pose().heading_rad);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.04, filter->variance(lag));
+  const double v = filter->twist().v, heading_rad = filter->pose().heading_rad;
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, -v * std::cos(heading_rad), filter->covariance(wm::kX, lag) / 0.04);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, -v * std::sin(heading_rad), filter->covariance(wm::kY, lag) / 0.04);
+}
+
 // Twists without the steps of counts, of a robot by counts with and without a gyro: the low-pass of 0.1 s, of 0.3 s for
 // turns, and with a dead band of a count's noise. Where counts give neither speed nor turn the twist is as it is.
 void test_rates_without_the_steps_of_counts(void) {
@@ -527,6 +552,7 @@ int main(void) {
   RUN_TEST(test_a_state_beyond_its_limit_takes_the_others_along);
   RUN_TEST(test_states_of_sensors_have_limits_and_walk);
   RUN_TEST(test_states_come_and_go_with_the_kind_of_the_motion);
+  RUN_TEST(test_corrections_of_the_heading_tell_nothing_of_the_lag);
   RUN_TEST(test_rates_without_the_steps_of_counts);
   RUN_TEST(test_the_variance_of_a_measurement_by_counts);
   RUN_TEST(test_an_unseen_heading_is_as_unsure_as_any);

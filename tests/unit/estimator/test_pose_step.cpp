@@ -16,7 +16,7 @@ struct vec3 {
 };
 
 struct at_work {
-  double heading = 0.7, dt_s = 0.4;
+  double heading = 0.7, before_heading = 0.72, dt_s = 0.4;  // a correction between
   wm::motion_twist twist{};
   wm::planar_twist before = {0.6, -0.2, 0.9};
   wm::motion_segment segment{};
@@ -32,7 +32,7 @@ struct at_work {
 
   wm::pose_step make(const wm::motion_noise &noise = kNoNoise) {
     segment.dt_s = dt_s;
-    return wm::make_pose_step(segment, twist, noise, heading, before, motion_state);
+    return wm::make_pose_step(segment, twist, noise, heading, before, before_heading, motion_state);
   }
 
   // Where it is after so much more of the twist and of the heading.
@@ -93,6 +93,7 @@ vec3 with_lag(const at_work &work, double more, bool first, bool last) {
   begin.twist.v = work.before.v;
   begin.twist.u = work.before.u;
   begin.twist.w = work.before.w;
+  begin.heading = work.before_heading;
   begin.dt_s = first ? more : 0.0;
   const wm::pose_step a = begin.make();
   rest.heading += a.turn_rad;
