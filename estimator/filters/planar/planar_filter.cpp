@@ -226,6 +226,7 @@ void planar_filter::set_pose(const wm_pose2 &pose, const double covariance[3][3]
   for (int i = 0; i < 3; i++) forget(i, value[i], 0.0);
   for (int i = 0; i < 3; i++)
     for (int j = 0; j < 3; j++) p()[i * stride_ + j] = i <= j ? covariance[i][j] : covariance[j][i];
+  twist_heading_rad_ = value[kHeading];
   noise_.restart(false);
   turn_test_.restart();
   wheels_.restart();

@@ -240,6 +240,7 @@ void joint_state::draw_to(int state, int mean, double factor, double added_varia
 void joint_state::set_pose(const wm_pose2 &pose, const double covariance[3][3]) {
   const double value[3] = {pose.x_m, pose.y_m, wrap(pose.heading_rad)};
   for (int i = 0; i < 3; i++) forget(i, value[i], 0.0);
+  twist_heading_rad_ = value[kHeading];
   scale_origin_m_[0] = value[0];
   scale_origin_m_[1] = value[1];
   for (int i = 0; i < 3; i++)
@@ -261,7 +262,7 @@ void joint_state::shift_pose(const wm_pose2 &to, const double added[3][3]) {
   double *mean = x();
   mean[kX] = to.x_m;
   mean[kY] = to.y_m;
-  mean[kHeading] = wrap(to.heading_rad);
+  mean[kHeading] = twist_heading_rad_ = wrap(to.heading_rad);
 }
 
 void joint_state::inflate_pose(double xy_m2, double heading_rad2) {

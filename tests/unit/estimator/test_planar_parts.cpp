@@ -367,6 +367,12 @@ void test_corrections_of_the_heading_tell_nothing_of_the_lag(void) {
   const double v = filter->twist().v, heading_rad = filter->pose().heading_rad;
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, -v * std::cos(heading_rad), filter->covariance(wm::kX, lag) / 0.04);
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, -v * std::sin(heading_rad), filter->covariance(wm::kY, lag) / 0.04);
+  // A pose that is given is no correction: from there on the robot has moved by the twist on new axes.
+  const double exact[3][3] = {{1e-6, 0, 0}, {0, 1e-6, 0}, {0, 0, 1e-8}};
+  filter->set_pose({0, 0, -1.0}, exact);
+  filter->move(make::twist(10.08, 0.5, 0.0));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.0, filter->covariance(wm::kX, lag));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.0, filter->covariance(wm::kY, lag));
 }
 
 // Twists without the steps of counts, of a robot by counts with and without a gyro: the low-pass of 0.1 s, of 0.3 s for
