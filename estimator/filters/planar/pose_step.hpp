@@ -24,9 +24,9 @@ struct pose_step {
   double noise[kPoseStates][kPoseStates];  // upper triangle
 };
 
-// `before`: the twist that held until the segment began, and the heading then, before the corrections since [Huang2010].
-// `motion_state`: index of each calibration state, -1 where off. F and W of [Stepanov2017], with exact arcs in place of
-// the first-order step, and a column for each calibration state.
+// `before`: the twist that held until the segment began, and the heading then, before the corrections since
+// [Huang2010]. `motion_state`: index of each calibration state, -1 where off. F and W of [Stepanov2017], with exact
+// arcs in place of the first-order step, and a column for each calibration state.
 pose_step make_pose_step(const motion_segment &segment, const motion_twist &twist, const motion_noise &noise,
                          double heading_rad, const planar_twist &before, double before_heading_rad,
                          const int motion_state[kMotionStates]);
