@@ -17,7 +17,7 @@ extern "C" {
 // ONE(state, key, unit, name, neutral, low, high, WALK or CONSTANT, initial, most, text)
 // TWO(state, second, key, unit, name, second name, neutral, low, high, ..., initial, most, text): two states, one sigma
 // `low` and `high`: an update is cut there, since the model no longer holds. `initial` and `most` are of the sigma
-// parameter. Below 0: see its text in the table. slam ignores the state for complete sigmas (slam::reading_of).
+// parameter. Below 0: see its text in the table. slam ignores most states for complete sigmas (slam::exact_states).
 // Defaults are what a tape measure and a data sheet leave open. The mounting's yaw is flat from 0.05 to 0.1.
 // clang-format off
 #define WM_SENSOR_STATES(ONE, TWO) \
