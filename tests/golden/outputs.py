@@ -5,6 +5,9 @@ A change of any bit of a trajectory, an innovation or a detection is a change of
 
     outputs.py BIN check              compares; exit code 1 and a diff where anything changed
     outputs.py BIN accept "REASON"    writes the files anew; the reason belongs into the commit message
+    outputs.py BIN near CHECKOUT      the same but for rounding? Compares with the programs in CHECKOUT/build/bin, by the
+                                      configurations of CHECKOUT, on the same drives: verdicts, states and counts equal,
+                                      poses within 1e-9 m and rad, sigmas within 1e-9 of themselves (tests/golden/near.py)
 
 The simulator makes the same bytes from a scenario and its seed on every machine; nothing else is read."""
 import csv
@@ -16,6 +19,8 @@ import shutil
 import subprocess
 import sys
 import tempfile
+
+import near
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 OUTPUTS = ROOT / "tests/golden/outputs"
@@ -96,17 +101,44 @@ def output_of(folder, config, world, seconds):
     return "\n".join(out) + "\n"
 
 
+def simulate(binaries, folder, world, seconds):
+    """The recording of a drive; several drives may share one."""
+    recording = folder / f"{world}-{seconds}"
+    if not recording.exists():
+        run(binaries / "waymark-simulate", ROOT / f"config/worlds/{world}.yaml", "--duration", seconds, "--out", recording)
+    return recording
+
+
+def replay(binaries, root, recording, config, out):
+    run(binaries / "waymark", "replay", recording, "--config", root / f"config/datasets/{config}.yaml", "--out", out)
+
+
 def make(binaries, folder):
     """Output of each drive, by its file's name."""
     out = {}
     for config, world, seconds in DRIVES:
-        recording = folder / f"{world}-{seconds}"
-        if not recording.exists():
-            run(binaries / "waymark-simulate", ROOT / f"config/worlds/{world}.yaml", "--duration", seconds, "--out", recording)
-        run(binaries / "waymark", "replay", recording, "--config", ROOT / f"config/datasets/{config}.yaml", "--out", folder / config)
+        replay(binaries, ROOT, simulate(binaries, folder, world, seconds), config, folder / config)
         out[f"{config}.txt"] = output_of(folder / config, config, world, seconds)
         shutil.rmtree(folder / config)
     return out
+
+
+def check_near(binaries, reference, folder):
+    """One line for each drive: the largest differences from what the reference's programs make of it."""
+    is_near = True
+    for config, world, seconds in DRIVES:
+        recording = simulate(binaries, folder, world, seconds)
+        replay(binaries, ROOT, recording, config, folder / "now")
+        replay(reference / "build/bin", reference, recording, config, folder / "was")
+        of = near.compare(folder / "was", folder / "now")
+        differences = ", ".join(f"{near.NAMES[kind]}: {worst:.1e}" for kind, worst in of.worst.items())
+        print(f"{config}: {'near' if not of.faults else 'DIFFERS'}; {of.verdicts} verdicts; {differences}")
+        for fault in of.faults:
+            print(f"  {fault}")
+        is_near = is_near and not of.faults
+        for name in ("now", "was"):
+            shutil.rmtree(folder / name)
+    return 0 if is_near else 1
 
 
 def check(made):
@@ -132,10 +164,16 @@ def accept(made, reason):
 
 
 def main():
-    if len(sys.argv) < 3 or (sys.argv[2] == "accept") != (len(sys.argv) == 4) or sys.argv[2] not in ("check", "accept"):
-        sys.exit(__doc__)
+    words = {"check": 3, "accept": 4, "near": 4}  # of a command line
+    if len(sys.argv) < 3 or words.get(sys.argv[2]) != len(sys.argv):
+        is_asked = sys.argv[1:] in (["--help"], ["-h"])
+        print(__doc__, file=sys.stdout if is_asked else sys.stderr)
+        return 0 if is_asked else 2
+    binaries = pathlib.Path(sys.argv[1])
     with tempfile.TemporaryDirectory() as folder:
-        made = make(pathlib.Path(sys.argv[1]), pathlib.Path(folder))
+        if sys.argv[2] == "near":
+            return check_near(binaries, pathlib.Path(sys.argv[3]).resolve(), pathlib.Path(folder))
+        made = make(binaries, pathlib.Path(folder))
     return check(made) if sys.argv[2] == "check" else accept(made, sys.argv[3])
 
 
