@@ -48,6 +48,20 @@ class FloorPlans(Folder):
         picture = np.asarray(Image.open(self.folder / "map" / about["image"]))
         self.assertEqual(int(picture[0, 55]), 205)  # the picture's first row is the map's uppermost
 
+    def test_a_picture_of_16_bits_has_the_same_cells(self):
+        (self.folder / "map.yaml").write_text("image: plan.png\nresolution: 0.05\norigin: [0, 0, 0]\n")
+        grey = np.array([[0, 100, 205, 254]], dtype=np.uint16)
+        for levels in (grey.astype(np.uint8), grey * 257):
+            Image.fromarray(levels).save(self.folder / "plan.png")
+            self.assertEqual(waymark.read_floor_plan(self.folder / "map.yaml").cells.tolist(), [[OCCUPIED, UNKNOWN, UNKNOWN, FREE]], levels.dtype)
+        (self.folder / "plan.png").write_bytes(b"P5\n4 1\n65535\n" + (grey * 257).astype(">u2").tobytes())  # a PGM by its content
+        self.assertEqual(waymark.read_floor_plan(self.folder / "map.yaml").cells.tolist(), [[OCCUPIED, UNKNOWN, UNKNOWN, FREE]])
+
+    def test_what_is_transparent_lies_on_white(self):
+        (self.folder / "map.yaml").write_text("image: plan.png\nresolution: 0.05\norigin: [0, 0, 0]\n")
+        Image.fromarray(np.array([[[0, 0, 0, 0], [0, 0, 0, 255]]], dtype=np.uint8)).save(self.folder / "plan.png")
+        self.assertEqual(waymark.read_floor_plan(self.folder / "map.yaml").cells.tolist(), [[FREE, OCCUPIED]])
+
     def test_cells_and_places_invert(self):
         rows, columns = np.mgrid[0:40:7, 0:60:7]
         x, y = plan().centre_of(rows.ravel(), columns.ravel())

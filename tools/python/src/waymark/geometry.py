@@ -16,8 +16,13 @@ def rotation(xyzw: ArrayLike) -> Array:
 
 
 def quaternion(matrix: Array) -> Array:
-    """Quaternion x, y, z, w of a rotation matrix, w >= 0: the eigenvector of Bar-Itzhack's matrix for the largest eigenvalue."""
+    """Quaternion x, y, z, w of a rotation matrix, w >= 0: the eigenvector of Bar-Itzhack's matrix for the largest eigenvalue.
+
+    NaN where the matrix has a NaN.
+    """
     m = np.asarray(matrix, dtype=float)
+    if not np.isfinite(m).all():
+        return np.full(4, np.nan)
     k = np.array([[m[0, 0] - m[1, 1] - m[2, 2], m[0, 1] + m[1, 0], m[0, 2] + m[2, 0], m[2, 1] - m[1, 2]],
                   [m[0, 1] + m[1, 0], m[1, 1] - m[0, 0] - m[2, 2], m[1, 2] + m[2, 1], m[0, 2] - m[2, 0]],
                   [m[0, 2] + m[2, 0], m[1, 2] + m[2, 1], m[2, 2] - m[0, 0] - m[1, 1], m[1, 0] - m[0, 1]],
@@ -35,8 +40,10 @@ def from_rpy(roll: float, pitch: float, yaw: float) -> Array:
 
 
 def to_rpy(matrix: Array) -> tuple[float, float, float]:
-    """Roll, pitch and yaw of a rotation matrix, rad; at a pitch of +-90 degrees the roll is 0."""
+    """Roll, pitch and yaw of a rotation matrix, rad; at a pitch of +-90 degrees the roll is 0. NaN where the matrix has a NaN."""
     m = np.asarray(matrix, dtype=float)
+    if not np.isfinite(m).all():
+        return np.nan, np.nan, np.nan
     if abs(m[2, 0]) > 1 - 1e-12:
         return 0.0, float(-np.sign(m[2, 0]) * np.pi / 2), float(np.arctan2(-m[0, 1], m[1, 1]))
     return (float(np.arctan2(m[2, 1], m[2, 2])), float(-np.arcsin(m[2, 0])), float(np.arctan2(m[1, 0], m[0, 0])))

@@ -20,7 +20,7 @@ FREE, OCCUPIED, UNKNOWN = 0, 100, -1
 """Values of `FloorPlan.cells`, as nav_msgs/OccupancyGrid has them."""
 
 _GREY = {FREE: 254, OCCUPIED: 0, UNKNOWN: 205}  # as map_saver of ROS writes them
-_FREE_BELOW, _OCCUPIED_ABOVE = 0.196, 0.65  # defaults of map_server
+_SHARES = {"free_thresh": 0.196, "occupied_thresh": 0.65, "negate": 0.0}  # defaults of map_server
 _SIDE_MAX_PX = 1 << 15  # of a picture; larger ones are a mistake or an attack
 
 
@@ -43,6 +43,9 @@ class FloorPlan:
         shapes = {layer.shape for layer in (self.cells, self.edges, self.drivable) if layer is not None}
         if len(shapes) != 1 or any(len(shape) != 2 for shape in shapes):
             raise ValueError(f"a floor plan needs layers of one shape (rows, columns); these have {sorted(shapes) or 'none'}")
+        for name in ("cells", "edges", "drivable"):
+            if getattr(self, name) is not None and not np.isfinite(getattr(self, name)).all():
+                raise ValueError(f"a floor plan's {name} are not finite: some are NaN or infinite")
         if not (np.isfinite(self.resolution_m) and self.resolution_m > 0 and np.isfinite(self.origin).all()):
             raise ValueError(f"a floor plan's resolution has to be positive and its origin finite: {self.resolution_m}, {self.origin}")
 
@@ -53,7 +56,12 @@ class FloorPlan:
         return int(layer.shape[0]), int(layer.shape[1])
 
     def cell_of(self, x_m: Array, y_m: Array) -> tuple[Array, Array]:
-        """Rows and columns (int64) of the cells in which points of the map lie; outside of the plan they are outside of its shape."""
+        """Rows and columns (int64) of the cells in which points of the map lie; outside of the plan they are outside of its shape.
+
+        ValueError: a point is not finite.
+        """
+        if not (np.isfinite(x_m).all() and np.isfinite(y_m).all()):
+            raise ValueError("a point whose cell is asked for is not finite")
         c, s = np.cos(self.origin[2]), np.sin(self.origin[2])
         dx, dy = np.asarray(x_m) - self.origin[0], np.asarray(y_m) - self.origin[1]
         along, across = (c * dx + s * dy) / self.resolution_m, (c * dy - s * dx) / self.resolution_m
@@ -72,7 +80,12 @@ def _grey(path: Path, about: Path) -> Array:
         with Image.open(path) as picture:
             if max(picture.size) > _SIDE_MAX_PX:
                 raise ValueError(f"{path}: {picture.size[0]} x {picture.size[1]} pixels; up to {_SIDE_MAX_PX} a side are read")
-            return np.asarray(picture.convert("L"))[::-1].copy()
+            if picture.mode.startswith("I"):  # 16 bits, whose convert("L") cuts at 255
+                return np.round(np.asarray(picture, dtype=np.float64) / 257).astype(np.uint8)[::-1]
+            opaque: Image.Image = picture
+            if picture.has_transparency_data:  # lies on white, as it does for the programs
+                opaque = Image.alpha_composite(Image.new("RGBA", picture.size, "white"), picture.convert("RGBA"))
+            return np.asarray(opaque.convert("L"))[::-1].copy()
     except FileNotFoundError:
         raise FileNotFoundError(f"{about}: its picture {path} is not there") from None
     except (OSError, Image.DecompressionBombError) as error:
@@ -89,17 +102,20 @@ def read_floor_plan(path: str | Path) -> FloorPlan:
         about = yaml.safe_load(file.read_text(encoding="utf-8"))
         resolution_m, given = float(about["resolution"]), [float(value) for value in about["origin"]]
         layers = {str(name): str(picture) for name, picture in (about.get("layers") or {}).items()}
-        free, occupied = float(about.get("free_thresh", _FREE_BELOW)), float(about.get("occupied_thresh", _OCCUPIED_ABOVE))
+        shares = {key: float(about.get(key, default)) for key, default in _SHARES.items()}
         x_m, y_m, yaw = (*given, 0.0)[:3]
     except (yaml.YAMLError, TypeError, KeyError, ValueError, AttributeError) as error:
         raise ValueError(f"{file}: this is not a map with image, resolution and origin: {type(error).__name__}: {error}") from None
+    for key, value in shares.items():
+        if not 0 <= value <= 1:
+            raise ValueError(f"{file}: {key} is {value}; it has to be from 0 to 1")
     cells = None
     if about.get("image") and (file.parent / str(about["image"])).is_file() or not layers:
         grey = _grey(file.parent / str(about.get("image", "")), file) / 255.0
-        dark = grey if about.get("negate") else 1.0 - grey
+        dark = grey if shares["negate"] else 1.0 - grey
         cells = np.full(dark.shape, UNKNOWN, dtype=np.int8)
-        cells[dark > occupied] = OCCUPIED
-        cells[dark < free] = FREE
+        cells[dark > shares["occupied_thresh"]] = OCCUPIED
+        cells[dark < shares["free_thresh"]] = FREE
     masks = {name: _grey(file.parent / layers[name], file) >= 128 if name in layers else None for name in ("edges", "drivable")}
     return FloorPlan(resolution_m, (x_m, y_m, yaw), cells, masks["edges"], masks["drivable"])
 
@@ -118,7 +134,7 @@ def write_floor_plan(path: str | Path, plan: FloorPlan) -> None:
         grey = np.select([plan.cells == FREE, plan.cells == OCCUPIED], [_GREY[FREE], _GREY[OCCUPIED]], _GREY[UNKNOWN])
         about["image"] = picture("plan", grey)
     about.update(resolution=float(plan.resolution_m), origin=[float(value) for value in plan.origin], negate=0,
-                 occupied_thresh=_OCCUPIED_ABOVE, free_thresh=_FREE_BELOW)
+                 occupied_thresh=_SHARES["occupied_thresh"], free_thresh=_SHARES["free_thresh"])
     layers = {name: picture(name, 255 * np.asarray(mask, dtype=bool)) for name, mask in (("edges", plan.edges), ("drivable", plan.drivable))
               if mask is not None}
     if layers:
@@ -150,6 +166,8 @@ def write_landmarks(path: str | Path, table: Table) -> None:
     if missing:
         raise ValueError(f"{path}: landmarks need the column {missing[0]}")
     count = len(table["id"])
+    if not np.isfinite(np.asarray(table["id"], dtype=np.float64)).all():
+        raise ValueError(f"{path}: an identity is not a number")
     out: Table = {"id": np.asarray(table["id"], dtype=np.int64), "x_m": np.asarray(table["x_m"]), "y_m": np.asarray(table["y_m"]),
                   "z_m": np.asarray(table.get("z_m", np.zeros(count)))}
     if "sigma_m" in table:

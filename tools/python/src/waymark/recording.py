@@ -174,10 +174,11 @@ class RecordingWriter:
         if key is not None:
             order = np.argsort(key, kind="stable")
             table = {column: np.asarray(values)[order] for column, values in table.items()}
-            self._times += [int(table["t_ns"].min()), int(table["t_ns"].max())] if len(order) else []
         path = self.path / name
         path.parent.mkdir(parents=True, exist_ok=True)
         write_table(path, table)
+        if key is not None and len(key):
+            self._times += [int(table["t_ns"].min()), int(table["t_ns"].max())]
         self._streams.append(name)
 
     def file(self, name: str, data: bytes) -> None:

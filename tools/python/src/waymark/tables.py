@@ -73,9 +73,19 @@ def field_text(value: Any) -> str:
     return "" if np.isnan(value) else repr(float(value))
 
 
+def _to_write(path: str | Path, name: str, column: Array) -> Array:
+    if is_text(name) or not is_integer(name) or column.dtype.kind != "f":
+        return column
+    whole = np.isfinite(column) & (column == np.round(column))
+    if not whole.all():
+        row = int(np.argmin(whole))
+        raise ValueError(f"{path}: column {name} holds whole numbers, but row {row} has {column[row]}")
+    return column.astype(np.int64)
+
+
 def write_table(path: str | Path, table: Table) -> None:
-    """Writes columns of equal lengths as CSV."""
-    columns = [np.asarray(column) for column in table.values()]
+    """Writes columns of equal lengths as CSV. ValueError: their lengths differ, or a column of integers has something else, as NaN."""
+    columns = [_to_write(path, name, np.asarray(column)) for name, column in table.items()]
     if len({len(column) for column in columns}) > 1:
         raise ValueError(f"{path}: the columns have different lengths")
     with Path(path).open("w", newline="", encoding="utf-8") as file:
