@@ -9,6 +9,8 @@
 
 #include "waymark/yaml.h"
 
+#define ATT_LINE_MAX 1024  // bytes; gpsd's longest ATT, with all its fields, is about 600
+
 static const char *const kFixNames[GPSD_FIX_COUNT] = {"fix",
                                                       "fix without corrections",
                                                       "DGPS",
@@ -101,13 +103,34 @@ static void take_numbers(const wm_yaml_node *report, gpsd_report *out) {
   }
 }
 
+// gpsd 3.22 writes the time of an ATT with a comma too many before it and none behind it; `out` is without both. 0: no
+// room.
+static size_t mended(const char *line, size_t length, char *out, size_t capacity) {
+  size_t count = 0;
+  for (size_t i = 0; i < length; i++) {
+    if (count + 2 > capacity) return 0;
+    if (i > 0 && line[i] == ',' && line[i - 1] == ',') continue;
+    if (i > 1 && line[i] == '"' && line[i - 1] == '"' && line[i - 2] == 'Z') out[count++] = ',';
+    out[count++] = line[i];
+  }
+  return count;
+}
+
+static wm_status parse(const char *line, size_t length, wm_yaml **out) {
+  char text[ATT_LINE_MAX];
+  wm_error ignored;
+  const wm_status status = wm_yaml_parse(line, length, "gpsd", out, &ignored);
+  if (status == WM_OK) return status;
+  const size_t count = mended(line, length, text, sizeof text);
+  return count > 0 ? wm_yaml_parse(text, count, "gpsd", out, &ignored) : status;
+}
+
 const char *gpsd_report_read(const char *line, size_t length, gpsd_report *out) {
   char time[40] = "";
   wm_yaml *document = NULL;
-  wm_error ignored;
   memset(out, 0, sizeof *out);
   if (length == 0 || line[0] != '{') return "is not a JSON object";
-  if (wm_yaml_parse(line, length, "gpsd", &document, &ignored) != WM_OK) return "is not valid JSON";
+  if (parse(line, length, &document) != WM_OK) return "is not valid JSON";
   const wm_yaml_node report = wm_yaml_root(document);
   out->kind = class_of(&report);
   take_text(&report, out->kind == GPSD_DEVICE ? "path" : "device", out->device, sizeof out->device);

@@ -62,6 +62,16 @@ static void other_reports_are_read(void) {
   expect("{}");
 }
 
+// What gpsdecode 3.22 prints for an HDT behind a GST: no valid JSON, and the deviations as accelerations.
+static void headings_of_gpsd_322_are_read(void) {
+  expect(
+      "{\"class\":\"ATT\",\"device\":\"stdin\",,\"time\":\"2024-03-23T12:00:00.000Z\"\"heading\":123.400,\"dip\":0.022,"
+      "\"acc_len\":0.020}");
+  TEST_ASSERT_EQUAL(GPSD_ATT, report.kind);
+  TEST_ASSERT_EQUAL_DOUBLE(123.4, report.heading_deg);
+  TEST_ASSERT_EQUAL_INT64(1711195200 * WM_NS_PER_S, report.time_ns);
+}
+
 static void broken_lines_are_refused(void) {
   static const char *const kBroken[] = {
       "",         "[]",         "{",          "{\"class\"", "{\"class\":", "{\"class\":\"TPV", "{\"a\":[1,2",
@@ -92,6 +102,7 @@ int main(void) {
   UNITY_BEGIN();
   RUN_TEST(positions_are_read);
   RUN_TEST(other_reports_are_read);
+  RUN_TEST(headings_of_gpsd_322_are_read);
   RUN_TEST(broken_lines_are_refused);
   RUN_TEST(places_are_metres_about_the_origin);
   return UNITY_END();
