@@ -202,6 +202,7 @@ static wm_status bind_signal(maker *m, const char *name) {
   if (status != WM_OK) return status;
   bound_signal *out = &m->self->signals[m->self->signal_count++];
   *out = (bound_signal){.bits = s->bits, .factor = s->factor, .offset = s->offset};
+  (void)snprintf(out->name, sizeof out->name, "%s", name);
   if (signal_bytes(&s->bits) > m->message->length)
     return refuse(m, "%s (%s:%d) needs %u bytes, but %s has %u; one of the two is wrong in the DBC", name, m->dbc->path,
                   s->line, signal_bytes(&s->bits), m->binding->message, m->message->length);
@@ -335,16 +336,17 @@ static wm_status bind_group(maker *m, const wm_can_binding *bindings, size_t cou
     if (++out->quantity_count > WM_QUANTITIES_MAX)
       return refuse(m, "more than %d quantities from one message", WM_QUANTITIES_MAX);
   }
-  out->key = dbc_key(m->message->id, m->message->is_extended);
+  out->match = wm_dbc_match(m->dbc, m->message);
   (void)snprintf(out->bus, sizeof out->bus, "%s", bindings[first].bus);
   (void)snprintf(out->name, sizeof out->name, "%s", bindings[first].message);
   find_counter(m, out);
   return WM_OK;
 }
 
-static int by_key(const void *a, const void *b) {
-  uint64_t x = ((const bound_message *)a)->key, y = ((const bound_message *)b)->key;
-  return (x > y) - (x < y);
+static int by_id(const void *a, const void *b) {
+  const bound_message *x = a, *y = b;
+  if (x->match.id != y->match.id) return x->match.id > y->match.id ? 1 : -1;
+  return x->match.is_extended - y->match.is_extended;
 }
 
 static wm_can_decoder *allocate(size_t dbc_ranges) {
@@ -381,7 +383,7 @@ wm_status wm_can_decoder_make(const wm_dbc *dbc, const wm_can_binding *bindings,
     wm_can_decoder_free(m.self);
     return status;
   }
-  qsort(m.self->messages, m.self->message_count, sizeof *m.self->messages, by_key);
+  qsort(m.self->messages, m.self->message_count, sizeof *m.self->messages, by_id);
   *out = m.self;
   return WM_OK;
 }

@@ -9,16 +9,15 @@
 #include "can_clock.h"
 #include "waymark/devices.h"
 
-#define IDS_MAX 4096                        // above all 2048 standard ids and any vehicle's extended ones
+#define FILTERS_MAX WM_CAN_COUNT            // a bound message has one quantity at least
 #define LOOK_EVERY_NS (500 * WM_NS_PER_MS)  // for an absent interface, or another one by the same name
 
 typedef struct can_device {
   wm_source base;
   char interface[WM_CAN_IFACE_MAX];
   wm_can_decoder *decoder;
-  uint32_t *ids;
-  uint8_t *is_extended;
-  size_t id_count;
+  wm_can_match filters[FILTERS_MAX];
+  size_t filter_count;
   const can_io *io;
   void *io_context;
   int socket;  // -1: not open
@@ -60,7 +59,7 @@ static void refused(can_device *self, int reason) {
 }
 
 static void open_it(can_device *self, unsigned index) {
-  int fd = self->io->open(self->io_context, index, self->ids, self->is_extended, self->id_count);
+  int fd = self->io->open(self->io_context, index, self->filters, self->filter_count);
   if (fd < 0) {
     refused(self, -fd);
     return;
@@ -183,8 +182,6 @@ static void close_device(wm_source *base) {
   can_device *self = (can_device *)base;
   drop_socket(self);
   wm_can_decoder_free(self->decoder);
-  free(self->ids);
-  free(self->is_extended);
   free(self);
 }
 
@@ -207,14 +204,7 @@ wm_status can_device_make(const char *interface, wm_can_decoder *decoder, const 
   self->socket = -1;
   (void)snprintf(self->base.name, sizeof self->base.name, "can");
   (void)snprintf(self->interface, sizeof self->interface, "%s", interface);
-  self->ids = calloc(IDS_MAX, sizeof *self->ids);
-  self->is_extended = calloc(IDS_MAX, sizeof *self->is_extended);
-  if (!self->ids || !self->is_extended) {
-    close_device(&self->base);
-    return wm_fail(err, WM_IO, "%s: no memory to open it", interface);
-  }
-  if (decoder) self->id_count = wm_can_decoder_ids(decoder, self->ids, self->is_extended, IDS_MAX);
-  if (self->id_count > IDS_MAX) self->id_count = IDS_MAX;
+  if (decoder) self->filter_count = wm_can_decoder_matches(decoder, self->filters, FILTERS_MAX);
   *out = &self->base;
   return WM_OK;
 }

@@ -19,8 +19,8 @@ typedef struct can_received {
 typedef struct can_io {
   // Index of the interface of this name, 0 without one; *is_up by its flags.
   unsigned (*find)(void *context, const char *interface, int *is_up);
-  // A bound raw socket for these ids (none: for all) and all error frames: its number, or -errno.
-  int (*open)(void *context, unsigned interface_index, const uint32_t *ids, const uint8_t *is_extended, size_t count);
+  // A bound raw socket for these frames (none: for all) and all error frames: its number, or -errno.
+  int (*open)(void *context, unsigned interface_index, const wm_can_match *filters, size_t count);
   // 1: *out is filled; 0: no frame within `wait_ms`; -errno.
   int (*receive)(void *context, int socket, int wait_ms, can_received *out);
   void (*close)(void *context, int socket);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // One line of `candump -l`, also as `candump -L`, python-can and canplayer write and read it:
 //
+//   (2026-01-31 07:05:09.000001) can0 123#    by `candump -L -tA`: local time, taken as UTC
 //   (1.000001) can0 123#                      classic, no data; three digits are an 11-bit id
 //   (1.000001) can0 12345678#DEADBEEF         classic; eight digits are a 29-bit id
 //   (1.000001) can0 123#1122334455667788_9    classic with the raw DLC 9; it still carries 8 bytes
@@ -48,7 +49,39 @@ static wm_status screen_output(wm_error *err, const char *seen) {
                  seen);
 }
 
-// "(SECONDS[.FRACTION])" into nanoseconds, exactly: no floating point.
+// Days from 1970-01-01 to a date of the Gregorian calendar. A year begins with March, so that a leap day is its last;
+// 400 years have 146097 days, and 719468 days lie between 0000-03-01 and 1970-01-01.
+static int64_t days_to(int year, int month, int day) {
+  const int64_t y = month > 2 ? year : year - 1, era = y / 400, of_era = y % 400;
+  const int64_t of_year = (153 * (month > 2 ? month - 3 : month + 9) + 2) / 5 + day - 1;
+  return era * 146097 + of_era * 365 + of_era / 4 - of_era / 100 + of_year - 719468;
+}
+
+// `count` digits as a number; -1 where there are others.
+static int fixed_digits(cursor *in, int count) {
+  int value = 0;
+  for (; count > 0 && is_digit(peek(in)); count--) value = value * 10 + (*in->at++ - '0');
+  return count == 0 ? value : -1;
+}
+
+static int passed(cursor *in, char mark) { return peek(in) == mark && in->at++ != NULL; }
+
+// "2020-12-19 12:04:45" as seconds since 1970, as if it were UTC; 0 where there is none.
+static int take_date(cursor *in, uint64_t *seconds) {
+  cursor at = *in;
+  const int year = fixed_digits(&at, 4), month = passed(&at, '-') ? fixed_digits(&at, 2) : -1;
+  const int day = passed(&at, '-') ? fixed_digits(&at, 2) : -1;
+  const int hour = passed(&at, ' ') || passed(&at, 'T') ? fixed_digits(&at, 2) : -1;
+  const int minute = passed(&at, ':') ? fixed_digits(&at, 2) : -1,
+            second = passed(&at, ':') ? fixed_digits(&at, 2) : -1;
+  if (year < 1970 || year > 2200 || month < 1 || month > 12 || day < 1 || day > 31) return 0;
+  if (hour < 0 || hour > 23 || minute < 0 || minute > 59 || second < 0 || second > 60) return 0;
+  *seconds = (uint64_t)(days_to(year, month, day) * 86400 + hour * 3600 + minute * 60 + second);
+  *in = at;
+  return 1;
+}
+
+// "(SECONDS[.FRACTION])" or "(DATE TIME[.FRACTION])" into nanoseconds, exactly: no floating point.
 static wm_status parse_time(cursor *in, wm_time_ns *out, wm_error *err) {
   if (peek(in) != '(') return wm_fail(err, WM_BAD_DATA, "a line begins with its time, (SECONDS.MICROS)");
   in->at++;
@@ -56,15 +89,13 @@ static wm_status parse_time(cursor *in, wm_time_ns *out, wm_error *err) {
   const char *close = memchr(in->at, ')', (size_t)(in->end - in->at));
   if (!close) return wm_fail(err, WM_BAD_DATA, "the time's closing bracket is missing: (SECONDS.MICROS)");
   shown whole = wm_text_shown((wm_text){from, (size_t)(close - from)});
-  // 2020-12-19 12:04:45.485261
-  if (memchr(from, ':', (size_t)(close - from))) return screen_output(err, "its time is a date");
-
   int negative = peek(in) == '-';
   if (negative) in->at++;
   uint64_t seconds = 0, nanos = 0;
   const uint64_t most = (uint64_t)(INT64_MAX / WM_NS_PER_S) - 1;
-  int digits = 0;
-  for (; is_digit(peek(in)); in->at++, digits++) {
+  const int is_date = !negative && take_date(in, &seconds);
+  int digits = is_date;
+  for (; !is_date && is_digit(peek(in)); in->at++, digits++) {
     seconds = seconds * 10 + (uint64_t)(*in->at - '0');
     if (seconds > most)
       return wm_fail(err, WM_OUT_OF_RANGE, "time (%s) does not fit into 64-bit nanoseconds (292 years)", whole.text);
@@ -165,7 +196,7 @@ static wm_status parse_payload(cursor *in, wm_can_frame *out, wm_error *err) {
 static int is_interface(wm_text name) {
   for (size_t i = 0; i < name.length; i++)
     if (name.at[i] <= ' ' || name.at[i] > '~') return 0;
-  return name.length > 0 && name.length < WM_CAN_IFACE_MAX;
+  return name.length > 0 && name.length < WM_CAN_BUS_MAX;
 }
 
 wm_status wm_candump_parse(const char *line, size_t length, wm_can_frame *out, wm_error *err) {
@@ -188,7 +219,7 @@ wm_status wm_candump_parse(const char *line, size_t length, wm_can_frame *out, w
   wm_text iface = next_word(&in);
   if (!is_interface(iface))
     return wm_fail(err, WM_BAD_DATA, "behind the time comes the interface's name, 1 to %d letters; '%s' is not one",
-                   WM_CAN_IFACE_MAX - 1, wm_text_shown(iface).text);
+                   WM_CAN_BUS_MAX - 1, wm_text_shown(iface).text);
   memcpy(out->iface, iface.at, iface.length);
 
   skip_blanks(&in);

@@ -8,6 +8,13 @@
 
 enum { kLargestFile = 16 * 1024 * 1024 };
 
+#define J1939_FORMAT 3      // of VFrameFormat, where the file doesn't list its values
+#define NO_ADDRESS 0xFEu    // J1939's null address, which files have where the sender is left open
+#define ADDRESS_MASK 0xFFu  // the sender's, the lowest byte of a J1939 id
+#define PGN_MASK 0x03FFFF00u
+#define DESTINATION_MASK 0xFF00u  // of a PDU1 format: the second byte is below PDU2_FIRST
+#define PDU2_FIRST 0xF0u
+
 static int by_id(const void *a, const void *b) {
   const dbc_message *x = a, *y = b;
   uint64_t i = dbc_key(x->id, x->is_extended), j = dbc_key(y->id, y->is_extended);
@@ -66,6 +73,7 @@ wm_status wm_dbc_parse(const char *source, size_t length, const char *path, wm_d
     return wm_fail(err, WM_FULL, "%s: no memory", path);
   }
   (void)snprintf(dbc->path, sizeof dbc->path, "%s", path);
+  dbc->j1939_format = J1939_FORMAT;
   memcpy(dbc->source, source, length);
   dbc->source[length] = '\0';
 
@@ -132,6 +140,31 @@ dbc_message *wm_dbc_find(const wm_dbc *dbc, uint64_t key) {
     }
   }
   return NULL;
+}
+
+// SAE J1939-21: priority (3 bits), data page (2), PDU format (8), PDU specific (8), source address (8).
+uint32_t wm_j1939_pgn_mask(uint32_t id) {
+  const int has_destination = (id >> 16 & 0xFFu) < PDU2_FIRST;
+  return has_destination ? PGN_MASK & ~DESTINATION_MASK : PGN_MASK;
+}
+
+static int is_j1939(const wm_dbc *dbc, const dbc_message *m) {
+  if (!m->is_extended || m->format == DBC_OTHER_FORMAT) return 0;
+  return m->format == DBC_J1939 || dbc->default_format == DBC_J1939 || (m->id & ADDRESS_MASK) == NO_ADDRESS;
+}
+
+// A file that has the PGN several times tells its senders apart: their addresses count then.
+wm_can_match wm_dbc_match(const wm_dbc *dbc, const dbc_message *message) {
+  wm_can_match out = {message->id, message->is_extended ? 0x1FFFFFFFu : 0x7FFu, message->is_extended};
+  if (!is_j1939(dbc, message)) return out;
+  const uint32_t pgn = wm_j1939_pgn_mask(message->id);
+  out.mask = pgn;
+  for (size_t i = 0; i < dbc->message_count && (message->id & ADDRESS_MASK) != NO_ADDRESS; i++) {
+    const dbc_message *other = &dbc->messages[i];
+    if (other == message || !is_j1939(dbc, other) || (other->id ^ message->id) & pgn) continue;
+    out.mask |= ADDRESS_MASK | ((other->id ^ message->id) & DESTINATION_MASK ? DESTINATION_MASK : 0);
+  }
+  return out;
 }
 
 dbc_signal *wm_dbc_find_signal(const wm_dbc *dbc, const dbc_message *message, wm_text name) {

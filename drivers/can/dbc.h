@@ -32,11 +32,14 @@ typedef struct dbc_signal {
   uint32_t first_value, value_count;
 } dbc_signal;
 
+typedef enum dbc_format { DBC_UNSTATED, DBC_OTHER_FORMAT, DBC_J1939 } dbc_format;
+
 typedef struct dbc_message {
   wm_text name, long_name;
   int line;
   uint32_t id;
   uint8_t is_extended;
+  uint8_t format;   // dbc_format by VFrameFormat
   uint32_t length;  // bytes; above WM_CAN_DATA_MAX for multi-frame messages
   uint32_t first_signal, signal_count;
 } dbc_message;
@@ -50,7 +53,14 @@ struct wm_dbc {
   dbc_range *ranges;
   size_t message_count, signal_count, value_count, range_count;
   size_t message_room, signal_room, value_room, range_room;
+  uint64_t j1939_format;   // value of VFrameFormat that is J1939's
+  uint8_t default_format;  // dbc_format of messages without VFrameFormat
 };
+
+// The bits of an id by which frames are of this message: all of them, or of a J1939 message those of its PGN.
+wm_can_match wm_dbc_match(const wm_dbc *dbc, const dbc_message *message);
+// Bits of the PGN in a J1939 id: without the destination where it has one.
+uint32_t wm_j1939_pgn_mask(uint32_t id);
 
 // Sorted by id; `key` is (id << 1 | is_extended). NULL where there is none. Cost: logarithmic.
 dbc_message *wm_dbc_find(const wm_dbc *dbc, uint64_t key);

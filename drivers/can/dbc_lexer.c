@@ -3,6 +3,11 @@
 
 static const char kMarks[] = ":|@()[],;";
 
+// A line ends with LF, CRLF or, in files of old editors, with CR alone.
+static int is_line_end(const lexer *self) {
+  return *self->at == '\n' || (*self->at == '\r' && (self->at + 1 == self->end || self->at[1] != '\n'));
+}
+
 static int is_space(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\n' || c == '\f' || c == '\v'; }
 static int is_mark(char c) { return c != '\0' && strchr(kMarks, c) != NULL; }
 
@@ -17,7 +22,7 @@ static token read_string(lexer *self) {
   const char *from = ++self->at;
   while (self->at < self->end && *self->at != '"') {
     if (*self->at == '\\' && self->at + 1 < self->end && self->at[1] == '"') self->at++;
-    if (*self->at == '\n') self->line++;
+    if (is_line_end(self)) self->line++;
     self->at++;
   }
   out.text = (wm_text){from, (size_t)(self->at - from)};
@@ -31,11 +36,11 @@ static token read_string(lexer *self) {
 
 static void skip_blanks_and_comments(lexer *self) {
   for (; self->at < self->end; self->at++) {
-    if (*self->at == '\n') {
+    if (is_line_end(self)) {
       self->line++;
       self->is_first = 1;
     } else if (*self->at == '/' && self->at + 1 < self->end && self->at[1] == '/') {  // to the line's end
-      while (self->at + 1 < self->end && self->at[1] != '\n') self->at++;
+      while (self->at + 1 < self->end && self->at[1] != '\n' && self->at[1] != '\r') self->at++;
     } else if (!is_space(*self->at)) {
       return;
     }

@@ -345,15 +345,47 @@ static wm_status read_values(reader *r) {
   return skip_statement(r);
 }
 
-// BA_ "SystemMessageLongSymbol" BO_ ID "name"; or BA_ "SystemSignalLongSymbol" SG_ ID SIGNAL "name";
+// BA_DEF_ BO_ "VFrameFormat" ENUM "StandardCAN","ExtendedCAN","reserved","J1939PG";
+static wm_status read_definition(reader *r) {
+  uint64_t value = 0;
+  if (r->now.kind == TOKEN_WORD) advance(r);
+  if (!text_is(r->now.text, "VFrameFormat") || !take(r, TOKEN_STRING)) return skip_statement(r);
+  if (!take(r, TOKEN_WORD)) return skip_statement(r);
+  for (; r->now.kind == TOKEN_STRING; value++) {
+    if (text_is(r->now.text, "J1939PG")) r->dbc->j1939_format = value;
+    advance(r);
+    take(r, ',');
+  }
+  return skip_statement(r);
+}
+
+// The value of VFrameFormat, a number or its name.
+static dbc_format frame_format(const reader *r) {
+  uint64_t value = 0;
+  if (r->now.kind == TOKEN_STRING) return text_is(r->now.text, "J1939PG") ? DBC_J1939 : DBC_OTHER_FORMAT;
+  if (r->now.kind != TOKEN_WORD || !word_as_u64(r->now.text, &value)) return DBC_UNSTATED;
+  return value == r->dbc->j1939_format ? DBC_J1939 : DBC_OTHER_FORMAT;
+}
+
+// BA_DEF_DEF_ "VFrameFormat" "J1939PG";
+static wm_status read_default(reader *r) {
+  if (text_is(r->now.text, "VFrameFormat") && take(r, TOKEN_STRING) && frame_format(r) == DBC_J1939)
+    r->dbc->default_format = DBC_J1939;
+  return skip_statement(r);
+}
+
+// BA_ "SystemMessageLongSymbol" BO_ ID "name"; BA_ "SystemSignalLongSymbol" SG_ ID SIGNAL "name"; BA_ "VFrameFormat"
+// BO_ ID 3;
 static wm_status read_attribute(reader *r) {
   wm_text attribute = r->now.text;
   if (!take(r, TOKEN_STRING) || r->now.kind != TOKEN_WORD) return skip_statement(r);
-  if (text_is(attribute, "SystemMessageLongSymbol")) {
+  const int is_format = text_is(attribute, "VFrameFormat");
+  if (is_format || text_is(attribute, "SystemMessageLongSymbol")) {
     uint64_t id = 0;
     advance(r);
     dbc_message *m = take_u64(r, &id) && id <= UINT32_MAX ? find_message(r, id) : NULL;
-    if (m && r->now.kind == TOKEN_STRING) m->long_name = r->now.text;
+    if (m && is_format) m->format = (uint8_t)frame_format(r);
+    if (m && !is_format && r->now.kind == TOKEN_STRING) m->long_name = r->now.text;
   } else if (text_is(attribute, "SystemSignalLongSymbol")) {
     const dbc_message *m = NULL;
     dbc_signal *s = NULL;
@@ -391,6 +423,8 @@ static wm_status read_statement(reader *r, dbc_pass pass) {
   if (text_is(keyword, "SIG_VALTYPE_")) return read_value_type(r);
   if (text_is(keyword, "SG_MUL_VAL_")) return read_selection(r);
   if (text_is(keyword, "VAL_")) return read_values(r);
+  if (text_is(keyword, "BA_DEF_")) return read_definition(r);
+  if (text_is(keyword, "BA_DEF_DEF_")) return read_default(r);
   if (text_is(keyword, "BA_")) return read_attribute(r);
   return skip_statement(r);
 }

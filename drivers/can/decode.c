@@ -5,19 +5,6 @@
 #include "decoder.h"
 #include "waymark/event.h"
 
-static size_t first_of(const wm_can_decoder *self, uint64_t key) {
-  size_t low = 0, high = self->message_count;
-  while (low < high) {
-    size_t middle = low + (high - low) / 2;
-    if (self->messages[middle].key < key) {
-      low = middle + 1;
-    } else {
-      high = middle;
-    }
-  }
-  return low;
-}
-
 // ── one signal ──────────────────────────────────────────────────────────────────────────────────────────────────────
 
 typedef enum presence { PRESENT, ABSENT, TOO_SHORT } presence;
@@ -124,6 +111,20 @@ static presence all_present(const wm_can_decoder *self, const bound_quantity *q,
   return worst;
 }
 
+// Numbers of a robot's signals are zero or within these.
+#define FLOAT_LEAST 1e-9
+#define FLOAT_MOST 1e9
+
+// Whether the bits of an integer could be those of a floating-point number.
+static void watch_bits(bound_signal *s, uint64_t raw) {
+  if (raw == 0 || s->bits.kind == SIGNAL_FLOAT || s->bits.kind == SIGNAL_DOUBLE) return;
+  const signal_bits as = {.kind = s->bits.length == 32 ? SIGNAL_FLOAT : SIGNAL_DOUBLE};
+  const double size = fabs(signal_number(&as, raw));
+  const int is_float = (s->bits.length == 32 || s->bits.length == 64) && size > FLOAT_LEAST && size < FLOAT_MOST;
+  if (is_float && s->floats++ == 0) s->first_float = raw;
+  s->others += !is_float;
+}
+
 static int gear_value(const bound_quantity *q, double number, double *out) {
   for (uint32_t i = 0; i < q->gear_count; i++) {
     if (q->gear[i].raw != number) continue;
@@ -141,6 +142,7 @@ static int quantity_value(const bound_quantity *q, bound_signal *signals, const 
   for (uint32_t i = 0; i < q->signal_count; i++) {
     bound_signal *s = &signals[i];
     uint64_t raw = signal_raw(&s->bits, data);
+    if (s->bits.length >= 32) watch_bits(s, raw);
     double number = is_ticks ? unwrap(s, raw, t_ns, doubt) : signal_number(&s->bits, raw);
     if (says_no_value(s, raw)) return 0;
     if (q->quantity != WM_Q_GEAR) {
@@ -168,6 +170,26 @@ static int watch_counter(bound_message *m, const payload *data, unsigned length,
   counts->frozen++;
   if (step.repeats < COUNTER_FROZEN) return 0;
   out->doubt |= WM_DOUBT_FROZEN_COUNTER;
+  return 1;
+}
+
+// A sender that is silent for so long has gone, and another one may take its place.
+#define SENDER_GONE_NS (3 * WM_NS_PER_S)
+
+// Of a message that comes from several buses or J1939 addresses, the first sender's frames are taken: two wheels'
+// counts must not be mixed. The DBC's own id goes before the others.
+static int is_of_sender(bound_message *m, const wm_can_frame *frame) {
+  if (m->bus[0] && strncmp(m->bus, frame->iface, WM_CAN_BUS_MAX) != 0) return 0;
+  const int is_same = m->frames > 0 && same_sender(frame->id, frame->iface, m->sender.id, m->sender.iface);
+  const int is_gone = m->frames == 0 || frame->t_ns - m->sender.last_ns > SENDER_GONE_NS;
+  const int is_named = frame->id == m->match.id && m->sender.id != m->match.id;
+  if (!is_same && !is_gone && !is_named) return 0;
+  if (!is_same) {
+    m->sender.id = frame->id;
+    memcpy(m->sender.iface, frame->iface, sizeof m->sender.iface);
+  }
+  m->sender.last_ns = frame->t_ns;
+  m->frames++;
   return 1;
 }
 
@@ -214,14 +236,12 @@ wm_status wm_can_decode(wm_can_decoder *self, const wm_can_frame *frame, wm_quan
     counts->bus_errors++;
     return WM_AGAIN;
   }
-  uint64_t key = dbc_key(frame->id, frame->is_extended);
-  size_t i = frame->is_remote ? self->message_count : first_of(self, key);
   payload data;
   int is_bound = 0;
   wm_status status = WM_AGAIN;
-  for (; i < self->message_count && self->messages[i].key == key; i++) {
+  for (size_t i = 0; i < self->message_count && !frame->is_remote; i++) {
     bound_message *m = &self->messages[i];
-    if (m->bus[0] && strncmp(m->bus, frame->iface, WM_CAN_IFACE_MAX) != 0) continue;
+    if (!wm_can_matches(&m->match, frame->id, frame->is_extended) || !is_of_sender(m, frame)) continue;
     if (!is_bound) payload_set(&data, frame->data, frame->length);
     is_bound = 1;
     wm_status here = decode_message(self, m, frame, &data, out, counts, err);
@@ -231,15 +251,16 @@ wm_status wm_can_decode(wm_can_decoder *self, const wm_can_frame *frame, wm_quan
   return out->count > 0 ? WM_OK : status;
 }
 
-size_t wm_can_decoder_ids(const wm_can_decoder *self, uint32_t *ids, uint8_t *is_extended, size_t capacity) {
+size_t wm_can_decoder_matches(const wm_can_decoder *self, wm_can_match *out, size_t capacity) {
   size_t count = 0;
   for (size_t i = 0; i < self->message_count; i++) {
-    uint64_t key = self->messages[i].key;
-    if (i > 0 && key == self->messages[i - 1].key) continue;
-    if (count < capacity) {
-      ids[count] = (uint32_t)(key >> 1);
-      is_extended[count] = (uint8_t)(key & 1u);
-    }
+    const wm_can_match *m = &self->messages[i].match;
+    size_t twin = 0;
+    while (twin < i && (self->messages[twin].match.id != m->id || self->messages[twin].match.mask != m->mask ||
+                        self->messages[twin].match.is_extended != m->is_extended))
+      twin++;
+    if (twin < i) continue;  // of another bus
+    if (count < capacity) out[count] = *m;
     count++;
   }
   return count;

@@ -28,6 +28,9 @@ typedef struct bound_signal {
   signal_bits bits;
   double factor, offset, si;  // (number * factor + offset) * si
   uint32_t first_selector, selector_count;
+  char name[64];            // in the DBC, for messages
+  uint32_t floats, others;  // values of an integer of 32 or 64 bits that are numbers as floating point, and that aren't
+  uint64_t first_float;     // bits of the first one other than 0
   uint32_t no_value_count;  // raw values for "not available"
   uint64_t no_value[NO_VALUE_MAX];
   int has_last;  // ticks only, as the rest
@@ -48,15 +51,26 @@ typedef struct bound_quantity {
 
 // The quantities of one message on one bus.
 typedef struct bound_message {
-  uint64_t key;  // dbc_key()
-  char bus[WM_CAN_IFACE_MAX];
+  wm_can_match match;
+  uint64_t frames;
+  struct {  // whose frames are taken
+    char iface[WM_CAN_BUS_MAX];
+    uint32_t id;
+    wm_time_ns last_ns;
+  } sender;
+  char bus[WM_CAN_BUS_MAX];
   char name[64];
   uint32_t first_quantity, quantity_count;
   counter counter;
 } bound_message;
 
+// Two frames of a message are of one sender where bus and J1939 source address (the lowest byte) are the same.
+static inline int same_sender(uint32_t id, const char *iface, uint32_t other_id, const char *other_iface) {
+  return ((id ^ other_id) & 0xFFu) == 0 && strcmp(iface, other_iface) == 0;
+}
+
 struct wm_can_decoder {
-  bound_message *messages;  // sorted by key
+  bound_message *messages;  // sorted by id
   bound_quantity *quantities;
   bound_signal *signals;
   bound_selector *selectors;

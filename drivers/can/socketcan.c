@@ -33,12 +33,12 @@ static unsigned find_interface(void *context, const char *interface, int *is_up)
 
 // Kernel filters for the bound ids. With more ids than the kernel takes, all frames pass, and the decoder sorts them
 // out.
-static int set_filters(int fd, const uint32_t *ids, const uint8_t *is_extended, size_t count) {
+static int set_filters(int fd, const wm_can_match *wanted, size_t count) {
   struct can_filter filters[CAN_RAW_FILTER_MAX];
   if (count == 0 || count > CAN_RAW_FILTER_MAX) return 0;
   for (size_t i = 0; i < count; i++) {
-    filters[i].can_id = ids[i] | (is_extended[i] ? CAN_EFF_FLAG : 0);
-    filters[i].can_mask = (is_extended[i] ? CAN_EFF_MASK : CAN_SFF_MASK) | CAN_EFF_FLAG | CAN_RTR_FLAG;
+    filters[i].can_id = wanted[i].id | (wanted[i].is_extended ? CAN_EFF_FLAG : 0);
+    filters[i].can_mask = wanted[i].mask | CAN_EFF_FLAG | CAN_RTR_FLAG;
   }
   return setsockopt(fd, SOL_CAN_RAW, CAN_RAW_FILTER, filters, (socklen_t)(count * sizeof filters[0]));
 }
@@ -56,15 +56,13 @@ static void ask_for_more(int fd) {
   (void)can_queue_grow(fd, CAN_QUEUE_BYTES);
 }
 
-static int open_socket(void *context, unsigned interface_index, const uint32_t *ids, const uint8_t *is_extended,
-                       size_t count) {
+static int open_socket(void *context, unsigned interface_index, const wm_can_match *filters, size_t count) {
   (void)context;
   int fd = socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC | SOCK_NONBLOCK, CAN_RAW);
   if (fd < 0) return -errno;
   ask_for_more(fd);
   struct sockaddr_can address = {.can_family = AF_CAN, .can_ifindex = (int)interface_index};
-  if (set_filters(fd, ids, is_extended, count) != 0 ||
-      bind(fd, (const struct sockaddr *)&address, sizeof address) != 0) {
+  if (set_filters(fd, filters, count) != 0 || bind(fd, (const struct sockaddr *)&address, sizeof address) != 0) {
     int reason = errno;
     (void)close(fd);
     return -reason;

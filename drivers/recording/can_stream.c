@@ -26,6 +26,9 @@ typedef struct can_stream {
   int has_ahead;  // `ahead` is read, and not handed on yet
   can_buses buses;
   size_t bus;  // its index
+  wm_can_survey *survey;
+  int has_differences;  // its times are summed up
+  wm_time_ns sum_ns;
 } can_stream;
 
 static void keep_problem(can_stream *self, long line, const char *why) {
@@ -54,6 +57,7 @@ static wm_status read_frame(can_stream *self, log_frame *out, wm_error *err) {
     out->line = self->lines.number;
     status = too_long ? wm_fail(&why, WM_BAD_DATA, "the line is longer than %d bytes", LINES_BUFFER_BYTES)
                       : wm_candump_parse(text, length, &out->can, &why);
+    if (status == WM_OK && self->has_differences) out->can.t_ns = self->sum_ns += out->can.t_ns;
     if (status == WM_OK && is_mine(self, out->can.iface)) return WM_OK;
     if (status == WM_OK || status == WM_AGAIN || self->bus > 0) continue;
     self->base.counts.malformed++;
@@ -80,11 +84,24 @@ static wm_status next_frame(can_stream *self, wm_error *err) {
   }
 }
 
+// What the whole log has shown: messages that never came, integers that are floating-point numbers.
+static void judge_whole(can_stream *self) {
+  char text[sizeof self->base.counts.first_problem];
+  char *first = self->base.counts.first_problem;
+  const int is_missing = wm_can_decoder_missing(self->decoder, self->survey, text, sizeof text) > 0;
+  if (!is_missing && wm_can_decoder_floats(self->decoder, text, sizeof text) == 0) return;
+  if (first[0] && self->base.counts.received > 0) return;
+  const char *slash = strrchr(self->lines.path, '/');
+  (void)snprintf(first, sizeof self->base.counts.first_problem, "%.40s: %.210s", slash ? slash + 1 : self->lines.path,
+                 text);
+}
+
 static wm_status next_event(wm_source *base, wm_event *out, wm_error *err) {
   can_stream *self = (can_stream *)base;
   for (;;) {
     wm_error why = {0};
     wm_status status = next_frame(self, err);
+    if (status == WM_END) judge_whole(self);
     if (status != WM_OK) return status;
     const wm_can_frame *frame = &self->frame.can;
     status = wm_can_event(self->decoder, self->part, &self->gnss, frame, out, &base->counts, &why);
@@ -104,17 +121,49 @@ static void close_can(wm_source *base) {
   can_stream *self = (can_stream *)base;
   lines_close(&self->lines);
   wm_can_decoder_free(self->decoder);
+  free(self->survey);
   free(self);
 }
 
 static const wm_source_ops kCan = {next_event, close_can};
 
+// Reads the log's first frames, and warns of what they show.
+static wm_status survey_log(can_stream *self, const char *log, wm_warn_fn warn, void *context, wm_error *err) {
+  const char *line;
+  char text[320], whole[WM_PATH_MAX + sizeof text];
+  size_t length;
+  int too_long;
+  wm_can_frame frame;
+  line_reader lines;
+  wm_status status = lines_open(&lines, log, err);
+  if (status != WM_OK) return status;
+  while ((status = lines_next(&lines, &line, &length, &too_long, err)) == WM_OK)
+    if (!too_long && wm_candump_parse(line, length, &frame, NULL) == WM_OK && !wm_can_survey_take(self->survey, &frame))
+      break;
+  lines_close(&lines);
+  self->has_differences = wm_can_survey_has_differences(self->survey);
+  if (self->has_differences && self->bus == 0 && warn) {
+    (void)snprintf(whole, sizeof whole, "%s: its times are differences (candump -td): they are summed up", log);
+    warn(context, whole);
+  }
+  if (wm_can_decoder_senders(self->decoder, self->survey, text, sizeof text) > 0 && warn) {
+    (void)snprintf(whole, sizeof whole, "%s: %s", log, text);
+    warn(context, whole);
+  }
+  return status == WM_END ? WM_OK : status;
+}
+
 wm_status can_stream_open(const char *log, const can_buses *buses, size_t bus, wm_can_part part,
-                          const double gnss_origin[3], wm_source **out, uint32_t *quantities, wm_error *err) {
+                          const double gnss_origin[3], wm_warn_fn warn, void *context, wm_source **out,
+                          uint32_t *quantities, wm_error *err) {
   const can_bus *is = &buses->bus[bus];
   *out = NULL;
   can_stream *self = calloc(1, sizeof *self);
-  if (!self) return wm_fail(err, WM_IO, "%s: no memory to read it", log);
+  if (self) self->survey = calloc(1, sizeof *self->survey);
+  if (!self || !self->survey) {
+    free(self);
+    return wm_fail(err, WM_IO, "%s: no memory to read it", log);
+  }
   self->base.ops = &kCan;
   self->base.is_motion = part == WM_CAN_MOTION;
   self->base.in_order = 1;
@@ -127,6 +176,7 @@ wm_status can_stream_open(const char *log, const can_buses *buses, size_t bus, w
   snprintf(self->base.name, sizeof self->base.name, "can%s%s%s", part == WM_CAN_GNSS ? "-gnss" : "",
            buses->count > 1 ? ":" : "", buses->count > 1 ? is->interface : "");
   wm_status status = wm_can_decoder_load(is->dbc, is->signals, part, &self->decoder, err);
+  if (status == WM_OK && self->decoder) status = survey_log(self, log, warn, context, err);
   if (status == WM_OK && self->decoder) status = lines_open(&self->lines, log, err);
   if (status != WM_OK || !self->decoder) {
     close_can(&self->base);

@@ -9,7 +9,7 @@
 #include "waymark/source.h"
 
 typedef struct can_bus {
-  char interface[WM_CAN_IFACE_MAX];  // name in the log's lines
+  char interface[WM_CAN_BUS_MAX];  // name in the log's lines
   char dbc[WM_PATH_MAX], signals[WM_PATH_MAX];
 } can_bus;
 
@@ -22,8 +22,10 @@ typedef struct can_buses {
 wm_status can_buses_read(const wm_yaml_node *list, const char *dir, can_buses *out, wm_error *err);
 
 // The stream of one of the buses: quantities, or the GNSS receiver's positions about `gnss_origin`. *quantities: bit
-// per wm_quantity that it can give. *out is NULL without bindings of that part.
+// per wm_quantity that it can give. *out is NULL without bindings of that part. Warns of times that are differences,
+// and of messages with several senders.
 wm_status can_stream_open(const char *log, const can_buses *buses, size_t bus, wm_can_part part,
-                          const double gnss_origin[3], wm_source **out, uint32_t *quantities, wm_error *err);
+                          const double gnss_origin[3], wm_warn_fn warn, void *context, wm_source **out,
+                          uint32_t *quantities, wm_error *err);
 
 #endif

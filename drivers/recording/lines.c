@@ -39,6 +39,13 @@ static wm_status fill(line_reader *self, wm_error *err) {
   if (n < 0) return wm_fail(err, WM_IO, "%s: cannot be read: %s", self->path, strerror(errno));
   self->ended = n == 0;
   self->end += (size_t)n;
+  if (self->line_end == '\0' && self->end >= 2 && memcmp(self->buffer, "\x1F\x8B", 2) == 0)
+    return wm_fail(err, WM_UNSUPPORTED,
+                   "%s: is packed by gzip; rename it to end in .gz, and `gunzip` makes a text of it", self->path);
+  if (self->line_end == '\0') {  // by the first part of the file
+    const int is_old_mac = memchr(self->buffer, '\r', self->end) && !memchr(self->buffer, '\n', self->end);
+    self->line_end = is_old_mac ? '\r' : '\n';
+  }
   return WM_OK;
 }
 
@@ -48,7 +55,7 @@ wm_status lines_next(line_reader *self, const char **text, size_t *length, int *
   for (;;) {
     size_t there = self->end - self->begin;
     const char *from = self->buffer + self->begin;
-    const char *newline = there > searched ? memchr(from + searched, '\n', there - searched) : NULL;
+    const char *newline = there > searched ? memchr(from + searched, self->line_end, there - searched) : NULL;
     if (!newline && !self->ended) {
       if (there == LINES_BUFFER_BYTES) {  // drop the content, skip to the line's end
         *too_long = 1;

@@ -250,7 +250,8 @@ static wm_status add_bus(wm_recording *self, const char *log, const can_buses *b
                          wm_error *err) {
   wm_source *source;
   uint32_t quantities = 0;
-  wm_status status = can_stream_open(log, buses, bus, part, wm_site_gnss_origin(self->site), &source, &quantities, err);
+  wm_status status = can_stream_open(log, buses, bus, part, wm_site_gnss_origin(self->site), self->warn.fn,
+                                     self->warn.context, &source, &quantities, err);
   self->quantities |= quantities;
   if (status == WM_OK && source) source->quantities = quantities;
   return status == WM_OK && source ? add_source(self, source, err) : status;

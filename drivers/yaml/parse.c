@@ -237,6 +237,12 @@ wm_status wm_yaml_parse(const char *text, size_t length, const char *path, wm_ya
   wm_error local;
   builder b = {.text = text, .err = err ? err : &local};
   if (length > WM_YAML_BYTES_MAX) return wm_fail(err, WM_BAD_CONFIG, "%s: larger than 16 MB", path);
+  if (length >= 2 && (memcmp(text, "\xFF\xFE", 2) == 0 || memcmp(text, "\xFE\xFF", 2) == 0))
+    return wm_fail(err, WM_BAD_CONFIG, "%s:1: the file is in UTF-16; save it as UTF-8", path);
+  if (length >= 3 && memcmp(text, "\xEF\xBB\xBF", 3) == 0) {  // UTF-8's byte order mark, which YAML allows
+    b.text = text += 3;
+    length -= 3;
+  }
   b.doc = calloc(1, sizeof *b.doc);
   if (!b.doc) return wm_fail(err, WM_IO, "%s: no memory to read it", path);
   snprintf(b.doc->file, sizeof b.doc->file, "%s", path);

@@ -41,8 +41,8 @@ static unsigned find(void *context, const char *interface, int *is_up) {
   return played_fault(WM_FAULT_BUS_REMOVED, about.of) ? 0 : index_of(interface);
 }
 
-static int open_socket(void *context, unsigned index, const uint32_t *ids, const uint8_t *is_extended, size_t count) {
-  (void)context, (void)ids, (void)is_extended, (void)count;
+static int open_socket(void *context, unsigned index, const wm_can_match *filters, size_t count) {
+  (void)context, (void)filters, (void)count;
   int i = 0;
   wm_play_stream about;
   if (!played_find(interfaces[index - INDEX_FIRST], WM_PLAY_CAN, &about)) return -ENODEV;

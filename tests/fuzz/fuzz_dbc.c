@@ -26,15 +26,23 @@ static void decode(wm_can_decoder *decoder, const dbc_message *m, uint32_t *stat
   wm_source_counts counts = {0};
   wm_quantities out;
   wm_error err;
+  static wm_can_survey survey;
+  char text[64];
+  memset(&survey, 0, sizeof survey);
   for (int i = 0; i < kFramesTried; i++) {
     wm_can_frame frame = {.id = m->id, .is_extended = m->is_extended, .iface = "can0"};
     frame.length = (uint8_t)(next_random(state) % (WM_CAN_DATA_MAX + 1));
     for (int k = 0; k < frame.length; k++) frame.data[k] = (uint8_t)(next_random(state) & next_random(state));
+    if (i % 3 == 1) frame.id ^= next_random(state) & 0x1C00FFFFu;  // another priority, destination or sender
+    (void)wm_can_survey_take(&survey, &frame);
+    if (wm_can_decoder_missing(decoder, &survey, text, sizeof text) >= sizeof text) abort();
     wm_status status = wm_can_decode(decoder, &frame, &out, &counts, &err);
     if (status == WM_OK && (out.count == 0 || out.count > WM_QUANTITIES_MAX)) abort();
     for (int k = 0; k < out.count; k++)
       if (!(out.value[k] - out.value[k] == 0.0)) abort();  // only finite values are handed out
   }
+  if (wm_can_decoder_senders(decoder, &survey, text, sizeof text) >= sizeof text) abort();
+  if (wm_can_decoder_floats(decoder, text, sizeof text) >= sizeof text) abort();
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {

@@ -66,8 +66,8 @@ static unsigned bus_find(void *context, const char *interface, int *is_up) {
   return 3;
 }
 
-static int bus_open(void *context, unsigned index, const uint32_t *ids, const uint8_t *is_extended, size_t count) {
-  (void)context, (void)index, (void)ids, (void)is_extended, (void)count;
+static int bus_open(void *context, unsigned index, const wm_can_match *filters, size_t count) {
+  (void)context, (void)index, (void)filters, (void)count;
   return 5;
 }
 

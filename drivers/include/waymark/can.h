@@ -15,11 +15,12 @@ extern "C" {
 #endif
 
 #define WM_CAN_DATA_MAX 64   // bytes of a CAN FD frame
-#define WM_CAN_IFACE_MAX 16  // IFNAMSIZ
+#define WM_CAN_IFACE_MAX 16  // of a device: IFNAMSIZ
+#define WM_CAN_BUS_MAX 64    // of a log, where the name may be a ROS topic or an adapter's path
 
 typedef struct wm_can_frame {
   wm_time_ns t_ns;
-  char iface[WM_CAN_IFACE_MAX];
+  char iface[WM_CAN_BUS_MAX];
   uint32_t id;  // 11 or 29 bits, without flags
   uint8_t is_extended, is_remote, is_error, is_fd;
   uint8_t fd_flags;  // 4 bits as candump writes them
@@ -29,14 +30,46 @@ typedef struct wm_can_frame {
 
 // One line of `candump -l` ("(SECONDS.MICROS) IFACE ID#DATA ..."): classic (also with a raw DLC, _9 to _F), FD (##),
 // remote and error frames (bit 29 of eight digits), with or without a final direction (R, T). `line` needn't be
-// terminated. WM_AGAIN: an empty line, or one that begins with '#'. WM_BAD_DATA, WM_OUT_OF_RANGE, WM_UNSUPPORTED (CAN
-// XL): *err has the reason, without file and line. candump's screen format is refused with a message of its own. The
-// time is exact (integers), also a negative one. Cost linear in `length`; no allocation. Any thread.
+// terminated. The time may be a date (`candump -L -tA`), which is taken as UTC. WM_AGAIN: an empty line, or one that
+// begins with '#'. WM_BAD_DATA, WM_OUT_OF_RANGE, WM_UNSUPPORTED (CAN XL): *err has the reason, without file and line.
+// candump's screen format is refused with a message of its own. The time is exact (integers), also a negative one. Cost
+// linear in `length`; no allocation. Any thread.
 wm_status wm_candump_parse(const char *line, size_t length, wm_can_frame *out, wm_error *err);
+
+// The ids of a log's first frames, and whether its times are differences (`candump -L -td`).
+#define WM_CAN_SURVEY_FRAMES 50000  // 12 s of a full bus of 500 kbit/s
+#define WM_CAN_SURVEY_IDS 512       // different ones; further ones are left out
+typedef struct wm_can_seen {
+  uint32_t id;
+  uint8_t is_extended;
+  char iface[WM_CAN_BUS_MAX];
+  uint64_t frames;
+} wm_can_seen;
+typedef struct wm_can_survey {
+  wm_can_seen seen[WM_CAN_SURVEY_IDS];  // in the order of their first frames; error and remote frames are left out
+  size_t count;
+  uint64_t frames, not_later;  // of all kinds; those whose stamp isn't later than that of the frame before
+  wm_time_ns first_ns, last_ns;
+} wm_can_survey;
+// All zeros begin one. 0: it has seen enough. Cost: a search among the ids.
+int wm_can_survey_take(wm_can_survey *self, const wm_can_frame *frame);
+// The most frequent id of this number with any width, else of this PGN (J1939); NULL: none.
+const wm_can_seen *wm_can_survey_nearest(const wm_can_survey *self, uint32_t id, int is_extended);
+// Stamps of a log that begins at 0 rise; differences go up and down. 1: they are differences.
+int wm_can_survey_has_differences(const wm_can_survey *self);
 
 // Writes a frame as such a line, terminated, with its line feed; stamps to the microsecond. Returns its length, 0 where
 // it doesn't fit (256 bytes suffice). No allocation. Any thread.
 size_t wm_candump_write(const wm_can_frame *frame, char *out, size_t capacity);
+
+// A frame is of a message where the bits of `mask` are those of `id`.
+typedef struct wm_can_match {
+  uint32_t id, mask;
+  uint8_t is_extended;
+} wm_can_match;
+static inline int wm_can_matches(const wm_can_match *match, uint32_t id, int is_extended) {
+  return match->is_extended == is_extended && ((id ^ match->id) & match->mask) == 0;
+}
 
 // A DBC file, read at start, UTF-8 or Windows-1252. Allocates (at most a few times the file's size, which is at most 16
 // MB); not for the real-time thread. WM_BAD_CONFIG with file and line for errors in BO_, SG_, SIG_VALTYPE_, SG_MUL_VAL_
@@ -86,10 +119,10 @@ typedef struct wm_can_binding {
   char message[64];                 // name in the DBC, short or long
   char signal[WM_CAN_SUM_MAX][64];  // several: their sum
   uint32_t signal_count;
-  char bus[WM_CAN_IFACE_MAX];  // "": any
-  char unit[16];               // "": the DBC's
-  double scale, offset;        // applied after the unit: quantity = scale * si + offset; 1 and 0
-  uint32_t gear_count;         // gear only: raw value -> direction; 0: by the names in the DBC's VAL_
+  char bus[WM_CAN_BUS_MAX];  // "": any
+  char unit[16];             // "": the DBC's
+  double scale, offset;      // applied after the unit: quantity = scale * si + offset; 1 and 0
+  uint32_t gear_count;       // gear only: raw value -> direction; 0: by the names in the DBC's VAL_
   struct {
     double raw;
     double direction;
@@ -112,6 +145,9 @@ void wm_can_decoder_free(wm_can_decoder *self);  // NULL is fine
 // WM_BAD_DATA: shorter than its bound signals (malformed), or all of its signals mean "not available" (not_finite); the
 // text is in *err.
 // The source, which has file and line, fills `counts.received` and `counts.first_problem`.
+// A message of J1939 (by the DBC's VFrameFormat, or source address FE) is taken by its PGN: priority, destination and
+// source address are free. Of several senders of a message (buses, source addresses) the first one is taken, and those
+// of the others are `ignored`, until it has been silent for 3 s.
 // A message's rolling counter, where the DBC has one that steps by one in the first frames, gives `lost`; a late frame
 // is subtracted again.
 // Ticks continue from their last value by the shorter way round. After a silence (0.25 s, three periods) of a counter
@@ -124,8 +160,16 @@ wm_status wm_can_decode(wm_can_decoder *self, const wm_can_frame *frame, wm_quan
 // part). Sets *out but for source, arrival and seq. Statuses as above; WM_AGAIN also without a position.
 wm_status wm_can_event(wm_can_decoder *self, wm_can_part part, wm_can_gnss *gnss, const wm_can_frame *frame,
                        wm_event *out, wm_source_counts *counts, wm_error *err);
-// CAN ids for kernel filters; returns how many there are.
-size_t wm_can_decoder_ids(const wm_can_decoder *self, uint32_t *ids, uint8_t *is_extended, size_t capacity);
+// Matches of the bound messages, for kernel filters; returns how many there are.
+size_t wm_can_decoder_matches(const wm_can_decoder *self, wm_can_match *out, size_t capacity);
+// Of the bound messages of which no frame has come: a text for people that names each wanted id, and those in the
+// survey that are like it, else the most frequent ones. "" where all came. Returns its length.
+size_t wm_can_decoder_missing(const wm_can_decoder *self, const wm_can_survey *seen, char *out, size_t capacity);
+// Of the bound messages that several senders (buses, J1939 source addresses) send: which one is taken. "": none.
+size_t wm_can_decoder_senders(const wm_can_decoder *self, const wm_can_survey *seen, char *out, size_t capacity);
+// Of the bound integer signals whose bits all are numbers as floating point, and none in range as an integer: the line
+// that the DBC lacks. "": none.
+size_t wm_can_decoder_floats(const wm_can_decoder *self, char *out, size_t capacity);
 // Quantities that this decoder can give: bit per wm_quantity.
 uint32_t wm_can_decoder_quantities(const wm_can_decoder *self);
 

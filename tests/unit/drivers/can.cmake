@@ -10,6 +10,7 @@ wm_test(can_dbc SOURCES can_dbc.c USES wm_can)
 target_include_directories(can_dbc PRIVATE ${CMAKE_SOURCE_DIR}/drivers/can)
 wm_test(wm_errors_can SOURCES can_errors.c USES wm_can)
 wm_test(can_decode SOURCES can_decode.c USES wm_can)
+wm_test(can_senders SOURCES can_senders.c USES wm_can)
 wm_test(can_gnss SOURCES can_gnss.c USES wm_can m)
 wm_test(can_bind SOURCES can_bind.c USES wm_can m)
 

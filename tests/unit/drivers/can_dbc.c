@@ -78,6 +78,23 @@ static void odd_but_right(void) {
   wm_dbc_free(dbc);
 }
 
+// With CR alone as line end, and with LF alone: the same content, in the same lines.
+static void line_ends_of_other_editors(void) {
+  static const char kEnds[] = {'\r', '\n'};
+  for (size_t k = 0; k < sizeof kEnds; k++) {
+    char text[sizeof kOdd];
+    size_t n = 0;
+    for (const char *c = kOdd; *c; c++)
+      if (*c != '\r') text[n++] = *c == '\n' ? kEnds[k] : *c;
+    text[n] = '\0';
+    load(text);
+    TEST_ASSERT_EQUAL_size_t(2, dbc->message_count);
+    TEST_ASSERT_EQUAL_size_t(3, dbc->signal_count);
+    TEST_ASSERT_EQUAL(11, signal_of(291, 0, "SPEED")->line);
+    wm_dbc_free(dbc);
+  }
+}
+
 // An attribute without a message's number, or with one that is too large, names no message.
 static void long_names_of_no_message(void) {
   load("BO_ 0 M: 8 X\nBA_ \"SystemMessageLongSymbol\" BO_ \"WITHOUT_A_NUMBER\";\n");
@@ -184,6 +201,7 @@ static void distances_of_names_are_the_same_from_both_sides(void) {
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(odd_but_right);
+  RUN_TEST(line_ends_of_other_editors);
   RUN_TEST(long_names_of_no_message);
   RUN_TEST(a_message_right_behind_an_empty_list);
   RUN_TEST(nothing_in_it);

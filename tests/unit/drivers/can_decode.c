@@ -443,14 +443,15 @@ static void several_quantities_and_ids(void) {
   TEST_ASSERT_EQUAL(WM_Q_WHEEL_TICKS_LEFT, f.got.id[0]);
   TEST_ASSERT_EQUAL(WM_Q_WHEEL_TICKS_RIGHT, f.got.id[1]);
   TEST_ASSERT_EQUAL_DOUBLE(2, f.got.value[1]);
-  uint32_t ids[4];
-  uint8_t extended[4];
-  TEST_ASSERT_EQUAL(2, wm_can_decoder_ids(f.decoder, ids, extended, 4));
-  TEST_ASSERT_EQUAL_HEX32(16, ids[0]);
-  TEST_ASSERT_EQUAL(0, extended[0]);
-  TEST_ASSERT_EQUAL_HEX32(0x101, ids[1]);
-  TEST_ASSERT_EQUAL(1, extended[1]);
-  TEST_ASSERT_EQUAL(2, wm_can_decoder_ids(f.decoder, ids, extended, 0));
+  wm_can_match matches[4];
+  TEST_ASSERT_EQUAL(2, wm_can_decoder_matches(f.decoder, matches, 4));
+  TEST_ASSERT_EQUAL_HEX32(16, matches[0].id);
+  TEST_ASSERT_EQUAL_HEX32(0x7FF, matches[0].mask);
+  TEST_ASSERT_EQUAL(0, matches[0].is_extended);
+  TEST_ASSERT_EQUAL_HEX32(0x101, matches[1].id);
+  TEST_ASSERT_EQUAL_HEX32(0x1FFFFFFF, matches[1].mask);
+  TEST_ASSERT_EQUAL(1, matches[1].is_extended);
+  TEST_ASSERT_EQUAL(2, wm_can_decoder_matches(f.decoder, matches, 0));
   TEST_ASSERT_EQUAL_HEX32(1u << WM_Q_WHEEL_TICKS_LEFT | 1u << WM_Q_WHEEL_TICKS_RIGHT | 1u << WM_Q_YAW_RATE,
                           wm_can_decoder_quantities(f.decoder));
   close_it(&f);

@@ -48,16 +48,18 @@ static const bad_input kTable[] = {
      "this is what candump shows on the screen (ID [LENGTH] BYTES), not a log; record with `candump -l any`, or "
      "`candump -L any > can.log`, which give (SECONDS.MICROS) IFACE ID#DATA"},
     {"screen output with a date", CANDUMP, "(2020-12-19 12:04:45.485261)  can0  123   [1]  11",
-     "this is what candump shows on the screen (its time is a date), not a log; record with `candump -l any`, or "
+     "this is what candump shows on the screen (ID [LENGTH] BYTES), not a log; record with `candump -l any`, or "
      "`candump -L any > can.log`, which give (SECONDS.MICROS) IFACE ID#DATA"},
     {"time without its end", CANDUMP, "(1.5 can0 123#00", "the time's closing bracket is missing: (SECONDS.MICROS)"},
     {"time with too many digits", CANDUMP, "(1.0000000001) can0 123#00",
      "time (1.0000000001) needs 1 to 9 digits behind its point"},
     {"time too late", CANDUMP, "(9999999999999.0) can0 123#00",
      "time (9999999999999.0) does not fit into 64-bit nanoseconds (292 years)"},
-    {"no interface", CANDUMP, "(1.5)", "behind the time comes the interface's name, 1 to 15 letters; '' is not one"},
-    {"interface's name too long", CANDUMP, "(1.5) a_name_of_16_chr 123#00",
-     "behind the time comes the interface's name, 1 to 15 letters; 'a_name_of_16_chr' is not one"},
+    {"no interface", CANDUMP, "(1.5)", "behind the time comes the interface's name, 1 to 63 letters; '' is not one"},
+    {"interface's name too long", CANDUMP,
+     "(1.5) a_name_of_64_letters_xxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxx 123#00",
+     "behind the time comes the interface's name, 1 to 63 letters; 'a_name_of_64_letters_xxxxxxxxxxxxxxxxxxxxxxx...' "
+     "is not one"},
     {"id of four digits", CANDUMP, "(1.5) can0 1234#00", "id '1234' has 4 digits; 3 are an 11-bit id, 8 a 29-bit one"},
     {"11-bit id too large", CANDUMP, "(1.5) can0 800#00", "id 800 is above 7FF"},
     {"29-bit id too large", CANDUMP, "(1.5) can0 40000000#00", "id 40000000 is above 1FFFFFFF"},

@@ -47,9 +47,8 @@ static unsigned find(void *context, const char *interface, int *is_up) {
   return self->index;
 }
 
-static int open_socket(void *context, unsigned index, const uint32_t *ids, const uint8_t *is_extended, size_t count) {
-  (void)ids;
-  (void)is_extended;
+static int open_socket(void *context, unsigned index, const wm_can_match *filters, size_t count) {
+  (void)filters;
   fake_can *self = context;
   if (index == 0 || index != self->index) return -ENODEV;
   self->is_open = 1;

@@ -114,6 +114,8 @@ static void spellings(void) {
       "w_radps,t_ns,v_mps\n2,10,1\n4,20,3\n",
       "t_ns,v_mps,w_radps,arrival_ns\n10,1,2,\n20,3,4,20\n",
       "\xEF\xBB\xBFt_ns,v_mps,w_radps\r\n10,1,2\r\n20,3,4\r\n",
+      "t_ns,v_mps,w_radps\r10,1,2\r20,3,4\r",
+      "\xEF\xBB\xBFt_ns,v_mps,w_radps\r10,1,2\r20,3,4",
       " t_ns , v_mps,\tw_radps \n\n10, 1 ,2\n\r\n20,3,4",
       "t_ns,note,v_mps,w_radps\n10,fine,1,2\n20,,3,4\n",
   };

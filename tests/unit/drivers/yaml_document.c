@@ -168,6 +168,36 @@ static void bad_documents(void) {
   refused("&a &b c: 1\n", "x.yaml:1: not valid YAML: did not find expected key, while parsing a block mapping");
 }
 
+// As editors of Windows and of old Macs save it: a byte order mark, CRLF, CR alone.
+static void encodings(void) {
+  static const char *const kTexts[] = {
+      "\xEF\xBB\xBF"
+      "a: 1\nb: x\n",
+      "\xEF\xBB\xBF"
+      "a: 1\r\nb: x\r\n",
+      "a: 1\rb: x\r", "\xEF\xBB\xBF---\na: 1\nb: x\n", "\xEF\xBB\xBF# c\na: 1\nb: x"};
+  for (size_t i = 0; i < sizeof kTexts / sizeof *kTexts; i++) {
+    wm_yaml_node root = parse(kTexts[i]), a = wm_yaml_get(&root, "a"), b = wm_yaml_get(&root, "b");
+    int64_t one;
+    TEST_ASSERT_EQUAL(WM_OK, wm_yaml_i64(&a, 0, 9, &one, &err));
+    TEST_ASSERT_EQUAL(i < 3 ? 2 : 3, wm_yaml_line(&b));
+    wm_yaml_free(doc);
+  }
+  doc = NULL;
+  refused(
+      "\xEF\xBB\xBF"
+      "a: 1\n\n\xFF\n",
+      "x.yaml:3: not valid YAML: invalid leading UTF-8 octet");
+  refused(
+      "\xFF\xFE"
+      "a",
+      "x.yaml:1: the file is in UTF-16; save it as UTF-8");
+  refused(
+      "\xFE\xFF"
+      "a",
+      "x.yaml:1: the file is in UTF-16; save it as UTF-8");
+}
+
 static void bounded(void) {
   char text[4096] = "a: &a [x, x, x, x, x, x, x, x, x, x]\n";
   for (int c = 'b'; c < 'j'; c++) {
@@ -242,6 +272,7 @@ int main(void) {
   RUN_TEST(typed_reads);
   RUN_TEST(unknown_keys);
   RUN_TEST(bad_documents);
+  RUN_TEST(encodings);
   RUN_TEST(bounded);
   RUN_TEST(empty_documents);
   RUN_TEST(missing_file);
