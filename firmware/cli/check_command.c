@@ -166,11 +166,6 @@ static void put(void *context, wm_output_kind kind, const void *record, size_t b
   evidence_put(&((checked *)context)->evidence, kind, record);
 }
 
-// The messages that the drive would have sent with a pose all the time.
-static uint64_t messages_due(const wm_config *config, const wm_run_report *report) {
-  return (uint64_t)(report->recorded_s * config->runtime.publish_rate_hz);
-}
-
 // Writes the corrected copy and prints its path.
 static void apply(checked *self, const trials_plan *plan, const suspect *of, size_t count) {
   file_edit edits[TRIAL_EDITS_MAX];
@@ -261,15 +256,17 @@ static void try_suspects(checked *self, const wm_assembly *assembly, double reco
 static void ended(void *context, const wm_assembly *assembly, const wm_run_report *report) {
   checked *self = context;
   const size_t bad = wm_findings_of(self->found, WM_SEVERITY_BAD);
-  source_data_judge(&self->sources, wm_recording_quantities(self->recording), self->found);
-  const uint64_t due = messages_due(assembly->config, report);
+  source_data_judge(&self->sources, wm_recording_quantities(self->recording), &report->health, self->found);
+  const uint64_t due = report->messages_due;
   const drive_facts facts = {assembly, self->sources.facts, &self->evidence, report->recorded_s, due};
   if (tells_facts)
     facts_print(&facts, stdout);
   else
     keep_facts(&facts);
+  if (tells_facts) comparisons_print(&self->sources.channels, assembly, stdout);
   evidence_judge(&self->evidence, assembly, &report->health, due, self->found);
   wm_health_map_findings(&report->health, self->found);
+  clock_data_judge_unused(&self->sources.clocks, &report->health, self->found);
   check_unused(&self->evidence, assembly, &report->health, wm_recording_quantities(self->recording), self->found);
   if (wm_findings_of(self->found, WM_SEVERITY_BAD) > bad && !self->is_quick)
     try_suspects(self, assembly, report->recorded_s);
@@ -301,6 +298,7 @@ static void check_recording(const wm_config *config, const char *dir, int is_qui
   if (status != WM_OK) wm_find_error(found, "setup", &err);
   wm_recording_close(self.recording);
   given_ids_free(&self.ids);
+  source_data_free(&self.sources);
 }
 
 // ── a robot's own devices ───────────────────────────────────────────────────────────────────────────────────────────

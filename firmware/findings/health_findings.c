@@ -15,6 +15,9 @@
 // Of the estimator's cycles. A robot's loop misses none; a computer that is shared with other work misses a few.
 #define DEADLINES_NOTE 0.001
 
+// Later than any transport, so that no lateness_max_ms is to be advised.
+#define LATE_BY_CLOCK_NS (10 * WM_NS_PER_S)
+
 // The lateness_max_ms that covers this lateness, in whole 10 ms.
 static double would_do_ms(wm_time_ns lateness_ns) { return ceil((double)lateness_ns * 1e-7) * 10; }
 
@@ -22,13 +25,20 @@ static void about_lateness(const wm_source_health *s, wm_findings *out) {
   if (s->late == 0 && s->lateness_p99_ns <= s->lateness_max_ns) return;
   const double bound_ms = (double)s->lateness_max_ns * 1e-6;
   const int is_usual = s->lateness_p99_ns > s->lateness_max_ns;
+  const int is_clock = s->lateness_p99_ns > LATE_BY_CLOCK_NS;
   char fix[WM_FINDING_FIX_MAX] = "the rows of a source have to be in the order of their stamps";
-  if (is_usual)
-    (void)snprintf(fix, sizeof fix, "`lateness_max_ms: %.0f` for this source would suffice",
+  if (is_clock)
+    (void)snprintf(fix, sizeof fix, "its stamps are of another clock than their arrivals, or the clock was set");
+  else if (s->lateness_worst_ns > s->lateness_max_ns && s->lateness_worst_ns < LATE_BY_CLOCK_NS)
+    (void)snprintf(
+        fix, sizeof fix,
+        "`lateness_max_ms: %.0f` for this source would suffice for all, %.0f for 99 of 100; merge.horizon_ms "
+        "has to be as large",
+        would_do_ms(s->lateness_worst_ns), would_do_ms(s->lateness_p99_ns));
+  else if (is_usual)
+    (void)snprintf(fix, sizeof fix,
+                   "`lateness_max_ms: %.0f` for this source would suffice; merge.horizon_ms has to be as large",
                    would_do_ms(s->lateness_p99_ns));
-  if (s->lateness_worst_ns > s->lateness_max_ns)
-    (void)snprintf(fix, sizeof fix, "`lateness_max_ms: %.0f` for this source would suffice for all, %.0f for 99 of 100",
-                   would_do_ms(s->lateness_worst_ns), would_do_ms(s->lateness_p99_ns));
   wm_finding *f =
       is_usual ? wm_find(out, WM_FOUND_DATA_LATE, WM_SEVERITY_NOTE, s->name, fix,
                          "its lateness is %.0f ms (99 of 100 at most), lateness_max_ms is %.0f; %" PRIu64 " of %" PRIu64

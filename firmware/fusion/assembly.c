@@ -8,19 +8,49 @@
 
 static wm_time_ns ns_from_ms(double ms) { return wm_ns_from_seconds(ms * 1e-3); }
 
-static void leave_out(wm_assembly *self, const char *name, const char *why) {
-  if (self->unused_count == sizeof self->unused / sizeof self->unused[0]) return;
-  char *line = self->unused[self->unused_count++];
-  (void)snprintf(line, sizeof self->unused[0], "%s: %s", name, why);
+static wm_unused *leave_out(wm_assembly *self, const char *name, wm_unused_why why) {
+  static wm_unused beyond;
+  const int has_room = self->unused_count < sizeof self->unused / sizeof self->unused[0];
+  wm_unused *out = has_room ? &self->unused[self->unused_count++] : &beyond;
+  *out = (wm_unused){.why = why};
+  (void)snprintf(out->name, sizeof out->name, "%s", name);
+  return out;
+}
+
+// "the estimator 'slam' doesn't take its data; landmark_ekf, odometry do"
+static void leave_to_others(wm_assembly *self, const char *name, uint32_t kinds, int is_bound) {
+  wm_unused *out = leave_out(self, name, WM_UNUSED_BY_ESTIMATOR);
+  size_t count, others = 0;
+  const wm_estimator *const *all = wm_estimators(&count);
+  out->is_bound = (uint8_t)is_bound;
+  int used =
+      snprintf(out->text, sizeof out->text, "the estimator '%s' doesn't take its data", self->config->estimator->name);
+  for (size_t i = 0; i < count && used > 0 && (size_t)used < sizeof out->text; i++)
+    if (all[i]->takes & kinds & ~(uint32_t)WM_MOTION_EVENTS)
+      used += snprintf(out->text + used, sizeof out->text - (size_t)used, "%s%s",
+                       others++ ? ", " : "; these do: ", all[i]->name);
 }
 
 // A source that the estimator can't use is not opened: it would only hold the watermark back.
-static const char *reason_to_leave_out(const wm_config *config, const wm_source *source,
-                                       const wm_source_config *wanted) {
-  uint32_t takes = config->estimator->takes | WM_MOTION_EVENTS;
-  if (!wanted->use) return "`use: false` in the configuration";
-  if (!(source->kinds & takes)) return "the estimator doesn't take its data";
-  return NULL;
+static int is_left_out(wm_assembly *self, const wm_source *source, const wm_source_config *wanted) {
+  const uint32_t takes = self->config->estimator->takes | WM_MOTION_EVENTS;
+  if (wanted->use && (source->kinds & takes)) return 0;
+  if (wanted->use)
+    leave_to_others(self, source->name, source->kinds, source->is_live);
+  else
+    (void)snprintf(leave_out(self, source->name, WM_UNUSED_WANTED)->text, sizeof self->unused[0].text, "%s",
+                   "`use: false` in the configuration");
+  return 1;
+}
+
+// What the configuration binds to this run has a use: a device or a detector that is for nothing is a mistake.
+static wm_status check_bound(const wm_assembly *self, wm_error *err) {
+  for (size_t i = 0; i < self->unused_count; i++)
+    if (self->unused[i].is_bound)
+      return wm_fail(err, WM_BAD_CONFIG,
+                     "%s: '%s' is bound, but %s; leave it out, or write `sources: [{name: %s, use: false}]`",
+                     self->config->path, self->unused[i].name, self->unused[i].text, self->unused[i].name);
+  return WM_OK;
 }
 
 static void add_source(wm_assembly *self, wm_source *source) {
@@ -29,11 +59,7 @@ static void add_source(wm_assembly *self, wm_source *source) {
   wm_config_source(self->config, source->name, &wanted, &rank);
   if ((size_t)rank == self->config->source_count && source->lateness_max_ms > 0)
     wanted.lateness_max_ms = source->lateness_max_ms, wanted.lateness_is_stated = 1;
-  const char *why_not = reason_to_leave_out(self->config, source, &wanted);
-  if (why_not) {
-    leave_out(self, source->name, why_not);
-    return;
-  }
+  if (is_left_out(self, source, &wanted)) return;
   wm_time_ns lateness_ns = ns_from_ms(wanted.lateness_max_ms);
   wm_time_ns horizon_ns = ns_from_ms(self->config->runtime.merge_horizon_ms);
   wm_assembled_source *s = &self->sources[self->source_count++];
@@ -61,11 +87,9 @@ static void choose_quantities(wm_assembly *self) {
       const wm_assembled_source *taken = &self->sources[k];
       const uint32_t both = less->source->quantities & taken->source->quantities & ~less->drops;
       if (both == 0 || strncmp(taken->name, "can", 3) == 0) continue;
-      char why[60];
-      (void)snprintf(why, sizeof why, "%s is taken from %.16s", wm_quantity_name((unsigned)__builtin_ctz(both)),
-                     taken->name);
       less->drops |= both;
-      leave_out(self, less->name, why);
+      (void)snprintf(leave_out(self, less->name, WM_UNUSED_QUANTITY)->text, sizeof self->unused[0].text,
+                     "%s is taken from %.16s", wm_quantity_name((unsigned)__builtin_ctz(both)), taken->name);
     }
 }
 
@@ -109,7 +133,7 @@ static wm_status add_vision(wm_assembly *self, wm_recording *recording, wm_error
   const wm_config *config = self->config;
   for (size_t i = 0; i < config->vision_count; i++)
     if (!(config->vision[i].detector->gives & config->estimator->takes))
-      leave_out(self, config->vision[i].detector->name, "the estimator doesn't take its data");
+      leave_to_others(self, config->vision[i].detector->name, config->vision[i].detector->gives, 1);
   wm_status status = wm_vision_open(config, recording, NULL, NULL, &self->vision, err);
   for (size_t i = 0; status == WM_OK && i < wm_vision_count(self->vision); i++) {
     if (self->source_count == WM_SOURCES_MAX)
@@ -143,6 +167,7 @@ wm_status wm_assemble(const wm_config *config, wm_recording *recording, uint64_t
   for (size_t i = 0; i < count && i < WM_SOURCES_MAX; i++) add_source(out, sources[i]);
   choose_quantities(out);
   status = add_vision(out, recording, err);
+  if (status == WM_OK) status = check_bound(out, err);
   if (status != WM_OK) return status;
   setup->sensors =
       wm_site_sensors(wm_recording_site(recording), &setup->sensor_count);  // the cameras' sensors have been added

@@ -25,6 +25,20 @@ typedef struct wm_assembled_source {
   double from_s, until_s;
 } wm_assembled_source;
 
+// A source that is not used, and why.
+typedef enum wm_unused_why {
+  WM_UNUSED_WANTED,        // `use: false`
+  WM_UNUSED_BY_ESTIMATOR,  // which takes no such data
+  WM_UNUSED_QUANTITY,      // of it, a quantity that another source gives
+} wm_unused_why;
+
+typedef struct wm_unused {
+  wm_unused_why why;
+  uint8_t is_bound;  // the configuration names it: a device, or a detector
+  char name[WM_SOURCE_NAME_MAX];
+  char text[128];  // "the estimator 'slam' doesn't take it; landmark_ekf does"
+} wm_unused;
+
 typedef struct wm_assembly {
   const wm_config *config;
   wm_setup setup;
@@ -33,7 +47,7 @@ typedef struct wm_assembly {
   uint32_t kinds;  // of all used sources
   wm_assembled_source sources[WM_SOURCES_MAX];
   size_t source_count;
-  char unused[WM_SOURCES_MAX + WM_VISION_MAX][WM_SOURCE_NAME_MAX + 64];  // "NAME: why not"
+  wm_unused unused[WM_SOURCES_MAX + WM_VISION_MAX];
   size_t unused_count;
   const char *calibration_text;
   size_t calibration_length;
@@ -45,8 +59,8 @@ typedef struct wm_assembly {
 } wm_assembly;
 
 // `config` and `recording` outlive the assembly. WM_BAD_CONFIG where they don't match: no data, a source of the
-// configuration that no recording has, an estimator that can't work with this setup. wm_assembly_close is also due
-// after a failure.
+// configuration that no recording has, an estimator that can't work with this setup or doesn't take a device or a
+// detector of the configuration. wm_assembly_close is also due after a failure.
 wm_status wm_assemble(const wm_config *config, wm_recording *recording, uint64_t seed, wm_assembly *out, wm_error *err);
 // Parameters of the motion by the sources (wm_motion_choose).
 wm_status wm_assembly_choose_motion(wm_assembly *self, wm_error *err);

@@ -230,8 +230,11 @@ wm_status waymark_start(waymark_session *self, wm_error *err) {
     wm_arena_close(&self->arena);
     return status;
   }
-  for (size_t i = 0; self->options.note && i < self->assembly.unused_count; i++)
-    self->options.note(self->options.context, self->assembly.unused[i]);
+  for (size_t i = 0; self->options.note && i < self->assembly.unused_count; i++) {
+    char line[sizeof(wm_unused)];
+    (void)snprintf(line, sizeof line, "%s: %s", self->assembly.unused[i].name, self->assembly.unused[i].text);
+    self->options.note(self->options.context, line);
+  }
   // A program pushes what its detectors take: their time is its own.
   for (size_t i = 0; i < wm_vision_count(self->assembly.vision); i++)
     wm_vision_source(self->assembly.vision, i)->ready_after_ns = 0;

@@ -17,8 +17,16 @@
 #define SQUARES_BAD 3.0  // mean square of innovations over their sigma; 1 is expected, correlated errors make it less
 #define DEGRADED_NOTE 0.01  // good drives are degraded for less
 #define DEGRADED_BAD 0.10
-#define UNSUPPORTED_MIN 100  // observations or pictures: with fewer the robot may have seen nothing yet
+#define UNSUPPORTED_MIN 20   // observations or pictures: with fewer the robot may have seen nothing yet
 #define UNSUPPORTED_BAD 0.5  // share of the time in dead reckoning, where no observation was ever fused
+// The same where some were: of the time, and of the observations that were used.
+#define HARDLY_SUPPORTED_BAD 0.9
+#define HARDLY_USED 0.1
+#define SQUARES_LEAST 0.01  // mean square of innovations over their sigma: a tenth of what is stated
+// Motion data that no robot can do, of all: single ones are slips and disturbances.
+#define OUTLIERS_MIN 20
+#define OUTLIERS_NOTE 0.001
+#define OUTLIERS_BAD 0.02
 #define BIASED_LOST_MAX 0.3  // share of the time lost beyond which a bias may come from wrong poses
 #define FACTOR_BAD 3.0       // of a sensor's stated sigma
 // Mean of the innovations over their sigma. Errors that last are correlated, so a tenth of a sigma is usual.
@@ -82,6 +90,8 @@ double evidence_score(const drive_evidence *self) {
 
 static void take_event(drive_evidence *self, const wm_event *event) {
   if (!self->has_events) self->first_ns = event->t_ns;
+  if (self->has_events && event->t_ns / 2 - self->last_ns / 2 > WM_LONGEST_SILENCE_NS / 2)
+    self->silent_s += wm_seconds_between(self->last_ns, event->t_ns);
   self->has_events = 1;
   self->last_ns = event->t_ns;
 }
@@ -108,7 +118,8 @@ void evidence_put(drive_evidence *self, wm_output_kind kind, const void *record)
 }
 
 uint64_t evidence_due(const drive_evidence *self, double publish_rate_hz) {
-  return self->has_events ? (uint64_t)(wm_seconds_between(self->first_ns, self->last_ns) * publish_rate_hz) : 0;
+  const double driven_s = wm_seconds_between(self->first_ns, self->last_ns) - self->silent_s;
+  return self->has_events && driven_s > 0 ? (uint64_t)(driven_s * publish_rate_hz) : 0;
 }
 
 double evidence_share(const drive_evidence *self, wm_state state, uint64_t total) {
@@ -118,6 +129,23 @@ double evidence_share(const drive_evidence *self, wm_state state, uint64_t total
 }
 
 // ── findings ────────────────────────────────────────────────────────────────────────────────────────────────────────
+
+// All innovations of a source are far smaller than stated: what it says has hardly any weight.
+static void weightless(const drive_evidence *self, const wm_assembly *assembly, size_t i, wm_findings *out) {
+  double squares = 0;
+  uint64_t fused = 0;
+  // Of a picture's edges one innovation stands for hundreds of points, along their best axis: it is small.
+  if (assembly->sources[i].kinds & WM_EVENT_BIT(WM_EVENT_POINTS)) return;
+  for (unsigned k = 0; k < WM_RESIDUAL_COUNT; k++) {
+    if (k == WM_RESIDUAL_STANDSTILL) continue;
+    squares += self->residuals[i][k].squares;
+    fused += self->residuals[i][k].fused;
+  }
+  if (fused < 5 * OBSERVATIONS_MIN || squares > SQUARES_LEAST * (double)fused) return;
+  wm_find(out, WM_FOUND_NOISE_TOO_LARGE, WM_SEVERITY_BAD, wm_assembly_source_name(assembly, i), NULL,
+          "its innovations are %.2g of what is stated: it has hardly any weight", sqrt(squares / (double)fused))
+      ->size = sqrt(squares / (double)fused);
+}
 
 static void refused(const drive_evidence *self, const wm_assembly *assembly, size_t i, wm_findings *out) {
   uint64_t fused = 0, refused = 0, worst = 0;
@@ -193,6 +221,14 @@ static double parameter(const wm_config *config, const char *key) {
 static void not_found(const wm_assembly *assembly, double share, wm_findings *out) {
   const double limit_m = parameter(assembly->config, "recover.sigma_xy_m");
   char fix[WM_FINDING_FIX_MAX];
+  const wm_start *given = &assembly->setup.start;
+  if (!isnan(given->p_m[0]) && !isnan(given->heading_rad)) {
+    wm_find(out, WM_FOUND_POSE_NOT_FOUND, WM_SEVERITY_BAD, "drive",
+            "a start is given: see the other findings, and whether its t_ns is within the drive",
+            "there is no pose for %.0f %% of the drive", 100 * share)
+        ->size = share;
+    return;
+  }
   // A limit in metres is not reached where the positions or ranges have a larger sigma.
   const int is_limited =
       limit_m > 0 && (assembly->kinds & (WM_EVENT_BIT(WM_EVENT_POSITION) | WM_EVENT_BIT(WM_EVENT_SIGHTING)));
@@ -243,15 +279,37 @@ static void is_lost(const drive_evidence *self, const wm_assembly *assembly, dou
 static void unsupported(const drive_evidence *self, const wm_assembly *assembly, const wm_health *health,
                         uint64_t total, wm_findings *out) {
   const double share = evidence_share(self, WM_STATE_DEAD_RECKONING, total);
-  if (share < UNSUPPORTED_BAD || self->fused > 0) return;
   const uint64_t observers = wm_assembly_observers(assembly);
-  uint64_t received = 0;
+  uint64_t received = 0, fused = 0;
   for (uint32_t i = 0; i < health->source_count && i < 64; i++)
-    if ((observers >> i) & 1u) received += health->sources[i].received;
-  if (received < UNSUPPORTED_MIN) return;
+    if ((observers >> i) & 1u) {
+      received += health->sources[i].received;
+      fused += health->sources[i].fused;
+    }
+  const int is_hardly = (double)fused < HARDLY_USED * (double)received && received >= 5 * UNSUPPORTED_MIN;
+  if (received < UNSUPPORTED_MIN || share < (self->fused == 0 ? UNSUPPORTED_BAD : HARDLY_SUPPORTED_BAD) ||
+      (self->fused > 0 && !is_hardly))
+    return;
   wm_find(out, WM_FOUND_POSE_DOUBTFUL, WM_SEVERITY_BAD, "observations",
-          "is the map given, are the sensors' names, the markers' family and the identities those of this place?",
-          "none of them reaches the pose, which is dead reckoning for %.0f %% of the drive", 100 * share)
+          "is the map given, are the sensors' names, their mountings, the markers' family and the identities those of "
+          "this place?",
+          "%" PRIu64 " of %" PRIu64 " reach the pose, which is dead reckoning for %.0f %% of the drive", fused,
+          received, 100 * share)
+      ->size = share;
+}
+
+static void outliers(const wm_assembly *assembly, const wm_health *health, wm_findings *out) {
+  const wm_counter *counter = wm_health_counter(health, WM_COUNTER_MOTION_OUTLIERS);
+  uint64_t received = 0;
+  for (uint32_t i = 0; i < health->source_count && i < assembly->source_count; i++)
+    if (assembly->sources[i].kinds & WM_MOTION_EVENTS) received += health->sources[i].received;
+  const double share = counter && received > 0 ? (double)counter->count / (double)received : 0;
+  if (!counter || counter->count < OUTLIERS_MIN || share < OUTLIERS_NOTE) return;
+  wm_find(out, WM_FOUND_MOTION_SENSOR, share > OUTLIERS_BAD ? WM_SEVERITY_BAD : WM_SEVERITY_NOTE, "motion",
+          "look at the sender: a counter that starts anew, bits that are lost, two senders of one message; "
+          "motion.limits has the plausible accelerations",
+          "%" PRIu64 " of %" PRIu64 " motion data are nothing that a robot can do, and are refused", counter->count,
+          received)
       ->size = share;
 }
 
@@ -403,6 +461,8 @@ static void calibration(const wm_assembly *assembly, const wm_health *health, wm
 void evidence_judge(const drive_evidence *self, const wm_assembly *assembly, const wm_health *health, uint64_t total,
                     wm_findings *out) {
   for (size_t i = 0; i < assembly->source_count; i++) refused(self, assembly, i, out);
+  for (size_t i = 0; i < assembly->source_count; i++) weightless(self, assembly, i, out);
+  outliers(assembly, health, out);
   const int is_lost = evidence_share(self, WM_STATE_LOST, total) > BIASED_LOST_MAX;
   for (size_t i = 0; i < assembly->source_count; i++) biased(self, assembly, i, is_lost, out);
   states(self, assembly, health, total, out);

@@ -22,6 +22,9 @@ typedef struct landmark_evidence {
   uint64_t fused, refused, unknown;  // unknown: the map doesn't have it
 } landmark_evidence;
 
+// A longer silence of all sources (a clock that was set, recordings put together) is skipped, not played.
+#define WM_LONGEST_SILENCE_NS (600 * WM_NS_PER_S)
+
 typedef struct drive_evidence {
   residual_evidence residuals[WM_SOURCES_MAX][WM_RESIDUAL_COUNT];
   landmark_evidence landmarks[EVIDENCE_LANDMARKS_MAX];
@@ -33,6 +36,7 @@ typedef struct drive_evidence {
   uint64_t causes[2][WM_SOURCES_MAX + 1][WM_CAUSE_COUNT];
   uint64_t poses;                // fused
   wm_time_ns first_ns, last_ns;  // stamps of the events
+  double silent_s;               // of this time, in silences longer than a replay plays (WM_LONGEST_SILENCE_NS)
   int has_events;
   wm_published begun;  // the first message
   // The first new pose soon after the start: how far from the one before; 0 s: there was none.

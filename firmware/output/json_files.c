@@ -205,7 +205,9 @@ wm_status wm_write_health_json(const char *dir, const wm_assembly *assembly, con
   (void)fputs("  \"unused\": [", f);
   for (size_t i = 0; i < assembly->unused_count; i++) {
     (void)fputs(i ? ", " : "", f);
-    string(f, assembly->unused[i]);
+    char line[sizeof(wm_unused)];
+    (void)snprintf(line, sizeof line, "%s: %s", assembly->unused[i].name, assembly->unused[i].text);
+    string(f, line);
   }
   (void)fputs("],\n  \"sources\": {\n", f);
   for (uint32_t i = 0; i < h->source_count; i++) {

@@ -8,6 +8,7 @@
 
 #include "fusion/pipeline.h"
 #include "fusion/source_reader.h"
+#include "output/drive_evidence.h"
 #include "output/run_folder.h"
 #include "replay/seen_frames.h"
 #include "rt/arena.h"
@@ -28,6 +29,7 @@ typedef struct replay {
   wm_replay_watch watch;
   wm_time_ns first_ns, now_ns;          // the run's clock is that of the arrivals
   wm_time_ns publish_ns, next_tick_ns;  // period and next due message
+  uint64_t ticks;                       // messages that were due
   int64_t allocations, page_faults;     // before the start; after it: since
 } replay;
 
@@ -104,6 +106,7 @@ static void publish_until(replay *self, wm_time_ns now_ns) {
     if (wm_pipeline_expect(&self->pipeline, self->next_tick_ns, &expected))
       wm_vision_set_prediction(self->assembly.vision, &expected);
     self->next_tick_ns += self->publish_ns;
+    self->ticks++;
   }
 }
 
@@ -112,9 +115,6 @@ static wm_time_ns first_tick(wm_time_ns now_ns, wm_time_ns period_ns) {
   if (remainder_ns < 0) remainder_ns += period_ns;
   return remainder_ns ? now_ns - remainder_ns + period_ns : now_ns;
 }
-
-// A longer silence of all sources (recordings joined together, a corrupt stamp) is skipped, not played tick by tick.
-#define LONGEST_SILENCE_NS (600 * WM_NS_PER_S)
 
 static wm_status play(replay *self, const wm_replay_options *options, double duration_s, int *was_stopped,
                       wm_error *err) {
@@ -128,7 +128,7 @@ static wm_status play(replay *self, const wm_replay_options *options, double dur
       break;
     }
     wm_time_ns arrival_ns = reader->next.arrival_ns;
-    if (self->now_ns == WM_TIME_NONE || arrival_ns / 2 - self->now_ns / 2 > LONGEST_SILENCE_NS / 2)
+    if (self->now_ns == WM_TIME_NONE || arrival_ns / 2 - self->now_ns / 2 > WM_LONGEST_SILENCE_NS / 2)
       self->next_tick_ns = first_tick(arrival_ns, self->publish_ns);
     publish_until(self, arrival_ns);
     self->now_ns = arrival_ns;
@@ -164,6 +164,7 @@ static void summarize(replay *self, wm_run_report *report) {
   wm_source_readers_health(self->readers, self->assembly.source_count, &report->health);
   report->poses = self->pipeline.fuser.poses;
   report->events = self->pipeline.fuser.events;
+  report->messages_due = self->ticks;
   report->recorded_s = wm_seconds_between(self->first_ns, self->now_ns);
   report->memory_bytes = self->arena.bytes;
   report->allocations_after_start = self->allocations;

@@ -24,7 +24,8 @@ typedef struct wm_run_report {
   wm_findings findings;  // where files are written, and of a live run
   uint64_t poses;        // fused, written to the trajectory
   uint64_t events;
-  double recorded_s;  // from the first stamp to the last arrival
+  uint64_t messages_due;  // recording only: published, had there been a pose all the time
+  double recorded_s;      // from the first stamp to the last arrival
   size_t memory_bytes;
   int64_t allocations_after_start, page_faults_after_start;
   uint64_t events_missing;  // event log only: lost by the run that wrote it

@@ -5,7 +5,8 @@
     findings.py BIN_DIR SOURCE_DIR
 
 Mistakes in the files of small_robot.py make the findings of a drive; those of devices, runs and computers are made in
-the C tests, those of calibrations and maps in check_faults.py. The robot without a mistake makes none."""
+the C tests, those of calibrations, maps, clocks and sources beside each other in check_faults.py and check_sources.py. The
+robot without a mistake makes none."""
 import json
 import math
 import pathlib
@@ -79,13 +80,13 @@ def check(bin_dir, config, recording, options):
 
 
 def covered_elsewhere(root):
-    """Identifiers that other tests name, by their C constant or, in check_faults.py, as text."""
+    """Identifiers that other tests name, by their C constant or, in Python, as text."""
     kinds = dict(re.findall(r'\[WM_FOUND_([A-Z_]+)\]\s*=\s*\{\s*"([a-z-]+)"', (root / "firmware/findings/kinds.c").read_text()))
     named = set()
     for test in ("findings", "doctor", "gpsd", "iio"):
         text = (root / f"tests/unit/firmware/test_{test}.c").read_text()
         named |= {kinds[name] for name in re.findall(r"WM_FOUND_([A-Z_]+)", text) if name in kinds}
-    faults = (root / "tests/golden/check_faults.py").read_text()
+    faults = "".join((root / f"tests/golden/{t}.py").read_text() for t in ("check_faults", "check_sources"))
     named |= {i for i in kinds.values() if f'"{i}"' in faults}
     return set(kinds.values()), named
 

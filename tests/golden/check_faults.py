@@ -6,6 +6,7 @@ import json
 import math
 import os
 import pathlib
+import random
 import shutil
 import struct
 import subprocess
@@ -103,12 +104,13 @@ def pose(t_s, step_s=0.001):
 
 def sightings(ids=(1, 2, 3), late_ms=50):
     rows = ["t_ns,sensor,id,bearing_rad,range_m,arrival_ns"]
+    noise = random.Random(1)
     for i in range(60):
         t, place = i * 100_000_000, ((5, 0), (0, 5), (-5, 0))[i % 3]
         x, y, heading = pose(t * 1e-9)
         dx, dy = place[0] - x - 0.1 * math.cos(heading), place[1] - y - 0.1 * math.sin(heading)
         bearing = math.remainder(math.atan2(dy, dx) - heading, 2 * math.pi)
-        rows.append(f"{t},laser,{ids[i % len(ids)]},{bearing:.5f},{math.hypot(dx, dy):.4f},{t + late_ms * 1_000_000}")
+        rows.append(f"{t},laser,{ids[i % len(ids)]},{bearing + noise.gauss(0, 0.01):.5f},{math.hypot(dx, dy) + noise.gauss(0, 0.05):.4f},{t + late_ms * 1_000_000}")
     return "\n".join(rows) + "\n"
 
 

@@ -28,6 +28,7 @@ wm_script_test(run_live_minute COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/recor
 wm_script_test(edge_drives COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/edge_drives.py ${CMAKE_SOURCE_DIR} ${CMAKE_BINARY_DIR}
   LABELS slow release-only TIMEOUT 1200)
 wm_script_test(run_check_faults COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/check_faults.py)
+wm_script_test(run_check_sources COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/check_sources.py)
 wm_script_test(run_frames_of COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/frames_of.py LABELS release-only)
 wm_script_test(run_survey_landmarks COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/survey_landmarks.py LABELS release-only)
 wm_script_test(run_landmarks_from_pixels COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/landmarks_from_pixels.py LABELS slow release-only)

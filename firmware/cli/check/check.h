@@ -5,6 +5,9 @@
 #ifndef WAYMARK_CLI_CHECK_CHECK_H
 #define WAYMARK_CLI_CHECK_CHECK_H
 
+#include "cli/check/channels.h"
+#include "cli/check/clocks.h"
+#include "cli/check/comparisons.h"
 #include "findings/findings.h"
 #include "fusion/assembly.h"
 #include "output/drive_evidence.h"
@@ -29,33 +32,31 @@ typedef struct agreement {
   uint64_t count;
 } agreement;
 
-void agreement_add(agreement *self, double a, double b);
-// Of a over b, if it is beyond `limit` or its inverse whichever of both is the noisy one; else 1.
-double agreement_ratio(const agreement *self, double limit);
-// 0 without data.
-double agreement_correlation(const agreement *self);
-
-// What was seen of the motion over CAN.
+// What was seen of the quantities of the motion, by source.
+typedef struct quantity_seen {
+  uint64_t count;
+  double least, most, last;
+  uint64_t zeros, as_float;  // as_float: values whose bits, taken for a float, are a usual number
+} quantity_seen;
+// A counter of wheel ticks that starts anew before the end of its bits.
+typedef struct ticks_wrap {
+  double last, step, step_before;
+  uint64_t counts, jumps, alike;      // alike: jumps of the size of the first one
+  double since, between, first_jump;  // counts: since the last jump, between the jumps
+} ticks_wrap;
 typedef struct motion_data {
   const wm_wheels *wheels;
-  uint64_t count[WM_Q_COUNT];
-  double least[WM_Q_COUNT], most[WM_Q_COUNT], last[WM_Q_COUNT];
-  double fastest_mps;     // by the ticks
-  wm_time_ns ticks_ns;    // stamp of the last pair of ticks
-  double ticks[2];        // at that stamp
-  double turn_by_ticks;   // rad/s, NaN: not known
-  agreement turn_wheels;  // turn rate of the gyro against that of the wheels' speeds
-  agreement turn_ticks;   // and of the ticks
-  agreement turn_steering;
-  agreement speed_wheels;  // vehicle's speed against the wheels'
-  double speed_by_ticks;   // m/s, NaN: not known
-  agreement speed_ticks;   // a speed over CAN against that of the ticks
+  quantity_seen at[WM_SOURCES_MAX][WM_Q_COUNT];
+  double fastest_mps;   // by the ticks
+  wm_time_ns ticks_ns;  // stamp of the last pair of ticks
+  double ticks[2];      // at that stamp
+  ticks_wrap wraps[2];  // left, right
 } motion_data;
 
 void motion_data_init(motion_data *self, const wm_wheels *wheels);
 void motion_data_take(motion_data *self, const wm_event *event);
 // `bound`: bit per wm_quantity of the binding.
-void motion_data_judge(const motion_data *self, uint32_t bound, wm_findings *out);
+void motion_data_judge(const motion_data *self, const wm_assembly *assembly, uint32_t bound, wm_findings *out);
 
 // Positions against the motion between them, and against headings.
 typedef struct course_data {
@@ -82,6 +83,7 @@ typedef struct source_facts {
   wm_time_ns latest_ns;                                // largest lateness, with look_ns
   uint64_t ahead;                                      // that arrive before their stamp, and are not used
   wm_time_ns look_ns;                                  // time of detection on this computer; 0 for other sources
+  int jumps;                                           // its stamps jump: a finding of its own
   uint64_t sightings, unknown_landmarks, bare_ranges;  // bare_ranges: without a bearing
   uint64_t ranges, far_ranges;                         // far: beyond the sensor's max_range_m, and not used
 } source_facts;
@@ -91,13 +93,16 @@ typedef struct source_data {
   source_facts facts[WM_SOURCES_MAX];
   motion_data motion;
   course_data course;
+  channels channels;
+  clock_data clocks;
 } source_data;
 
 void source_data_init(source_data *self, const wm_assembly *assembly);
 // An event that arrived.
 void source_data_take(source_data *self, const wm_event *event);
 // After the last event: each source's counts, and the sources against each other. `bound` as above.
-void source_data_judge(source_data *self, uint32_t bound, wm_findings *out);
+void source_data_judge(source_data *self, uint32_t bound, const wm_health *health, wm_findings *out);
+void source_data_free(source_data *self);
 
 // What the recording has and the run does not use, after a drive.
 void check_unused(const drive_evidence *evidence, const wm_assembly *assembly, const wm_health *health, uint32_t bound,

@@ -18,6 +18,19 @@
 #define FIXED_ANGLE_MIN 0.8
 #define HEADING_OFF_RAD 0.35  // a mounting that is seen with the naked eye
 
+static void agreement_add(agreement *self, double a, double b) {
+  if (isnan(a) || isnan(b)) return;
+  self->aa += a * a;
+  self->bb += b * b;
+  self->ab += a * b;
+  self->count++;
+}
+
+static double agreement_correlation(const agreement *self) {
+  const double size = sqrt(self->aa * self->bb);
+  return size > 0 ? self->ab / size : 0;
+}
+
 void course_data_init(course_data *self) {
   memset(self, 0, sizeof *self);
   self->motion_ns = self->from_ns = WM_TIME_NONE;

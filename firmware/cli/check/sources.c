@@ -60,7 +60,7 @@ static void counted(const wm_assembled_source *s, const source_facts *facts, wm_
   if (c->first_problem[0] && skipped == 0)  // of the whole file, not of a row
     wm_find(out, WM_FOUND_NO_DATA, WM_SEVERITY_NOTE, s->name, mend_rows(s->source), "%s", c->first_problem);
   else if (c->first_problem[0])
-    wm_find(out, WM_FOUND_ROWS_SKIPPED, of_hundred(skipped, all) >= 5 ? WM_SEVERITY_BAD : WM_SEVERITY_NOTE, s->name,
+    wm_find(out, WM_FOUND_ROWS_SKIPPED, of_hundred(skipped, all) >= 2 ? WM_SEVERITY_BAD : WM_SEVERITY_NOTE, s->name,
             mend_rows(s->source), "%s (%" PRIu64 " like it, %" PRIu64 " of 100)", c->first_problem, skipped,
             of_hundred(skipped, all));
   if (of_hundred(c->lost, facts->events + c->lost) >= 1)
@@ -72,7 +72,7 @@ static void counted(const wm_assembled_source *s, const source_facts *facts, wm_
     wm_find(out, WM_FOUND_VALUES_FROZEN, WM_SEVERITY_NOTE, s->name,
             "the sender is stuck: its values are not used meanwhile",
             "%" PRIu64 " of 100 equal the one before, which noise makes impossible", of_hundred(c->frozen, all));
-  if (of_hundred(c->out_of_order, all) >= 1)
+  if (of_hundred(c->out_of_order, all) >= 1 && !facts->jumps)
     wm_find(out, WM_FOUND_ROWS_DISORDERED, WM_SEVERITY_NOTE, s->name,
             "the recorder's clock was set, or two recordings were put together",
             "%" PRIu64 " of 100 are older than the one before", of_hundred(c->out_of_order, all));
@@ -113,6 +113,8 @@ static wm_time_ns look_ns(const wm_assembly *assembly, const wm_source *source) 
 
 // No sensor and no network is so late; rows in disorder are.
 #define IMPLAUSIBLE_LATENESS_NS (30 * WM_NS_PER_S)
+// So late is a clock that was set, not a queue.
+#define LATE_BY_CLOCK_NS (2 * WM_NS_PER_S)
 
 static void judge(const wm_assembly *assembly, const wm_assembled_source *s, const source_facts *facts,
                   wm_findings *out) {
@@ -125,17 +127,28 @@ static void judge(const wm_assembly *assembly, const wm_assembled_source *s, con
   }
   counted(s, facts, out);
   rate(s, facts, out);
-  if (facts->latest_ns > IMPLAUSIBLE_LATENESS_NS) {
+  if (facts->latest_ns > IMPLAUSIBLE_LATENESS_NS && !facts->jumps) {
     wm_find(out, WM_FOUND_ROWS_DISORDERED, WM_SEVERITY_BAD, s->name,
             "sort the rows by t_ns; or correct arrival_ns, which has to be of the same clock",
             "rows arrive up to %.1f s after newer ones", (double)facts->latest_ns * 1e-9);
-  } else if (facts->latest_ns > s->merge.lateness_max_ns && facts->latest_ns > s->merge.lateness_most_ns) {
-    char mend[120], with_look[80] = "";
+  } else if (facts->latest_ns > s->merge.lateness_max_ns && facts->latest_ns > s->merge.lateness_most_ns &&
+             !facts->jumps) {
+    char mend[WM_FINDING_FIX_MAX], with_look[80] = "";
+    const double late_ms = ceil((double)facts->latest_ns * 1e-7) * 10;
     if (facts->look_ns > 0)
       (void)snprintf(with_look, sizeof with_look, " with the %.0f ms that detection takes on this computer",
                      (double)facts->look_ns * 1e-6);
-    (void)snprintf(mend, sizeof mend, "sources: [{name: %.40s, lateness_max_ms: %.0f}]", s->name,
-                   ceil((double)facts->latest_ns * 1e-7) * 10);
+    if (late_ms <= assembly->config->runtime.merge_horizon_ms)
+      (void)snprintf(mend, sizeof mend, "sources: [{name: %.40s, lateness_max_ms: %.0f}]", s->name, late_ms);
+    else if (facts->latest_ns < LATE_BY_CLOCK_NS)
+      (void)snprintf(
+          mend, sizeof mend,
+          "merge: {horizon_ms: %.0f} and sources: [{name: %.40s, lateness_max_ms: %.0f}], which delays every "
+          "pose; better, send it sooner",
+          late_ms, s->name, late_ms);
+    else
+      (void)snprintf(mend, sizeof mend,
+                     "no transport takes that long: are t_ns and arrival_ns of one clock, and was it set meanwhile?");
     wm_find(out, WM_FOUND_DATA_LATE, WM_SEVERITY_NOTE, s->name, mend,
             "as much as %.0f ms late%s, more than its lateness_max_ms (%.0f)", (double)facts->latest_ns * 1e-6,
             with_look, (double)s->merge.lateness_max_ns * 1e-6);
@@ -227,6 +240,8 @@ void source_data_init(source_data *self, const wm_assembly *assembly) {
   for (size_t i = 0; i < WM_SOURCES_MAX; i++)
     self->facts[i] = (source_facts){.first_ns = WM_TIME_NONE, .last_ns = WM_TIME_NONE, .latest_ns = INT64_MIN};
   motion_data_init(&self->motion, &assembly->setup.wheels);
+  channels_init(&self->channels, &assembly->setup.wheels);
+  clock_data_init(&self->clocks, assembly);
   course_data_init(&self->course);
 }
 
@@ -234,24 +249,31 @@ void source_data_take(source_data *self, const wm_event *event) {
   take(&self->facts[event->source], self->assembly, event);
   take_range(&self->facts[event->source], &self->assembly->setup, event);
   motion_data_take(&self->motion, event);
+  channels_take(&self->channels, event);
+  clock_data_take(&self->clocks, event);
   course_data_take(&self->course, event);
 }
 
-void source_data_judge(source_data *self, uint32_t bound, wm_findings *out) {
+void source_data_free(source_data *self) { channels_free(&self->channels); }
+
+void source_data_judge(source_data *self, uint32_t bound, const wm_health *health, wm_findings *out) {
   const source_facts *motion = NULL;
   uint32_t kinds = 0;
+  clock_data_judge(&self->clocks, health, out);
   for (size_t i = 0; i < self->assembly->source_count; i++) {
     const wm_assembled_source *s = &self->assembly->sources[i];
     source_facts *facts = &self->facts[i];
     if (s->source->is_live) continue;
     facts->look_ns = look_ns(self->assembly, s->source);
+    facts->jumps = clock_data_jumps(&self->clocks, i);
     if (facts->events > 0) facts->latest_ns += facts->look_ns;
     judge(self->assembly, s, facts, out);
     kinds |= s->kinds;
     if (is_motion(s) && facts->events > 1 && !motion) motion = facts;
   }
   for (size_t i = 0; motion && i < self->assembly->source_count; i++)
-    if (self->facts[i].events > 1 && !is_motion(&self->assembly->sources[i])) spans(self, i, motion, out);
+    if (self->facts[i].events > 1 && &self->facts[i] != motion && !self->facts[i].jumps) spans(self, i, motion, out);
   course_data_judge(&self->course, out);
-  if (kinds & WM_EVENT_BIT(WM_EVENT_QUANTITIES)) motion_data_judge(&self->motion, bound, out);
+  if (kinds & WM_EVENT_BIT(WM_EVENT_QUANTITIES)) motion_data_judge(&self->motion, self->assembly, bound, out);
+  comparisons_judge(&self->channels, self->assembly, out);
 }

@@ -28,14 +28,19 @@ static void gyro(const wm_assembly *assembly, uint32_t bound, wm_findings *out) 
 }
 
 static void sources(const wm_assembly *assembly, wm_findings *out) {
+  // One that takes none at all is chosen for dead reckoning.
+  const int takes_observations = (assembly->config->estimator->takes & ~(uint32_t)WM_MOTION_EVENTS) != 0;
   for (size_t i = 0; i < assembly->unused_count; i++) {
-    const char *line = assembly->unused[i], *why = strstr(line, ": ");
-    char name[WM_FINDING_ABOUT_MAX];
-    if (!why || strstr(why, "use: false")) continue;  // wanted so
-    (void)snprintf(name, sizeof name, "%.*s", (int)(why - line), line);
-    wm_find(out, WM_FOUND_DATA_UNUSED, WM_SEVERITY_NOTE, name,
-            "choose an estimator that takes them (docs/estimators.md), or write `use: false` for this source",
-            "is not used: %s", why + 2);
+    const wm_unused *one = &assembly->unused[i];
+    char fix[WM_FINDING_FIX_MAX];
+    if (one->why == WM_UNUSED_WANTED) continue;
+    (void)snprintf(fix, sizeof fix,
+                   "choose an estimator that takes it (docs/choose.md), or write `sources: [{name: %s, use: false}]`",
+                   one->name);
+    wm_find(out, WM_FOUND_DATA_UNUSED,
+            one->why == WM_UNUSED_BY_ESTIMATOR && takes_observations ? WM_SEVERITY_BAD : WM_SEVERITY_NOTE, one->name,
+            one->why == WM_UNUSED_BY_ESTIMATOR ? fix : "leave its signal out of can-signals.yaml, if that is intended",
+            "is not used: %s", one->text);
   }
 }
 

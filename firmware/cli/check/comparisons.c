@@ -1,0 +1,429 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cli/check/comparisons.h"
+
+#include <math.h>
+#include <string.h>
+
+#define LAG_WINDOWS 4        // a robot obeys within a second
+#define LAG_GAIN 0.02        // of the correlation, for a lag that is not 0
+#define PAIRS_MIN 20         // windows in common
+#define COVER_MIN 0.8        // share of a window that has data
+#define TURN_MIN_RAD 0.5     // a drive that turns less shows neither sign nor factor
+#define TURN_RMS_MIN 0.02    // rad/s
+#define WAY_MIN_M 5.0        // likewise of a speed
+#define WAY_RMS_MIN 0.05     // m/s
+#define CORRELATION_MIN 0.5  // of a sign
+#define FIT_MIN 0.8          // of an axis, and of two that agree
+// Tyres, tracks and slip make some per cent, a skid-steer base's slip a half.
+#define FACTOR_MIN 1.5
+#define NEAR 0.1            // of a factor that is named: 57.3 within 10 %
+#define NOTHING_SHARE 0.15  // of the other's root mean square, over NOTHING_WINDOWS together: shows no turn
+#define NOTHING_WINDOWS 8
+#define LONE_ZEROS_MIN 0.2  // share of the values; a wheel that turns slowly has a few
+#define OBEYED 0.98         // a command that fits better is no command
+#define DEGREES (180 / M_PI)
+#define KMH 3.6
+
+typedef struct fit {
+  double aa, bb, ab;  // sums over the windows
+  double total[2];    // of the sizes: rad or m
+  double coarse[2];   // root mean square over several windows together, of a rate
+  double r;           // correlation about zero
+  double lag_s;       // by which b is later
+  size_t count;
+} fit;
+
+static int has_window(const channel *c, size_t i) {
+  return i < c->windows && (double)c->cover[i] >= COVER_MIN * WINDOW_S;
+}
+
+static fit fit_at(const channel *a, const channel *b, int lag) {
+  fit out = {.lag_s = lag * WINDOW_S};
+  double block[2] = {0, 0};
+  size_t in_block = 0, blocks = 0;
+  for (size_t i = LAG_WINDOWS; i < a->windows; i++) {
+    const size_t k = (size_t)((long)i + lag);
+    if (!has_window(a, i) || !has_window(b, k)) continue;
+    const double x = (double)a->sum[i], y = (double)b->sum[k];
+    out.aa += x * x;
+    out.bb += y * y;
+    out.ab += x * y;
+    out.total[0] += fabs(x);
+    out.total[1] += fabs(y);
+    out.count++;
+    block[0] += x;
+    block[1] += y;
+    if (++in_block < NOTHING_WINDOWS) continue;
+    for (int s = 0; s < 2; s++) {
+      out.coarse[s] += block[s] * block[s];
+      block[s] = 0;
+    }
+    in_block = 0;
+    blocks++;
+  }
+  for (int s = 0; s < 2; s++)
+    out.coarse[s] = blocks > 0 ? sqrt(out.coarse[s] / (double)blocks) / (NOTHING_WINDOWS * WINDOW_S) : 0;
+  const double size = sqrt(out.aa * out.bb);
+  out.r = size > 0 ? out.ab / size : 0;
+  return out;
+}
+
+static fit best_fit(const channel *a, const channel *b) {
+  fit best = fit_at(a, b, 0);
+  const double at_zero = fabs(best.r);
+  for (int lag = -LAG_WINDOWS; lag <= LAG_WINDOWS; lag++) {
+    const fit other = fit_at(a, b, lag);
+    if (other.count >= PAIRS_MIN && fabs(other.r) > fmax(fabs(best.r), at_zero + LAG_GAIN)) best = other;
+  }
+  return best;
+}
+
+// a over b: beyond the limit whichever of the two is the noisy one, else 1. Noise of b makes ab/bb too small, noise of
+// a makes aa/ab too large: the factor is in between.
+static double factor_of(const fit *f) {
+  const double ab = fabs(f->ab);
+  if (!(ab > 0) || !(f->bb > 0)) return 1;
+  const double least = ab / f->bb, most = f->aa / ab;
+  return least > FACTOR_MIN || most < 1 / FACTOR_MIN ? sqrt(least * most) : 1;
+}
+
+static int is_excited(const fit *f, int is_way) {
+  const double rms = sqrt(fmax(f->aa, f->bb) / (double)(f->count ? f->count : 1)) / WINDOW_S;
+  const double total = fmax(f->total[0], f->total[1]);
+  return f->count >= PAIRS_MIN && total >= (is_way ? WAY_MIN_M : TURN_MIN_RAD) &&
+         rms >= (is_way ? WAY_RMS_MIN : TURN_RMS_MIN);
+}
+
+// ── what two channels say of each other ─────────────────────────────────────────────────────────────────────────────
+
+typedef enum contradiction {
+  UNKNOWN,  // the drive doesn't show it
+  AGREE,
+  OTHER_SIGN,
+  OTHER_FACTOR,
+  FIRST_SHOWS_NOTHING,
+  SECOND_SHOWS_NOTHING
+} contradiction;
+
+static contradiction compare(const channel *a, const channel *b, fit *f) {
+  const int is_way = channel_is_way(a->kind);
+  *f = best_fit(a, b);
+  if (!is_excited(f, is_way)) return UNKNOWN;
+  const int may_be_quiet = a->has_scale && b->has_scale && fabs(f->r) < FIT_MIN;  // else its scale is wrong
+  if (may_be_quiet && f->coarse[0] < NOTHING_SHARE * f->coarse[1]) return FIRST_SHOWS_NOTHING;
+  if (may_be_quiet && f->coarse[1] < NOTHING_SHARE * f->coarse[0]) return SECOND_SHOWS_NOTHING;
+  if (f->r < -CORRELATION_MIN) return OTHER_SIGN;
+  if (f->r < CORRELATION_MIN) return UNKNOWN;
+  if (a->has_scale && b->has_scale && factor_of(f) != 1) return OTHER_FACTOR;
+  return f->r > FIT_MIN ? AGREE : UNKNOWN;
+}
+
+// Of a command only a sign, a unit, and a sensor that never moves are sure: a robot obeys late and in part.
+static int are_commands(const channels *all, const channel *c) {
+  return (c->kind == CHANNEL_TWIST_TURN || c->kind == CHANNEL_TWIST_WAY) &&
+         all->twists[c->source].kind == WM_ROWS_COMMANDS;
+}
+
+// Which of two is believed, where no third one decides: what counts wheels or integrates over what measures a rate.
+static int rank(const channel *c) {
+  static const int kRanks[CHANNEL_KINDS] = {
+      [CHANNEL_YAW_RATE] = 2,     [CHANNEL_TWIST_TURN] = 5,    [CHANNEL_WHEELS_TURN] = 4,
+      [CHANNEL_TICKS_TURN] = 3,   [CHANNEL_STEERING_TURN] = 1, [CHANNEL_INCREMENT_TURN] = 6,
+      [CHANNEL_HEADING_TURN] = 0, [CHANNEL_VEHICLE_WAY] = 1,   [CHANNEL_WHEELS_WAY] = 3,
+      [CHANNEL_TICKS_WAY] = 2,    [CHANNEL_TWIST_WAY] = 4,     [CHANNEL_INCREMENT_WAY] = 5};
+  return kRanks[c->kind];
+}
+
+// ── names and lines ─────────────────────────────────────────────────────────────────────────────────────────────────
+
+static const char *source_of(const channel *c, const wm_assembly *assembly) {
+  return wm_assembly_source_name(assembly, c->source);
+}
+
+static int is_can(const channel *c, const wm_assembly *assembly) {
+  return strncmp(source_of(c, assembly), "can", 3) == 0;
+}
+
+static const char *word_of(const channel *c, const wm_assembly *assembly) {
+  static const char *const kOfCan[CHANNEL_KINDS] = {[CHANNEL_YAW_RATE] = "yaw_rate",
+                                                    [CHANNEL_ROLL_RATE] = "roll_rate",
+                                                    [CHANNEL_PITCH_RATE] = "pitch_rate",
+                                                    [CHANNEL_VEHICLE_WAY] = "vehicle_speed"};
+  static const char *const kOfFile[CHANNEL_KINDS] = {[CHANNEL_YAW_RATE] = "wz_radps",
+                                                     [CHANNEL_ROLL_RATE] = "wx_radps",
+                                                     [CHANNEL_PITCH_RATE] = "wy_radps",
+                                                     [CHANNEL_VEHICLE_WAY] = "v_mps"};
+  static const char *const kOfBoth[CHANNEL_KINDS] = {[CHANNEL_TWIST_TURN] = "w_radps",
+                                                     [CHANNEL_WHEELS_TURN] = "the difference of the wheels' speeds",
+                                                     [CHANNEL_TICKS_TURN] = "the difference of the wheels' ticks",
+                                                     [CHANNEL_STEERING_TURN] = "the steering",
+                                                     [CHANNEL_INCREMENT_TURN] = "dheading_rad",
+                                                     [CHANNEL_HEADING_TURN] = "heading_rad",
+                                                     [CHANNEL_WHEELS_WAY] = "the wheels' speeds",
+                                                     [CHANNEL_TICKS_WAY] = "the speed by the wheels' ticks",
+                                                     [CHANNEL_TWIST_WAY] = "v_mps",
+                                                     [CHANNEL_INCREMENT_WAY] = "dx_m"};
+  const char *of_both = kOfBoth[c->kind];
+  return of_both ? of_both : is_can(c, assembly) ? kOfCan[c->kind] : kOfFile[c->kind];
+}
+
+// "wz_radps of imu"; of CAN the quantity alone.
+static const char *name_of(const channel *c, const wm_assembly *assembly, char *out, size_t capacity) {
+  const char *word = word_of(c, assembly), *source = source_of(c, assembly);
+  (void)(is_can(c, assembly) ? snprintf(out, capacity, "%s", word)
+                             : snprintf(out, capacity, "%s of %.40s", word, source));
+  return out;
+}
+
+typedef struct scene {
+  const channels *all;
+  const wm_assembly *assembly;
+  wm_findings *out;
+} scene;
+
+// Whether the accelerometer of this source shows that it hangs upside down.
+static int is_upside_down(const channels *all, uint16_t source) {
+  const double *a = all->acceleration[source];
+  const double n = (double)all->accelerations[source];
+  return n > 0 && a[2] / n < -0.7 * sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]) / n && a[2] / n < -2;
+}
+
+static void sign_line(const scene *s, const channel *c, char *fix, size_t capacity) {
+  const char *source = source_of(c, s->assembly);
+  if (is_can(c, s->assembly))
+    (void)snprintf(fix, capacity,
+                   "`scale: -1` at the one that is not positive to the left; or left and right are swapped");
+  else if (c->kind == CHANNEL_YAW_RATE && is_upside_down(s->all, c->source))
+    (void)snprintf(fix, capacity, "it hangs upside down. calibration.yaml: `imu: {mounting: {rpy_deg: [180, 0, 0]}}`");
+  else if (c->kind == CHANNEL_YAW_RATE)
+    (void)snprintf(
+        fix, capacity,
+        "calibration.yaml: `imu: {mounting: {rpy_deg: [180, 0, 0]}}` where it hangs upside down; else %s.csv: "
+        "wz_radps times -1: positive is to the left",
+        source);
+  else
+    (void)snprintf(fix, capacity, "%s.csv: %s times -1: positive is to the left", source, word_of(c, s->assembly));
+}
+
+// A factor that is nearly one with a usual cause is that one.
+static double usual_factor(double factor) {
+  static const double kUsual[] = {DEGREES, 1 / DEGREES, 2, 0.5, KMH, 1 / KMH, 1000, 0.001, 100, 0.01};
+  for (size_t i = 0; i < sizeof kUsual / sizeof kUsual[0]; i++)
+    if (fabs(factor / kUsual[i] - 1) < NEAR / 2) return kUsual[i];
+  return factor;
+}
+
+// A factor with a usual cause: of `a` over `b`, and what a is then.
+static const char *unit_of(double factor, int is_way) {
+  static const struct {
+    double factor;
+    int is_way;
+    const char *what;
+  } kKnown[] = {{DEGREES, 0, "deg/s"}, {KMH, 1, "km/h"}, {2.237, 1, "mph"}, {1000, 1, "mm/s"}, {100, 1, "cm/s"}};
+  for (size_t i = 0; i < sizeof kKnown / sizeof kKnown[0]; i++)
+    if (kKnown[i].is_way == is_way && fabs(factor / kKnown[i].factor - 1) < NEAR) return kKnown[i].what;
+  return NULL;
+}
+
+static void factor_line(const scene *s, const channel *c, double measured, char *fix, size_t capacity) {
+  const double factor = usual_factor(measured);
+  const char *unit = unit_of(factor, channel_is_way(c->kind)), *source = source_of(c, s->assembly);
+  const wm_wheels *w = s->all->wheels;
+  if (c->kind == CHANNEL_TICKS_TURN || c->kind == CHANNEL_WHEELS_TURN)
+    (void)snprintf(fix, capacity,
+                   "measure the track again (`wheels: {track_m: %.3g}` would agree), or look at the gyro's unit",
+                   w->track_m * factor);
+  else if (c->kind == CHANNEL_TICKS_WAY)
+    (void)snprintf(fix, capacity,
+                   "one of them is wrong: the speed's unit, or the wheels' (`radius_m: %.4g` or `ticks_per_turn: %.6g` "
+                   "would agree)",
+                   w->radius_m / factor, w->ticks_per_turn * factor);
+  else if (is_can(c, s->assembly) && unit)
+    (void)snprintf(fix, capacity, "its unit is %s. can-signals.yaml: `unit: %s` at %s", unit, unit,
+                   word_of(c, s->assembly));
+  else if (is_can(c, s->assembly))
+    (void)snprintf(
+        fix, capacity,
+        "can-signals.yaml: `scale: %.3g` at %s if the other one is right; compare its unit and bits with the DBC",
+        1 / factor, word_of(c, s->assembly));
+  else
+    (void)snprintf(fix, capacity, "%s%s%s%s.csv: %s times %.4g if the other one is right", unit ? "it is in " : "",
+                   unit ? unit : "", unit ? ". " : "", source, word_of(c, s->assembly), 1 / factor);
+}
+
+// ── findings ────────────────────────────────────────────────────────────────────────────────────────────────────────
+
+// The roll or pitch rate of the same IMU that shows the other's turn; NULL: none.
+static const channel *other_axis(const channels *all, const channel *gyro, const channel *other, double *r) {
+  for (size_t i = 0; i < all->count; i++) {
+    const channel *c = &all->at[i];
+    if (c->source != gyro->source || !channel_is_tilt(c->kind)) continue;
+    const fit f = best_fit(c, other);
+    *r = f.r;
+    if (is_excited(&f, 0) && fabs(f.r) > FIT_MIN && factor_of(&f) == 1) return c;
+  }
+  return NULL;
+}
+
+// rpy_deg by which the axis that turns, by its sign, becomes z.
+static const char *turned_mounting(const channel *axis, double r) {
+  if (axis->kind == CHANNEL_ROLL_RATE) return r > 0 ? "[0, -90, 0]" : "[0, 90, 0]";
+  return r > 0 ? "[90, 0, 0]" : "[-90, 0, 0]";
+}
+
+static void shows_nothing(const scene *s, const channel *quiet, const channel *other, const fit *f) {
+  const double turned = fmax(f->total[0], f->total[1]);
+  const char *what = channel_is_way(quiet->kind) ? "m of way" : "rad of turn", *about = source_of(quiet, s->assembly);
+  char name[96], of[96], fix[WM_FINDING_FIX_MAX] = "look at the sensor, and at the signal's place in the DBC";
+  double r = 0;
+  (void)name_of(quiet, s->assembly, name, sizeof name);
+  (void)name_of(other, s->assembly, of, sizeof of);
+  // A speed beside a gyro, as of a DVL, has no turn rate of its own: the column is filled with zeros, and not read.
+  if (quiet->kind == CHANNEL_TWIST_TURN && quiet->zeros == quiet->values && other->kind == CHANNEL_YAW_RATE) return;
+  const int is_constant = quiet->least == quiet->most;
+  const wm_severity severity = are_commands(s->all, other) && !is_constant ? WM_SEVERITY_NOTE : WM_SEVERITY_BAD;
+  const channel *axis = quiet->kind == CHANNEL_YAW_RATE ? other_axis(s->all, quiet, other, &r) : NULL;
+  if (axis) {
+    (void)snprintf(fix, sizeof fix, "calibration.yaml: `imu: {mounting: {rpy_deg: %s}}`", turned_mounting(axis, r));
+    wm_find(s->out, WM_FOUND_SENSORS_DISAGREE, WM_SEVERITY_BAD, about, fix,
+            "%s shows no turn where %s turns (%.1f rad), but its %s does (r %.2f): its %s axis is up", name, of, turned,
+            word_of(axis, s->assembly), r, axis->kind == CHANNEL_ROLL_RATE ? "x" : "y");
+    return;
+  }
+  if (quiet->kind == CHANNEL_YAW_RATE && !is_can(quiet, s->assembly))
+    (void)snprintf(
+        fix, sizeof fix,
+        is_constant ? "is the gyro switched on? Leave the source out (`use: false`), and the motion's own turn is taken"
+                    : "is another of its axes up? calibration.yaml: `imu: {mounting: {rpy_deg: [90, 0, 0]}}` (y up), "
+                      "`[0, -90, 0]` (x up)");
+  if (is_constant)
+    wm_find(s->out, WM_FOUND_MOTION_SENSOR, severity, about, fix,
+            "%s is %.10g in all of its %llu data, while %s has %.1f %s", name, quiet->last,
+            (unsigned long long)quiet->values, of, turned, what);
+  else
+    wm_find(s->out, WM_FOUND_SENSORS_DISAGREE, severity, about, fix, "%s shows %.2f times the %s of %s (%.1f)", name,
+            fmin(f->coarse[0], f->coarse[1]) / fmax(f->coarse[0], f->coarse[1]),
+            channel_is_way(quiet->kind) ? "way" : "turn", of, turned);
+}
+
+static void disagrees(const scene *s, const channel *c, const channel *other, const fit *f, contradiction how) {
+  const int is_way = channel_is_way(c->kind);
+  const double factor = factor_of(f), sign = f->r < 0 ? -1 : 1;
+  const double size = factor != 1 || f->ab == 0 ? factor : sqrt(f->aa / f->bb);
+  char name[96], of[96], fix[WM_FINDING_FIX_MAX];
+  (void)name_of(c, s->assembly, name, sizeof name);
+  (void)name_of(other, s->assembly, of, sizeof of);
+  const int is_unit = unit_of(factor, is_way) != NULL || unit_of(1 / factor, is_way) != NULL;
+  const int is_weak = (are_commands(s->all, c) || are_commands(s->all, other)) && !is_unit && f->r < OBEYED;
+  if (how == OTHER_SIGN) {
+    sign_line(s, c, fix, sizeof fix);
+    wm_find(s->out, WM_FOUND_SENSORS_DISAGREE, WM_SEVERITY_BAD, source_of(c, s->assembly), fix,
+            "%s turns left where %s turns right: %.2f times its turn (r %.2f, %.1f rad in all)", name, of, sign * size,
+            f->r, f->total[1])
+        ->size = sign * size;
+    return;
+  }
+  const double lone = c->values > 0 ? (double)c->lone_zeros / (double)c->values : 0;
+  factor_line(s, c, factor, fix, sizeof fix);
+  if (lone > LONE_ZEROS_MIN)
+    (void)snprintf(fix, sizeof fix, "%.0f of 100 of its values are 0 between others: leave those rows out of %s",
+                   100 * lone, source_of(c, s->assembly));
+  wm_find(s->out, WM_FOUND_SENSORS_DISAGREE, is_weak ? WM_SEVERITY_NOTE : WM_SEVERITY_BAD, source_of(c, s->assembly),
+          fix, "%s is %.2f times %s%s (r %.2f, %.1f %s in all)", name, factor, is_way ? "" : "the turn rate by ", of,
+          f->r, f->total[1], is_way ? "m" : "rad")
+      ->size = factor;
+}
+
+// Channels of one quantity. The one that agrees with most of the others is the measure of them.
+static void judge_quantity(const scene *s, int of_way) {
+  const channel *of[CHANNELS_MAX];
+  int votes[CHANNELS_MAX] = {0};
+  size_t count = 0, best = 0;
+  fit f;
+  for (size_t i = 0; i < s->all->count; i++) {
+    const channel *c = &s->all->at[i];
+    if (channel_is_way(c->kind) == of_way && !channel_is_tilt(c->kind) && c->values > 0) of[count++] = c;
+  }
+  for (size_t i = 0; i < count; i++)
+    for (size_t k = i + 1; k < count; k++) {
+      const contradiction how = compare(of[i], of[k], &f);
+      votes[i] += how == AGREE ? 2 : how == FIRST_SHOWS_NOTHING ? -2 : how > AGREE ? -1 : 0;
+      votes[k] += how == AGREE ? 2 : how == SECOND_SHOWS_NOTHING ? -2 : how > AGREE ? -1 : 0;
+    }
+  for (size_t i = 1; i < count; i++)
+    if (votes[i] > votes[best] || (votes[i] == votes[best] && rank(of[i]) > rank(of[best]))) best = i;
+  for (size_t i = 0; i < count; i++) {
+    if (i == best) continue;
+    const contradiction how = compare(of[i], of[best], &f);
+    if (how == FIRST_SHOWS_NOTHING)
+      shows_nothing(s, of[i], of[best], &f);
+    else if (how == SECOND_SHOWS_NOTHING)
+      shows_nothing(s, of[best], of[i], &f);
+    else if (how > AGREE)
+      disagrees(s, of[i], of[best], &f, how);
+  }
+}
+
+// An accelerometer at rest, or on the average of a drive, measures 9.8 m/s2 upwards.
+static void judge_gravity(const scene *s, uint16_t source) {
+  static const char *const kMountings[3][2] = {
+      {"[0, -90, 0]", "[0, 90, 0]"}, {"[90, 0, 0]", "[-90, 0, 0]"}, {"", "[180, 0, 0]"}};
+  const double n = (double)s->all->accelerations[source];
+  double a[3], size = 0;
+  if (n < 100) return;
+  int axis = 0;
+  for (int k = 0; k < 3; k++) {
+    a[k] = s->all->acceleration[source][k] / n;
+    size += a[k] * a[k];
+    if (fabs(a[k]) > fabs(a[axis])) axis = k;
+  }
+  size = sqrt(size);
+  const char *about = wm_assembly_source_name(s->assembly, source);
+  char fix[WM_FINDING_FIX_MAX];
+  if (size > 0.9 && size < 1.1) {
+    wm_find(s->out, WM_FOUND_VALUE_IMPLAUSIBLE, WM_SEVERITY_BAD, about,
+            "its accelerations are in g: times 9.80665 (ax_mps2, ay_mps2, az_mps2)",
+            "the mean of its acceleration is %.2f m/s2, gravity is 9.8", size);
+    return;
+  }
+  // Within 45 degrees of up, or no gravity in it: a tilt is the mounting's own business.
+  if (wm_findings_has(s->out, WM_FOUND_SENSORS_DISAGREE, about)) return;
+  if (size < 8 || size > 11.5 || (axis == 2 && a[2] > 0) || fabs(a[axis]) < 0.9 * size) return;
+  (void)snprintf(
+      fix, sizeof fix,
+      "calibration.yaml: `imu: {mounting: {rpy_deg: %s}}`, with the last number by its direction; of one that is "
+      "given already, correct it%s",
+      kMountings[axis][a[axis] < 0], axis == 2 ? "; or all accelerations have the other sign" : "");
+  wm_find(s->out, WM_FOUND_SENSORS_DISAGREE, WM_SEVERITY_BAD, about, fix,
+          "its accelerometer shows gravity on %s%c: that axis is up, not z", a[axis] < 0 ? "-" : "", "xyz"[axis])
+      ->size = a[axis];
+}
+
+void comparisons_judge(const channels *self, const wm_assembly *assembly, wm_findings *out) {
+  const scene s = {self, assembly, out};
+  judge_quantity(&s, 0);
+  judge_quantity(&s, 1);
+  for (uint16_t source = 0; source < assembly->source_count && source < WM_SOURCES_MAX; source++)
+    judge_gravity(&s, source);
+}
+
+void comparisons_print(const channels *self, const wm_assembly *assembly, FILE *to) {
+  char name[96], of[96];
+  for (size_t i = 0; i < self->count; i++)
+    for (size_t k = i + 1; k < self->count; k++) {
+      const channel *a = &self->at[i], *b = &self->at[k];
+      if (channel_is_way(a->kind) != channel_is_way(b->kind) || channel_is_tilt(a->kind) || channel_is_tilt(b->kind))
+        continue;
+      fit f;
+      const contradiction how = compare(a, b, &f);
+      (void)fprintf(to, "compared     %s with %s: ", name_of(a, assembly, name, sizeof name),
+                    name_of(b, assembly, of, sizeof of));
+      if (how == UNKNOWN && !is_excited(&f, channel_is_way(a->kind)))
+        (void)fprintf(to, "not observable in this drive\n");
+      else if (fabs(f.r) > CORRELATION_MIN && a->has_scale && b->has_scale)
+        (void)fprintf(to, "%.2f times, r %.2f, lag %.2f s\n", f.bb > 0 ? copysign(sqrt(f.aa / f.bb), f.r) : 0, f.r,
+                      f.lag_s);
+      else
+        (void)fprintf(to, "r %.2f, lag %.2f s\n", f.r, f.lag_s);
+    }
+}

@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+// Two measurements of one quantity, compared over a drive: sign, factor, axis, zeros.
+#ifndef WAYMARK_CLI_CHECK_COMPARISONS_H
+#define WAYMARK_CLI_CHECK_COMPARISONS_H
+
+#include <stdio.h>
+
+#include "cli/check/channels.h"
+#include "findings/findings.h"
+#include "fusion/assembly.h"
+
+// Findings about the sensors that contradict the others.
+void comparisons_judge(const channels *self, const wm_assembly *assembly, wm_findings *out);
+// A line for each pair: "compared  A with B: 0.99 times, r 0.98", or that the drive does not show it.
+void comparisons_print(const channels *self, const wm_assembly *assembly, FILE *to);
+
+#endif

@@ -1,0 +1,249 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""`waymark check` compares the sources of a recording with each other and looks at the clock of each: a drive whose way
+is known, written with one fault at a time, and the finding that has to name it, with its size and the line to write.
+Right drives, of other rates and noises, make no finding."""
+import json
+import math
+import os
+import pathlib
+import random
+import struct
+import subprocess
+import sys
+import tempfile
+
+ROOT = pathlib.Path(os.environ.get("WM_SOURCE_DIR", ".")).resolve()
+BIN = pathlib.Path(os.environ.get("WM_BIN_DIR", ROOT / "build/bin"))
+START_NS = 1_700_000_000 * 10**9
+SECONDS = 20.0
+CONFIG = "format: waymark-config/1\nestimator: odometry\n"
+RECORDING = "format: waymark-recording/1\nname: drive\nstreams: [{}]\nvehicle:\n  initial_pose: {{x_m: 0, y_m: 0, heading_rad: 0}}\n"
+DBC = 'VERSION ""\nNS_ :\nBS_:\nBU_: ECU\nBO_ 256 DRIVE: 8 ECU\n SG_ SPEED : 0|32@1{0} (1,0) [0|0] "m/s" ECU\n SG_ YAW : 32|32@1{0} (1,0) [0|0] "rad/s" ECU\n{1}'
+VALTYPES = "SIG_VALTYPE_ 256 SPEED : 1;\nSIG_VALTYPE_ 256 YAW : 1;\n"
+SIGNALS = "- {quantity: vehicle_speed, message: DRIVE, signal: SPEED}\n- {quantity: yaw_rate, message: DRIVE, signal: YAW}\n"
+
+
+def turn(t):
+    """rad/s: straight, a bend to the left, one to the right."""
+    return 0.3 if 6 < t < 11 else -0.25 if 14 < t < 18 else 0.0
+
+
+def speed(t):
+    return 1.0 + 0.2 * math.sin(0.7 * t)
+
+
+def heading(t, step=0.01):
+    return sum(turn(k * step) * step for k in range(round(t / step)))
+
+
+def ns(t):
+    return START_NS + round(t * 1e9)
+
+
+def times(rate_hz, seconds=SECONDS):
+    return [k / rate_hz for k in range(round(seconds * rate_hz))]
+
+
+def noise(seed):
+    source = random.Random(seed)
+    return lambda sigma: source.gauss(0, sigma) if sigma else 0.0
+
+
+def table(head, rows):
+    return head + "\n" + "".join(",".join(str(c) for c in row) + "\n" for row in rows)
+
+
+def motion(rate_hz=50, v=1.0, w=1.0, sigma=0.01, stamp=ns, repeat=1, arrival=None, exact=False):
+    """motion.csv: speed and turn rate times a factor each; each value `repeat` times."""
+    n, rows, held = noise(1), [], None
+    for k, t in enumerate(times(rate_hz)):
+        if k % repeat == 0:
+            s = 0 if exact else sigma
+            held = (f"{v * speed(t) + n(s):.5f}", f"{w * turn(t) + n(s):.5f}") if not exact else (v, w * turn(t))
+        rows.append([stamp(t), *held, *([arrival(t)] if arrival else [])])
+    return table("t_ns,v_mps,w_radps" + (",arrival_ns" if arrival else ""), rows)
+
+
+def imu(rate_hz=100, axes=(0, 0, 1), factor=1.0, up=(0, 0, 1), gravity=9.81, sigma=0.003, stamp=ns, zero=None, lag_s=0.0, bias=0.0, every=1):
+    """imu.csv: the turn about an axis, gravity along another; `zero`: which samples are 0."""
+    n, rows = noise(2), []
+    for k, t in enumerate(times(rate_hz)):
+        w = factor * turn(t - lag_s)
+        rates = [a * w + n(sigma) + bias for a in axes]
+        if zero and zero(k):
+            rates = [0, 0, 0]
+        rows.append([stamp(t), *(f"{r:.6f}" for r in rates), *(f"{gravity * u + n(0.02):.4f}" for u in up)])
+    return table("t_ns,wx_radps,wy_radps,wz_radps,ax_mps2,ay_mps2,az_mps2", rows[::every])
+
+
+def can(stamp=lambda t: f"{START_NS / 1e9 + t:.6f}", valtype=True, signed="-", v=1.0, w=1.0, endings=""):
+    lines = [f"({stamp(t)}) can0 100#{struct.pack('<ff', v * speed(t), w * turn(t)).hex().upper()}" for t in times(100)]
+    return {"can.log": "\n".join(lines) + "\n", "vehicle.dbc": DBC.format(signed, VALTYPES if valtype else ""), "can-signals.yaml": SIGNALS}
+
+
+def gnss(sigma=0.05, stated=0.05, rate_hz=5, scale=1.0):
+    n, x, y, rows = noise(3), 0.0, 0.0, []
+    for k in range(round(SECONDS * 100)):
+        t = k / 100
+        if k % round(100 / rate_hz) == 0:
+            rows.append([ns(t), f"{scale * x + n(sigma):.4f}", f"{scale * y + n(sigma):.4f}", 0, stated, 0.1])
+        h = heading_at[k]
+        x, y = x + 0.01 * speed(t) * math.cos(h), y + 0.01 * speed(t) * math.sin(h)
+    return table("t_ns,x_m,y_m,z_m,sigma_xy_m,sigma_z_m", rows)
+
+
+heading_at = [0.0]
+for _k in range(round(SECONDS * 100)):
+    heading_at.append(heading_at[-1] + 0.01 * turn(_k / 100))
+
+
+def increments(scale_turn=1.0, scale_way=1.0):
+    rows = [[ns(t + 0.1), ns(t), f"{0.1 * scale_way * speed(t):.5f}", 0, f"{scale_turn * (heading_at[round(100 * t) + 10] - heading_at[round(100 * t)]):.6f}"]
+            for t in times(10, SECONDS - 0.2)]
+    return table("t_ns,from_ns,dx_m,dy_m,dheading_rad", rows)
+
+
+def ticks(track_m=0.5, radius_m=0.1, per_turn=2000, swap=False, raw_bits=None, wraps_at=None, rate_hz=50):
+    left = right = 0.0
+    rows = []
+    for t in times(rate_hz):
+        per_m = per_turn / (2 * math.pi * radius_m)
+        left += (speed(t) - turn(t) * track_m / 2) / rate_hz * per_m
+        right += (speed(t) + turn(t) * track_m / 2) / rate_hz * per_m
+        counts = [round(left), round(right)]
+        if wraps_at:
+            counts = [c % wraps_at for c in counts]
+        rows.append([ns(t), *(counts[::-1] if swap else counts)])
+    return table("t_ns,left,right", rows)
+
+
+WHEELS = "wheels: {radius_m: 0.1, track_m: 0.5, ticks_per_turn: 2000}\n"
+
+
+def jump(at_s, by_s):
+    return lambda t: ns(t) + (round(by_s * 1e9) if t >= at_s else 0)
+
+
+def grid(step_s):
+    return lambda t: START_NS + int(t // step_s * step_s * 1e9)
+
+
+def both(**files):
+    """motion.csv and imu.csv, and what replaces or joins them."""
+    return {"motion.csv": motion(), "imu.csv": imu(), **{k.replace("_csv", ".csv").replace("_yaml", ".yaml"): v for k, v in files.items()}}
+
+
+DISAGREE, STAMPS = "sensors-disagree", "clock-jumped"
+# name, files, finding (severity, identifier, about), words of its text, words of its fix
+FAULTS = [
+    ("gyro of the other sign", both(imu_csv=imu(factor=-1)), ("bad", DISAGREE, "imu"), "-1.00 times", "wz_radps times -1"),
+    ("gyro that hangs upside down", both(imu_csv=imu(factor=-1, up=(0, 0, -1))), ("bad", DISAGREE, "imu"), "-1.00 times", "rpy_deg: [180, 0, 0]"),
+    ("gyro of the other sign at 20 Hz, twice the noise", both(imu_csv=imu(20, factor=-1, sigma=0.02)), ("bad", DISAGREE, "imu"), "-1.0", "times -1"),
+    ("twist of the other sign, increments decide", {**both(motion_csv=motion(w=-1)), "increments.csv": increments()}, ("bad", DISAGREE, "motion"), "-1.0", "motion.csv: w_radps times -1"),
+    ("gyro of the other sign on CAN", {**can(w=-1), "increments.csv": increments()}, ("bad", DISAGREE, "can"), "-1.0", "scale: -1"),
+    ("gyro in degrees", both(imu_csv=imu(factor=180 / math.pi)), ("bad", DISAGREE, "imu"), "57.", "deg/s. imu.csv: wz_radps times 0.01745"),
+    ("gyro in degrees, 200 Hz", both(imu_csv=imu(200, factor=180 / math.pi, bias=0.3)), ("bad", DISAGREE, "imu"), "57.", "imu.csv: wz_radps times 0.017"),
+    ("twist in degrees", {**both(motion_csv=motion(w=180 / math.pi)), "increments.csv": increments()}, ("bad", DISAGREE, "motion"), "57.", "motion.csv: w_radps times 0.017"),
+    ("gyro of twice the rate", both(imu_csv=imu(factor=2)), ("bad", DISAGREE, "imu"), "2.0", "wz_radps times 0.5"),
+    ("gyro of half the rate", both(imu_csv=imu(factor=0.5)), ("bad", DISAGREE, "imu"), "0.50 times", "wz_radps times 2"),
+    ("gyro of twice the rate and a lag", both(imu_csv=imu(factor=2, lag_s=0.5)), ("bad", DISAGREE, "imu"), "2.0", "wz_radps times 0.5"),
+    ("gyro of which every other value is 0", both(imu_csv=imu(zero=lambda k: k % 2)), ("bad", DISAGREE, "imu"), "0.50 times", "50 of 100 of its values are 0"),
+    ("gyro of which two of three values are 0", both(imu_csv=imu(zero=lambda k: k % 3)), ("bad", DISAGREE, "imu"), "0.33 times", "wz_radps"),
+    ("gyro of zeros", both(imu_csv=imu(zero=lambda k: True)), ("bad", "motion-sensor", "imu"), "is 0 in all of its 2000 data", "use: false"),
+    ("gyro that shows no turn", both(imu_csv=imu(axes=(0, 0, 0))), ("bad", DISAGREE, "imu"), "shows 0.0", "mounting"),
+    ("gyro about y, y up", both(imu_csv=imu(axes=(0, 1, 0), up=(0, 1, 0))), ("bad", DISAGREE, "imu"), "its y axis is up", "rpy_deg: [90, 0, 0]"),
+    ("gyro about x, x up", both(imu_csv=imu(axes=(1, 0, 0), up=(1, 0, 0))), ("bad", DISAGREE, "imu"), "its x axis is up", "rpy_deg: [0, -90, 0]"),
+    ("gyro about x, x down", both(imu_csv=imu(axes=(-1, 0, 0), up=(-1, 0, 0))), ("bad", DISAGREE, "imu"), "its x axis is up", "rpy_deg: [0, 90, 0]"),
+    ("y up, straight on", {"motion.csv": motion(w=0), "imu.csv": imu(axes=(0, 0, 0), up=(0, 1, 0))}, ("bad", DISAGREE, "imu"), "gravity on y", "rpy_deg: [90, 0, 0]"),
+    ("accelerations in g", both(imu_csv=imu(gravity=1.0)), ("bad", "value-implausible", "imu"), "1.00 m/s2", "in g"),
+    ("steps of twice the way", {"motion.csv": motion(), "increments.csv": increments(scale_way=2)}, ("bad", DISAGREE, "*"), "times", "times"),
+    ("speed in km/h", {"motion.csv": motion(v=3.6), "increments.csv": increments()}, ("bad", DISAGREE, "motion"), "3.6", "km/h. motion.csv: v_mps times 0.27"),
+    ("values in threes, turn too small", {"motion.csv": motion(100, w=0.6, repeat=3), "imu.csv": imu()}, ("bad", DISAGREE, "*"), "times", "times"),
+    ("ticks of swapped wheels", {"ticks.csv": ticks(swap=True), "imu.csv": imu(), "calibration.yaml": WHEELS}, ("bad", DISAGREE, "*"), "turns left where", ""),
+    ("track of half the length", {"ticks.csv": ticks(track_m=1.0), "imu.csv": imu(), "calibration.yaml": WHEELS}, ("bad", DISAGREE, "*"), "times", ""),
+    ("counter that starts anew at 3000", {"ticks.csv": ticks(wraps_at=3000), "imu.csv": imu(), "calibration.yaml": WHEELS}, ("bad", "value-implausible", "ticks"), "anew at about 30", "ticks.csv"),
+    ("clock set back by 8 s", both(motion_csv=motion(stamp=jump(9, -8))), ("bad", STAMPS, "motion"), "back by 7.98 s, 8.980 s after", "add 7.98 s"),
+    ("clock set back by 2 s, arrivals go on", both(motion_csv=motion(stamp=jump(9, -2), arrival=lambda t: ns(t) + 2_000_000)), ("bad", STAMPS, "motion"), "back by 1.98 s", "add 1.98 s"),
+    ("gyro's clock set back by 3 s", both(imu_csv=imu(stamp=jump(12, -3))), ("bad", STAMPS, "imu"), "back by 2.99 s", "add 2.99 s"),
+    ("clock set back by 1 s on CAN", can(lambda t: f"{START_NS / 1e9 + t - (t > 10):.6f}"), ("bad", STAMPS, "can"), "back by 0.99 s", "add 0.99 s"),
+    ("clock set forwards by an hour", {"motion.csv": motion(stamp=jump(9, 3600))}, ("bad", STAMPS, "motion"), "forwards by 3600.02 s, 8.980 s after", "subtract 3600.02 s"),
+    ("clock set forwards by 20 s while data arrive", both(motion_csv=motion(stamp=jump(9, 20), arrival=lambda t: ns(t) + (21 * 10**9 if t >= 9 else 20 * 10**9 + 1))), ("bad", STAMPS, "motion"), "forwards by 20.02 s", "subtract 20.02 s"),
+    ("from 1970 to now on CAN", can(lambda t: f"{t + (START_NS / 1e9 if t > 5 else 0):.6f}"), ("bad", STAMPS, "can"), "1970", "leave the first 501 rows out"),
+    ("first stamps of 0", {"motion.csv": motion(stamp=lambda t: ns(t) if t > 2 else round(t * 1e6))}, ("bad", STAMPS, "motion"), "1970", "leave the first 101 rows out"),
+    ("gyro of another clock", both(imu_csv=imu(stamp=lambda t: ns(t) + 3600 * 10**9)), ("bad", "clocks-apart", "imu"), "3600.000 s after", "difference"),
+    ("gyro of the time since boot", both(imu_csv=imu(stamp=lambda t: round((t + 85) * 1e9))), ("bad", "clocks-apart", "imu"), "don't overlap", "one clock"),
+    ("stamps of whole seconds", both(motion_csv=motion(stamp=grid(1.0))), ("bad", "clock-coarse", "motion"), "have the stamp of the one before", "grid of about 1 s"),
+    ("stamps of 16 ms at 200 Hz", both(imu_csv=imu(200, stamp=grid(0.016))), ("bad", "clock-coarse", "imu"), "have the stamp", "0.016 s"),
+    ("stamps of 10 ms at 200 Hz", both(imu_csv=imu(200, stamp=grid(0.01))), ("note", "clock-coarse", "imu"), "have the stamp", "0.01 s"),
+    ("rows that come twice", both(motion_csv="\n".join(line for row in motion().splitlines() for line in ([row, row] if row[0] == "1" else [row])) + "\n"), ("note", "rows-disordered", "motion"), "come twice", "two programs"),
+    ("rows in disorder, 1 of 20 is half a second late", both(motion_csv=(lambda rows: "\n".join(rows[:1] + [r for k in range(1, len(rows) - 25) for r in ([rows[k]] if k % 20 else []) + ([rows[k - 25]] if k > 25 and (k - 25) % 20 == 0 else [])]) + "\n")(motion().splitlines())), ("bad", "rows-unused", "motion"), "rows are not used", ""),
+    ("floats without their type", can(valtype=False), ("bad", "value-implausible", "can"), "as a float", "SIG_VALTYPE_ ID SIGNAL : 1;"),
+    ("floats without their type, unsigned", can(valtype=False, signed="+"), ("bad", "value-implausible", "can"), "as a float", "SIG_VALTYPE_"),
+    ("floats without their type, backwards", can(valtype=False, v=-1), ("bad", "value-implausible", "can"), "as a float", "SIG_VALTYPE_"),
+    ("floats without their type, slow", can(valtype=False, v=0.01, w=0.1), ("bad", "value-implausible", "can"), "as a float", "SIG_VALTYPE_"),
+    ("nobody takes the positions", {**both(), "gnss.csv": gnss(), "config.yaml": "format: waymark-config/1\nestimator: slam\n"}, ("bad", "data-unused", "gnss"), "these do: landmark_ekf", "use: false"),
+    ("positions of ten times their sigma", {"motion.csv": motion(), "gnss.csv": gnss(sigma=0.01, stated=2.0), "config.yaml": "format: waymark-config/1\nestimator: landmark_ekf\n"}, ("bad", "noise-too-large", "gnss"), "of what is stated", "real sigma"),
+]
+RIGHT = [
+    ("motion and gyro", both()),
+    ("a gyro with a bias", both(imu_csv=imu(bias=0.01))),
+    ("a slow gyro with much noise", both(imu_csv=imu(20, sigma=0.05))),
+    ("a base that turns a fifth less than its wheels", both(motion_csv=motion(w=1.2))),
+    ("values in threes beside a gyro", {"motion.csv": motion(100, repeat=3), "imu.csv": imu()}),
+    ("a gyro that lags by 0.3 s", both(imu_csv=imu(lag_s=0.3))),
+    ("a gyro on CAN", can()),
+    ("CAN, unsigned turn to the left alone", can(w=0.5)),
+    ("ticks and a gyro", {"ticks.csv": ticks(), "imu.csv": imu(), "calibration.yaml": WHEELS}),
+    ("straight on, a gyro of noise", {"motion.csv": motion(w=0), "imu.csv": imu(axes=(0, 0, 0))}),
+    ("an accelerometer without gravity", both(imu_csv=imu(gravity=0))),
+    ("exact values", {"motion.csv": motion(exact=True), "imu.csv": imu()}),
+    ("stamps of 16 ms at 50 Hz", both(motion_csv=motion(stamp=grid(0.016)))),
+]
+
+
+def check(folder):
+    done = subprocess.run([BIN / "waymark", "check", folder / "config.yaml", folder, "--json", "--quick"], capture_output=True, text=True)
+    if done.returncode not in (0, 2):
+        sys.exit(f"exit code {done.returncode}\n{done.stdout}{done.stderr}")
+    return json.loads(done.stdout)
+
+
+def drive(folder, files):
+    for old in folder.iterdir():
+        old.unlink()
+    streams = [f for f in files if f.endswith((".csv", ".log"))]
+    for name, content in {"config.yaml": CONFIG, "recording.yaml": RECORDING.format(", ".join(streams)), **files}.items():
+        (folder / name).write_text(content)
+    return check(folder)
+
+
+def main():
+    failures = []
+    only = sys.argv[1] if len(sys.argv) > 1 else ""
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = pathlib.Path(temporary)
+        for name, files in RIGHT:
+            if only not in name:
+                continue
+            said = drive(folder, files)
+            failures += [f"{name}: {f['severity']} {f['about']}: {f['text']} [{f['id']}]" for f in said["findings"]]
+        for name, files, (severity, identifier, about), words, fix in FAULTS:
+            if only not in name:
+                continue
+            said = drive(folder, files)
+            mine = [f for f in said["findings"] if (f["severity"], f["id"]) == (severity, identifier) and about in ("*", f["about"])
+                    and words in f["text"] and fix in f["fix"]]
+            print(f"{'found' if mine else 'BAD  '}  {name}")
+            for f in said["findings"]:
+                print(f"       {f['severity']} {f['about']}: {f['text']}; fix: {f['fix']} [{f['id']}]")
+            if not mine:
+                failures.append(f"{name}: not found")
+            if said["good"] != (severity != "bad"):
+                failures.append(f"{name}: good is {said['good']}")
+    print(f"{len(FAULTS)} faults planted, {len(RIGHT)} right drives")
+    print("\n".join(failures) or "good")
+    sys.exit(bool(failures))
+
+
+main()
