@@ -40,12 +40,6 @@ constexpr rate_noise kNoise[] = {
     {0.03, 0.01, 0.05},   // calibrated: only while their noise is not used
 };
 
-// Moving rows between two decisions, and the share of repeated ones above which they are commands, of the rows until
-// then; of a longer run only so many count, since a measurement stands still, too. On the recordings that share is at
-// least 0.27 of commands and at most 0.12 of measured twists at any decision. Runs of 4 or 16 separate them worse.
-constexpr uint32_t kRows = 64, kRun = 8;
-constexpr double kCommandShare = 0.2;
-
 }  // namespace
 
 bool is_state(double sigma, int term, motion_kind kind) {
@@ -80,16 +74,6 @@ rate_noise rate_noise_of(const wm_motion_params &p, motion_kind kind) {
   if (p.noise_yaw_rate_radps >= 0.0) out.yaw_rate_radps = p.noise_yaw_rate_radps;
   if (p.noise_yaw_rate_rel >= 0.0) out.yaw_rate_rel = p.noise_yaw_rate_rel;
   return out;
-}
-
-void command_detector::note(double v_mps, double w_radps, bool moving) {
-  run_ = v_mps == last_v_mps_ && w_radps == last_w_radps_ ? run_ + (run_ <= kRun) : 0;
-  if (moving && run_ <= kRun) {
-    repeated_ += run_ > 0;
-    if (++moving_ % kRows == 0) kind_ = repeated_ > kCommandShare * moving_ ? kKindCommands : kKindMeasured;
-  }
-  last_v_mps_ = v_mps;
-  last_w_radps_ = w_radps;
 }
 
 }  // namespace wm

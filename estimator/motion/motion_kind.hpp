@@ -5,6 +5,7 @@
 #define WAYMARK_ESTIMATOR_MOTION_KIND_HPP
 
 #include "motion/motion_params.h"
+#include "waymark/repeated_rows.h"
 
 namespace wm {
 
@@ -34,18 +35,18 @@ struct rate_noise {
 };
 rate_noise rate_noise_of(const wm_motion_params &params, motion_kind kind);
 
-// Commands repeat until they change, whereas a measurement has noise: the rows that equal the row before are counted
-// while the robot moves.
+// Commands repeat until they change, whereas a measurement has noise (waymark/repeated_rows.h).
 class command_detector {
  public:
-  void note(double v_mps, double w_radps, bool moving);
-  motion_kind kind() const { return static_cast<motion_kind>(kind_); }
+  void note(double v_mps, double w_radps, bool moving) { wm_rows_note(&rows_, v_mps, w_radps, moving); }
+  motion_kind kind() const {
+    return rows_.kind == WM_ROWS_COMMANDS   ? kKindCommands
+           : rows_.kind == WM_ROWS_MEASURED ? kKindMeasured
+                                            : kKindUnknown;
+  }
 
  private:
-  double last_v_mps_, last_w_radps_;
-  uint32_t moving_, repeated_;
-  uint32_t run_;   // repeated rows until now
-  uint32_t kind_;  // 0: not yet known
+  wm_repeated_rows rows_;
 };
 
 }  // namespace wm

@@ -267,7 +267,7 @@ static void ended(void *context, const wm_assembly *assembly, const wm_run_repor
   evidence_judge(&self->evidence, assembly, &report->health, due, self->found);
   wm_health_map_findings(&report->health, self->found);
   clock_data_judge_unused(&self->sources.clocks, &report->health, self->found);
-  check_unused(&self->evidence, assembly, &report->health, wm_recording_quantities(self->recording), self->found);
+  check_unused(&self->evidence, &self->sources, &report->health, wm_recording_quantities(self->recording), self->found);
   if (wm_findings_of(self->found, WM_SEVERITY_BAD) > bad && !self->is_quick)
     try_suspects(self, assembly, report->recorded_s);
 }

@@ -219,7 +219,6 @@ static double parameter(const wm_config *config, const char *key) {
 }
 
 static void not_found(const wm_assembly *assembly, double share, wm_findings *out) {
-  const double limit_m = parameter(assembly->config, "recover.sigma_xy_m");
   char fix[WM_FINDING_FIX_MAX];
   const wm_start *given = &assembly->setup.start;
   if (!isnan(given->p_m[0]) && !isnan(given->heading_rad)) {
@@ -229,6 +228,7 @@ static void not_found(const wm_assembly *assembly, double share, wm_findings *ou
         ->size = share;
     return;
   }
+  const double limit_m = parameter(assembly->config, "recover.sigma_xy_m");
   // A limit in metres is not reached where the positions or ranges have a larger sigma.
   const int is_limited =
       limit_m > 0 && (assembly->kinds & (WM_EVENT_BIT(WM_EVENT_POSITION) | WM_EVENT_BIT(WM_EVENT_SIGHTING)));
@@ -279,6 +279,7 @@ static void is_lost(const drive_evidence *self, const wm_assembly *assembly, dou
 static void unsupported(const drive_evidence *self, const wm_assembly *assembly, const wm_health *health,
                         uint64_t total, wm_findings *out) {
   const double share = evidence_share(self, WM_STATE_DEAD_RECKONING, total);
+  if (share < (self->fused == 0 ? UNSUPPORTED_BAD : HARDLY_SUPPORTED_BAD)) return;
   const uint64_t observers = wm_assembly_observers(assembly);
   uint64_t received = 0, fused = 0;
   for (uint32_t i = 0; i < health->source_count && i < 64; i++)
@@ -287,9 +288,7 @@ static void unsupported(const drive_evidence *self, const wm_assembly *assembly,
       fused += health->sources[i].fused;
     }
   const int is_hardly = (double)fused < HARDLY_USED * (double)received && received >= 5 * UNSUPPORTED_MIN;
-  if (received < UNSUPPORTED_MIN || share < (self->fused == 0 ? UNSUPPORTED_BAD : HARDLY_SUPPORTED_BAD) ||
-      (self->fused > 0 && !is_hardly))
-    return;
+  if (received < UNSUPPORTED_MIN || (self->fused > 0 && !is_hardly)) return;
   wm_find(out, WM_FOUND_POSE_DOUBTFUL, WM_SEVERITY_BAD, "observations",
           "is the map given, are the sensors' names, their mountings, the markers' family and the identities those of "
           "this place?",

@@ -65,6 +65,17 @@ def motion(rate_hz=50, v=1.0, w=1.0, sigma=0.01, stamp=ns, repeat=1, arrival=Non
     return table("t_ns,v_mps,w_radps" + (",arrival_ns" if arrival else ""), rows)
 
 
+def commands():
+    """motion.csv of commands: they hold for 1 to 12 rows."""
+    source, rows, held, left = random.Random(4), [], None, 0
+    for t in times(50):
+        left -= 1
+        if left <= 0:
+            held, left = (f"{speed(t):.2f}", f"{turn(t) + source.gauss(0, 0.05):.2f}"), source.choice((1, 1, 1, 2, 2, 3, 5, 8, 12))
+        rows.append([ns(t), *held])
+    return table("t_ns,v_mps,w_radps", rows)
+
+
 def imu(rate_hz=100, axes=(0, 0, 1), factor=1.0, up=(0, 0, 1), gravity=9.81, sigma=0.003, stamp=ns, zero=None, lag_s=0.0, bias=0.0, every=1):
     """imu.csv: the turn about an axis, gravity along another; `zero`: which samples are 0."""
     n, rows = noise(2), []
@@ -182,6 +193,7 @@ FAULTS = [
     ("floats without their type, unsigned", can(valtype=False, signed="+"), ("bad", "value-implausible", "can"), "as a float", "SIG_VALTYPE_"),
     ("floats without their type, backwards", can(valtype=False, v=-1), ("bad", "value-implausible", "can"), "as a float", "SIG_VALTYPE_"),
     ("floats without their type, slow", can(valtype=False, v=0.01, w=0.1), ("bad", "value-implausible", "can"), "as a float", "SIG_VALTYPE_"),
+    ("commands beside a gyro", {"motion.csv": commands(), "imu.csv": imu()}, ("note", "data-unused", "imu"), "the gyro is not used", "twist: measured"),
     ("nobody takes the positions", {**both(), "gnss.csv": gnss(), "config.yaml": "format: waymark-config/1\nestimator: slam\n"}, ("bad", "data-unused", "gnss"), "these do: landmark_ekf", "use: false"),
     ("positions of ten times their sigma", {"motion.csv": motion(), "gnss.csv": gnss(sigma=0.01, stated=2.0), "config.yaml": "format: waymark-config/1\nestimator: landmark_ekf\n"}, ("bad", "noise-too-large", "gnss"), "of what is stated", "real sigma"),
 ]

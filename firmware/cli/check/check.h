@@ -105,7 +105,7 @@ void source_data_judge(source_data *self, uint32_t bound, const wm_health *healt
 void source_data_free(source_data *self);
 
 // What the recording has and the run does not use, after a drive.
-void check_unused(const drive_evidence *evidence, const wm_assembly *assembly, const wm_health *health, uint32_t bound,
+void check_unused(const drive_evidence *evidence, const source_data *data, const wm_health *health, uint32_t bound,
                   wm_findings *out);
 
 #endif

@@ -274,8 +274,10 @@ static const char *turned_mounting(const channel *axis, double r) {
 static void shows_nothing(const scene *s, const channel *quiet, const channel *other, const fit *f) {
   const double turned = fmax(f->total[0], f->total[1]);
   const char *what = channel_is_way(quiet->kind) ? "m of way" : "rad of turn", *about = source_of(quiet, s->assembly);
-  char name[96], of[96], fix[WM_FINDING_FIX_MAX] = "look at the sensor, and at the signal's place in the DBC";
+  char name[96], of[96], fix[WM_FINDING_FIX_MAX];
   double r = 0;
+  (void)snprintf(fix, sizeof fix, "look at the %s, and at the signal's place in the DBC",
+                 quiet->kind == CHANNEL_YAW_RATE ? "gyro" : "sensor");
   (void)name_of(quiet, s->assembly, name, sizeof name);
   (void)name_of(other, s->assembly, of, sizeof of);
   // A speed beside a gyro, as of a DVL, has no turn rate of its own: the column is filled with zeros, and not read.

@@ -6,19 +6,42 @@
 
 #include "cli/check/check.h"
 
-// motion.model as configured.
-static int32_t model_of(const wm_assembly *assembly) {
+// A choice of the motion's parameters as configured, `otherwise` where there is none of this name.
+static int32_t choice_of(const wm_assembly *assembly, const char *key, int32_t otherwise) {
   const wm_param_table *table = &wm_motion_params_table;
-  int32_t model = WM_MOTION_AUTO;
+  int32_t choice = otherwise;
   for (size_t i = 0; i < table->count; i++)
-    if (strcmp(table->params[i].key, "model") == 0)
-      memcpy(&model, (const char *)assembly->setup.motion + table->params[i].offset, sizeof model);
-  return model;
+    if (strcmp(table->params[i].key, key) == 0)
+      memcpy(&choice, (const char *)assembly->setup.motion + table->params[i].offset, sizeof choice);
+  return choice;
+}
+
+static int is_choice(const wm_assembly *assembly, const char *key, const char *name) {
+  const wm_param_table *table = &wm_motion_params_table;
+  for (size_t i = 0; i < table->count; i++)
+    if (strcmp(table->params[i].key, key) == 0)
+      return strcmp(table->params[i].names[choice_of(assembly, key, 0)], name) == 0;
+  return 0;
+}
+
+// A robot obeys a command late and in part, so that no gyro is taken beside one.
+static void gyro_beside_commands(const wm_assembly *assembly, const channels *seen, wm_findings *out) {
+  const channel *gyro = NULL, *commands = NULL;
+  for (size_t i = 0; i < seen->count; i++) {
+    const channel *c = &seen->at[i];
+    if (c->kind == CHANNEL_YAW_RATE) gyro = c;
+    if (c->kind == CHANNEL_TWIST_TURN && seen->twists[c->source].kind == WM_ROWS_COMMANDS) commands = c;
+  }
+  if (!gyro || !commands || is_choice(assembly, "twist", "measured")) return;
+  wm_find(out, WM_FOUND_DATA_UNUSED, WM_SEVERITY_NOTE, wm_assembly_source_name(assembly, gyro->source),
+          "`motion: {twist: measured}` if the rows are measured; else give what the wheels measure",
+          "the gyro is not used: the rows of %s repeat until they change, and are taken for commands",
+          wm_assembly_source_name(assembly, commands->source));
 }
 
 // A gyro is worth more than any other motion sensor: bound, but not taken, it is a mistake of the configuration.
 static void gyro(const wm_assembly *assembly, uint32_t bound, wm_findings *out) {
-  const int32_t model = model_of(assembly);
+  const int32_t model = choice_of(assembly, "model", WM_MOTION_AUTO);
   const int is_read = model == WM_MOTION_AUTO ? !(assembly->kinds & WM_EVENT_BIT(WM_EVENT_INCREMENT))
                                               : model == WM_MOTION_SPEED_YAW_RATE;
   if (!((bound >> WM_Q_YAW_RATE) & 1u) || is_read) return;
@@ -65,8 +88,10 @@ static void observations(const drive_evidence *self, const wm_assembly *assembly
   }
 }
 
-void check_unused(const drive_evidence *evidence, const wm_assembly *assembly, const wm_health *health, uint32_t bound,
+void check_unused(const drive_evidence *evidence, const source_data *data, const wm_health *health, uint32_t bound,
                   wm_findings *out) {
+  const wm_assembly *assembly = data->assembly;
+  gyro_beside_commands(assembly, &data->channels, out);
   sources(assembly, out);
   if (assembly->kinds & WM_EVENT_BIT(WM_EVENT_QUANTITIES)) gyro(assembly, bound, out);
   observations(evidence, assembly, health, out);

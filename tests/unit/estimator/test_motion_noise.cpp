@@ -488,6 +488,24 @@ void test_commands_are_told_by_their_repetitions(void) {
   for (int run = 0; run < 8; run++)
     for (int i = 0; i < 100; i++) detector.note(1.0, 0.01 * run, true);
   TEST_ASSERT_EQUAL(wm::kKindCommands, detector.kind());  // 72 rows of which 64 repeat count
+  // A measurement that is written several times: each value as often, or once more where the rates are no multiples.
+  const auto written = [](int rows, int times, int more) {
+    wm::command_detector repeats{};
+    double v = 1.0;
+    for (int i = 0, left = 0, k = 0; i < rows; i++, left--) {
+      if (left == 0) {
+        v += 0.01;
+        left = times + (k++ % 2 ? more : 0);
+      }
+      repeats.note(v, 0.1, true);
+    }
+    return repeats.kind();
+  };
+  for (int times = 2; times <= 8; times++) TEST_ASSERT_EQUAL(wm::kKindMeasured, written(640, times, 0));
+  TEST_ASSERT_EQUAL(wm::kKindMeasured, written(640, 2, 1));
+  TEST_ASSERT_EQUAL(wm::kKindMeasured, written(640, 3, 1));
+  TEST_ASSERT_EQUAL(wm::kKindCommands, written(640, 2, 4));
+  TEST_ASSERT_EQUAL(wm::kKindCommands, written(640, 1, 2));
   wm::command_detector stands{};
   for (int i = 0; i < 400; i++) stands.note(1.0 + (i < 60 || i > 360 ? 0.01 * i : 0.0), 0.0, true);
   TEST_ASSERT_EQUAL(wm::kKindMeasured, stands.kind());  // one long run

@@ -213,6 +213,82 @@ static void a_drive_that_no_observation_reaches_is_not_good(void) {
   TEST_ASSERT_EQUAL(WM_SEVERITY_BAD, found.at[0].severity);
   drive_in(WM_STATE_DEAD_RECKONING, WM_CAUSE_NONE, -1, 30);
   TEST_ASSERT_EQUAL(0, found.count);
+  EYE->fused = 30;  // of a thousand
+  drive_in(WM_STATE_DEAD_RECKONING, WM_CAUSE_NONE, -1, 30);
+  TEST_ASSERT_TRUE(wm_findings_has(&found, WM_FOUND_POSE_DOUBTFUL, "observations"));
+  EYE->received = 20;
+  EYE->fused = 0;
+  drive_in(WM_STATE_DEAD_RECKONING, WM_CAUSE_NONE, -1, 0);
+  TEST_ASSERT_TRUE(wm_findings_has(&found, WM_FOUND_POSE_DOUBTFUL, "observations"));
+  EYE->received = 19;  // it may have seen nothing yet
+  drive_in(WM_STATE_DEAD_RECKONING, WM_CAUSE_NONE, -1, 0);
+  TEST_ASSERT_EQUAL(0, found.count);
+}
+
+static void innovations_of_a_tenth_of_their_sigma_are_not_good(void) {
+  drive_with(0.2, WM_FUSED);
+  TEST_ASSERT_EQUAL(0, found.count);
+  drive_with(0.05, WM_FUSED);
+  TEST_ASSERT_TRUE(wm_findings_has(&found, WM_FOUND_NOISE_TOO_LARGE, "eye"));
+  TEST_ASSERT_EQUAL(WM_SEVERITY_BAD, found.at[0].severity);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.05, found.at[0].size);
+}
+
+// A tenth of a per cent of the motion's data, and 2 %.
+static void motion_that_no_robot_can_do_is_found(void) {
+  static const struct {
+    uint64_t count;
+    size_t findings;
+    wm_severity severity;
+  } kCases[] = {{19, 0, 0}, {100, 1, WM_SEVERITY_NOTE}, {253, 1, WM_SEVERITY_BAD}};
+  for (size_t i = 0; i < sizeof kCases / sizeof kCases[0]; i++) {
+    static drive_evidence evidence;
+    static wm_config config;
+    static wm_assembly assembly = {.source_count = 1, .sources[0].kinds = WM_EVENT_BIT(WM_EVENT_TWIST2)};
+    assembly.config = &config;
+    assembly.setup.start.p_m[0] = (double)NAN;
+    setUp();
+    EYE->received = 10000;
+    counter(WM_COUNTER_MOTION_OUTLIERS);
+    health.counters[0].count = kCases[i].count;
+    evidence_judge(&evidence, &assembly, &health, 0, &found);
+    TEST_ASSERT_EQUAL(kCases[i].findings, found.count);
+    if (found.count > 0) TEST_ASSERT_EQUAL(kCases[i].severity, found.at[0].severity);
+  }
+}
+
+// A number is advised where a transport can be so late; of a clock none.
+static void no_lateness_is_advised_that_no_transport_has(void) {
+  EYE->late = 5;
+  EYE->lateness_p99_ns = EYE->lateness_worst_ns = 400 * WM_NS_PER_MS;
+  wm_health_findings(&health, &found);
+  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(found.at[0].fix, "lateness_max_ms: 400"), found.at[0].fix);
+  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(found.at[0].fix, "merge.horizon_ms"), found.at[0].fix);
+  found.count = 0;
+  EYE->lateness_p99_ns = EYE->lateness_worst_ns = 3600 * WM_NS_PER_S;
+  wm_health_findings(&health, &found);
+  TEST_ASSERT_NULL_MESSAGE(strstr(found.at[0].fix, "lateness_max_ms"), found.at[0].fix);
+}
+
+// A start that is given is not asked for.
+static void a_start_that_is_given_is_not_asked_for(void) {
+  static drive_evidence evidence;
+  static wm_config config;
+  static wm_assembly assembly;
+  assembly.config = &config;
+  evidence_judge(&evidence, &assembly, &health, 100, &found);  // at (0, 0), heading 0
+  TEST_ASSERT_TRUE(wm_findings_has(&found, WM_FOUND_POSE_NOT_FOUND, "drive"));
+  TEST_ASSERT_NULL_MESSAGE(strstr(found.at[0].fix, "give x_m"), found.at[0].fix);
+}
+
+// An hour without a datum, which a replay skips, is no time without a pose.
+static void a_silence_that_is_skipped_is_not_due(void) {
+  static drive_evidence evidence;
+  for (int i = 0; i <= 200; i++) {
+    const wm_event event = {.t_ns = i * 100 * WM_NS_PER_MS + (i > 100 ? 3600 * WM_NS_PER_S : 0)};
+    evidence_put(&evidence, WM_OUTPUT_EVENT, &event);
+  }
+  TEST_ASSERT_UINT64_WITHIN(1, 995, evidence_due(&evidence, 50));
 }
 
 // Against the sigma that the configuration states for it.
@@ -327,6 +403,11 @@ int main(void) {
   RUN_TEST(innovations_of_their_sigma_are_good_and_larger_ones_are_found);
   RUN_TEST(the_cause_of_a_lost_or_degraded_drive_is_named);
   RUN_TEST(a_drive_that_no_observation_reaches_is_not_good);
+  RUN_TEST(innovations_of_a_tenth_of_their_sigma_are_not_good);
+  RUN_TEST(motion_that_no_robot_can_do_is_found);
+  RUN_TEST(no_lateness_is_advised_that_no_transport_has);
+  RUN_TEST(a_start_that_is_given_is_not_asked_for);
+  RUN_TEST(a_silence_that_is_skipped_is_not_due);
   RUN_TEST(a_scale_far_from_its_stated_one_contradicts);
   RUN_TEST(a_map_that_is_named_and_not_read_is_found);
   RUN_TEST(a_finding_of_the_drive_is_not_repeated_by_the_health);
