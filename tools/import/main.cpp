@@ -3,8 +3,13 @@
 // Python package's waymark-import-bag.
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <cstdio>
+#include <cstring>
 #include <filesystem>
+#include <fstream>
+#include <string_view>
 
 #include "common/failure.h"
 #include "common/program.h"
@@ -28,12 +33,45 @@ int run(const wm::tools::ImportWish &wish) {
   return wm::tools::kDone;
 }
 
-// A bag of ROS or an MCAP file: a folder with rosbag2's metadata, or a file by its ending.
-bool is_bag(const std::filesystem::path &path) {
+// How a bag begins: MCAP, rosbag2's SQLite, ROS 1; or one that was compressed as a whole, which no video is: zstd,
+// gzip, bzip2, xz, lz4.
+constexpr std::array<std::string_view, 8> kBeginnings{"\x89MCAP0\r\n",
+                                                      "SQLite format 3",
+                                                      "#ROSBAG",
+                                                      "\x28\xb5\x2f\xfd",
+                                                      "\x1f\x8b",
+                                                      "BZh",
+                                                      "\xfd"
+                                                      "7zXZ",
+                                                      "\x04\x22\x4d\x18"};
+constexpr std::array<std::string_view, 6> kEndings{".mcap", ".bag", ".db3", ".zstd", ".zst", ".active"};
+
+// By its content, for files that were renamed, else by its ending, for one that is empty.
+bool is_bag_file(const std::filesystem::path &path) {
   const std::string ending = path.extension().string();
+  if (std::find(kEndings.begin(), kEndings.end(), ending) != kEndings.end()) return true;
+  std::array<char, 16> head{};
+  std::ifstream file(path, std::ios::binary);
+  file.read(head.data(), static_cast<std::streamsize>(head.size()));
+  const std::string_view begin(head.data(), static_cast<size_t>(file.gcount()));
+  return std::any_of(kBeginnings.begin(), kBeginnings.end(),
+                     [&](std::string_view known) { return begin.substr(0, known.size()) == known; });
+}
+
+// A bag of ROS or an MCAP file: a file, or a folder that holds one, with rosbag2's metadata or without.
+bool is_bag(const std::filesystem::path &path) {
   std::error_code ignored;
-  return ending == ".mcap" || ending == ".bag" || ending == ".db3" ||
-         std::filesystem::is_regular_file(path / "metadata.yaml", ignored);
+  if (!std::filesystem::is_directory(path, ignored)) return is_bag_file(path);
+  for (const auto &entry : std::filesystem::directory_iterator(path, ignored)) {
+    if (entry.path().filename() == "metadata.yaml") return true;
+    if (entry.is_regular_file(ignored) && is_bag_file(entry.path())) return true;
+  }
+  return false;
+}
+
+// Whether an argument is the value of an option before it.
+bool is_value(const char *before) {
+  return std::string_view(before).substr(0, 2) == "--" && std::strchr(before, '=') == nullptr;
 }
 
 int run_bag_import(char **argv) {
@@ -48,7 +86,7 @@ int run_bag_import(char **argv) {
 
 int main(int argc, char **argv) {
   for (int i = 1; i < argc; i++)
-    if (is_bag(argv[i])) return run_bag_import(argv);
+    if (!is_value(argv[i - 1]) && is_bag(argv[i])) return run_bag_import(argv);
   wm::tools::ImportWish wish;
   wm::cli::App app(
       "Makes a video of any kind (H.264 and others, by libav) into what a recording holds: MJPEG in AVI, with its "

@@ -22,6 +22,7 @@ STREAMS = ("motion.csv", "motion6.csv", "increments.csv", "ticks.csv", "speeds.c
 """Streams of sensors that are tables, in the order of the format's table."""
 
 _JPEG_QUALITY = 95  # the error of a pixel stays below a grey level's noise
+_ERROR_FLAG = 0x20000000  # CAN_ERR_FLAG of linux/can.h, which candump prints in the identifier
 _CAN_LINE = re.compile(r"\((\d+)\.(\d{6})\) (\S+) ([0-9A-Fa-f]+)#(#[0-9A-Fa-f])?(R\d?|[0-9A-Fa-f]*)(?: [RT])?\s*$")
 
 
@@ -36,7 +37,7 @@ class Frame:
 
 @dataclass(frozen=True)
 class CanFrame:
-    """A CAN frame. `flags` is None for a classic frame, else the FD frame's nibble of flags."""
+    """A CAN frame. `flags` is None for a classic frame, else the FD frame's nibble of flags. `error`: the controller's report, no datum."""
 
     t_ns: int
     interface: str
@@ -45,6 +46,7 @@ class CanFrame:
     data: bytes
     flags: int | None = None
     remote: bool = False
+    error: bool = False
 
 
 def _read_yaml(path: Path) -> dict[str, Any]:
@@ -109,22 +111,24 @@ class Recording:
         if not path.is_file():
             return
         with path.open(encoding="ascii", errors="replace") as file:
-            for number, line in enumerate(file, start=1):
+            for row, line in enumerate(file, start=1):
                 if not line.strip():
                     continue
                 match = _CAN_LINE.match(line)
                 if not match:
-                    raise ValueError(f"{path}:{number}: this is not a line of `candump -l`")
+                    raise ValueError(f"{path}:{row}: this is not a line of `candump -l`")
                 seconds, micros, interface, identifier, flags, data = match.groups()
                 remote = data.startswith("R")
-                yield CanFrame(int(seconds) * 10**9 + int(micros) * 1000, interface, int(identifier, 16),
-                               len(identifier) > 3, b"" if remote else bytes.fromhex(data),
-                               int(flags[1], 16) if flags else None, remote)
+                number = int(identifier, 16)
+                error = bool(number & _ERROR_FLAG)
+                yield CanFrame(int(seconds) * 10**9 + int(micros) * 1000, interface, number & ~_ERROR_FLAG,
+                               len(identifier) > 3 and not error, b"" if remote else bytes.fromhex(data),
+                               int(flags[1], 16) if flags else None, remote, error)
 
 
 def can_line(frame: CanFrame) -> str:
     """A frame as `candump -l` writes it."""
-    identifier = f"{frame.id:08X}" if frame.extended else f"{frame.id:03X}"
+    identifier = f"{frame.id | _ERROR_FLAG:08X}" if frame.error else f"{frame.id:08X}" if frame.extended else f"{frame.id:03X}"
     data = "R" if frame.remote else frame.data.hex().upper()
     flags = "" if frame.flags is None else f"#{frame.flags:X}"
     return f"({frame.t_ns // 10**9}.{frame.t_ns // 1000 % 10**6:06d}) {frame.interface} {identifier}#{flags}{data}\n"
@@ -135,6 +139,9 @@ def jpeg_size(jpeg: bytes) -> tuple[int, int]:
     at = 2
     while at + 9 <= len(jpeg) and jpeg[at] == 0xFF:
         marker = jpeg[at + 1]
+        if marker == 0xFF:  # a fill byte before a marker (ITU-T T.81, B.1.1.2)
+            at += 1
+            continue
         if 0xC0 <= marker <= 0xCF and marker not in (0xC4, 0xC8, 0xCC):
             return int.from_bytes(jpeg[at + 7 : at + 9], "big"), int.from_bytes(jpeg[at + 5 : at + 7], "big")
         at += 2 + int.from_bytes(jpeg[at + 2 : at + 4], "big")

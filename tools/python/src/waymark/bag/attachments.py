@@ -1,20 +1,24 @@
 # SPDX-License-Identifier: Apache-2.0
 """Files that `waymark export` attached: calibration, DBC, map, truth."""
 
-from pathlib import Path
+from typing import Any
 
 import yaml
-from mcap.reader import make_reader
 
 from ..mcapio.writer import is_attachment
 from ..recording import FORMAT, RecordingWriter
+from .containers import Bag
 
 
-def write_attachments(path: Path, writer: RecordingWriter) -> bool:
+def write_attachments(bag: Bag, writer: RecordingWriter) -> bool:
     """Writes the attached files of a recording into a new one; whether there were any."""
-    with path.open("rb") as file:
-        found = {item.name: bytes(item.data) for item in make_reader(file).iter_attachments() if is_attachment(item.name)}
-    meta = yaml.safe_load(found.pop("recording.yaml", b"{}"))
+    found: dict[str, bytes] = {}
+    for file in bag.files:
+        found |= file.attachments(is_attachment)
+    try:
+        meta: Any = yaml.safe_load(found.pop("recording.yaml", b"{}"))
+    except yaml.YAMLError:
+        return False
     if not isinstance(meta, dict) or meta.get("format") != FORMAT:
         return False
     cameras = set(writer.cameras())

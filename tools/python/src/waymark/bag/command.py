@@ -4,20 +4,18 @@
 import argparse
 import shutil
 import sys
-from collections.abc import Callable
+import time
 from pathlib import Path
-from typing import Any
-
-from rosbags.highlevel import AnyReader
-from rosbags.interfaces import Connection
 
 from ..mcapio import streams
 from ..recording import RecordingWriter
-from ..ros import typestore
-from . import tables
+from . import sight, tables
 from .attachments import write_attachments
 from .collection import Collection
-from .takers import TAKERS, tf_static
+from .containers import Bag, Unreadable
+from .reading import Progress, read
+
+_LINE_EVERY_S = 5.0  # between two lines of progress where standard error is no terminal
 
 _EXAMPLES = """examples:
   waymark import drive.mcap --out recordings/drive
@@ -91,67 +89,16 @@ def _write_positions(into: Collection, given: argparse.Namespace) -> None:
             into.refuse(topic, f"poses are an answer, not a sensor; --truth {topic} takes them as truth.csv")
 
 
-def _write_cameras(into: Collection, base: str) -> None:
-    for topic, rows in sorted(into.rows.get("tags", {}).items()):
-        into.writer.table("marker-corners.csv", tables.tags(rows, into.camera(topic)))
-    for name, frame in sorted(into.frame_ids.items()):
-        camera = into.cameras.setdefault(name, {})
-        place = tables.mounting(into, frame, base, optical=True)
-        if place:
-            camera["mounting"] = place
-        else:
-            into.note(f"camera {name}", f"/tf_static leads from '{frame}' to no '{base}': write its mounting into calibration.yaml")
-    cameras = {name: camera for name, camera in sorted(into.cameras.items()) if "model" in camera}
-    for name in sorted(set(into.cameras) - set(cameras)):
-        into.note(f"camera {name}", "without camera_info; calibrate it (`waymark calibrate camera`), or write its lens into calibration.yaml")
-    if cameras:
-        into.writer.calibration["cameras"] = cameras
-    if into.families:
-        into.writer.calibration["x_marker_families"] = sorted(into.families)
-
-
-def _is_ours(connection: Connection) -> bool:
-    return connection.topic.startswith("/recording/") and connection.msgtype.startswith("waymark_msgs/msg/")
-
-
-def _read(bag: AnyReader, into: Collection, progress: Callable[[int, int], None] | None) -> dict[str, list[Any]]:
-    """Takes every message that has a taker; rows of our own tables by their file."""
-    own: dict[str, list[Any]] = {}
-    taken = [c for c in bag.connections if c.msgtype in TAKERS or c.topic.endswith("tf_static") or _is_ours(c)]
-    total = sum(connection.msgcount for connection in taken)
-    for count, (connection, log_ns, raw) in enumerate(bag.messages(taken)):
-        try:
-            message = bag.deserialize(raw, connection.msgtype)
-            if _is_ours(connection):
-                own.setdefault(connection.topic, []).append(message)
-            elif connection.topic.endswith("tf_static"):
-                tf_static(into, connection.topic, message, log_ns)
-            else:
-                TAKERS[connection.msgtype](into, connection.topic, message, log_ns)
-        except OSError:
-            raise
-        except Exception as error:  # what the decoder raises on bytes that don't fit the type is its own matter
-            raise ImportFailure(f"{connection.topic}: the message of {log_ns} ns ({len(raw)} bytes) is no {connection.msgtype}: "
-                                f"{error or type(error).__name__}") from error
-        if progress and count % 500 == 0:
-            progress(count, total)
-    for connection in bag.connections:
-        if connection not in taken:
-            into.refuse(connection.topic, f"{connection.msgtype}: a recording has no place for it")
-    return own
-
-
-def import_bag(path: Path, out: Path, given: argparse.Namespace, progress: Callable[..., None] | None = None) -> Collection:
+def import_bag(path: Path, out: Path, given: argparse.Namespace, progress: Progress | None = None) -> Collection:
     """Writes the recording of a bag; what was found stands in the collection."""
-    with AnyReader([path], default_typestore=typestore()) as bag, RecordingWriter(out) as writer:
+    with RecordingWriter(out) as writer, Bag(path, out) as bag:
         into = Collection(writer)
-        own = _read(bag, into, progress)
-        ours = write_attachments(path, writer) if path.suffix == ".mcap" else False
+        own = read(bag, into, progress)
+        ours = write_attachments(bag, writer)
         for topic, rows in sorted(own.items()):
             columns = [name for name in rows[0].__dataclass_fields__ if name not in ("header", "__msgtype__")]
             writer.table(topic.removeprefix("/recording/").replace("_", "-") + ".csv", streams.rows_to_table(rows, columns))
-        for frame in sorted(into.can, key=lambda frame: frame.t_ns):
-            writer.can(frame)
+        into.can.finish()
         if ours:  # an export of ours: what isn't taken follows from the recording
             into.refused.clear()
             if "/truth/pose" in into.rows.get("poses", {}):
@@ -160,14 +107,39 @@ def import_bag(path: Path, out: Path, given: argparse.Namespace, progress: Calla
             _write_motion(into, given)
             _write_imu(into, given)
             _write_positions(into, given)
-            _write_cameras(into, given.base)
+            sight.write(into, given.base, None if given.tags is None else given.tags == "rectified")
+        for note in bag.all_notes():
+            into.note(path.name, note)
     return into
 
 
-def _has_end(path: Path) -> bool:
-    with path.open("rb") as file:
-        file.seek(max(path.stat().st_size - 8, 0))
-        return file.read() == b"\x89MCAP0\r\n"
+class _Shown:
+    """Progress on standard error: a number that runs on a terminal, a line every so often elsewhere."""
+
+    def __init__(self) -> None:
+        self._begin = self._said = time.monotonic()
+        self._is_terminal = sys.stderr.isatty()
+
+    def __call__(self, share: float) -> None:
+        now = time.monotonic()
+        if now - self._said < (0.1 if self._is_terminal else _LINE_EVERY_S):
+            return
+        self._said = now
+        left_s = (now - self._begin) * (1 - share) / max(share, 1e-3)
+        text = f"waymark import: {100 * share:.0f} %, {left_s:.0f} s left"
+        print(f"\r{text}\033[K" if self._is_terminal else text, end="" if self._is_terminal else "\n", file=sys.stderr, flush=True)
+
+    def close(self) -> None:
+        """Clears the running number."""
+        if self._is_terminal:
+            print("\r\033[K", end="", file=sys.stderr)
+
+
+def _failed(given: argparse.Namespace, progress: _Shown, text: str) -> int:
+    progress.close()
+    shutil.rmtree(given.out, ignore_errors=True)
+    print(f"waymark import: {given.bag}: {text}", file=sys.stderr)
+    return 1
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -182,24 +154,24 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--origin", metavar=("LAT", "LON", "ALT"), type=float, nargs=3, help="of the map (default: the first fix)")
     parser.add_argument("--truth", metavar="TOPIC", help="poses that are the truth; `waymark eval` compares with them")
     parser.add_argument("--base", metavar="FRAME", default="base_link", help="the robot's frame in /tf_static (default base_link)")
+    parser.add_argument("--tags", choices=("raw", "rectified"), help="whose pixels the corners of tags are (default: as their node reads)")
     given = parser.parse_args(argv)
     if given.out.exists() and any(given.out.iterdir()):
         parser.error(f"{given.out} is not empty: give a new folder")
-    progress = None
-    if sys.stderr.isatty():
-        progress = lambda done, total: print(f"\r{100 * done // max(total, 1)} %", end="", file=sys.stderr)  # noqa: E731
+    progress = _Shown()
     try:
         into = import_bag(given.bag, given.out, given, progress)
-    except Exception as error:  # the readers of bags raise whatever a broken file leads to
-        shutil.rmtree(given.out, ignore_errors=True)
-        cut = given.bag.suffix == ".mcap" and given.bag.is_file() and not _has_end(given.bag)
-        hint = "; the file has no end, as of a recorder that was killed: `mcap recover` (of MCAP's makers) completes it" if cut else ""
-        print(f"waymark import: {given.bag}: {error or type(error).__name__}{hint}", file=sys.stderr)
-        return 1
-    if progress:
-        print("\r\033[K", end="", file=sys.stderr)
-    for topic, text in sorted(into.notes.items()):
-        print(f"note: {topic}: {text}")
+    except (ImportFailure, Unreadable) as problem:
+        return _failed(given, progress, str(problem))
+    except MemoryError:
+        return _failed(given, progress, "there is not enough memory")
+    except OSError as error:
+        where = f"{error.filename}: " if error.filename else ""
+        return _failed(given, progress, f"{where}{error.strerror or 'reading or writing fails'}")
+    progress.close()
+    for topic, texts in sorted(into.notes.items()):
+        for text in texts:
+            print(f"note: {topic}: {text}")
     for topic, text in sorted(into.refused.items()):
         print(f"not taken: {topic}: {text}")
     print(f"{given.out}: {', '.join(into.writer.meta['streams']) or 'nothing'}")

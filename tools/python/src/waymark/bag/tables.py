@@ -19,7 +19,7 @@ def _table(names: list[str], rows: list[tuple[Any, ...]]) -> Table:
             for name, column in zip(names, columns)}
 
 
-def _without_arrival(table: Table) -> Table:
+def without_arrival(table: Table) -> Table:
     """Leaves arrival_ns out where all arrived at once."""
     if (table["arrival_ns"] == table["t_ns"]).all():
         del table["arrival_ns"]
@@ -32,9 +32,9 @@ def motion(rows: list[tuple[Any, ...]]) -> tuple[str, Table] | None:
     if not any(table[name].any() for name in list(table)[1:7]):
         return None
     if any(table[name].any() for name in ("vy_mps", "vz_mps", "wx_radps", "wy_radps")):
-        return "motion6.csv", _without_arrival(table)
+        return "motion6.csv", without_arrival(table)
     plain = {"t_ns": table["t_ns"], "v_mps": table["vx_mps"], "w_radps": table["wz_radps"], "arrival_ns": table["arrival_ns"]}
-    return "motion.csv", _without_arrival(plain)
+    return "motion.csv", without_arrival(plain)
 
 
 def increments(rows: list[tuple[Any, ...]]) -> Table:
@@ -62,21 +62,14 @@ def gnss(rows: list[tuple[Any, ...]], origin: list[float] | None) -> tuple[Table
     table = {"t_ns": t.astype(np.int64), "x_m": across * np.cos(phi) * np.radians(longitude - origin[1]),
              "y_m": along * np.radians(latitude - origin[0]), "z_m": altitude - origin[2], "sigma_xy_m": sigma,
              "sigma_z_m": np.where(vz > 0, np.sqrt(np.maximum(vz, 0)), 2 * sigma), "arrival_ns": arrival.astype(np.int64)}
-    return _without_arrival(table), origin
+    return without_arrival(table), origin
 
 
 def imu(rows: list[tuple[Any, ...]]) -> Table:
     """imu.csv without the columns of which nothing is known."""
     values = [f"{kind}{axis}_{unit}" for kind, unit in (("w", "radps"), ("a", "mps2")) for axis in "xyz"]
-    table = _without_arrival(_table(["t_ns", *values, *(f"sigma_{name}" for name in values), "arrival_ns"], rows))
+    table = without_arrival(_table(["t_ns", *values, *(f"sigma_{name}" for name in values), "arrival_ns"], rows))
     return {name: column for name, column in table.items() if name in ("t_ns", *values[:3]) or not np.isnan(column).all()}
-
-
-def tags(rows: list[tuple[Any, ...]], camera: str) -> Table:
-    """Corners of tags of one camera."""
-    names = ["t_ns", "id", *(f"{axis}{k}_px" for k in range(4) for axis in "uv"), "arrival_ns"]
-    table = _without_arrival(_table(names, rows))
-    return {"t_ns": table.pop("t_ns"), "sensor": np.full(len(rows), camera), **table}
 
 
 def truth(rows: list[tuple[Any, ...]]) -> Table:

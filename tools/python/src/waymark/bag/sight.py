@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Takers of pictures, camera_info and tags, and the cameras of the recording that they make."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from ..recording import Frame, jpeg_size
+from ..tables import Array, Table
+from . import cameras, pictures, tables, tags
+from .collection import Collection, stamp_ns
+from .decoding import BadMessage, Topic
+from .pictures import Depths
+from .views import TagRows
+
+
+def _picture(into: Collection, topic: str, message: Any, log_ns: int, make: Callable[[Any, Depths], bytes]) -> None:
+    if topic not in into.sight.cameras.by_topic:
+        return
+    depths = into.sight.depths.setdefault(topic, Depths(lambda text: into.note(topic, text)))
+    jpeg = make(message, depths)
+    size = jpeg_size(jpeg)
+    camera = into.sight.cameras.by_topic[topic]
+    if camera.size and size != camera.size:
+        raise BadMessage(f"a picture of {size[0]} x {size[1]} follows one of {camera.size[0]} x {camera.size[1]}")
+    name = into.sight.cameras.pictures(topic, message.header.frame_id, size)
+    t_ns = stamp_ns(message, log_ns)
+    try:
+        into.writer.frame(name, Frame(t_ns, into.arrival_ns(topic, t_ns, log_ns), jpeg))
+    except ValueError:  # AVI's lengths have 32 bits
+        raise BadMessage("the video has 4 GB, the most that an AVI file holds") from None
+
+
+def image(into: Collection, topic: str, message: Any, log_ns: int) -> None:
+    """A raw picture becomes a grey JPEG."""
+    _picture(into, topic, message, log_ns, pictures.jpeg_of_image)
+
+
+def compressed_image(into: Collection, topic: str, message: Any, log_ns: int) -> None:
+    """A JPEG goes through as it is; another kind becomes a grey JPEG."""
+    _picture(into, topic, message, log_ns, pictures.jpeg_of_compressed)
+
+
+def camera_info(into: Collection, topic: str, message: Any, log_ns: int) -> None:
+    """The first one with a lens is the camera's calibration."""
+    into.sight.cameras.camera_info(topic, message, stamp_ns(message, log_ns))
+
+
+def detections(kind: str) -> Callable[[Collection, str, Any, int], None]:
+    """The taker of a type of detections of tags."""
+    reader = tags.READERS[kind]
+
+    def take(into: Collection, topic: str, message: Any, log_ns: int) -> None:
+        t_ns = stamp_ns(message, log_ns)
+        arrival_ns = into.arrival_ns(topic, t_ns, log_ns)
+        bad: BadMessage | None = None
+        found = reader.read(message)
+        while True:
+            try:
+                seen = next(found)
+            except StopIteration:
+                break
+            except BadMessage as problem:
+                bad = problem
+                break
+            rows = into.sight.tags.setdefault(topic, TagRows(kind, message.header.frame_id.lstrip("/"), seen.corners is not None))
+            rows.whole.extend((t_ns, arrival_ns, seen.id))
+            rows.values.extend(seen.corners or seen.place or [])
+        if reader.families:
+            into.sight.families.update(tag.family for tag in message.detections)
+        if bad:
+            raise bad
+
+    return take
+
+
+def problem_of(topic: Topic, raw: Any) -> str | None:
+    """Why a topic's first message is no picture that can be taken; None where it is one."""
+    try:
+        message = topic.decode(raw)
+        make = pictures.jpeg_of_image if topic.kind == cameras.PICTURE_KINDS[0] else pictures.jpeg_of_compressed
+        make(message, Depths(lambda text: None))
+    except pictures.NotTaken as problem:
+        return str(problem)
+    except Exception:  # one bad message says nothing of the topic; reading names it
+        return None
+    return None
+
+
+def write(into: Collection, base: str, rectified_tags: bool | None) -> None:
+    """Writes the tables of tags, and cameras into calibration.yaml."""
+    found = into.sight.cameras.found()
+    _write_tags(into, found, rectified_tags)
+    entries: dict[str, dict[str, Any]] = {}
+    for camera in found:
+        label = f"camera {camera.name}"
+        for note in camera.lens.notes:
+            into.note(label, note)
+        if not camera.frame:
+            into.note(label, "its messages name no frame: write its mounting into calibration.yaml")
+        elif place := tables.mounting(into, camera.frame, base, optical=True):
+            entries.setdefault(camera.name, dict(camera.lens.entry or {}))["mounting"] = place
+        else:
+            into.note(label, f"/tf_static leads from '{camera.frame}' to no '{base}': write its mounting into calibration.yaml")
+        if camera.lens.entry:
+            entries.setdefault(camera.name, dict(camera.lens.entry))
+    entries = {name: entry for name, entry in sorted(entries.items()) if "model" in entry}
+    if entries:
+        into.writer.calibration["cameras"] = entries
+    if into.sight.families:
+        into.writer.calibration["x_marker_families"] = sorted(into.sight.families)
+
+
+def _write_tags(into: Collection, found: list[cameras.Found], rectified: bool | None) -> None:
+    """Corners in marker-corners.csv, poses in markers.csv; where a camera has both, its corners."""
+    written: dict[str, list[Table]] = {"marker-corners.csv": [], "markers.csv": []}
+    of_corners: set[str] = set()
+    for topic, rows in sorted(into.sight.tags.items(), key=lambda item: (not item[1].has_corners, item[0])):
+        camera = cameras.of_detections(found, topic, rows.frame)
+        name = camera.name if camera else into.camera(topic)
+        columns = rows.columns()
+        if rows.has_corners:
+            of_corners.add(name)
+            if camera and (tags.READERS[rows.kind].is_of_rectified if rectified is None else rectified):
+                columns = _in_raw(into, topic, camera, columns, is_said=rectified is not None)
+            written["marker-corners.csv"].append(tags.corner_table(columns, name))
+        elif name in of_corners:
+            into.refuse(topic, "poses of tags whose corners are taken")
+        else:
+            if rows.kind == "apriltag_ros/msg/AprilTagDetectionArray":
+                into.note(topic, "its messages name no family: the poses are taken as of tag36h11, which is read half a turn from the library's way up")
+            written["markers.csv"].append(tags.pose_table(columns, name))
+    for file, parts in written.items():
+        if parts:
+            whole = {column: np.concatenate([part[column] for part in parts]) for column in parts[0]}
+            into.writer.table(file, tables.without_arrival(whole))
+
+
+def _in_raw(into: Collection, topic: str, camera: cameras.Found, columns: list[Array], is_said: bool) -> list[Array]:
+    """Corners of the rectified picture as those of the raw one."""
+    pixels = np.stack(columns[2:10], axis=1).reshape(-1, 2)
+    moved = tags.to_raw(camera, pixels)
+    if moved is None:
+        return columns
+    if not is_said:
+        into.note(topic, f"its corners are taken as those of the rectified picture, which apriltag_ros reads, and written as pixels of the raw one by the "
+                         f"lens of camera {camera.name}; `--tags raw` takes them as they are")
+    return [columns[0], columns[1], *moved.reshape(-1, 8).T, columns[10]]

@@ -1,0 +1,178 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tags that other detectors reported, as rows of marker-corners.csv (corners) and markers.csv (poses).
+
+Ours: the middle of a pixel is whole; corners from the upper left one on, clockwise, of the print as OpenCV's readers see it. The others:
+
+  AprilTag's library (apriltag_msgs)   the middle of a pixel is at a half; corners against the clock from the lower left one on
+                                       (apriltag.c: homography_project of (-1,1), (1,1), (1,-1), (-1,-1)). Its four oldest families are drawn
+                                       the other way up than OpenCV's and ours (cv::aruco::DICT_APRILTAG_*): half a turn
+  OpenCV's aruco (fiducial_msgs)       as ours
+  poses (aruco_msgs, aruco_opencv_msgs, apriltag_ros of ROS 1, fiducial_msgs, vision_msgs)
+                                       in the camera's optical frame (REP 103). OpenCV: x to the right, y up, z out of the print.
+                                       AprilTag: z into it, y down. aruco_ros: y out of it, z up. The axis that points towards the camera,
+                                       or away from it, tells which
+"""
+
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..geometry import OPTICAL, rotation
+from ..tables import Array, Table
+from . import lenses
+from .cameras import Found
+from .decoding import BadMessage
+from .lens_fit import equidistant, radtan
+
+_HALF_TURNED = {"16h5", "25h9", "36h10", "36h11"}
+_UPRIGHT_ORDER, _HALF_TURNED_ORDER = (3, 2, 1, 0), (1, 0, 3, 2)
+_HALF_PX = 0.5
+_NUMBER = re.compile(r"(\d+)\D*$")
+_FACING_MIN = 0.05  # cosine; a print seen more askew than that, 87 degrees, isn't read by any detector
+
+
+class Seen(NamedTuple):
+    """A tag with its four corners in pixels, u0 v0 ... u3 v3 in our order, or with the place and the yaw of its pose (m, rad, camera's body)."""
+
+    id: int
+    corners: list[float] | None
+    place: list[float] | None = None
+
+
+def _is_half_turned(family: str) -> bool:
+    return family.lower().removeprefix("tag").removeprefix("_") in _HALF_TURNED
+
+
+def _corners(points: list[tuple[float, float]], order: tuple[int, ...], shift_px: float) -> list[float]:
+    out = [float(value) - shift_px for k in order for value in points[k]]
+    if not np.isfinite(out).all():
+        raise BadMessage("a corner is no number")
+    return out
+
+
+def _pose(identity: int, place: Any, turn: Any, half_turned: bool = False) -> Seen:
+    """A pose in the optical frame: place in the body frame, and the direction of the print's upper edge about the view."""
+    p = np.array([place.x, place.y, place.z], dtype=float)
+    q = np.array([turn.x, turn.y, turn.z, turn.w], dtype=float)
+    if not np.isfinite(p).all() or not np.isfinite(q).all() or not q.any() or not p[2] > 0:
+        raise BadMessage(f"the pose of tag {identity} is none: it lies not before the camera, or its quaternion is 0")
+    axes = rotation(q)
+    towards = -p / np.linalg.norm(p)
+    facing = {"z": float(axes[:, 2] @ towards), "y": float(axes[:, 1] @ towards)}
+    if max(map(abs, facing.values())) < _FACING_MIN:
+        raise BadMessage(f"the pose of tag {identity} shows it from its edge")
+    if abs(facing["z"]) >= abs(facing["y"]):
+        up = axes[:, 1] if facing["z"] > 0 else -axes[:, 1]
+    else:
+        up = axes[:, 2] if facing["y"] > 0 else -axes[:, 2]
+    body, upper = OPTICAL @ p, OPTICAL @ (-up if half_turned else up)
+    return Seen(identity, None, [*map(float, body), float(np.arctan2(upper[1], upper[0]))])
+
+
+def apriltag(message: Any) -> Iterator[Seen]:
+    """apriltag_msgs/AprilTagDetectionArray."""
+    for tag in message.detections:
+        order = _HALF_TURNED_ORDER if _is_half_turned(tag.family) else _UPRIGHT_ORDER
+        yield Seen(int(tag.id), _corners([(c.x, c.y) for c in tag.corners], order, _HALF_PX))
+
+
+def apriltag_pose(message: Any) -> Iterator[Seen]:
+    """AprilTagDetectionArray of apriltag_ros for ROS 1: a pose; of a bundle of tags none of them has one."""
+    for tag in message.detections:
+        if len(tag.id) == 1:
+            yield _pose(int(tag.id[0]), tag.pose.pose.pose.position, tag.pose.pose.pose.orientation, half_turned=True)
+
+
+def fiducials(message: Any) -> Iterator[Seen]:
+    """fiducial_msgs/FiducialArray."""
+    for tag in message.fiducials:
+        yield Seen(int(tag.fiducial_id), _corners([(tag.x0, tag.y0), (tag.x1, tag.y1), (tag.x2, tag.y2), (tag.x3, tag.y3)], (0, 1, 2, 3), 0.0))
+
+
+def fiducial_poses(message: Any) -> Iterator[Seen]:
+    """fiducial_msgs/FiducialTransformArray."""
+    for tag in message.transforms:
+        yield _pose(int(tag.fiducial_id), tag.transform.translation, tag.transform.rotation)
+
+
+def aruco_poses(message: Any) -> Iterator[Seen]:
+    """aruco_msgs/MarkerArray (id) and aruco_opencv_msgs/ArucoDetection (marker_id)."""
+    for tag in message.markers:
+        pose = tag.pose.pose if hasattr(tag.pose, "pose") else tag.pose
+        yield _pose(int(tag.marker_id if hasattr(tag, "marker_id") else tag.id), pose.position, pose.orientation)
+
+
+def vision_poses(message: Any) -> Iterator[Seen]:
+    """vision_msgs/Detection2DArray and Detection3DArray whose first hypothesis has a number as its class, and a pose."""
+    for found in message.detections:
+        if not len(found.results):
+            continue
+        best = found.results[0]
+        about = getattr(best, "hypothesis", best)
+        name = str(getattr(about, "class_id", getattr(about, "id", "")))
+        number = _NUMBER.search(name)
+        where = best.pose.pose if hasattr(best.pose, "pose") else best.pose
+        place = where.position
+        if not number:
+            raise BadMessage(f"a detection of class '{name}', which is no number of a tag")
+        if not any((place.x, place.y, place.z)):
+            raise BadMessage("a detection without a pose: a box alone gives no corners of a tag")
+        yield _pose(int(number[1]), place, where.orientation)
+
+
+@dataclass(frozen=True)
+class Reader:
+    """How a type is read. `is_of_rectified`: its node reads rectified pictures; `families`: whether its tags name theirs."""
+
+    read: Callable[[Any], Iterator[Seen]]
+    is_of_rectified: bool = False
+    families: bool = False
+
+
+READERS = {
+    "apriltag_msgs/msg/AprilTagDetectionArray": Reader(apriltag, is_of_rectified=True, families=True),
+    "apriltag_ros/msg/AprilTagDetectionArray": Reader(apriltag_pose),
+    "fiducial_msgs/msg/FiducialArray": Reader(fiducials),
+    "fiducial_msgs/msg/FiducialTransformArray": Reader(fiducial_poses),
+    "aruco_msgs/msg/MarkerArray": Reader(aruco_poses),
+    "aruco_opencv_msgs/msg/ArucoDetection": Reader(aruco_poses),
+    "vision_msgs/msg/Detection2DArray": Reader(vision_poses),
+    "vision_msgs/msg/Detection3DArray": Reader(vision_poses),
+}
+
+
+def to_raw(camera: Found, pixels: Array) -> Array | None:
+    """Pixels (n, 2) of the rectified picture as those of the pictures that the recording's lens is of; None where nothing has to be done."""
+    entry = camera.lens.entry
+    if entry is None or camera.info is None or camera.is_rectified or not lenses.has_rectified(camera.info):
+        return None
+    straight = lenses.of(camera.info, True, (entry["size"][0], entry["size"][1])).entry
+    if straight is None or (straight["intrinsics"] == entry["intrinsics"] and not any(entry["distortion"]) and entry["model"] == "pinhole-radtan"):
+        return None
+    fx, fy, cx, cy = straight["intrinsics"]
+    turn = lenses.values(camera.info, "r")
+    rays = np.column_stack([(pixels[:, 0] - cx) / fx, (pixels[:, 1] - cy) / fy, np.ones(len(pixels))])
+    if len(turn) == 9 and abs(np.linalg.det(turn.reshape(3, 3)) - 1) < 1e-3:
+        rays = rays @ turn.reshape(3, 3)  # R turns rays of the raw camera into those of the rectified one
+    flat = rays[:, :2] / rays[:, 2:]
+    bent = radtan(entry["distortion"], flat) if entry["model"] == "pinhole-radtan" else equidistant(entry["distortion"], flat)
+    fx, fy, cx, cy = entry["intrinsics"]
+    return np.asarray(bent * (fx, fy) + (cx, cy))
+
+
+def corner_table(columns: list[Array], camera: str) -> Table:
+    """marker-corners.csv of rows t, id, eight pixels, arrival."""
+    t, identity, *pixels, arrival = columns
+    table: Table = {"t_ns": t.astype(np.int64), "sensor": np.full(len(t), camera), "id": identity.astype(np.int64)}
+    table |= {f"{axis}{k}_px": pixels[2 * k + (axis == "v")] for k in range(4) for axis in "uv"}
+    return table | {"arrival_ns": arrival.astype(np.int64)}
+
+
+def pose_table(columns: list[Array], camera: str) -> Table:
+    """markers.csv of rows t, id, x, y, z, yaw, arrival."""
+    t, identity, x, y, z, yaw, arrival = columns
+    return {"t_ns": t.astype(np.int64), "sensor": np.full(len(t), camera), "id": identity.astype(np.int64), "x_m": x, "y_m": y, "z_m": z,
+            "yaw_rad": yaw, "arrival_ns": arrival.astype(np.int64)}
