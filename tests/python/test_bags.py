@@ -135,12 +135,12 @@ class Robots(unittest.TestCase):
         done = subprocess.run(["diff", "-r", "-x", "recording.yaml", self.out("a"), self.out("b")], capture_output=True, check=False)
         self.assertEqual((done.returncode, done.stdout), (0, b""))
 
-    def test_odometry_without_a_twist_becomes_increments(self):
+    def test_odometry_without_a_twist_has_its_poses_differences(self):
         bag = robot_bag(self.drive.folder / "still", StoragePlugin.MCAP, twist=False)
         code, text = imported(bag, "--out", self.out("a"))
         self.assertEqual(code, 0, text)
-        np.testing.assert_allclose(waymark.Recording(self.out("a")).table("increments.csv")["dx_m"], 0.01, atol=1e-12)
-        self.assertIn("increments.csv", text)
+        np.testing.assert_allclose(waymark.Recording(self.out("a")).table("motion.csv")["v_mps"], 0.5, atol=1e-12)
+        self.assertIn("differences of its poses", text)
 
     def test_stamps_of_a_simulator_s_clock_have_no_arrivals(self):
         bag = robot_bag(self.drive.folder / "simulated", StoragePlugin.MCAP, late_ns=10**15)

@@ -3,7 +3,7 @@
 
 import io
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TextIO
@@ -225,6 +225,14 @@ class RecordingWriter:
     def cameras(self) -> list[str]:
         """Names of the cameras that have pictures so far."""
         return sorted(self._videos)
+
+    def restamp(self, camera: str, clock: Callable[[Array, Array], tuple[Array, Array]]) -> None:
+        """Replaces stamps and arrivals of a camera's pictures so far by what `clock` makes of both."""
+        if camera not in self._videos:
+            return
+        rows = self._videos[camera][1]
+        t_ns, arrival_ns = clock(np.array([t for t, _ in rows], dtype=np.int64), np.array([t if a is None else a for t, a in rows], dtype=np.int64))
+        rows[:] = [(int(t), int(a)) for t, a in zip(t_ns, arrival_ns)]
 
     def can(self, frame: CanFrame) -> None:
         """Appends a CAN frame to can.log."""

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What was taken out of a bag before it is written as a recording."""
 
+from array import array
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,15 +12,23 @@ from ..recording import RecordingWriter
 from ..tables import Array
 from . import names
 from .can import CanLog
+from .clocks import SET_NS, Clock, goes_on, once, seconds, settle, silences
+from .frames import Frames
+from .samples import Samples
 from .views import Sight
-
-_OTHER_CLOCK_NS = 60_000_000_000  # longest gap within one clock; a larger step is another clock
 
 
 def stamp_ns(message: Any, log_ns: int) -> int:
     """The header's stamp; a header without one (0) counts at the time of the log."""
     stamp = message.header.stamp
     return stamp.sec * 10**9 + stamp.nanosec or log_ns
+
+
+class NoSuchTopic(Exception):
+    """A topic that the user names and the bag doesn't have."""
+
+    def __init__(self, option: str, topic: str, there: Iterable[str]):
+        super().__init__(f"{option} {topic}: the bag has no such topic of that kind; it has: {', '.join(sorted(there)) or 'none'}")
 
 
 @dataclass
@@ -35,30 +45,96 @@ class Collection:
 
     def __init__(self, writer: RecordingWriter):
         self.writer = writer
-        self.rows: dict[str, dict[str, list[tuple[Any, ...]]]] = {}
+        self.samples: dict[str, dict[str, Samples]] = {}
         self.sight = Sight()
-        self.frame_ids_imu: dict[str, str] = {}
-        self.static: dict[str, tuple[str, Array]] = {}
+        self.frames = Frames()
         self.can = CanLog(writer)
         self.notes: dict[str, list[str]] = {}
         self.refused: dict[str, str] = {}
         self.bad: dict[str, Bad] = {}
+        self.findings: dict[str, list[str]] = {}
+        self.clocks: dict[str, Clock] = {}
+        self._stamps: dict[str, "array[int]"] = {}
+        self._once: dict[str, Array] = {}
 
-    def row(self, kind: str, topic: str, values: tuple[Any, ...]) -> None:
-        """Adds a row of numbers."""
-        self.rows.setdefault(kind, {}).setdefault(topic, []).append(values)
+    def sample(self, kind: str, topic: str, times: tuple[int, int], frames: tuple[str, str], values: Iterable[float]) -> Samples:
+        """Adds a message as numbers: its stamp and log, its frame and child frame."""
+        topics = self.samples.setdefault(kind, {})
+        if topic not in topics:
+            values = list(values)
+            topics[topic] = Samples(len(values), *frames)
+        topics[topic].add(*times, values)
+        return topics[topic]
 
     def arrival_ns(self, topic: str, t_ns: int, log_ns: int) -> int:
-        """When a datum came: at its log, or at once where the log's clock can't be that of the stamps (simulated time, a robot's own)."""
-        if abs(log_ns - t_ns) <= _OTHER_CLOCK_NS:
-            return max(log_ns, t_ns)
-        self.note(topic, "its stamps are of another clock than the bag's (simulated time?): no arrivals")
-        return t_ns
+        """Keeps stamp and log for the topic's clock; the log's time, which the clock makes an arrival later."""
+        pairs = self._stamps.setdefault(topic, array("q"))
+        if pairs[-2:] != array("q", (t_ns, log_ns)):  # several rows of one message
+            pairs.extend((t_ns, log_ns))
+        return log_ns
+
+    def settle(self) -> None:
+        """Makes the topics' clocks, once all is read."""
+        stamps: dict[str, Array] = {topic: np.array(pairs, dtype=np.int64).reshape(-1, 2) for topic, pairs in self._stamps.items()}
+        for topics in self.samples.values():
+            for topic, samples in topics.items():
+                times = samples.times
+                self._once[topic] = keep = once(times, samples.values)
+                stamps[topic] = times[keep]
+                if not keep.all():
+                    self.note(topic, f"{int((~keep).sum())} of its {len(keep)} messages come twice, with the same stamp: taken once")
+        self.clocks = settle(stamps, self.note)
+        for begin, end in silences(self.clocks, stamps):
+            self._silence(begin, end)
+
+    def _silence(self, begin_ns: int, end_ns: int) -> None:
+        """A span without any message: a pause, or, where poses go on as if nothing was, a clock that was set."""
+        text = f"no topic has a message for {seconds(end_ns - begin_ns)} from {(begin_ns - self._first_ns()) / 1e9:.2f} s on"
+        usual = [goes_on(*self._places(kind, topic), begin_ns, end_ns)
+                 for kind in ("odometry", "poses") for topic in self.samples.get(kind, {})]
+        steps = [step for step in usual if step]
+        if steps or end_ns - begin_ns > SET_NS:
+            step = min(steps, default=int(1e9))
+            for clock in self.clocks.values():
+                clock.cuts.append((end_ns, end_ns - begin_ns - step))
+            why = f"the poses go on as if {seconds(step)} had passed" if steps else "longer than a day"
+            self.note("clock", f"{text}, {why}: the clock was set; the later times are moved back")
+        else:
+            self.note("clock", f"{text}: a pause of the recorder, or a clock that was set; the times are kept")
+
+    def _first_ns(self) -> int:
+        firsts = [int(self.clocks[topic](samples.times[:1, 0], samples.times[:1, 1])[0][0])
+                  for topics in self.samples.values() for topic, samples in topics.items()]
+        return min(firsts, default=0)
+
+    def _places(self, kind: str, topic: str) -> tuple[Array, Array]:
+        t_ns, _, values = self.timed(topic, self.samples[kind][topic])
+        return t_ns, values[:, :3]
+
+    def timed(self, topic: str, samples: Samples) -> tuple[Array, Array, Array]:
+        """Times, arrivals and numbers of a topic's messages in the order of their times; of several of one time the first."""
+        keep = self._once[topic]
+        times = samples.times[keep]
+        t_ns, arrival_ns = self.clocks[topic](times[:, 0], times[:, 1])
+        t_ns, first = np.unique(t_ns, return_index=True)
+        if len(first) < len(times):
+            self.note(topic, f"{len(times) - len(first)} of its messages have the stamp of another one: the first is taken")
+        return t_ns, arrival_ns[first], samples.values[keep][first]
+
+    def on_clock(self, topic: str, table: dict[str, Array]) -> dict[str, Array]:
+        """A table whose t_ns are stamps and whose arrival_ns are the log's, on the recording's clock."""
+        t_ns, arrival_ns = self.clocks[topic](table["t_ns"], table["arrival_ns"])
+        return {**table, "t_ns": t_ns, "arrival_ns": arrival_ns}
 
     def note(self, topic: str, text: str) -> None:
         """What a user should know of a topic that is taken."""
         if text not in self.notes.setdefault(topic, []):
             self.notes[topic].append(text)
+
+    def find(self, topic: str, text: str) -> None:
+        """What in a topic contradicts other data, what was made of it, and what to write where that is wrong."""
+        if text not in self.findings.setdefault(topic, []):
+            self.findings[topic].append(text)
 
     def refuse(self, topic: str, text: str) -> None:
         """Why a topic, or some of its messages, is not taken."""
@@ -81,15 +157,3 @@ class Collection:
     def camera(topic: str) -> str:
         """A camera's name by a topic of it: "/camera/front/detections" is "front"."""
         return names.camera_name(topic.split("/"))
-
-    def transform(self, frame: str, base: str) -> Array | None:
-        """A frame in `base` along the transforms that stand still; None where no chain leads there."""
-        matrix, frame = np.eye(4), frame.lstrip("/")
-        for _ in range(len(self.static) + 1):
-            if frame == base:
-                return matrix
-            if frame not in self.static:
-                return None
-            parent, step = self.static[frame]
-            matrix, frame = step @ matrix, parent
-        return None

@@ -9,6 +9,7 @@ from .cameras import PICTURE_KINDS
 from .collection import Collection, stamp_ns
 from .containers import Bag
 from .decoding import BadMessage, Topic
+from .motion_takers import TRANSFORMS
 from .pictures import NotTaken
 from .takers import TAKERS, elsewhere
 
@@ -56,7 +57,7 @@ def read(bag: Bag, into: Collection, progress: Progress | None) -> dict[str, lis
     for count, (topic, log_ns, raw) in enumerate(bag.messages(lambda topic: id(topic) in wanted)):
         if progress and count % _EVERY == 0:
             progress(bag.done)
-        if topic.name in into.refused:
+        if topic.name in into.refused or (topic.kind in TRANSFORMS and into.frames.is_known(raw)):
             continue
         counts[topic.name] = counts.get(topic.name, 0) + 1
         if is_ours(topic):

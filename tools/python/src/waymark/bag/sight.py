@@ -25,6 +25,7 @@ def _picture(into: Collection, topic: str, message: Any, log_ns: int, make: Call
     if camera.size and size != camera.size:
         raise BadMessage(f"a picture of {size[0]} x {size[1]} follows one of {camera.size[0]} x {camera.size[1]}")
     name = into.sight.cameras.pictures(topic, message.header.frame_id, size)
+    into.sight.topics.setdefault(name, topic)
     t_ns = stamp_ns(message, log_ns)
     try:
         into.writer.frame(name, Frame(t_ns, into.arrival_ns(topic, t_ns, log_ns), jpeg))
@@ -90,6 +91,8 @@ def problem_of(topic: Topic, raw: Any) -> str | None:
 
 def write(into: Collection, base: str, rectified_tags: bool | None) -> None:
     """Writes the tables of tags, and cameras into calibration.yaml."""
+    for name, topic in into.sight.topics.items():
+        into.writer.restamp(name, into.clocks[topic])
     found = into.sight.cameras.found()
     _write_tags(into, found, rectified_tags)
     entries: dict[str, dict[str, Any]] = {}
@@ -102,7 +105,7 @@ def write(into: Collection, base: str, rectified_tags: bool | None) -> None:
         elif place := tables.mounting(into, camera.frame, base, optical=True):
             entries.setdefault(camera.name, dict(camera.lens.entry or {}))["mounting"] = place
         else:
-            into.note(label, f"/tf_static leads from '{camera.frame}' to no '{base}': write its mounting into calibration.yaml")
+            into.note(label, f"{into.frames.why_not(camera.frame, base)}: write its mounting into calibration.yaml")
         if camera.lens.entry:
             entries.setdefault(camera.name, dict(camera.lens.entry))
     entries = {name: entry for name, entry in sorted(entries.items()) if "model" in entry}
@@ -120,6 +123,7 @@ def _write_tags(into: Collection, found: list[cameras.Found], rectified: bool | 
         camera = cameras.of_detections(found, topic, rows.frame)
         name = camera.name if camera else into.camera(topic)
         columns = rows.columns()
+        columns[0], columns[-1] = into.clocks[topic](columns[0], columns[-1])
         if rows.has_corners:
             of_corners.add(name)
             if camera and (tags.READERS[rows.kind].is_of_rectified if rectified is None else rectified):

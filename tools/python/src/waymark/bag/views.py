@@ -32,6 +32,7 @@ class Sight:
     """What a bag's cameras saw."""
 
     cameras: Cameras = field(default_factory=Cameras)
+    topics: dict[str, str] = field(default_factory=dict)  # of each camera's pictures
     depths: dict[str, Depths] = field(default_factory=dict)
     tags: dict[str, TagRows] = field(default_factory=dict)
     families: set[str] = field(default_factory=set)

@@ -1,0 +1,255 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Stamps of a bag's topics onto one clock, by the times at which the recorder logged the messages.
+
+A stamp plus the message's delay is the time of its log, and no delay is negative: the smallest difference log - stamp of a topic is
+the offset of its clock (Olson 2010, A passive solution to the sensor synchronization problem). Where the difference steps, the clock was
+set; where it is far from that of the other topics, the sensor has a clock of its own.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..tables import Array
+
+STEP_NS = 100_000_000  # a clock that is set moves by more: time servers slew what is less than 128 ms
+OTHER_CLOCK_NS = 10_000_000_000  # a message is never later than this: a larger offset is another clock
+AHEAD_NS = 50_000_000  # a message that is logged before its stamp by more has another clock: computers on one network agree better
+OTHER_LOG_NS = 60_000_000_000  # a log farther off than this from all stamps is of another clock (simulated time)
+PAUSE_NS = 60_000_000_000  # a silence of all topics that is longer is named
+SET_NS = 86_400_000_000_000  # a silence of all topics of more than a day: the clock was set on the way
+_WINDOW = 10  # messages on each side of a step whose smallest delays are compared
+_DRIFT_MIN_NS = 10_000_000  # drift over the drive that is taken out of a sensor's own clock; less is below its delays
+_COARSE_NS = 2_000_000  # a step of a clock that is finer matters to no sensor of a robot
+_LAG_NS = 500_000_000  # a delay that grows by more is named
+
+Say = Callable[[str, str], None]
+
+
+def seconds(ns: float) -> str:
+    """A time in words: three digits below a second, else what is needed."""
+    value = abs(ns) / 1e9
+    return f"{value:.3f} s" if value < 1 else f"{value:.2f} s" if value < 100 else f"{value:.0f} s"
+
+
+@dataclass
+class Clock:
+    """How stamps of a topic become times of the recording: by pieces of the log's time."""
+
+    ends_ns: list[int] = field(default_factory=list)  # the log's time at which each piece but the last ends
+    offset_ns: list[int] = field(default_factory=lambda: [0])  # added to the stamps of a piece
+    drift: float = 0.0  # added for each ns of the log after `start_ns`
+    start_ns: int = 0
+    delay_ns: int = 0  # the smallest; a message without a stamp was true at log - delay
+    by_log: bool = False  # no stamps: the log's times
+    has_arrival: bool = True
+    spread: bool = False  # messages of one stamp are spread evenly up to the next stamp
+    cuts: list[tuple[int, int]] = field(default_factory=list)  # times from which on all is earlier, and by how much
+
+    def __call__(self, stamp_ns: Array, log_ns: Array) -> tuple[Array, Array]:
+        """Times and arrivals of messages by their stamps (0: none) and times of the log."""
+        stamp_ns, log_ns = np.asarray(stamp_ns, dtype=np.int64), np.asarray(log_ns, dtype=np.int64)
+        piece = np.searchsorted(np.array(self.ends_ns, dtype=np.int64), log_ns, side="right") if self.ends_ns else 0
+        t = stamp_ns + np.array(self.offset_ns, dtype=np.int64)[piece] + np.rint(self.drift * (log_ns - self.start_ns)).astype(np.int64)
+        t = np.where((stamp_ns == 0) | self.by_log, log_ns - self.delay_ns, t)
+        if self.spread:
+            t = _spread(t)
+        arrival = np.maximum(log_ns, t) if self.has_arrival else t
+        shift_t, shift_a = np.zeros_like(t), np.zeros_like(t)
+        for at_ns, by_ns in self.cuts:
+            shift_t += np.where(t >= at_ns, by_ns, 0)
+            shift_a += np.where(arrival >= at_ns, by_ns, 0)
+        return t - shift_t, np.maximum(arrival - shift_a, t - shift_t)
+
+
+def _spread(t: Array) -> Array:
+    """Messages of one stamp evenly from it to the next stamp; those of the last one at the usual distance."""
+    _, first, counts = np.unique(t, return_index=True, return_counts=True)
+    begins = t[first]
+    usual = int(np.median(np.diff(begins) // counts[:-1])) if len(begins) > 1 else 0
+    width = np.append(np.diff(begins) // counts[:-1], usual)
+    rank = np.arange(len(t)) - np.repeat(np.sort(first), counts)
+    return np.asarray(np.repeat(begins, counts) + rank * np.repeat(width, counts))
+
+
+@dataclass
+class _Topic:
+    """What the stamps of one topic show."""
+
+    name: str
+    stamp: Array
+    log: Array
+    ends: list[int]
+    delays: list[int]  # the smallest difference log - stamp of each piece
+    known: Array  # which messages have a stamp
+
+    @property
+    def delay(self) -> int:
+        """The smallest of the piece that is nearest to the log."""
+        return min(self.delays, key=abs)
+
+
+def _steps(stamp: Array, log: Array) -> list[int]:
+    """Indices of the first message after each step of the stamps' clock."""
+    delay, out = log - stamp, []
+    if len(stamp) < 4:
+        return []
+    usual = np.median(np.diff(stamp))
+    usual_log = np.median(np.diff(log))
+    jumps = np.abs(np.diff(delay)) > STEP_NS
+    # A stall of the recorder has its step in the log; a clock's is in the stamps.
+    jumps &= np.abs(np.diff(stamp) - usual) > np.abs(np.diff(log) - usual_log)
+    begin = 0
+    for i in np.flatnonzero(jumps) + 1:
+        before, after = delay[max(begin, i - _WINDOW):i], delay[i:i + _WINDOW]
+        if len(before) and abs(int(after.min()) - int(before.min())) > STEP_NS:
+            out.append(int(i))
+            begin = int(i)
+    return out
+
+
+def _look(name: str, times: Array) -> _Topic:
+    stamp, log = times[:, 0], times[:, 1]
+    known = stamp != 0
+    s, lg = stamp[known], log[known]
+    if not len(s):
+        return _Topic(name, stamp, log, [], [0], known)
+    steps = _steps(s, lg)
+    pieces = np.split(lg - s, steps)
+    return _Topic(name, stamp, log, [int(lg[i]) for i in steps], [int(piece.min()) for piece in pieces], known)
+
+
+def _drift(topic: _Topic) -> tuple[float, int]:
+    """Growth of the smallest delay along the log (ns a ns), and over the whole way (ns): a line through the least of ten parts."""
+    log, delay = topic.log[topic.known], (topic.log - topic.stamp)[topic.known]
+    span = int(log[-1] - log[0]) if len(log) > 50 else 0
+    if span < 20 * 10**9 or topic.ends:
+        return 0.0, 0
+    parts = np.array_split(np.arange(len(log)), 10)
+    at = np.array([part[np.argmin(delay[part])] for part in parts])
+    x, y = (log[at] - log[0]).astype(float), (delay[at] - delay[at[0]]).astype(float)
+    slope, start = np.polyfit(x, y, 1)
+    rest = np.abs(y - slope * x - start).max()
+    grown = slope * span
+    return (float(slope), int(grown)) if abs(grown) > 4 * rest else (0.0, 0)
+
+
+def _reference(topics: list[_Topic]) -> tuple[list[_Topic], int]:
+    """The topics whose stamps are of one clock, that of most of them (of two: the log's), and the smallest delay among them."""
+    groups: list[list[_Topic]] = []
+    for topic in sorted(topics, key=lambda topic: topic.delay):
+        if groups and topic.delay - groups[-1][0].delay <= OTHER_CLOCK_NS:
+            groups[-1].append(topic)
+        else:
+            groups.append([topic])
+    best = max(groups, key=lambda group: (len(group), -min(abs(topic.delay) for topic in group)))
+    if min(abs(topic.delay) for topic in best) <= OTHER_LOG_NS:  # the log's clock: no message is logged before it was true
+        best = [topic for topic in best if topic.delay >= -AHEAD_NS] or best
+    return best, min(topic.delay for topic in best)
+
+
+def _name_coarse(topic: _Topic, clock: Clock, say: Say) -> None:
+    """Stamps of a coarse clock. Where messages share one, the times of the log are better."""
+    stamp, log = topic.stamp[topic.known], topic.log[topic.known]
+    steps = np.diff(np.unique(stamp))
+    if len(stamp) < 10 or not len(steps):
+        return
+    grid = int(np.gcd.reduce(steps))
+    shared = 1 - (len(steps) + 1) / len(stamp)
+    usual = (int(stamp.max()) - int(stamp.min())) / max(len(stamp) - 1, 1)
+    text = f"its stamps come in steps of {grid / 1e6:.6g} ms"
+    if grid >= _COARSE_NS and shared > 0.2:
+        if len(np.unique(log)) > 0.9 * len(log):
+            clock.by_log, clock.delay_ns = True, topic.delay
+            say(topic.name, f"{text}, and {100 * shared:.0f} % of the messages share one with another: the times of the log are used")
+        else:
+            clock.spread = True
+            say(topic.name, f"{text}, and the times of the log are no finer: messages of one stamp are spread evenly")
+    elif grid >= _COARSE_NS and grid > 0.3 * usual and len(np.unique(steps)) > 1:
+        say(topic.name, f"{text}: each is off by as much as that; speeds and turns of it have that noise")
+
+
+def _own_clock(topic: _Topic, reference_ns: int, say: Say) -> Clock:
+    """A clock by its offset and its drift against the reference's."""
+    offset = topic.delay - reference_ns
+    clock = Clock(topic.ends, [delay - reference_ns for delay in topic.delays], delay_ns=reference_ns)
+    slope, grown = _drift(topic)
+    text = ""
+    if abs(grown) > _DRIFT_MIN_NS:
+        clock.drift, clock.start_ns = slope, int(topic.log[topic.known][0])
+        clock.offset_ns = [int((topic.log - topic.stamp)[topic.known][:max(len(topic.stamp) // 10, 1)].min()) - reference_ns]
+        text = f", and it runs {abs(slope) * 1e6:.0f} ppm too {'slow' if slope > 0 else 'fast'}"
+    say(topic.name, f"its stamps are of a clock of its own, {seconds(offset)} {'behind' if offset > 0 else 'ahead of'} that of the others"
+                    f"{text}: moved onto theirs by the times at which it was logged")
+    return clock
+
+
+def _one(topic: _Topic, reference: list[_Topic], reference_ns: int, say: Say) -> Clock:
+    missing = int((~topic.known).sum())
+    if missing == len(topic.stamp):
+        return Clock(by_log=True, delay_ns=0 if abs(reference_ns) <= OTHER_LOG_NS else reference_ns)
+    if missing:
+        say(topic.name, f"{missing} of its {len(topic.stamp)} messages have no stamp: the times of the log are used for them")
+    if not any(topic is other for other in reference):
+        clock = _own_clock(topic, reference_ns, say)
+    else:
+        clock = Clock(topic.ends, [delay - topic.delay for delay in topic.delays], delay_ns=topic.delay)
+        _, grown = _drift(topic)
+        if abs(grown) > _LAG_NS:
+            cause = "a queue that is read too slowly, or a clock that runs slow" if grown > 0 else "a clock that runs fast"
+            say(topic.name, f"from its stamps to its log it takes {seconds(grown)} {'more' if grown > 0 else 'less'} at the end than at the start: {cause}")
+    for k, end in enumerate(topic.ends):
+        step = topic.delays[k] - topic.delays[k + 1]
+        at = (end - int(topic.log[0])) / 1e9
+        say(topic.name, f"its stamps jump {'forward' if step > 0 else 'back'} by {seconds(step)} at {at:.2f} s, while the times of the log go on: "
+                        "the clock was set; the stamps are mended")
+    _name_coarse(topic, clock, say)
+    return clock
+
+
+def once(times: Array, values: Array) -> Array:
+    """Which messages are the first with their stamp and content: a row that comes twice counts once."""
+    rows = np.column_stack([times[:, 0].astype(np.float64), times[:, 0] % 1_000_003, values])
+    stamped = times[:, 0] != 0
+    _, first = np.unique(rows[stamped].view([("", rows.dtype)] * rows.shape[1]), return_index=True)
+    keep = ~stamped
+    keep[np.flatnonzero(stamped)[first]] = True
+    return np.asarray(keep)
+
+
+def settle(stamps: dict[str, Array], note: Say) -> dict[str, Clock]:
+    """The clock of each topic by its (stamp, log) pairs (n, 2), in the order of the log. What was found is said."""
+    topics = [_look(name, times) for name, times in sorted(stamps.items()) if len(times)]
+    stamped = [topic for topic in topics if topic.known.any()]
+    if not stamped:
+        return {topic.name: Clock(by_log=True) for topic in topics}
+    reference, reference_ns = _reference(stamped)
+    clocks = {topic.name: _one(topic, reference, reference_ns, note) for topic in topics}
+    if abs(reference_ns) > OTHER_LOG_NS:
+        for topic in reference:
+            note(topic.name, "its stamps are of another clock than the bag's (simulated time?): no arrivals")
+        for clock in clocks.values():
+            clock.has_arrival = False
+    return clocks
+
+
+def silences(clocks: dict[str, Clock], stamps: dict[str, Array]) -> list[tuple[int, int]]:
+    """Spans (begin, end; ns) in which no topic has a message, longer than PAUSE_NS."""
+    all_t = [clocks[name](times[:, 0], times[:, 1])[0] for name, times in stamps.items() if len(times)]
+    if not all_t:
+        return []
+    t = np.unique(np.concatenate(all_t))
+    gaps = np.flatnonzero(np.diff(t) > PAUSE_NS)
+    return [(int(t[i]), int(t[i + 1])) for i in gaps]
+
+
+def goes_on(t_ns: Array, places: Array, begin_ns: int, end_ns: int) -> int | None:
+    """The usual step (ns) of poses that move on over a silence as over any other step; None: they don't, or they stand."""
+    i = int(np.searchsorted(t_ns, end_ns)) - 1
+    if i < 3 or i + 4 > len(t_ns):
+        return None
+    steps = np.linalg.norm(np.diff(places[i - 3:i + 5], axis=0), axis=1)
+    over, usual = steps[3], float(np.median(np.delete(steps, 3)))
+    dt = np.diff(t_ns[i - 3:i + 5])
+    return int(np.median(np.delete(dt, 3))) if 1e-4 < usual and over <= 3 * usual and t_ns[i] <= begin_ns else None

@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Fixes of receivers as positions in the map: metres east, north and up in the plane that touches the WGS84 ellipsoid at the origin."""
+
+import argparse
+import re
+
+import numpy as np
+
+from ..geometry import place_of, tangent_plane
+from ..tables import Array
+from .collection import Collection, NoSuchTopic
+from .frames import bare, mounting
+from .motion import Motion
+from .tables import without_arrival
+from .samples import Samples
+
+_STATUS_SIGMA_M = {-1: 5.0, 0: 5.0, 1: 2.0, 2: 0.5}
+"""Sigma without a stated covariance, by NavSatStatus: a plain fix, one with satellite corrections, one with a ground station's
+(RTK float or fixed); usual figures of data sheets."""
+_VARIANCE_MAX_M2 = 1e6  # a larger one means "not known"
+_UP_SIGMAS = 2.0  # the altitude's sigma in horizontal ones, by the satellites' geometry
+_SPREAD_SIGMAS = 3.0  # the way under the fixes in sigmas of a fix, from which on they show its direction
+_FUSED = re.compile(r"filtered|fused|ekf|ukf", re.I)
+
+
+def _real(topic: str, into: Collection, values: Array) -> Array:
+    """Which messages are fixes; the others are counted."""
+    latitude, longitude, status = values[:, 0], values[:, 1], values[:, 7]
+    finite = np.isfinite(latitude) & np.isfinite(longitude)
+    none = status < 0
+    zero = ~none & finite & (latitude == 0) & (longitude == 0)
+    inside = finite & (np.abs(latitude) <= 90) & (np.abs(longitude) <= 360)
+    for mask, text in ((none, "say that there is no fix"), (zero, "are of latitude 0 and longitude 0, which is no fix"),
+                       (~none & ~zero & ~inside, "have no latitude and longitude")):
+        if mask.any():
+            into.note(topic, f"{int(mask.sum())} of its {len(values)} messages {text}: left out")
+    return np.asarray(~none & ~zero & inside)
+
+
+def _sigmas(values: Array, has_altitude: Array) -> tuple[Array, Array]:
+    """Sigma in the plane and upwards, by the covariance where one is stated, else by the status."""
+    stated = values[:, 3:6].copy()
+    stated[(values[:, 6] == 0) | ~(stated > 0).all(axis=1) & ~(stated[:, :2] > 0).all(axis=1)] = np.nan
+    stated[~(stated > 0) | (stated >= _VARIANCE_MAX_M2)] = np.nan
+    usual = np.array([_STATUS_SIGMA_M.get(int(status), 5.0) for status in values[:, 7]])
+    xy = np.sqrt(stated[:, :2].mean(axis=1))
+    xy = np.where(np.isfinite(xy), xy, usual)
+    z = np.where(np.isfinite(stated[:, 2]), np.sqrt(stated[:, 2]), _UP_SIGMAS * xy)
+    return xy, np.where(has_altitude, z, np.nan)
+
+
+def _choose(into: Collection, given: argparse.Namespace) -> str | None:
+    """The receiver with the smallest stated errors; a filter's answer only where there is no receiver."""
+    topics: dict[str, Samples] = into.samples.get("fixes", {})
+    if given.gnss:
+        if given.gnss not in topics:
+            raise NoSuchTopic("--gnss", given.gnss, topics)
+        return str(given.gnss)
+
+    def rank(topic: str) -> tuple[float, ...]:
+        values = topics[topic].values
+        ok = (values[:, 7] >= 0) & np.isfinite(values[:, 0]) & (values[:, :2] != 0).any(axis=1)
+        if not ok.any():
+            return 1.0, 0.0, 0.0
+        return 0.0, float(bool(_FUSED.search(topic))), float(np.median(_sigmas(values[ok], ok[ok])[0]))
+
+    return min(sorted(topics), key=rank) if topics else None
+
+
+def _altitude(into: Collection, topic: str, altitude: Array) -> Array:
+    """The altitudes; NaN where a fix has none (2-D: not a number, or exactly 0 between others that are far from it)."""
+    out = np.where(np.isfinite(altitude), altitude, np.nan)
+    known = out[np.isfinite(out) & (out != 0)]
+    if len(known) and abs(np.median(known)) > 5:
+        out[out == 0] = np.nan
+    missing = int(np.isnan(out).sum())
+    if missing:
+        into.note(topic, f"{missing} of its {len(out)} fixes have no altitude: their z is empty, their x and y are taken")
+    return out
+
+
+def _start(motion: Motion | None, t_ns: Array, places: Array, sigma_m: Array) -> Array | None:
+    """Where the drive starts (east, north; m) if its first fix comes on the way: the dead-reckoned way is laid over the fixes
+    (Umeyama 1991, without a scale). None: it starts at the first fix, or the fixes don't show it.
+    """
+    if motion is None or motion.is_command or len(t_ns) < 5:
+        return None
+    twist, dt = np.nan_to_num(motion.twist), np.append(np.diff(motion.t_ns) / 1e9, 0.0)
+    heading = np.concatenate([[0.0], np.cumsum(twist[:, 5] * dt)])[:-1]
+    middle = heading + 0.5 * twist[:, 5] * dt
+    step = np.column_stack([np.cos(middle) * twist[:, 0] - np.sin(middle) * twist[:, 1],
+                            np.sin(middle) * twist[:, 0] + np.cos(middle) * twist[:, 1]]) * dt[:, None]
+    way = np.vstack([np.zeros(2), np.cumsum(step, axis=0)[:-1]])
+    at = np.column_stack([np.interp(t_ns, motion.t_ns, column) for column in way.T])
+    before = np.linalg.norm(at[0])
+    a, b = at - at.mean(axis=0), places - places.mean(axis=0)
+    if before < float(np.median(sigma_m)) or np.linalg.norm(a, axis=1).max() < max(_SPREAD_SIGMAS * float(np.median(sigma_m)), 1.0):
+        return None
+    turn = np.arctan2(np.sum(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]), np.sum(a * b))
+    c, s = np.cos(turn), np.sin(turn)
+    rotation = np.array([[c, -s], [s, c]])
+    rest = b - a @ rotation.T
+    if np.sqrt(np.mean(rest**2)) > 3 * float(np.median(sigma_m)) + 0.02 * float(np.linalg.norm(a, axis=1).max()):
+        return None
+    return np.asarray(places.mean(axis=0) - rotation @ at.mean(axis=0))
+
+
+def _origin(into: Collection, topic: str, motion: Motion | None, t_ns: Array, values: Array, known: Array) -> list[float]:
+    """The map's origin: the first fix, or the start of a drive whose first fix comes later."""
+    first = [float(values[0, 0]), float(values[0, 1]), float(known[0]) if len(known) else 0.0]
+    if not len(known):
+        into.note(topic, "no fix has an altitude: that of the origin is written as 0")
+    places = tangent_plane(first, values[:, 0], values[:, 1], np.full(len(values), first[2]))[:, :2]
+    start = _start(motion, t_ns, places, _sigmas(values, np.isfinite(values[:, 2]))[0])
+    if start is None or motion is None:
+        return first
+    into.note(topic, f"its first fix comes {(int(t_ns[0]) - int(motion.t_ns[0])) / 1e9:.1f} s after the drive's start: the map's origin is the start, "
+                     f"{np.linalg.norm(start):.2f} m from that fix by {motion.topic}")
+    return [*place_of(first, start[0], start[1])[:2], first[2]]
+
+
+def write(into: Collection, given: argparse.Namespace, base: str, motion: Motion | None) -> None:
+    """gnss.csv, the map's origin, and the antenna's place."""
+    topic = _choose(into, given)
+    if topic is None:
+        return
+    for other in into.samples["fixes"]:
+        if other != topic:
+            into.refuse(other, f"positions come from {topic}; --gnss {other} takes this one")
+    samples = into.samples["fixes"][topic]
+    t, arrival, values = into.timed(topic, samples)
+    ok = _real(topic, into, values)
+    if not ok.any():
+        into.refuse(topic, "it never has a fix")
+        return
+    t, arrival, values = t[ok], arrival[ok], values[ok]
+    altitude = _altitude(into, topic, values[:, 2])
+    known = altitude[np.isfinite(altitude)]
+    origin = list(given.origin or _origin(into, topic, motion, t, values, known))
+    # Without an altitude the place on the ground follows from one like it: 10 m change it by 1.6 parts in a million.
+    height = np.where(np.isfinite(altitude), altitude, np.median(known) if len(known) else origin[2])
+    east, north, up = tangent_plane(origin, values[:, 0], values[:, 1], height).T
+    xy, z = _sigmas(values, np.isfinite(altitude))
+    into.writer.table("gnss.csv", without_arrival({
+        "t_ns": t, "x_m": east, "y_m": north, "z_m": np.where(np.isfinite(altitude), up, np.nan), "sigma_xy_m": xy,
+        "sigma_z_m": z, "arrival_ns": arrival}))
+    into.writer.calibration["gnss"] = {"origin": [float(value) for value in origin], **_antenna(into, topic, samples.frame, base)}
+
+
+def _antenna(into: Collection, topic: str, frame: str, base: str) -> dict[str, object]:
+    matrix = into.frames.transform(frame, base)
+    if matrix is not None:
+        return {"mounting": {"xyz_m": mounting(matrix)["xyz_m"]}}
+    if frame and bare(frame) != bare(base):
+        into.note(topic, f"{into.frames.why_not(frame, base)}: write the antenna's place into calibration.yaml (gnss: {{mounting: {{xyz_m: [x, y, z]}}}})")
+    return {}

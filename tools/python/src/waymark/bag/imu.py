@@ -1,0 +1,349 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The IMU out of a bag: gyro and accelerometer joined, and compared with the motion: sign, unit, axis, zeros.
+
+Over the drive the gyro's three rates are a direction times the turn rate of the motion. That direction is the vertical in the
+IMU's axes, its length the gyro's scale; the accelerometer's mean shows the vertical, too (REP 145: +9.81 m/s2 upwards at rest).
+"""
+
+import argparse
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..geometry import from_rpy, rotation_vectors, rotations, turned
+from ..tables import Array, Table
+from . import compare
+from .collection import Collection, NoSuchTopic
+from .frames import mounting
+from .motion import Motion
+from .tables import without_arrival
+
+_G = 9.80665  # m/s2
+_UNITS = {_G: ("", 1.0), 1.0: ("g", _G), 1000.0: ("thousandths of g", _G / 1000), 100 * _G: ("cm/s2", 0.01)}
+_UNIT_SHARE = 0.12  # how far the mean may be from gravity: biases and scales of cheap accelerometers
+_SAME, _NEAR = np.cos(np.radians(20)), np.cos(np.radians(30))  # directions that are one axis; by gravity, on slopes
+_FITS, _LIKE = 0.8, 0.5  # correlation from which on gyro and motion say the same; below the second they have nothing in common
+_EXACT_SHARE, _EXACT_R = 0.03, 0.98  # half or double is a unit's fault only where it is exact: the turns of skid steer are off by as much
+_ZEROS = 0.2  # share of messages of exact zeros between others from which on they are no data
+_SILENT = 0.15
+_UP = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass
+class Imu:
+    """One IMU on the recording's clock."""
+
+    topic: str
+    frame: str
+    t_ns: Array
+    arrival_ns: Array
+    gyro: Array  # (n, 3)
+    accelerometer: Array  # (n, 3)
+    sigmas: Array  # (n, 6)
+    rotation: Array | None = None  # of its axes in the robot's frame; None: not stated
+    said: list[tuple[bool, str]] = field(default_factory=list)
+    usable: bool = True
+
+    def say(self, text: str, finding: bool = True) -> None:
+        self.said.append((finding, text))
+
+
+def _is_there(values: Array) -> bool:
+    return bool(np.isfinite(values).all(axis=1).mean() > 0.5 and np.nan_to_num(values).any())
+
+
+def _without_zeros(imu: Imu) -> None:
+    """Leaves messages out that have exact zeros on all axes of the gyro between others that have not."""
+    zero: Array = np.asarray(~imu.gyro.any(axis=1))
+    between = zero.copy()
+    between[1:-1] &= ~zero[:-2] | ~zero[2:]
+    if zero.any() and _ZEROS < between.mean() and zero.mean() < 0.95:
+        imu.say(f"{100 * zero.mean():.0f} % of its messages have a gyro of zeros between others that have not: left out")
+        for name in ("t_ns", "arrival_ns", "gyro", "accelerometer", "sigmas"):
+            setattr(imu, name, getattr(imu, name)[~zero])
+
+
+def _candidate(into: Collection, topic: str, base: str) -> Imu:
+    samples = into.samples["imu"][topic]
+    t, arrival, values = into.timed(topic, samples)
+    gyro, sigmas = values[:, :3].copy(), values[:, 10:].copy()
+    matrix = into.frames.transform(samples.frame, base) if samples.frame else None
+    if samples.frame == base:
+        matrix = np.eye(4)
+    imu = Imu(topic, samples.frame, t, arrival, gyro, values[:, 3:6].copy(), sigmas, None if matrix is None else matrix[:3, :3])
+    if not _is_there(gyro) and np.isfinite(values[:, 6:10]).all(axis=1).mean() > 0.9 and values[:, 6:10].any() and not np.isfinite(gyro).any():
+        turns = rotations(values[:, 6:10])
+        step = rotation_vectors(np.nan_to_num(np.einsum("nji,njk->nik", turns[:-1], turns[1:])))
+        imu.gyro[:-1] = step / (np.diff(t)[:, None] / 1e9)
+        imu.gyro[-1:] = imu.gyro[-2:-1] if len(t) > 1 else 0.0
+        imu.arrival_ns = np.maximum(arrival, np.append(arrival[1:], arrival[-1:]))
+        imu.say("it has orientations alone: their differences are its turn rates", finding=False)
+    _without_zeros(imu)
+    return imu
+
+
+def _join(into: Collection, imu: Imu, others: list[Imu], base: str) -> None:
+    """The accelerometer of another topic, at the gyro's stamps and on its axes."""
+    donors = [other for other in others if other is not imu and _is_there(other.accelerometer) and not _is_there(other.gyro)]
+    if _is_there(imu.accelerometer) or not donors:
+        return
+
+    def shared(topic: str) -> int:
+        return next((i for i, (a, b) in enumerate(zip(topic, imu.topic)) if a != b), min(len(topic), len(imu.topic)))
+
+    donor = max(donors, key=lambda other: (shared(other.topic), other.topic))
+    ok = np.isfinite(donor.accelerometer).all(axis=1)
+    joined = np.column_stack([np.interp(imu.t_ns, donor.t_ns[ok], column, np.nan, np.nan) for column in donor.accelerometer[ok].T])
+    matrix = into.frames.transform(donor.frame, imu.frame)
+    imu.accelerometer = joined if matrix is None else joined @ matrix[:3, :3].T
+    imu.say(f"its accelerometer is that of {donor.topic}, at the gyro's stamps", finding=False)
+    into.refused.pop(donor.topic, None)
+    donor.usable = False
+
+
+def _axis(direction: Array) -> str:
+    """A direction in words: an axis, or its components."""
+    k = int(np.abs(direction).argmax())
+    return f"{'+' if direction[k] > 0 else '-'}{'xyz'[k]}" if abs(direction[k]) > _SAME else "(" + ", ".join(f"{v:.2f}" for v in direction) + ")"
+
+
+def _gravity(imu: Imu) -> Array | None:
+    """The vertical by the accelerometer; its unit is mended. None: it has no gravity, or nothing at all."""
+    ok = np.isfinite(imu.accelerometer).all(axis=1)
+    if not ok.any() or not imu.accelerometer[ok].any():
+        return None
+    mean = imu.accelerometer[ok].mean(axis=0)
+    size = float(np.linalg.norm(mean))
+    for value, (name, scale) in _UNITS.items():
+        if abs(size / value - 1) < _UNIT_SHARE:
+            if name:
+                imu.say(f"its accelerometer shows {size:.3g} at rest, so it is in {name}, not in m/s2: converted")
+                imu.accelerometer *= scale
+                imu.sigmas[:, 3:] *= scale
+            return np.asarray(mean / size)
+    if size < 0.3 * _G:
+        imu.say(f"its accelerometer has no gravity (mean {size:.2f} m/s2): it does not show which axis is up", finding=False)
+    else:
+        imu.say(f"its accelerometer's mean is {size:.3g} m/s2, and gravity is 9.81")
+    return None
+
+
+@dataclass
+class _Fit:
+    """The gyro as a vector times the motion's turn rate."""
+
+    vector: Array
+    r: float
+    lag: int
+
+
+def _fit(imu: Imu, motion: Motion) -> _Fit | str:
+    """Over the drive; a text where it shows nothing."""
+    borders = compare.grid(imu.t_ns, motion.t_ns)
+    rate = compare.held(motion.t_ns, motion.twist[:, 5], borders)[:, 0]
+    if not compare.turns(rate):
+        return "not observable"
+    fits = []
+    for lag in range(-compare.LAG_MAX, compare.LAG_MAX + 1):
+        gyro = compare.held(imu.t_ns, imu.gyro, borders, lag)
+        ok = np.isfinite(gyro).all(axis=1) & np.isfinite(rate)
+        power = float(np.sum(gyro[ok] ** 2))
+        if ok.sum() < compare.WINDOWS_MIN or not rate[ok].any():
+            continue
+        vector = rate[ok] @ gyro[ok] / (rate[ok] @ rate[ok])
+        fits.append(_Fit(vector, float(np.linalg.norm(vector) * np.sqrt(rate[ok] @ rate[ok] / power)) if power else 0.0, lag))
+    if not fits:
+        return "not observable"
+    still = next((fit for fit in fits if fit.lag == 0), fits[0])
+    best = max(fits, key=lambda fit: fit.r)
+    return best if best.r > still.r + 0.02 else still
+
+
+def _set_up(imu: Imu, up: Array, motion: Motion | None) -> str:
+    """Mounts the IMU so that `up` of its axes is the robot's z; its direction about it by the accelerations of the drive. What is known of it."""
+    k = int(np.abs(up).argmax())
+    if abs(up[k]) > np.cos(np.radians(10)):  # screwed on along its axes: what is left is the ground's slope
+        up = np.sign(up[k]) * np.eye(3)[k]
+    before = np.eye(3) if imu.rotation is None else imu.rotation
+    imu.rotation = turned(before @ up, _UP) @ before
+    yaw = None if motion is None else _forward(imu, motion)
+    if yaw is not None:
+        imu.rotation = from_rpy(0, 0, yaw) @ imu.rotation
+        return "its x axis by the accelerations of the drive"
+    return "its direction about the vertical is not observable in this drive (estimators in the plane don't use it)"
+
+
+def _forward(imu: Imu, motion: Motion) -> float | None:
+    """The yaw that turns the levelled accelerations onto those of the speed; None where the drive shows none."""
+    ok = np.isfinite(imu.accelerometer).all(axis=1)
+    if not ok.any():
+        return None
+    assert imu.rotation is not None
+    borders = compare.grid(imu.t_ns, motion.t_ns)
+    level = (imu.accelerometer @ imu.rotation.T)[:, :2]
+    felt = compare.held(imu.t_ns, level - np.nanmean(level, axis=0), borders)
+    speed = compare.held(motion.t_ns, motion.twist[:, 0], borders)[:, 0] / compare.WINDOW_S
+    gained = np.full(len(speed), np.nan)
+    gained[1:-1] = (speed[2:] - speed[:-2]) / 2
+    ok = np.isfinite(felt).all(axis=1) & np.isfinite(gained)
+    if ok.sum() < compare.WINDOWS_MIN or not gained[ok].any() or not felt[ok].any():
+        return None
+    m = gained[ok] @ felt[ok] / (gained[ok] @ gained[ok])
+    rest = felt[ok] - np.outer(gained[ok], m)
+    # Twice its own sigma in the plane's two axes, by the residuals.
+    sigma = np.sqrt(np.mean(rest**2) / (gained[ok] @ gained[ok]))
+    if np.linalg.norm(m) < 5 * sigma or not 0.5 < np.linalg.norm(m) < 2:
+        return None
+    yaw = float(-np.arctan2(m[1], m[0]))
+    right = np.round(yaw / (np.pi / 2)) * (np.pi / 2)
+    return float(right) if abs(yaw - right) < np.radians(25) else yaw
+
+
+def _line(imu: Imu) -> str:
+    matrix = np.eye(4)
+    matrix[:3, :3] = np.eye(3) if imu.rotation is None else imu.rotation
+    return f"calibration.yaml has `imu: {{mounting: {{rpy_deg: {[round(v, 1) + 0.0 for v in mounting(matrix)['rpy_deg']]}}}}}`"
+
+
+def _scale(imu: Imu, size: float, r: float, words: str) -> None:
+    """The gyro's unit by its size against the motion's turns."""
+    known = next((k for k in compare.KNOWN_FACTORS if abs(size / k - 1) < compare.KNOWN_SHARE), None)
+    if known is None and 1 / compare.SAME <= size <= compare.SAME:
+        return
+    text = f"its gyro is {size:.3g} times {words}"
+    if known is None:
+        imu.say(f"{text}: one of both has another scale; it is kept as it is")
+        return
+    text += f", {compare.KNOWN_FACTORS[known]}"
+    if known not in (2.0, 0.5) or (abs(size / known - 1) < _EXACT_SHARE and r > _EXACT_R):
+        imu.gyro /= known
+        imu.sigmas[:, :3] /= known
+        imu.say(f"{text}: divided by {known:.4g}; --as-is takes it as it is")
+    else:
+        imu.say(f"{text}, or the turns of the motion are (skid steer): it is kept as it is")
+
+
+def _orient(imu: Imu, fit: _Fit, gravity: Array | None, motion: Motion, words: str) -> None:
+    """Sign and axis by the turns and by gravity."""
+    expected = _UP if imu.rotation is None else imu.rotation[2]
+    up = fit.vector / np.linalg.norm(fit.vector)
+    stated = "no mounting is stated" if imu.rotation is None else f"by its frame '{imu.frame}' it is {_axis(expected)}"
+    along = float(up @ expected)
+    by_gravity = None if gravity is None else float(up @ gravity)
+    if along > _SAME:
+        if gravity is not None and gravity @ expected < -_NEAR:
+            imu.accelerometer *= -1
+            imu.say("its accelerometer shows gravity downwards, not the force against it (REP 145: +9.81 upwards): turned round")
+        elif gravity is not None and gravity @ expected < _NEAR:
+            imu.say(f"its accelerometer has gravity along {_axis(gravity)}, while its gyro turns about {_axis(up)}: its accelerations are not to be used")
+        return
+    if along < -_SAME and (by_gravity is None or by_gravity < -_SAME):
+        imu.gyro *= -1
+        imu.say(f"its gyro turns to the other side than {words} (r {-fit.r:.2f}), "
+                + ("and its accelerometer shows it upright" if gravity is not None else "and it has no gravity that shows it upside down")
+                + ": its rates are multiplied by -1; --as-is takes them as they are")
+        return
+    if by_gravity is not None and by_gravity < -_SAME:
+        imu.accelerometer *= -1
+        imu.say("its accelerometer shows gravity downwards, not the force against it (REP 145: +9.81 upwards): turned round")
+    also = "its gyro and its accelerometer show" if by_gravity is not None and abs(by_gravity) > _SAME else "its gyro shows"
+    known = _set_up(imu, up, motion)
+    imu.say(f"{also} its {_axis(up)} axis upwards (r {fit.r:.2f} with {words}), but {stated}: {_line(imu)}; {known}")
+
+
+def _by_gravity(imu: Imu, gravity: Array | None, motion: Motion | None) -> None:
+    """Where no turn shows anything."""
+    if gravity is None:
+        return
+    expected = _UP if imu.rotation is None else imu.rotation[2]
+    if gravity @ expected > _NEAR:
+        return
+    if gravity @ expected < -_NEAR:
+        imu.say("its accelerometer shows it upside down, or has the other sign; the drive has no turns that tell which: nothing is changed")
+    elif imu.rotation is None:
+        known = _set_up(imu, gravity, motion)
+        imu.say(f"its accelerometer shows its {_axis(gravity)} axis upwards, and no mounting is stated: {_line(imu)}; {known}")
+    else:
+        imu.say(f"its accelerometer shows its {_axis(gravity)} axis upwards, tf its {_axis(expected)} axis; the drive has no turns that tell which is "
+                "right: tf's is taken")
+
+
+def _judge(imu: Imu, motion: Motion | None) -> None:
+    """What gravity and the motion say of the IMU."""
+    gravity = _gravity(imu)
+    fit = "not observable" if motion is None else _fit(imu, motion)
+    if motion is None or isinstance(fit, str):
+        _by_gravity(imu, gravity, motion)
+        return
+    words = f"the {'commands' if motion.is_command else 'turn rate'} of {motion.topic}"
+    size = float(np.linalg.norm(fit.vector))
+    if size < _SILENT and not (size * 180 / np.pi > _SILENT and fit.r > _FITS):
+        imu.usable = False
+        imu.say(f"its gyro shows no turn ({size:.2f} times {words}): it is not taken")
+        return
+    if motion.is_command:
+        if fit.r > _FITS and fit.vector @ (_UP if imu.rotation is None else imu.rotation[2]) < 0:
+            imu.say(f"its gyro turns to the other side than {words}; it is kept as it is")
+        _by_gravity(imu, gravity, motion)
+        return
+    if fit.r < _LIKE:
+        imu.usable = False
+        imu.say(f"its gyro has nothing in common with {words} (r {fit.r:.2f}): it is not taken; --as-is takes it")
+        return
+    if fit.lag:
+        imu.say(f"its turns come {abs(fit.lag) * compare.WINDOW_S:.2f} s {'after' if fit.lag > 0 else 'before'} those of {words}: the clock of one of both is off")
+    if fit.r < _FITS:
+        imu.say(f"its gyro has little in common with {words} (r {fit.r:.2f}); it is kept as it is")
+        return
+    _orient(imu, fit, gravity, motion, words)
+    _scale(imu, size, fit.r, words)
+
+
+def _rank(imu: Imu) -> tuple[float, ...]:
+    """Smaller is better: one with a gyro, that fits the motion, whose place is known."""
+    return (float(not _is_there(imu.gyro)), float(not imu.usable), float(sum(finding for finding, _ in imu.said)), float(imu.rotation is None),
+            float(not _is_there(imu.accelerometer)), float("raw" in imu.topic))
+
+
+def choose(into: Collection, given: argparse.Namespace, base: str, motion: Motion | None) -> Imu | None:
+    """The IMU, judged; None where none has a gyro that can be used."""
+    topics = into.samples.get("imu", {})
+    if given.imu and given.imu not in topics:
+        raise NoSuchTopic("--imu", given.imu, topics)
+    found = [imu for imu in (_candidate(into, topic, base) for topic in sorted(topics)) if len(imu.t_ns) > 1]
+    for imu in found:
+        if _is_there(imu.gyro):
+            _join(into, imu, found, base)
+            if not given.as_is:
+                _judge(imu, motion)
+    if not found:
+        return None
+    best = next((imu for imu in found if imu.topic == given.imu), None) or min(found, key=lambda imu: (*_rank(imu), imu.topic))
+    for other in found:
+        if other is not best and other.usable:
+            into.refuse(other.topic, f"the IMU is {best.topic}; --imu {other.topic} takes this one")
+        elif other is not best and _is_there(other.gyro):
+            into.refuse(other.topic, other.said[-1][1])
+    if not _is_there(best.gyro):
+        has = "zeros" if np.isfinite(best.gyro).any() else "no rates"
+        (into.find if has == "zeros" else into.note)(best.topic, f"its gyro has {has} in all of its {len(best.t_ns)} messages: it is not taken")
+        return None
+    for finding, text in best.said:
+        (into.find if finding else into.note)(best.topic, text)
+    return best if best.usable else None
+
+
+def write(into: Collection, imu: Imu, base: str) -> None:
+    """imu.csv without the columns of which nothing is known, and the mounting."""
+    names = [f"{kind}{axis}_{unit}" for kind, unit in (("w", "radps"), ("a", "mps2")) for axis in "xyz"]
+    ok = np.isfinite(imu.gyro).all(axis=1)
+    values = np.hstack([imu.gyro, imu.accelerometer, imu.sigmas])[ok]
+    table: Table = {"t_ns": imu.t_ns[ok], **dict(zip([*names, *(f"sigma_{name}" for name in names)], values.T)), "arrival_ns": imu.arrival_ns[ok]}
+    table = without_arrival(table)
+    into.writer.table("imu.csv", {name: column for name, column in table.items() if name in ("t_ns", *names[:3]) or not np.isnan(column).all()})
+    if imu.rotation is not None:
+        matrix = np.eye(4)
+        matrix[:3, :3] = imu.rotation
+        into.writer.calibration["imu"] = {"mounting": {"rpy_deg": mounting(matrix)["rpy_deg"]}}
+    else:
+        into.note(imu.topic, f"{into.frames.why_not(imu.frame, base)}: axes as {base}'s are assumed")
