@@ -70,12 +70,14 @@ class Ros1File:
                 elif _number(fields, b"op") == _CHUNK_INFO:
                     for key, count in struct.iter_unpack("<II", data[: len(data) // 8 * 8]):
                         counts[key] = counts.get(key, 0) + count
+            is_whole = file.tell() == self._size
         for key, topic in self._connections.items():
             topic.count = counts.get(key, 0)
-        return bool(self._connections)
+        return is_whole and bool(self._connections)
 
     def _scan(self) -> None:
         """Connections and counts by the whole file."""
+        self._connections.clear()
         counts: dict[Topic, int] = {}
         for batch in self._batches(lambda topic: True):
             for _, topic, _ in batch.messages:
@@ -103,10 +105,13 @@ class Ros1File:
         (size,) = struct.unpack("<I", size)
         if size > _CHUNK_MAX:
             return None
+        data = file.read(size)
         try:
-            return _fields(header), file.read(size)  # a chunk that is cut is read as far as it goes
+            fields = _fields(header)
         except struct.error:
             return None
+        # A chunk that is cut is read as far as it goes.
+        return (fields, data) if len(data) == size or _number(fields, b"op") == _CHUNK else None
 
     def messages(self, wanted: Callable[[Topic], bool]) -> Iterator[tuple[Topic, int, Any]]:
         """Messages of the wanted topics in the order of their log: topic, log time in ns, bytes."""

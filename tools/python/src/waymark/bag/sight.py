@@ -68,10 +68,10 @@ def detections(kind: str) -> Callable[[Collection, str, Any, int], None]:
             rows = into.sight.tags.setdefault(topic, TagRows(kind, message.header.frame_id.lstrip("/"), seen.corners is not None))
             rows.whole.extend((t_ns, arrival_ns, seen.id))
             rows.values.extend(seen.corners or seen.place or [])
-        if reader.families:
-            into.sight.families.update(tag.family for tag in message.detections)
         if bad:
             raise bad
+        if reader.families:
+            into.sight.families.update(tag.family for tag in message.detections)
 
     return take
 
@@ -94,7 +94,6 @@ def write(into: Collection, base: str, rectified_tags: bool | None) -> None:
     for name, topic in into.sight.topics.items():
         into.writer.restamp(name, into.clocks[topic])
     found = into.sight.cameras.found()
-    _write_tags(into, found, rectified_tags)
     entries: dict[str, dict[str, Any]] = {}
     for camera in found:
         label = f"camera {camera.name}"
@@ -108,6 +107,7 @@ def write(into: Collection, base: str, rectified_tags: bool | None) -> None:
             into.note(label, f"{into.frames.why_not(camera.frame, base)}: write its mounting into calibration.yaml")
         if camera.lens.entry:
             entries.setdefault(camera.name, dict(camera.lens.entry))
+    _write_tags(into, found, rectified_tags, base)
     entries = {name: entry for name, entry in sorted(entries.items()) if "model" in entry}
     if entries:
         into.writer.calibration["cameras"] = entries
@@ -115,7 +115,7 @@ def write(into: Collection, base: str, rectified_tags: bool | None) -> None:
         into.writer.calibration["x_marker_families"] = sorted(into.sight.families)
 
 
-def _write_tags(into: Collection, found: list[cameras.Found], rectified: bool | None) -> None:
+def _write_tags(into: Collection, found: list[cameras.Found], rectified: bool | None, base: str) -> None:
     """Corners in marker-corners.csv, poses in markers.csv; where a camera has both, its corners."""
     written: dict[str, list[Table]] = {"marker-corners.csv": [], "markers.csv": []}
     of_corners: set[str] = set()
@@ -131,14 +131,22 @@ def _write_tags(into: Collection, found: list[cameras.Found], rectified: bool | 
             written["marker-corners.csv"].append(tags.corner_table(columns, name))
         elif name in of_corners:
             into.refuse(topic, "poses of tags whose corners are taken")
+        elif not _is_optical(rows.frame, camera):
+            into.refuse(topic, f"its poses are in '{rows.frame}', which is no camera's optical frame")
         else:
             if rows.kind == "apriltag_ros/msg/AprilTagDetectionArray":
                 into.note(topic, "its messages name no family: the poses are taken as of tag36h11, which is read half a turn from the library's way up")
-            written["markers.csv"].append(tags.pose_table(columns, name))
+            place = tables.mounting(into, rows.frame, base, optical=True)
+            written["markers.csv"].append(tags.pose_table(columns, name, place["rpy_deg"] if place else [0.0, 0.0, 0.0]))
     for file, parts in written.items():
         if parts:
             whole = {column: np.concatenate([part[column] for part in parts]) for column in parts[0]}
             into.writer.table(file, tables.without_arrival(whole))
+
+
+def _is_optical(frame: str, camera: cameras.Found | None) -> bool:
+    """Whether poses are in a camera's optical frame: that of its pictures, one that is named so, or, without any camera, one named after it."""
+    return "optical" in frame or (frame in ("", camera.frame) if camera else "cam" in frame or not frame)
 
 
 def _in_raw(into: Collection, topic: str, camera: cameras.Found, columns: list[Array], is_said: bool) -> list[Array]:

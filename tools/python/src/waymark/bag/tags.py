@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..geometry import OPTICAL, rotation
+from ..geometry import OPTICAL, from_rpy, rotation
 from ..tables import Array, Table
 from . import lenses
 from .cameras import Found
@@ -35,7 +35,8 @@ _FACING_MIN = 0.05  # cosine; a print seen more askew than that, 87 degrees, isn
 
 
 class Seen(NamedTuple):
-    """A tag with its four corners in pixels, u0 v0 ... u3 v3 in our order, or with the place and the yaw of its pose (m, rad, camera's body)."""
+    """A tag with its four corners in pixels, u0 v0 ... u3 v3 in our order, or with its pose: its place in m and the direction of its upper
+    edge from left to right, both in the camera's body frame."""
 
     id: int
     corners: list[float] | None
@@ -54,7 +55,7 @@ def _corners(points: list[tuple[float, float]], order: tuple[int, ...], shift_px
 
 
 def _pose(identity: int, place: Any, turn: Any, half_turned: bool = False) -> Seen:
-    """A pose in the optical frame: place in the body frame, and the direction of the print's upper edge about the view."""
+    """A pose in the optical frame."""
     p = np.array([place.x, place.y, place.z], dtype=float)
     q = np.array([turn.x, turn.y, turn.z, turn.w], dtype=float)
     if not np.isfinite(p).all() or not np.isfinite(q).all() or not q.any() or not p[2] > 0:
@@ -65,11 +66,11 @@ def _pose(identity: int, place: Any, turn: Any, half_turned: bool = False) -> Se
     if max(map(abs, facing.values())) < _FACING_MIN:
         raise BadMessage(f"the pose of tag {identity} shows it from its edge")
     if abs(facing["z"]) >= abs(facing["y"]):
-        up = axes[:, 1] if facing["z"] > 0 else -axes[:, 1]
+        up, out = (axes[:, 1], axes[:, 2]) if facing["z"] > 0 else (-axes[:, 1], -axes[:, 2])
     else:
-        up = axes[:, 2] if facing["y"] > 0 else -axes[:, 2]
-    body, upper = OPTICAL @ p, OPTICAL @ (-up if half_turned else up)
-    return Seen(identity, None, [*map(float, body), float(np.arctan2(upper[1], upper[0]))])
+        up, out = (axes[:, 2], axes[:, 1]) if facing["y"] > 0 else (-axes[:, 2], -axes[:, 1])
+    right = np.cross(up, out) * (-1 if half_turned else 1)
+    return Seen(identity, None, [*map(float, OPTICAL @ p), *map(float, OPTICAL @ right)])
 
 
 def apriltag(message: Any) -> Iterator[Seen]:
@@ -171,8 +172,11 @@ def corner_table(columns: list[Array], camera: str) -> Table:
     return table | {"arrival_ns": arrival.astype(np.int64)}
 
 
-def pose_table(columns: list[Array], camera: str) -> Table:
-    """markers.csv of rows t, id, x, y, z, yaw, arrival."""
-    t, identity, x, y, z, yaw, arrival = columns
+def pose_table(columns: list[Array], camera: str, rpy_deg: list[float]) -> Table:
+    """markers.csv of rows t, id, x, y, z, the upper edge's direction, arrival. `rpy_deg`: the camera's mounting; the yaw of the edge is the one
+    that is seen from above, the robot being level."""
+    t, identity, x, y, z, *edge, arrival = columns
+    level = from_rpy(np.radians(rpy_deg[0]), np.radians(rpy_deg[1]), 0.0)
+    ahead, left, _ = level @ np.stack(edge)
     return {"t_ns": t.astype(np.int64), "sensor": np.full(len(t), camera), "id": identity.astype(np.int64), "x_m": x, "y_m": y, "z_m": z,
-            "yaw_rad": yaw, "arrival_ns": arrival.astype(np.int64)}
+            "yaw_rad": np.arctan2(left, ahead), "arrival_ns": arrival.astype(np.int64)}

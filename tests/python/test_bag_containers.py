@@ -1,0 +1,301 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""`waymark import`: bags as they lie about. The same drive comes out of each container; what is cut or damaged is read as far as it goes.
+
+    test_bag_containers.py BIN_DIR"""
+
+import bz2
+import gzip
+import lzma
+import shutil
+import sqlite3
+import subprocess
+import unittest
+
+import lz4.frame
+import numpy as np
+import zstandard
+from bag_files import BIN, M, START_NS, BagTest, Events, imported
+from mcap.writer import CompressionType, IndexType
+from mcap.writer import Writer as McapWriter
+from rosbags.rosbag1 import Writer as Ros1Writer
+from rosbags.rosbag2 import StoragePlugin
+from rosbags.typesys import Stores, get_typestore
+
+import waymark
+
+COUNT = 40
+
+
+def zstd(data):
+    return zstandard.ZstdCompressor().compress(data)
+
+
+class Whole(BagTest):
+    """Containers that have all of the drive."""
+
+    def setUp(self):
+        super().setUp()
+        self.events = Events().drive(COUNT)
+
+    def check(self, path, rows=COUNT, out="out"):
+        text, folder = self.take(path, out=out)
+        motion = waymark.Recording(folder).table("motion.csv")
+        self.assertEqual(len(motion["t_ns"]), rows, text)
+        self.assertEqual(motion["t_ns"].tolist(), [START_NS + i * 50_000_000 for i in range(rows)])
+        np.testing.assert_array_equal(motion["v_mps"], 0.5)
+        return text
+
+    def test_each_way_of_writing_it(self):
+        f = self.folder
+        whole = self.events.mcap(f / "a.mcap").read_bytes()
+        database = next(self.events.folder(f / "sqlite", StoragePlugin.SQLITE3).glob("*.db3"))
+        split = f / "split"
+        split.mkdir()
+        for part in (0, 1, 2, 10):  # in the order of numbers, not of letters
+            half = Events()
+            half.items = self.events.items[10 * min(part, 3) : 10 * min(part, 3) + 10]
+            half.mcap(split / f"drive_{part}.mcap")
+        ways = {
+            "uncompressed": self.events.mcap(f / "b.mcap", CompressionType.NONE),
+            "lz4": self.events.mcap(f / "c.mcap", CompressionType.LZ4),
+            "no chunks": self.events.mcap(f / "d.mcap", chunking=False),
+            "no index, no summary": self.events.mcap(f / "e.mcap", use_statistics=False, use_summary_offsets=False, repeat_channels=False,
+                                                     repeat_schemas=False, index_types=IndexType.NONE),
+            "messages compressed": self.events.mcap(f / "f.mcap", encode=zstd),
+            "renamed": shutil.copy(f / "a.mcap", f / "drive.bin"),
+            "renamed to another kind": shutil.copy(f / "a.mcap", f / "drive.db3"),
+            "ROS 1": self.events.ros1(f / "g.bag"),
+            "ROS 1, bz2": self.events.ros1(f / "h.bag", Ros1Writer.CompressionFormat.BZ2),
+            "ROS 1, lz4": self.events.ros1(f / "i.bag", Ros1Writer.CompressionFormat.LZ4),
+            "split": split,
+        }
+        for ending, pack in ((".zstd", zstd), (".zst", zstd), (".gz", gzip.compress), (".bz2", bz2.compress), (".xz", lzma.compress),
+                             (".lz4", lz4.frame.compress)):
+            ways[ending] = f / f"packed.mcap{ending}"
+            ways[ending].write_bytes(pack(whole))
+        ways["database packed"] = f / "drive.db3.zstd"
+        ways["database packed"].write_bytes(zstd(database.read_bytes()))
+        for name, path in ways.items():
+            with self.subTest(name):
+                self.check(path, out=f"out-{name}")
+
+    def test_folders(self):
+        for name in ("no metadata", "no identifier", "renamed", "metadata is none", "packed", "packed and unpacked", "a folder around it"):
+            for plugin in (StoragePlugin.MCAP, StoragePlugin.SQLITE3):
+                with self.subTest(name, plugin=plugin.name):
+                    folder = self.events.folder(self.folder / f"{name} {plugin.name}", plugin)
+                    meta, (file,) = folder / "metadata.yaml", [p for p in folder.iterdir() if p.name != "metadata.yaml"]
+                    if name in ("no metadata", "a folder around it"):
+                        meta.unlink()
+                    elif name == "no identifier":
+                        meta.write_text(meta.read_text().replace("storage_identifier: mcap", 'storage_identifier: ""').replace("sqlite3", '""'))
+                        self.assertIn('""', meta.read_text())
+                    elif name == "renamed":
+                        file.rename(file.with_name("another" + file.suffix))
+                    elif name == "metadata is none":
+                        meta.write_text("rosbag2_bagfile_information: [\n")
+                    elif name.startswith("packed"):
+                        file.with_name(file.name + ".zstd").write_bytes(zstd(file.read_bytes()))
+                        if name == "packed":
+                            file.unlink()
+                        else:
+                            meta.unlink()
+                    if name == "a folder around it":
+                        (self.folder / f"around {plugin.name}").mkdir()
+                        folder = folder.rename(self.folder / f"around {plugin.name}" / "inner").parent
+                    text = self.check(folder, out=f"out-{name}-{plugin.name}")
+                    if name in ("no metadata", "metadata is none", "renamed"):
+                        self.assertIn("metadata.yaml", text)
+
+    def test_ros_1_in_mcap(self):
+        store = get_typestore(Stores.ROS1_NOETIC)
+        from bag_files import as_ros1
+        path = self.folder / "ros1.mcap"
+        with path.open("wb") as file:
+            writer = McapWriter(file)
+            writer.start(profile="ros1", library="test")
+            kind = "nav_msgs/msg/Odometry"
+            definition = store.generate_msgdef(kind, ros_version=1)[0].encode()
+            channel = writer.register_channel("/odom", "ros1", writer.register_schema("nav_msgs/Odometry", "ros1msg", definition))
+            for log_ns, _, _, message in self.events.items:
+                writer.add_message(channel, log_ns, bytes(store.serialize_ros1(as_ros1(message, kind, store), kind)), log_ns)
+            writer.finish()
+        self.check(path)
+
+    def test_what_lies_in_the_write_ahead_file_is_read(self):
+        (path,) = self.events.folder(self.folder / "bag", StoragePlugin.SQLITE3).glob("*.db3")
+        database = sqlite3.connect(path)
+        database.execute("PRAGMA journal_mode=WAL")
+        (kept,) = database.execute("SELECT COUNT(*) FROM messages").fetchone()
+        rows = database.execute("SELECT * FROM messages ORDER BY timestamp DESC LIMIT 15").fetchall()
+        database.execute("DELETE FROM messages WHERE timestamp >= ?", (min(row[2] for row in rows),))
+        database.commit()
+        database.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+        database.executemany(f"INSERT INTO messages VALUES ({','.join('?' * len(rows[0]))})", rows)
+        database.commit()
+        alone = self.folder / "killed"  # as a recorder leaves it that was killed: both files, and nothing merged
+        alone.mkdir()
+        for ending in ("", "-wal"):
+            shutil.copy(f"{path}{ending}", alone / f"drive.db3{ending}")
+        database.close()
+        self.assertGreater((alone / "drive.db3-wal").stat().st_size, 0)
+        before = {file.name: file.read_bytes() for file in alone.iterdir()}
+        self.check(alone, rows=kept)
+        self.assertEqual({file.name: file.read_bytes() for file in alone.iterdir()}, before)
+        (alone / "drive.db3-wal").unlink()
+        self.check(alone, rows=kept - 15, out="without")
+
+
+class Cut(BagTest):
+    """Containers of which a part is missing."""
+
+    def setUp(self):
+        super().setUp()
+        self.events = Events().drive(400)
+
+    def rows(self, path, out):
+        text, folder = self.take(path, out=out)
+        t = waymark.Recording(folder).table("motion.csv")["t_ns"]
+        self.assertEqual(t.tolist(), [START_NS + i * 50_000_000 for i in range(len(t))])
+        return text, len(t)
+
+    def test_a_file_that_is_cut_is_read_up_to_the_cut(self):
+        whole = {"zstd.mcap": self.events.mcap(self.folder / "a", CompressionType.ZSTD, 1 << 15), "lz4.mcap": self.events.mcap(
+            self.folder / "b", CompressionType.LZ4, 1 << 15), "plain.mcap": self.events.mcap(self.folder / "c", CompressionType.NONE),
+            "loose.mcap": self.events.mcap(self.folder / "d", chunking=False), "ros1.bag": self.events.ros1(self.folder / "e"),
+            "bz2.bag": self.events.ros1(self.folder / "f", Ros1Writer.CompressionFormat.BZ2)}
+        for name, path in whole.items():
+            data = path.read_bytes()
+            least = {"bz2.bag": 0}.get(name, 1)  # one chunk of bz2 is one block: nothing of it can be had
+            for share in (0.5, 0.7, 0.98):
+                with self.subTest(name, share=share):
+                    cut = self.folder / f"{share}-{name}"
+                    cut.write_bytes(data[: int(share * len(data))])
+                    if not least and share < 0.9:
+                        code, text = imported(cut, "--out", self.folder / f"out-{share}-{name}")
+                        self.assertIn(code, (0, 1))
+                        continue
+                    text, count = self.rows(cut, f"out-{share}-{name}")
+                    self.assertGreater(count, 0.8 * 400 * (share - 0.25), text)
+                    if count < 400:  # else the index alone is missing
+                        self.assertRegex(text, "read up to there|without its end|is cut")
+
+    def test_a_packed_file_that_is_cut(self):
+        packed = self.folder / "a.mcap.zstd"
+        packed.write_bytes(zstd(self.events.mcap(self.folder / "a.mcap", CompressionType.NONE).read_bytes()))
+        packed.write_bytes(packed.read_bytes()[:-2000])
+        text, count = self.rows(packed, "out")
+        self.assertGreater(count, 50, text)
+        self.assertRegex(text, "is damaged or cut|without its end")
+
+    def test_a_damaged_part_costs_that_part(self):
+        path = self.events.mcap(self.folder / "a.mcap", CompressionType.ZSTD, 1 << 14)
+        data = bytearray(path.read_bytes())
+        data[len(data) // 3 : len(data) // 3 + 400] = bytes(400)
+        path.write_bytes(bytes(data))
+        text, folder = self.take(path)
+        t = waymark.Recording(folder).table("motion.csv")["t_ns"]
+        self.assertGreater(len(t), 200, text)
+        self.assertLess(len(t), 400)
+        self.assertEqual(t[-1], START_NS + 399 * 50_000_000)  # what follows the damage is there
+        self.assertRegex(text, "damaged|left out")
+
+    def test_wrong_checksums_are_named(self):
+        path = self.events.mcap(self.folder / "a.mcap", CompressionType.NONE, 1 << 14)
+        data = bytearray(path.read_bytes())
+        at = data.index(np.float64(0.5).tobytes(), len(data) // 4)
+        data[at + 2] ^= 1
+        path.write_bytes(bytes(data))
+        text, _ = self.take(path)
+        self.assertIn("1 of its chunks differ from their checksums", text)
+
+
+class Refused(BagTest):
+    """What is no bag: one sentence, and what to do."""
+
+    def test_it_is_said_in_our_words(self):
+        f = self.folder
+        (f / "empty.mcap").write_bytes(b"")
+        (f / "text.bag").write_text("these are no bytes of a bag\n")
+        (f / "zeros.db3").write_bytes(bytes(5000))
+        (f / "magic.mcap").write_bytes(b"\x89MCAP0\r\n")
+        (f / "short.db3").write_bytes(b"SQLite format 3\0" + bytes(80))
+        (f / "ros1.bag").write_bytes(b"#ROSBAG V2.0\n")
+        (f / "old.bag").write_bytes(b"#ROSBAG V1.2\n" + bytes(100))
+        (f / "junk.zst").write_bytes(zstd(b"not a bag, but packed"))
+        (f / "nothing").mkdir()
+        two = f / "two"
+        for name in "ab":
+            (two / name).mkdir(parents=True)
+            Events().drive(3).mcap(two / name / "x.mcap")
+        database = sqlite3.connect(f / "other.db3")
+        database.execute("CREATE TABLE invoices (id INTEGER)")
+        database.commit()
+        database.close()
+        for name, word in (("empty.mcap", "is empty"), ("text.bag", "is no bag"), ("zeros.db3", "is no bag"), ("magic.mcap", "without its end"),
+                           ("short.db3", "rosbag2"), ("ros1.bag", "nothing"), ("old.bag", "format 2.0"), ("junk.zst", "is no bag"),
+                           ("nothing", "no file in this folder"), ("two", "2 bags"), ("missing.mcap", "no such file"), ("other.db3", "rosbag2")):
+            with self.subTest(name):
+                text, out = self.take(f / name, code=1, out=f"out-{name}")
+                self.assertIn(word, text)
+                self.assertIn("waymark import: ", text)
+                self.assertFalse(out.exists())
+                self.assertNotRegex(text, r"Error|Exception|errno|sqlite3\.|rosbags|object at|<_io")
+
+    def test_the_command_knows_a_bag_by_its_content(self):
+        Events().drive(3).mcap(self.folder / "drive.bin")
+        (self.folder / "holds one").mkdir()
+        shutil.copy(self.folder / "drive.bin", self.folder / "holds one" / "a.mcap")
+        (self.folder / "p.zstd").write_bytes(zstd((self.folder / "drive.bin").read_bytes()))
+        for name in ("drive.bin", "holds one", "p.zstd"):
+            # Where the Python package's program isn't on the path, the command says that it would read the bag.
+            done = subprocess.run([BIN / "waymark-import", self.folder / name, "--out", self.folder / "o"], capture_output=True, text=True,
+                                  check=False, env={"PATH": "/nowhere"})
+            self.assertIn("bags are read by the Python package", done.stderr, name)
+
+
+class Messages(BagTest):
+    """One bad message costs one message, one bad topic a topic."""
+
+    def test_a_message_whose_bytes_are_none_costs_itself(self):
+        events = Events().drive(20)
+        count = 0
+
+        def encode(data):
+            nonlocal count
+            count += 1
+            return {5: data[:40], 9: b"", 12: data + bytes(50)}.get(count, data)
+
+        for compression in (CompressionType.NONE, CompressionType.ZSTD):
+            count = 0
+            text, folder = self.take(events.mcap(self.folder / "a.mcap", compression, encode=encode), out=f"out-{compression.name}")
+            self.assertEqual(len(waymark.Recording(folder).table("motion.csv")["t_ns"]), 17)
+            self.assertIn("note: /odom: 3 of 20 messages are left out; the first at 1700000000.203 s: its 40 bytes are no nav_msgs/msg/Odometry", text)
+
+    def test_topics_that_cant_be_read_cost_themselves(self):
+        path = self.folder / "a.mcap"
+        good = Events().drive(5)
+        with path.open("wb") as file:
+            writer = McapWriter(file)
+            writer.start(profile="ros2", library="test")
+            kind = "nav_msgs/msg/Odometry"
+            whole = M.definition(kind)
+            ways = {"/good": ("cdr", kind, "ros2msg", whole), "/protobuf": ("protobuf", kind, "protobuf", b"\0\1"),
+                    "/json": ("json", kind, "jsonschema", b"{}"), "/unknown": ("cdr", "my_msgs/msg/Pose7", "ros2msg", b"float63 x[[[\n"),
+                    "/no_schema": ("cdr", "", "", b"")}
+            for topic, (wire, name, style, definition) in ways.items():
+                schema = writer.register_schema(name, style, definition) if name else 0
+                channel = writer.register_channel(topic, wire, schema)
+                for log_ns, _, _, message in good.items:
+                    writer.add_message(channel, log_ns, M.encode(message, kind), log_ns)
+            writer.finish()
+        text, folder = self.take(path)
+        self.assertEqual(len(waymark.Recording(folder).table("motion.csv")["t_ns"]), 5)
+        for topic in ("/protobuf", "/json", "/unknown", "/no_schema"):
+            self.assertIn(f"not taken: {topic}: ", text)
+        self.assertIn("encoded as 'protobuf'", text)
+
+
+if __name__ == "__main__":
+    unittest.main()
