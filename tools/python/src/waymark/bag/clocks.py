@@ -120,19 +120,20 @@ def _look(name: str, times: Array) -> _Topic:
     return _Topic(name, stamp, log, [int(lg[i]) for i in steps], [int(piece.min()) for piece in pieces], known)
 
 
-def _drift(topic: _Topic) -> tuple[float, int]:
-    """Growth of the smallest delay along the log (ns a ns), and over the whole way (ns): a line through the least of ten parts."""
+def _drift(topic: _Topic) -> tuple[float, int, int]:
+    """Growth of the smallest delay along the log (ns a ns), over the whole way (ns), and that delay at the begin: a line through the
+    least of ten parts."""
     log, delay = topic.log[topic.known], (topic.log - topic.stamp)[topic.known]
     span = int(log[-1] - log[0]) if len(log) > 50 else 0
     if span < 20 * 10**9 or topic.ends:
-        return 0.0, 0
+        return 0.0, 0, topic.delay
     parts = np.array_split(np.arange(len(log)), 10)
     at = np.array([part[np.argmin(delay[part])] for part in parts])
     x, y = (log[at] - log[0]).astype(float), (delay[at] - delay[at[0]]).astype(float)
     slope, start = np.polyfit(x, y, 1)
     rest = np.abs(y - slope * x - start).max()
     grown = slope * span
-    return (float(slope), int(grown)) if abs(grown) > 4 * rest else (0.0, 0)
+    return (float(slope), int(grown), int(delay[at[0]] + start)) if abs(grown) > 4 * rest else (0.0, 0, topic.delay)
 
 
 def _reference(topics: list[_Topic]) -> tuple[list[_Topic], int]:
@@ -166,7 +167,7 @@ def _name_coarse(topic: _Topic, clock: Clock, say: Say) -> None:
         else:
             clock.spread = True
             say(topic.name, f"{text}, and the times of the log are no finer: messages of one stamp are spread evenly")
-    elif grid >= _COARSE_NS and grid > 0.3 * usual and len(np.unique(steps)) > 1:
+    elif grid >= _COARSE_NS and grid > 0.3 * usual and (steps % int(np.median(steps)) != 0).mean() > 0.03:
         say(topic.name, f"{text}: each is off by as much as that; speeds and turns of it have that noise")
 
 
@@ -174,11 +175,11 @@ def _own_clock(topic: _Topic, reference_ns: int, say: Say) -> Clock:
     """A clock by its offset and its drift against the reference's."""
     offset = topic.delay - reference_ns
     clock = Clock(topic.ends, [delay - reference_ns for delay in topic.delays], delay_ns=reference_ns)
-    slope, grown = _drift(topic)
+    slope, grown, begin = _drift(topic)
     text = ""
     if abs(grown) > _DRIFT_MIN_NS:
         clock.drift, clock.start_ns = slope, int(topic.log[topic.known][0])
-        clock.offset_ns = [int((topic.log - topic.stamp)[topic.known][:max(len(topic.stamp) // 10, 1)].min()) - reference_ns]
+        clock.offset_ns = [begin - reference_ns]
         text = f", and it runs {abs(slope) * 1e6:.0f} ppm too {'slow' if slope > 0 else 'fast'}"
     say(topic.name, f"its stamps are of a clock of its own, {seconds(offset)} {'behind' if offset > 0 else 'ahead of'} that of the others"
                     f"{text}: moved onto theirs by the times at which it was logged")
@@ -195,7 +196,7 @@ def _one(topic: _Topic, reference: list[_Topic], reference_ns: int, say: Say) ->
         clock = _own_clock(topic, reference_ns, say)
     else:
         clock = Clock(topic.ends, [delay - topic.delay for delay in topic.delays], delay_ns=topic.delay)
-        _, grown = _drift(topic)
+        _, grown, _ = _drift(topic)
         if abs(grown) > _LAG_NS:
             cause = "a queue that is read too slowly, or a clock that runs slow" if grown > 0 else "a clock that runs fast"
             say(topic.name, f"from its stamps to its log it takes {seconds(grown)} {'more' if grown > 0 else 'less'} at the end than at the start: {cause}")
@@ -244,12 +245,17 @@ def silences(clocks: dict[str, Clock], stamps: dict[str, Array]) -> list[tuple[i
     return [(int(t[i]), int(t[i + 1])) for i in gaps]
 
 
-def goes_on(t_ns: Array, places: Array, begin_ns: int, end_ns: int) -> int | None:
-    """The usual step (ns) of poses that move on over a silence as over any other step; None: they don't, or they stand."""
+def excess(t_ns: Array, end_ns: int) -> int:
+    """How much longer than a topic's usual step the one over a silence is that ends at `end_ns`; 0: it has none there."""
+    i = int(np.searchsorted(t_ns, end_ns))
+    return int(t_ns[i] - t_ns[i - 1] - np.median(np.diff(t_ns))) if 0 < i < len(t_ns) else 0
+
+
+def goes_on(t_ns: Array, places: Array, end_ns: int) -> bool:
+    """Whether poses move on over a silence as over any other step."""
     i = int(np.searchsorted(t_ns, end_ns)) - 1
     if i < 3 or i + 4 > len(t_ns):
-        return None
+        return False
     steps = np.linalg.norm(np.diff(places[i - 3:i + 5], axis=0), axis=1)
-    over, usual = steps[3], float(np.median(np.delete(steps, 3)))
-    dt = np.diff(t_ns[i - 3:i + 5])
-    return int(np.median(np.delete(dt, 3))) if 1e-4 < usual and over <= 3 * usual and t_ns[i] <= begin_ns else None
+    usual = float(np.median(np.delete(steps, 3)))
+    return 1e-4 < usual and float(steps[3]) <= 3 * usual

@@ -12,7 +12,7 @@ from ..recording import RecordingWriter
 from ..tables import Array
 from . import names
 from .can import CanLog
-from .clocks import SET_NS, Clock, goes_on, once, seconds, settle, silences
+from .clocks import SET_NS, Clock, excess, goes_on, once, seconds, settle, silences
 from .frames import Frames
 from .samples import Samples
 from .views import Sight
@@ -84,32 +84,26 @@ class Collection:
                 if not keep.all():
                     self.note(topic, f"{int((~keep).sum())} of its {len(keep)} messages come twice, with the same stamp: taken once")
         self.clocks = settle(stamps, self.note)
-        for begin, end in silences(self.clocks, stamps):
-            self._silence(begin, end)
+        cuts = [cut for begin, end in silences(self.clocks, stamps) if (cut := self._silence(begin, end))]
+        for clock in self.clocks.values():
+            clock.cuts = cuts
 
-    def _silence(self, begin_ns: int, end_ns: int) -> None:
-        """A span without any message: a pause, or, where poses go on as if nothing was, a clock that was set."""
+    def _silence(self, begin_ns: int, end_ns: int) -> tuple[int, int] | None:
+        """A span without any message: a pause (None), or, where poses go on as if nothing was, a clock that was set: when, by how much."""
         text = f"no topic has a message for {seconds(end_ns - begin_ns)} from {(begin_ns - self._first_ns()) / 1e9:.2f} s on"
-        usual = [goes_on(*self._places(kind, topic), begin_ns, end_ns)
-                 for kind in ("odometry", "poses") for topic in self.samples.get(kind, {})]
-        steps = [step for step in usual if step]
-        if steps or end_ns - begin_ns > SET_NS:
-            step = min(steps, default=int(1e9))
-            for clock in self.clocks.values():
-                clock.cuts.append((end_ns, end_ns - begin_ns - step))
-            why = f"the poses go on as if {seconds(step)} had passed" if steps else "longer than a day"
-            self.note("clock", f"{text}, {why}: the clock was set; the later times are moved back")
-        else:
+        poses = [self.timed(topic, samples) for kind in ("odometry", "poses") for topic, samples in self.samples.get(kind, {}).items()]
+        moved = [excess(t_ns, end_ns) for t_ns, _, values in poses if goes_on(t_ns, values[:, :3], end_ns)]
+        if not moved and end_ns - begin_ns <= SET_NS:
             self.note("clock", f"{text}: a pause of the recorder, or a clock that was set; the times are kept")
+            return None
+        why = "and the poses go on as if there was none" if moved else "longer than a day"
+        self.note("clock", f"{text}, {why}: the clock was set; the later times are moved back")
+        return end_ns, max(moved, default=end_ns - begin_ns - 10**9)
 
     def _first_ns(self) -> int:
         firsts = [int(self.clocks[topic](samples.times[:1, 0], samples.times[:1, 1])[0][0])
                   for topics in self.samples.values() for topic, samples in topics.items()]
         return min(firsts, default=0)
-
-    def _places(self, kind: str, topic: str) -> tuple[Array, Array]:
-        t_ns, _, values = self.timed(topic, self.samples[kind][topic])
-        return t_ns, values[:, :3]
 
     def timed(self, topic: str, samples: Samples) -> tuple[Array, Array, Array]:
         """Times, arrivals and numbers of a topic's messages in the order of their times; of several of one time the first."""

@@ -114,7 +114,7 @@ def _gravity(imu: Imu) -> Array | None:
         return None
     mean = imu.accelerometer[ok].mean(axis=0)
     size = float(np.linalg.norm(mean))
-    for value, (name, scale) in _UNITS.items():
+    for value, (name, scale) in sorted(_UNITS.items(), key=lambda unit: abs(np.log(size / unit[0]))):
         if abs(size / value - 1) < _UNIT_SHARE:
             if name:
                 imu.say(f"its accelerometer shows {size:.3g} at rest, so it is in {name}, not in m/s2: converted")

@@ -1,0 +1,138 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Fixes of receivers out of bags: those that are none, altitudes that are absent, the exact tangent plane, the antenna's place.
+
+    test_bag_gnss.py BIN_DIR"""
+
+import unittest
+
+import numpy as np
+from bag_drives import BagTest, matrix, ns, place
+
+from waymark.geometry import place_of, tangent_plane
+
+ORIGIN = (52.5, 13.4, 34.0)
+CONFIG = "format: waymark-config/1\nestimator: landmark_ekf\ninitial_pose: {x_m: 0, y_m: 0, heading_rad: 0}\n"
+
+
+class Fixes(BagTest):
+    """The drive with a fix a second."""
+
+    def fix(self, bag, t, where, altitude=34.0, status=0, variance=1e-4, kind=2, topic="/fix", frame="gps"):
+        bag.put(topic, "NavSatFix", ns(t), bag.m.make(
+            "NavSatFix", header=bag.m.header(ns(t), frame), status=bag.m.make("NavSatStatus", status=status), latitude=where[0], longitude=where[1],
+            altitude=altitude, position_covariance=np.diag([variance] * 3).ravel(), position_covariance_type=kind))
+
+    def drive(self, change=lambda i, where, altitude: (where, altitude, 0), antenna=(0.0, 0.0), frame="gps"):
+        bag = self.bag()
+        bag.drive()
+        for i, t in enumerate(np.arange(16.0)):
+            x, y, heading = place(t)
+            c, s = np.cos(heading), np.sin(heading)
+            where = place_of(ORIGIN, x + c * antenna[0] - s * antenna[1], y + s * antenna[0] + c * antenna[1])
+            where, altitude, status = change(i, where[:2], 34.0)
+            self.fix(bag, t, where, altitude, status, frame=frame)
+        return bag
+
+    def test_those_that_are_none_are_left_out(self):
+        nan = float("nan")
+        kinds = {"zeros": lambda i, w, a: ((0.0, 0.0), a, 0), "status -1": lambda i, w, a: ((1.0, 2.0), a, -1), "not a number": lambda i, w, a: (
+            (nan, nan), nan, 0), "zeros and status -1": lambda i, w, a: ((0.0, 0.0), 0.0, -1), "a latitude of 91": lambda i, w, a: ((91.0, 13.4), a, 0)}
+        for name, bad in kinds.items():
+            for first in (3, 1):
+                with self.subTest(name, first=first):
+                    recording, said = self.take(self.drive(lambda i, w, a, b=bad, n=first: b(i, w, a) if i < n else (w, a, 0)))
+                    self.assertIn(f"{first} of its 16 messages", said)
+                    self.assertEqual(len(recording.table("gnss.csv")["t_ns"]), 16 - first)
+                    np.testing.assert_allclose(recording.calibration["gnss"]["origin"], ORIGIN, atol=1e-6)
+                    self.assert_end(recording, said, 0.1, config=CONFIG)
+
+    def test_an_altitude_that_is_absent(self):
+        nan = float("nan")
+        for name, change, empty in (("of the first three", lambda i, w, a: (w, nan if i < 3 else a, 0), 3), ("of some", lambda i, w, a: (
+                w, nan if i % 4 == 2 else a, 0), 4), ("of all", lambda i, w, a: (w, nan, 0), 16), ("0 of the first", lambda i, w, a: (
+                    w, 0.0 if i < 2 else a, 0), 2), ("infinite", lambda i, w, a: (w, np.inf if i == 5 else a, 0), 1)):
+            with self.subTest(name):
+                recording, said = self.take(self.drive(change))
+                gnss = recording.table("gnss.csv")
+                self.assertEqual(int(np.isnan(gnss["z_m"]).sum()), empty, said)
+                self.assertEqual(int(np.isnan(gnss["sigma_z_m"]).sum()), empty)
+                right = np.array([place(t)[:2] for t in np.arange(16.0)])
+                np.testing.assert_allclose(np.column_stack([gnss["x_m"], gnss["y_m"]]), right, atol=1e-3)
+                self.assert_end(recording, said, 0.1, config=CONFIG)
+
+    def test_a_receiver_that_never_has_a_fix(self):
+        recording, said = self.take(self.drive(lambda i, w, a: ((0.0, 0.0), 0.0, -1)))
+        self.assertIn("not taken: /fix: it never has a fix", said)
+        self.assertNotIn("gnss.csv", recording.streams())
+
+    def test_the_antenna_s_place(self):
+        for name, parent, child, pose in (("ahead", "base_link", "gps", matrix((1.2, 0, 1.5))), ("to the left", "base_link", "gps", matrix((0, 0.8, 1.5))),
+                                          ("inverse", "gps", "base_link", matrix((-1.2, 0, -1.5))), ("turned", "base_link", "gps", matrix(
+                                              (-0.5, 0.3, 1), (0, 0, 1))), ("far behind", "base_link", "gps", matrix((-2.0, 0, 1)))):
+            with self.subTest(name):
+                right = (pose if parent == "base_link" else np.linalg.inv(pose))[:3, 3]
+                bag = self.drive(antenna=right[:2])
+                bag.tf(parent, child, pose)
+                recording, said = self.take(bag, "--origin", *ORIGIN)
+                np.testing.assert_allclose(recording.calibration["gnss"]["mounting"]["xyz_m"], right, atol=1e-6)
+                self.assert_end(recording, said, 0.1, config=CONFIG)
+
+    def test_an_antenna_without_a_place_is_named(self):
+        recording, said = self.take(self.drive())
+        self.assertIn("gnss: {mounting: {xyz_m", said)
+        self.assertNotIn("mounting", recording.calibration["gnss"])
+
+    def test_sigmas_by_the_covariance_and_its_kind(self):
+        for variance, kind, status, sigma in ((4.0, 2, 0, 2.0), (4.0, 0, 0, 5.0), (0.0, 2, 0, 5.0), (-1.0, 2, 0, 5.0), (1e9, 1, 0, 5.0), (0.0, 0, 2, 0.5),
+                                              (9.0, 3, 2, 3.0), (0.0, 0, 1, 2.0), (float("nan"), 2, 0, 5.0)):
+            with self.subTest(variance=variance, kind=kind):
+                bag = self.bag()
+                for t in range(3):
+                    self.fix(bag, t, (52.5, 13.4 + 1e-5 * t), status=status, variance=variance, kind=kind)
+                recording, _ = self.take(bag)
+                gnss = recording.table("gnss.csv")
+                np.testing.assert_allclose(gnss["sigma_xy_m"], sigma)
+                np.testing.assert_allclose(gnss["sigma_z_m"], sigma if sigma == np.sqrt(variance) else 2 * sigma)
+
+    def test_the_receiver_before_a_filter_and_the_better_one_of_two(self):
+        bag = self.bag()
+        for t in np.arange(0, 3, 0.01):
+            self.fix(bag, t, (52.5, 13.4), variance=1e-4, topic="/gps/filtered")
+            self.fix(bag, t, (52.5, 13.4), variance=25.0, topic="/cheap/fix")
+            self.fix(bag, t, (0.0, 0.0), variance=1e-6, status=-1, topic="/dead/fix")
+        for t in range(3):
+            self.fix(bag, t, (52.5, 13.4), variance=1.0, topic="/good/fix")
+        recording, said = self.take(bag)
+        self.assertEqual(len(recording.table("gnss.csv")["t_ns"]), 3, said)
+        self.assertIn("not taken: /gps/filtered: positions come from /good/fix", said)
+
+
+class TangentPlane(unittest.TestCase):
+    """WGS84 onto the plane, against figures of PROJ 9.1 (+proj=cart, +proj=topocentric)."""
+
+    def test_near_and_far(self):
+        for origin, where, right in (((48.1, 11.5, 500), (48.11, 11.51, 510), (744.72519, 1112.06103, 9.85956)),
+                                     ((48.1, 11.5, 500), (48.0, 11.4, 450), (-7463.05710, -11115.06175, -64.05335)),
+                                     ((48.1, 11.5, 500), (49.1, 12.5, 500), (73027.19970, 111679.40707, -1396.10890)),
+                                     ((48.1, 11.5, 500), (-48.1, -168.5, 0), (0, 42526.86509, -12733097.53055))):
+            np.testing.assert_allclose(tangent_plane(origin, *where), right, atol=1e-4)
+
+    def test_antimeridian_and_poles(self):
+        # 0.02 degrees of longitude on the parallel of 60 degrees are 1116.0 m on either side of the line.
+        over, plain = tangent_plane((60, 179.99, 0), 60, -179.99, 0), tangent_plane((60, 10, 0), 60, 10.02, 0)
+        np.testing.assert_allclose(over, plain, atol=1e-6)
+        self.assertAlmostEqual(over[0], 1116.0, delta=0.1)
+        # 0.001 degrees from the pole are 111.69 m, in whichever direction.
+        for longitude, right in ((0, (0, -111.69)), (90, (111.69, 0)), (180, (0, 111.69)), (-90, (-111.69, 0))):
+            np.testing.assert_allclose(tangent_plane((90, 0, 0), 89.999, longitude, 0)[:2], right, atol=0.01)
+
+    def test_back(self):
+        for origin in (ORIGIN, (60, 179.99, 0), (-33, 151, 1000), (0, 0, 0)):
+            for east, north in ((0, 0), (3, -4), (5000, 5000), (-2500, 100)):
+                latitude, longitude, height = place_of(origin, east, north)
+                np.testing.assert_allclose(tangent_plane(origin, latitude, longitude, height), (east, north, 0), atol=1e-6)
+
+
+if __name__ == "__main__":
+    unittest.main()
