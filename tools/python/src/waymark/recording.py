@@ -234,6 +234,10 @@ class RecordingWriter:
         t_ns, arrival_ns = clock(np.array([t for t, _ in rows], dtype=np.int64), np.array([t if a is None else a for t, a in rows], dtype=np.int64))
         rows[:] = [(int(t), int(a)) for t, a in zip(t_ns, arrival_ns)]
 
+    def streams(self) -> list[str]:
+        """Names of the tables that were written so far."""
+        return list(self._streams)
+
     def can(self, frame: CanFrame) -> None:
         """Appends a CAN frame to can.log."""
         if self._can is None:

@@ -71,7 +71,7 @@ def detections(kind: str) -> Callable[[Collection, str, Any, int], None]:
         if bad:
             raise bad
         if reader.families:
-            into.sight.families.update(tag.family for tag in message.detections)
+            into.sight.families.update("tag" + tag.family.removeprefix("tag") for tag in message.detections)
 
     return take
 
@@ -113,6 +113,9 @@ def write(into: Collection, base: str, rectified_tags: bool | None) -> None:
         into.writer.calibration["cameras"] = entries
     if into.sight.families:
         into.writer.calibration["x_marker_families"] = sorted(into.sight.families)
+    if "marker-corners.csv" in into.writer.streams():
+        family = min(into.sight.families, default="aruco_4x4_50")
+        into.note("marker-corners.csv", f"poses need the edge of the prints: write `markers: {{family: {family}, size_m: ...}}` into calibration.yaml")
 
 
 def _write_tags(into: Collection, found: list[cameras.Found], rectified: bool | None, base: str) -> None:
