@@ -3,7 +3,7 @@
 
 #include <limits>
 
-#include "math/elementary.hpp"
+#include "math/jet.hpp"
 #include "waymark/internal/sensors/mounting.hpp"
 
 namespace wm {
@@ -13,110 +13,120 @@ constexpr double kLevel[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
 constexpr double kTouching_m2 = 1e-6;  // landmark within 1 mm of the sensor's axis: no bearing
 constexpr double kShallow_m = 0.02;    // least depth
 constexpr double kPole = 1e-3;         // floor of a unit ray's horizontal part, so that its tangent stays finite
+constexpr double kOnAxis = 1e-6;       // sine of the angle from the sensor's axis below which the angle's scale is lost
 
-// Small rotations about the sensor's x and y axes, applied to a direction.
-void tilt(double roll_rad, double pitch_rad, double v[3]) {
-  const double x = v[0] - pitch_rad * v[2], y = v[1] + roll_rad * v[2];
-  v[2] += pitch_rad * v[0] - roll_rad * v[1];
+// The formulas are templates: T is double, or a jet. A sighting is differentiated in two steps, which takes a third of
+// the operations: the ray in the sensor's axes by what moves it, and bearing, range and elevation by the ray and the
+// sensor's other states.
+
+// What moves the ray. The height is the landmark's over the sensor's.
+template <class T>
+struct ray_view {
+  T x_m, y_m, heading_rad, body_roll_rad, body_pitch_rad, height_m;
+  T yaw_rad, mount_x_m, mount_y_m, roll_rad, pitch_rad;
+};
+using ray_jet = jet<even(kBySensor + kPitch + 1)>;
+
+// The ray and the states that do not move it.
+template <class T>
+struct sensor_view {
+  T v[3];
+  T error[kSensorStates];  // from kFirstOwn on
+};
+constexpr int kFirstOwn = kPitch + 1;
+using sensor_jet = jet<even(3 + kSensorStates - kFirstOwn)>;
+
+// Small rotations about the x and y axes, applied to a direction.
+template <class T>
+void tilt(const T &roll_rad, const T &pitch_rad, T v[3]) {
+  const T x = v[0] - pitch_rad * v[2], y = v[1] + roll_rad * v[2];
+  v[2] = v[2] + (pitch_rad * v[0] - roll_rad * v[1]);
   v[0] = x;
   v[1] = y;
 }
 
-// The landmark from the sensor, in the sensor's axes, with its derivative by each cause that moves it.
-struct sensor_ray {
-  double v[3];
-  double by[kCauses][3];
-  double floor_m;  // distance on the floor
-};
-
-// A vector in levelled axes along the mounting's yaw, in the sensor's own axes.
-void turn_to_sensor(const mounted_sensor &sensor, const sensor_errors &errors, const double level[3], double out[3]) {
-  const double(*axis)[3] = sensor.is_steep ? kLevel : sensor.axis;
-  for (int i = 0; i < 3; i++) out[i] = axis[i][0] * level[0] + axis[i][1] * level[1] + axis[i][2] * level[2];
-  tilt(errors[kRoll], errors[kPitch], out);
+// The landmark from the sensor, in the sensor's axes: x_c, y_c, alpha of [Stepanov2017], with the mounting's height,
+// roll and pitch. floor_m: distance on the floor.
+template <class T>
+void find_ray(const mounted_sensor &sensor, const ray_view<T> &at, const double landmark_m[3], T v[3],
+              double *floor_m) {
+  const sin_cos_of<T> h = sine_cosine(at.heading_rad), m = sine_cosine(at.yaw_rad);
+  const T dx = landmark_m[0] - at.x_m, dy = landmark_m[1] - at.y_m;
+  T from[3] = {h.cos * dx + h.sin * dy - at.mount_x_m, h.cos * dy - h.sin * dx - at.mount_y_m, at.height_m};
+  *floor_m = std::sqrt(square(value_of(from[0])) + square(value_of(from[1])));
+  tilt(at.body_roll_rad, at.body_pitch_rad, from);
+  const T level[3] = {m.cos * from[0] + m.sin * from[1], m.cos * from[1] - m.sin * from[0], from[2]};
+  if (sensor.is_steep)
+    for (int i = 0; i < 3; i++) v[i] = level[i];
+  else
+    for (int i = 0; i < 3; i++)
+      v[i] = sensor.axis[i][0] * level[0] + sensor.axis[i][1] * level[1] + sensor.axis[i][2] * level[2];
+  tilt(at.roll_rad, at.pitch_rad, v);
 }
-
-void find_ray(const mounted_sensor &sensor, const sensor_errors &errors, const wm_pose2 &pose,
-              const double landmark_m[3], bool with_height, sensor_ray *out) {
-  const sin_cos h = sincos(pose.heading_rad), m = sincos(sensor.yaw_rad + errors[kYaw]);
-  const double dx = landmark_m[0] - pose.x_m, dy = landmark_m[1] - pose.y_m;
-  // In base_link, then from the sensor in levelled axes along its yaw ([Stepanov2017]: x_c, y_c, alpha).
-  const double base_x = h.cos * dx + h.sin * dy, base_y = h.cos * dy - h.sin * dx;
-  const double from_x = base_x - sensor.x_m - errors[kMountX], from_y = base_y - sensor.y_m - errors[kMountY];
-  const double up = finite(landmark_m[2]) ? landmark_m[2] - sensor.z_m : 0.0;
-  const double level[3] = {m.cos * from_x + m.sin * from_y, m.cos * from_y - m.sin * from_x, up};
-  const double c = h.cos * m.cos - h.sin * m.sin, s = h.sin * m.cos + h.cos * m.sin;  // of heading + yaw
-  turn_to_sensor(sensor, errors, level, out->v);
-  out->floor_m = std::sqrt(from_x * from_x + from_y * from_y);
-
-  const auto column = [&](int cause, double x, double y, double z) {
-    const double moved[3] = {x, y, z};
-    turn_to_sensor(sensor, errors, moved, out->by[cause]);
-  };
-  column(kByX, -c, s, 0.0);
-  column(kByY, -s, -c, 0.0);
-  column(kByHeading, m.cos * base_y - m.sin * base_x, -m.cos * base_x - m.sin * base_y, 0.0);
-  column(kBySensor + kYaw, level[1], -level[0], 0.0);
-  column(kBySensor + kMountX, -m.cos, m.sin, 0.0);
-  column(kBySensor + kMountY, -m.sin, -m.cos, 0.0);
-  const double *v = out->v;
-  const double by_roll[3] = {0.0, v[2], -v[1]}, by_pitch[3] = {-v[2], 0.0, v[0]};
-  for (int i = 0; i < 3; i++) {
-    out->by[kBySensor + kRoll][i] = by_roll[i];
-    out->by[kBySensor + kPitch][i] = by_pitch[i];
-  }
-  if (!with_height) return;
-  column(kByBodyRoll, m.sin * up, m.cos * up, -m.sin * level[0] - m.cos * level[1]);
-  column(kByBodyPitch, -m.cos * up, m.sin * up, m.cos * level[0] - m.sin * level[1]);
-  column(kByHeight, 0.0, 0.0, 1.0);
-}
-
-// The causes whose columns find_ray() fills.
-constexpr int kRayCauses[] = {kByX,
-                              kByY,
-                              kByHeading,
-                              kBySensor + kYaw,
-                              kBySensor + kMountX,
-                              kBySensor + kMountY,
-                              kBySensor + kRoll,
-                              kBySensor + kPitch,
-                              kByBodyRoll,
-                              kByBodyPitch,
-                              kByHeight};
-
-constexpr int kRayCauseCount = sizeof kRayCauses / sizeof kRayCauses[0];  // the last three by the height
 
 // A relative error of angles from the sensor's x axis moves the ray along the great circle through that axis; the
 // result is by how much of that the bearing and the elevation move, rad.
+template <class T>
 struct axis_angle {
-  double bearing, elevation;
+  T bearing, elevation;
 };
 
-axis_angle by_angle_scale(const double v[3], double flat_m, double length_m) {
-  const double off_axis = std::sqrt(v[1] * v[1] + v[2] * v[2]);
-  if (!(off_axis > 1e-6 * length_m)) return {0.0, 0.0};
-  const double angle = atan2(off_axis, v[0]);
+template <class T>
+axis_angle<T> by_angle_scale(const T v[3], const T &flat_m, const T &length_m) {
+  if (!(square(value_of(v[1])) + square(value_of(v[2])) > square(kOnAxis * value_of(length_m)))) return {0.0, 0.0};
+  const T off_axis = root(v[1] * v[1] + v[2] * v[2]), angle = atan2(off_axis, v[0]);
   return {angle * v[1] * length_m * length_m / off_axis / (flat_m * flat_m), angle * v[0] * v[2] / (off_axis * flat_m)};
 }
 
-// `causes`: of kRayCauses, as many as count; `length_m`: of the ray.
-void expect_range(const mounted_sensor &sensor, const sensor_errors &errors, const sensor_ray &ray, int causes,
-                  double length_m, expected_sighting *out) {
-  const double *v = ray.v;
-  const sin_cos axis = errors[kDepthAxis] != 0.0 ? sincos(errors[kDepthAxis]) : sin_cos{0.0, 1.0};
-  const double along[3] = {sensor.range_is_depth ? axis.cos : v[0] / length_m,
-                           sensor.range_is_depth ? axis.sin : v[1] / length_m,
-                           sensor.range_is_depth ? 0.0 : v[2] / length_m};
-  const double plain = sensor.range_is_depth ? axis.cos * v[0] + axis.sin * v[1] : length_m;
-  out->range_m = errors[kRangeScale] * plain + errors[kRangeBias];
-  for (int i = 0; i < causes; i++) {
-    const double *d = ray.by[kRayCauses[i]];
-    out->range_by[kRayCauses[i]] = errors[kRangeScale] * (along[0] * d[0] + along[1] * d[1] + along[2] * d[2]);
-  }
-  out->range_by[kBySensor + kRangeBias] = 1.0;
-  out->range_by[kBySensor + kRangeScale] = plain;
-  if (sensor.range_is_depth)
-    out->range_by[kBySensor + kDepthAxis] = errors[kRangeScale] * (axis.cos * v[1] - axis.sin * v[0]);
+template <class T>
+T expect_range(const mounted_sensor &sensor, const sensor_view<T> &at, const T &length_m) {
+  if (!sensor.range_is_depth) return at.error[kRangeScale] * length_m + at.error[kRangeBias];
+  const sin_cos_of<T> axis = sine_cosine(at.error[kDepthAxis]);
+  return at.error[kRangeScale] * (axis.cos * at.v[0] + axis.sin * at.v[1]) + at.error[kRangeBias];
+}
+
+template <class T>
+T expect_bearing(const sensor_view<T> &at, const T &flat_m, const axis_angle<T> &stretch) {
+  return wrap(atan2(at.v[1], at.v[0]) + at.error[kAngleScale] * stretch.bearing +
+              (at.error[kEccentricY] * at.v[0] - at.error[kEccentricX] * at.v[1]) / flat_m);
+}
+
+// The landmark's or the sensor's height may be unknown: then neither it nor the body's tilt moves the ray.
+ray_view<ray_jet> view_of(const mounted_sensor &sensor, const sensor_errors &errors, const wm_pose2 &pose,
+                          const double landmark_m[3], bool with_height) {
+  const auto own = [&](double calibrated, int state) {
+    return ray_jet::variable(calibrated + errors[state], kBySensor + state);
+  };
+  const auto of_height = [&](double value, int cause) {
+    return with_height ? ray_jet::variable(value, cause) : ray_jet(0.0);
+  };
+  return {.x_m = ray_jet::variable(pose.x_m, kByX),
+          .y_m = ray_jet::variable(pose.y_m, kByY),
+          .heading_rad = ray_jet::variable(pose.heading_rad, kByHeading),
+          .body_roll_rad = of_height(0.0, kByBodyRoll),
+          .body_pitch_rad = of_height(0.0, kByBodyPitch),
+          .height_m = of_height(landmark_m[2] - sensor.z_m, kByHeight),
+          .yaw_rad = own(sensor.yaw_rad, kYaw),
+          .mount_x_m = own(sensor.x_m, kMountX),
+          .mount_y_m = own(sensor.y_m, kMountY),
+          .roll_rad = own(0.0, kRoll),
+          .pitch_rad = own(0.0, kPitch)};
+}
+
+sensor_view<sensor_jet> view_of(const ray_jet ray[3], const sensor_errors &errors) {
+  sensor_view<sensor_jet> out;
+  for (int i = 0; i < 3; i++) out.v[i] = sensor_jet::variable(ray[i].value, i);
+  for (int k = kFirstOwn; k < kSensorStates; k++) out.error[k] = sensor_jet::variable(errors[k], 3 + k - kFirstOwn);
+  return out;
+}
+
+// A component's value, and its derivatives by each cause.
+double put(const sensor_jet &component, const ray_jet ray[3], double by[kCauses]) {
+  const double along[3] = {component.derivative(0), component.derivative(1), component.derivative(2)};
+  for (int c = 0; c < kBySensor + kFirstOwn; c++)
+    by[c] = along[0] * ray[0].derivative(c) + along[1] * ray[1].derivative(c) + along[2] * ray[2].derivative(c);
+  for (int k = kFirstOwn; k < kSensorStates; k++) by[kBySensor + k] = component.derivative(3 + k - kFirstOwn);
+  return component.value;
 }
 
 }  // namespace
@@ -153,40 +163,21 @@ level_ray levelled(const mounted_sensor &sensor, const sensor_errors &errors, do
 expected_sighting expect(const mounted_sensor &sensor, const sensor_errors &errors, const wm_pose2 &pose,
                          const double landmark_m[3], unsigned components) {
   expected_sighting out{};
-  sensor_ray ray;
   const bool with_height = finite(landmark_m[2]) && finite(sensor.z_m);
-  const int causes = with_height ? kRayCauseCount : kRayCauseCount - 3;
-  find_ray(sensor, errors, pose, landmark_m, with_height, &ray);
-  const double *v = ray.v, q = v[0] * v[0] + v[1] * v[1];
-  out.distance_m = ray.floor_m;
-  out.possible = q > kTouching_m2 && (!sensor.range_is_depth || v[0] > kShallow_m);
-  if (!(q > kTouching_m2)) return out;
-  const double over_q = 1.0 / q, flat = std::sqrt(q), length = std::sqrt(q + v[2] * v[2]);
+  ray_jet ray[3];
+  find_ray(sensor, view_of(sensor, errors, pose, landmark_m, with_height), landmark_m, ray, &out.distance_m);
+  const sensor_view<sensor_jet> at = view_of(ray, errors);
+  const sensor_jet q = at.v[0] * at.v[0] + at.v[1] * at.v[1];
+  out.possible = q.value > kTouching_m2 && (!sensor.range_is_depth || ray[0].value > kShallow_m);
+  if (!(q.value > kTouching_m2)) return out;
+  const sensor_jet flat = root(q), length = root(q + at.v[2] * at.v[2]);
   const bool scaled = (components & kAngleScaled) || errors[kAngleScale] != 0.0;
-  const axis_angle stretch = scaled ? by_angle_scale(v, flat, length) : axis_angle{0.0, 0.0};
-  if (components & kBearing) {
-    const double by_x = -v[1] / flat, by_y = v[0] / flat;
-    out.bearing_rad = wrap(atan2(v[1], v[0]) + errors[kAngleScale] * stretch.bearing + errors[kEccentricX] * by_x +
-                           errors[kEccentricY] * by_y);
-    for (int i = 0; i < causes; i++) {
-      const double *d = ray.by[kRayCauses[i]];
-      out.bearing_by[kRayCauses[i]] = (v[0] * d[1] - v[1] * d[0]) * over_q;
-    }
-    out.bearing_by[kBySensor + kAngleScale] = stretch.bearing;
-    out.bearing_by[kBySensor + kEccentricX] = by_x;
-    out.bearing_by[kBySensor + kEccentricY] = by_y;
-  }
-  if (components & kRange) expect_range(sensor, errors, ray, causes, length, &out);
+  const auto stretch = scaled ? by_angle_scale(at.v, flat, length) : axis_angle<sensor_jet>{0.0, 0.0};
+  if (components & kBearing) out.bearing_rad = put(expect_bearing(at, flat, stretch), ray, out.bearing_by);
+  if (components & kRange) out.range_m = put(expect_range(sensor, at, length), ray, out.range_by);
   out.elevation_rad = std::numeric_limits<double>::quiet_NaN();
-  if ((components & kElevation) && with_height) {
-    const double over_length2 = 1.0 / (length * length);
-    out.elevation_rad = atan2(v[2], flat) + errors[kAngleScale] * stretch.elevation;
-    for (int i = 0; i < causes; i++) {
-      const double *d = ray.by[kRayCauses[i]];
-      out.elevation_by[kRayCauses[i]] = (flat * d[2] - v[2] * (v[0] * d[0] + v[1] * d[1]) / flat) * over_length2;
-    }
-    out.elevation_by[kBySensor + kAngleScale] = stretch.elevation;
-  }
+  if ((components & kElevation) && with_height)
+    out.elevation_rad = put(atan2(at.v[2], flat) + at.error[kAngleScale] * stretch.elevation, ray, out.elevation_by);
   return out;
 }
 

@@ -56,10 +56,9 @@ struct sensor_errors {
 // A sighting depends on the pose (x, y, heading), on the sensor's errors, on the body's own tilt on its suspension
 // (roll about its x axis, pitch about y), and on the landmark's height. By the landmark's x, y: minus those by the
 // pose's.
-enum sighting_cause : int { kByX, kByY, kByHeading };
-inline constexpr int kBySensor = kByHeading + 1;  // and those after it, by sensor_state
-inline constexpr int kByBodyRoll = kBySensor + kSensorStates, kByBodyPitch = kByBodyRoll + 1;
-inline constexpr int kByHeight = kByBodyPitch + 1, kCauses = kByHeight + 1;
+enum sighting_cause : int { kByX, kByY, kByHeading, kByBodyRoll, kByBodyPitch, kByHeight };
+inline constexpr int kBySensor = kByHeight + 1;  // and those after it, by sensor_state
+inline constexpr int kCauses = kBySensor + kSensorStates;
 
 // Which components are wanted; the others stay 0, since each costs an arctangent.
 enum sighting_component : unsigned {

@@ -2,7 +2,7 @@
 // The table of the sensors' calibration states, for every filter that takes sightings or markers. A row gives the keys
 // and their unit, the name in calibration(), the neutral value, limits, and whether the state walks. From it follow the
 // parameters, the slots, start, process noise, roll-back, limits, the list of calibration values and the capacity. The
-// derivative of a new state stands in sensor_model.cpp; nothing else names it.
+// formula of a new state stands in sensor_model.cpp; nothing else names it.
 #ifndef WAYMARK_ESTIMATOR_SENSORS_SENSOR_STATES_H
 #define WAYMARK_ESTIMATOR_SENSORS_SENSOR_STATES_H
 

@@ -183,17 +183,15 @@ void test_expected_sighting_and_its_derivatives(void) {
     m.init(s);
     const wm_pose2 pose = {0.5, 0.3, depth ? -2.4 : 0.8};
     wm::sensor_errors errors;
-    errors[wm::kYaw] = 0.05;
-    errors[wm::kMountX] = 0.02;
-    errors[wm::kMountY] = -0.03;
+    for (int k = 0; k < wm::kSensorStates; k++) errors[k] += k % 2 ? 0.03 : -0.02;
     errors[wm::kRangeScale] = 1.04;
     errors[wm::kRangeBias] = 0.1;
-    errors[wm::kDepthAxis] = depth ? 0.02 : 0.0;
     const wm::expected_sighting e = wm::expect(m, errors, pose, landmark);
     TEST_ASSERT_TRUE(e.possible);
     const double h = 1e-6;
-    for (int k = 0; k < wm::kBySensor + wm::kSensorStates; k++) {
-      if (k == wm::kBySensor + wm::kTimeOffset) continue;  // by the motion, not by this model
+    for (int k = 0; k < wm::kCauses; k++) {
+      // The body's tilt and the height: test_landmark_elevation.cpp. The time offset is the motion's.
+      if ((k >= wm::kByBodyRoll && k < wm::kBySensor) || k == wm::kBySensor + wm::kTimeOffset) continue;
       wm_pose2 pose_at[2] = {pose, pose};
       wm::sensor_errors errors_at[2] = {errors, errors};
       wm::expected_sighting at[2];
@@ -202,8 +200,7 @@ void test_expected_sighting_and_its_derivatives(void) {
         (k < wm::kBySensor ? *pose_entry[k] : errors_at[side][k - wm::kBySensor]) += side == 0 ? h : -h;
         at[side] = wm::expect(m, errors_at[side], pose_at[side], landmark);
       }
-      // Roll and pitch are small rotations: the model is linear in them, exact at 0 alone.
-      const double within = k == wm::kBySensor + wm::kAngleScale ? 1e-4 : 1e-7;
+      const double within = 1e-8;
       TEST_ASSERT_DOUBLE_WITHIN(within, wm::wrap(at[0].bearing_rad - at[1].bearing_rad) / (2 * h), e.bearing_by[k]);
       TEST_ASSERT_DOUBLE_WITHIN(within, (at[0].range_m - at[1].range_m) / (2 * h), e.range_by[k]);
       TEST_ASSERT_DOUBLE_WITHIN(within, (at[0].elevation_rad - at[1].elevation_rad) / (2 * h), e.elevation_by[k]);

@@ -89,7 +89,7 @@ void test_expected_elevation_and_its_derivatives(void) {
         case wm::kByHeading: p.heading_rad += by; break;
         case wm::kByHeight: at[2] += by; break;
         default: {
-          if (cause < wm::kByBodyRoll) {
+          if (cause >= wm::kBySensor) {
             errors[cause - wm::kBySensor] += by;
             break;
           }
