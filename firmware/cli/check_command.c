@@ -6,10 +6,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "cli/check/changed_copy.h"
+#include "cli/causes.h"
 #include "cli/check/check.h"
 #include "cli/check/facts.h"
-#include "cli/check/trials.h"
 #include "cli/commands.h"
 #include "cli/options.h"
 #include "fusion/assembly.h"
@@ -26,8 +25,10 @@ static const char kHelp[] =
     "of\n"
     "time lost, size of the innovations, calibration, time spans of the sources, units, landmarks. Where the "
     "observations\n"
-    "contradict the poses it tries the usual mistakes (signs, units, axes, mountings, clocks, identities, wheels) and\n"
-    "names the one that explains them. Prints the facts, then a line for each finding with its fix. Exit code 2 "
+    "contradict the poses `waymark causes` tries the usual mistakes (signs, units, axes, mountings, clocks, "
+    "identities,\n"
+    "wheels) and names the one that explains them. Prints the facts, then a line for each finding with its fix. Exit "
+    "code 2 "
     "where\n"
     "something has to be corrected first.\n"
     "\n"
@@ -35,7 +36,7 @@ static const char kHelp[] =
     "  --calibration FILE  instead of the recording's\n"
     "  --map FILE          a map.yaml instead of the recording's\n"
     "  --json              facts and findings, for programs\n"
-    "  --quick             without the trials of the usual mistakes\n"
+    "  --quick             without the search for the mistake that explains them\n"
     "  --apply FOLDER      a corrected copy of the recording, and of the configuration where that has the mistake,\n"
     "                      if the trials find a cause; the originals stay\n"
     "\n"
@@ -100,6 +101,7 @@ static void take_note(void *context, const char *text) {
 
 // With --json: the facts as an object, printed at the end; NULL: none.
 static char *json_facts;
+static char *json_causes;  // likewise: the answer of the engine for causes, as it gave it
 static void keep_facts(const drive_facts *facts) {
   size_t bytes;
   FILE *to = open_memstream(&json_facts, &bytes);
@@ -113,13 +115,9 @@ static void keep_facts(const drive_facts *facts) {
 typedef struct checked {
   wm_recording *recording;
   wm_findings *found;
-  const char *dir;
-  int is_quick;          // without trials
-  const char *apply_to;  // folder of a corrected copy; NULL: none
-  clock_t begin;
+  int is_quick;  // without the search for causes
+  causes_question question;
   source_data sources;
-  source_seen seen[WM_SOURCES_MAX];
-  given_ids ids;
   drive_evidence evidence;
 } checked;
 
@@ -157,8 +155,6 @@ static void print_memory(void *context, const wm_arena_need *needs, size_t count
 static void arrived(void *context, const wm_event *event) {
   checked *self = context;
   source_data_take(&self->sources, event);
-  source_seen_take(&self->seen[event->source], event);
-  given_ids_take(&self->ids, event);
 }
 
 static void put(void *context, wm_output_kind kind, const void *record, size_t bytes) {
@@ -166,91 +162,31 @@ static void put(void *context, wm_output_kind kind, const void *record, size_t b
   evidence_put(&((checked *)context)->evidence, kind, record);
 }
 
-// Writes the corrected copy and prints its path.
-static void apply(checked *self, const trials_plan *plan, const suspect *of, size_t count) {
-  file_edit edits[TRIAL_EDITS_MAX];
-  wm_error err = {0};
-  changed_copy copy = {.dir = self->dir};
-  char config[WM_PATH_MAX];
-  const size_t edit_count = trials_edits(plan, of, count, edits);
-  (void)snprintf(copy.out, sizeof copy.out, "%s", self->apply_to);
-  wm_status status =
-      changed_copy_make(&copy, &plan->config->overrides, edits, edit_count, "waymark check --apply", &err);
-  if (status == WM_OK)
-    status = changed_copy_config(&copy, plan->config, edits, edit_count, "waymark check --apply", config, &err);
-  if (status != WM_OK) {
-    wm_find_error(self->found, "apply", &err);
+// Which mistake in the files explains what was found? The engine that answers is the desk's.
+static void ask_for_causes(checked *self) {
+  causes_answer answer;
+  const size_t consequences = self->found->count;
+  causes_ask(&self->question, self->found, &answer);
+  if (!answer.is_installed) {
+    fact(
+        "causes       not searched: waymark-causes is not installed here; at a desk with Waymark's Python package, "
+        "check\n"
+        "             tries the usual mistakes in the files, and names the one that explains these findings\n");
     return;
   }
-  fact("applied      %s: the recording with %zu changes; all other files are links\n", self->apply_to, edit_count);
-  if (config[0]) fact("applied      %s: the configuration for it\n", config);
-}
-
-// A finding with what a suspect is, the rest of the sentence, and the lines that undo it.
-__attribute__((format(printf, 5, 6))) static void name_cause(checked *self, const trials_plan *plan, const suspect *one,
-                                                             wm_severity severity, const char *format, ...) {
-  char what[200], more[200], fix[WM_FINDING_FIX_MAX];
-  file_edit edits[TRIAL_EDITS_MAX];
-  va_list arguments;
-  suspect_text(one, plan->assembly, plan->files, what, sizeof what);
-  va_start(arguments, format);
-  (void)vsnprintf(more, sizeof more, format, arguments);
-  va_end(arguments);
-  changed_lines(self->dir, &plan->config->overrides, edits, trials_edits(plan, one, 1, edits), fix, sizeof fix);
-  wm_find(self->found, WM_FOUND_LIKELY_CAUSE, severity, "cause", fix, "%s%s", what, more);
-}
-
-// Where a counter or a gyro stands, nothing else is to blame, unless its signal is read from a wrong place.
-static size_t suspects_of(const checked *self, const wm_assembly *assembly, const suspect_files *files,
-                          suspect list[SUSPECTS_MAX]) {
-  const size_t count = suspects_list(assembly, files, self->seen, list);
-  if (!wm_findings_has(self->found, WM_FOUND_MOTION_SENSOR, "can")) return count;
-  size_t kept = 0;
-  for (size_t i = 0; i < count; i++)
-    if (list[i].kind == SUSPECT_NONE || list[i].kind == SUSPECT_SIGNAL) list[kept++] = list[i];
-  return kept;
-}
-
-// The usual mistakes, one after the other, undone: which of them explains the observations?
-static void try_suspects(checked *self, const wm_assembly *assembly, double recorded_s) {
-  static suspect list[SUSPECTS_MAX];
-  static suspect_files files;
-  static trials_found found;
-  const double drive_s = (double)(clock() - self->begin) / CLOCKS_PER_SEC;
-  progress_line progress;
-  progress_begin(&progress);
-  suspect_files_read(&files, assembly->config, self->dir);
-  const trials_plan plan = {.config = assembly->config,
-                            .assembly = assembly,
-                            .dir = self->dir,
-                            .files = &files,
-                            .suspects = list,
-                            .count = suspects_of(self, assembly, &files, list),
-                            .ids = &self->ids,
-                            .drive_s = drive_s,
-                            .recorded_s = recorded_s,
-                            .progress = progress_show,
-                            .progress_context = &progress};
-  trials_run(&plan, &found);
-  progress_end(&progress);
-  fact("trials       %zu usual mistakes tried: %s\n", plan.count - 1,
-       found.count > 0 ? "found what explains the observations" : "none of them explains the observations");
-  const size_t consequences = self->found->count;
-  const double before = 100 * found.before.explained, after = 100 * found.after.explained;
-  for (size_t i = 0; i < found.count; i++) {
-    if (found.before.is_valid)
-      name_cause(self, &plan, &found.at[i], WM_SEVERITY_BAD,
-                 ": corrected in a trial, %.0f %% of the updates fit (now %.0f %%), and each is %.1f times as likely",
-                 after, before, exp(fmin(20, found.after.score - found.before.score)));
-    else
-      name_cause(self, &plan, &found.at[i], WM_SEVERITY_BAD,
-                 ": corrected in a trial, %.0f %% of the updates fit (now there is none)", after);
+  if (!answer.is_answered) {
+    fact("causes       not searched: waymark-causes ended without an answer\n");
+    return;
   }
-  for (size_t i = 0; i < found.equal_count; i++)
-    name_cause(self, &plan, &found.equal[i], WM_SEVERITY_NOTE,
-               ": explains the observations as well as the cause above; find out which of the two is true");
-  if (found.count > 0 && self->apply_to) apply(self, &plan, found.at, found.count);
+  fact("trials       %" PRIu64 " usual mistakes tried: %s\n", answer.rows,
+       answer.is_found       ? "found what explains the observations"
+       : answer.is_undecided ? "several explain the observations alike"
+                             : "none of them explains the observations");
+  if (answer.applied[0][0])
+    fact("applied      %s: the corrected recording; all other files are links\n", answer.applied[0]);
+  if (answer.applied[1][0]) fact("applied      %s: the configuration for it\n", answer.applied[1]);
   wm_findings_to_front(self->found, consequences);
+  json_causes = answer.json;
 }
 
 static void ended(void *context, const wm_assembly *assembly, const wm_run_report *report) {
@@ -268,21 +204,19 @@ static void ended(void *context, const wm_assembly *assembly, const wm_run_repor
   wm_health_map_findings(&report->health, self->found);
   clock_data_judge_unused(&self->sources.clocks, &report->health, self->found);
   check_unused(&self->evidence, &self->sources, &report->health, wm_recording_quantities(self->recording), self->found);
-  if (wm_findings_of(self->found, WM_SEVERITY_BAD) > bad && !self->is_quick)
-    try_suspects(self, assembly, report->recorded_s);
+  if (wm_findings_of(self->found, WM_SEVERITY_BAD) > bad && !self->is_quick) ask_for_causes(self);
 }
 
-static void check_recording(const wm_config *config, const char *dir, int is_quick, const char *apply_to,
+static void check_recording(const wm_config *config, const causes_question *question, int is_quick,
                             wm_findings *found) {
   static checked self;
   static wm_run_report report;
   wm_error err = {0};
   self.found = found;
-  self.dir = dir;
+  self.question = *question;
   self.is_quick = is_quick;
-  self.apply_to = apply_to;
-  self.begin = clock();
-  wm_status status = wm_recording_open(dir, &config->overrides, take_note, found, &self.recording, &err);
+  wm_status status =
+      wm_recording_open(question->recording, &config->overrides, take_note, found, &self.recording, &err);
   if (status != WM_OK) {
     wm_find_error(found, "recording", &err);
     return;
@@ -297,7 +231,6 @@ static void check_recording(const wm_config *config, const char *dir, int is_qui
   progress_end(&progress);
   if (status != WM_OK) wm_find_error(found, "setup", &err);
   wm_recording_close(self.recording);
-  given_ids_free(&self.ids);
   source_data_free(&self.sources);
 }
 
@@ -345,10 +278,11 @@ static int tell(const wm_findings *found) {
     wm_findings_print(found, stdout);
     if (is_good) (void)puts("good");
   } else {
-    (void)printf("{\n  \"good\": %s,\n  \"facts\": %s,\n  \"findings\": ", is_good ? "true" : "false",
-                 json_facts ? json_facts : "null");
+    (void)printf("{\n  \"good\": %s,\n  \"facts\": %s,\n  \"causes\": %s,\n  \"findings\": ",
+                 is_good ? "true" : "false", json_facts ? json_facts : "null", json_causes ? json_causes : "null");
     free(json_facts);
-    json_facts = NULL;
+    free(json_causes);
+    json_facts = json_causes = NULL;
     wm_findings_json(found, stdout);
     (void)fputs("\n}\n", stdout);
   }
@@ -395,7 +329,8 @@ int command_check(int argc, char *const *argv) {
   }
   check_config(&config, &found);
   if (count > 1)
-    check_recording(&config, words[1], is_quick, apply_to, &found);
+    check_recording(&config, &(causes_question){words[0], words[1], landmarks, calibration, map, apply_to}, is_quick,
+                    &found);
   else if (wm_devices_count(&config.devices) > 0)
     check_devices(&config, &found);
   wm_config_free(&config);

@@ -38,6 +38,7 @@ static const struct {
 } kDesk[] = {
     {"batch", "replay and judge many recordings on all cores", "waymark-fleet"},
     {"calibrate", "find a camera's lens and mounting; read calibrations of other programs", "waymark-calibrate"},
+    {"causes", "find the mistake in the files that explains a drive", "waymark, of Python (pip)"},
     {"compare", "what a change did to all drives of a batch", "waymark-fleet"},
     {"detect", "run a detector on pictures: what it finds, drawn and as a table", "waymark-tools"},
     {"diff", "compare two runs: what differs, and where the difference begins", "waymark-tools"},

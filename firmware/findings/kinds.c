@@ -69,6 +69,9 @@ const wm_finding_kind kFindingKinds[WM_FOUND_COUNT] = {
                                    "correct the sensor that differs from the robot's real motion"},
     [WM_FOUND_LIKELY_CAUSE] = {"likely-cause", "a usual mistake, which was undone in a trial of the recording",
                                "write what is proposed, and check again"},
+    [WM_FOUND_CAUSE_UNDECIDED] = {"cause-undecided",
+                                  "one of several mistakes, or none: this drive does not tell them apart",
+                                  "measure what is named, or drive with turns and changes of speed"},
     [WM_FOUND_OBSERVATIONS_REFUSED] =
         {"observations-refused", "a wrong pose, clock, mounting, identity or map: what is observed contradicts it",
          "see the other findings; `waymark check CONFIG RECORDING` tries the usual causes"},

@@ -1,0 +1,230 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Mistakes of sizes drawn at random in the files of robots that are written here: `waymark causes` has to name each with its size,
+and no other; the corrected copy has to be right. Right drives, and a drive that cannot tell two mistakes apart, name none.
+
+    causes.py BIN_DIR SOURCE_DIR [--only WORD[,WORD]] [--rounds N] [--json]
+
+A row a drive: what was planted, what was named, its size against the planted one, and whether the corrected copy is right."""
+import json
+import math
+import pathlib
+import random
+import re
+import subprocess
+import sys
+import tempfile
+import time
+
+import replays
+import small_robot
+
+SIZE_WITHIN = 0.25  # of the planted size: a filter's own states take a part of it
+
+
+# ── robots ───────────────────────────────────────────────────────────────────────────────────────────────────────────
+
+def landmarks_robot(folder, seed):
+    small_robot.write(folder, seed)
+
+
+def satellites_robot(folder, seed, constant=False):
+    """Twist and positions of an antenna (0.3, 0, 1) m; curves and changes of speed, or one speed on a straight."""
+    rng, duration_s, step = random.Random(seed), 60.0, 0.02
+    x, y, heading, motion, gnss = 0.0, 0.0, 0.3, [], []
+    for k in range(round(duration_s / step)):
+        t = k * step
+        v = 1.5 if constant else 1.2 + 0.7 * math.sin(0.5 * t)
+        w = 0.0 if constant else 0.5 * math.sin(0.23 * t) + 0.25 * math.sin(0.9 * t)
+        stamp = small_robot.START_NS + round(t * 1e9)
+        motion.append({"t_ns": stamp, "v_mps": v + rng.gauss(0, 0.02), "w_radps": w + rng.gauss(0, 0.005)})
+        if k % 10 == 0:
+            gnss.append({"t_ns": stamp, "x_m": x + 0.3 * math.cos(heading) + rng.gauss(0, 0.02), "y_m": y + 0.3 * math.sin(heading) + rng.gauss(0, 0.02),
+                         "sigma_xy_m": 0.03})
+        x, y, heading = x + v * step * math.cos(heading + w * step / 2), y + v * step * math.sin(heading + w * step / 2), heading + w * step
+    folder.mkdir(parents=True)
+    (folder / "motion.csv").write_text(small_robot.table(motion))
+    (folder / "gnss.csv").write_text(small_robot.table(gnss))
+    (folder / "calibration.yaml").write_text("gnss: {mounting: {xyz_m: [0.3, 0, 1]}}\n")
+    (folder / "recording.yaml").write_text("format: waymark-recording/1\nname: satellites\nstreams: [motion.csv, gnss.csv, calibration.yaml]\n"
+                                           "vehicle:\n  initial_pose: {x_m: 0, y_m: 0, heading_rad: 0.3}\n")
+
+
+# ── mistakes ─────────────────────────────────────────────────────────────────────────────────────────────────────────
+# Each draws a size and returns the changes of the files, the name of the row that has to be named, and the size that undoes it.
+
+def each(**columns):
+    def change(row):
+        for name, function in columns.items():
+            if row.get(name):
+                value = function(float(row[name]))
+                row[name] = str(value) if isinstance(value, int) else f"{value:.6f}"
+    return replays.each_row(change)
+
+
+def stamps(function):
+    return replays.each_row(lambda row: row.update({n: str(function(int(row[n]))) for n in ("t_ns", "arrival_ns") if row.get(n)}))
+
+
+def value(pattern, new):
+    def change(whole):
+        assert re.search(pattern, whole), pattern
+        return re.sub(pattern, new, whole)
+    return change
+
+
+def signed(rng, low, high):
+    return rng.choice((-1, 1)) * rng.uniform(low, high)
+
+
+def map_scale(rng):
+    f = 1 + signed(rng, 0.04, 0.15)
+    return {"landmarks.csv": each(x_m=lambda x: f * x, y_m=lambda y: f * y)}, "scale of the map", [1 / f]
+
+
+def clock(rng):
+    s = signed(rng, 0.6, 4)
+    return {"sightings.csv": stamps(lambda t: t + round(s * 1e9))}, "clock of sightings:front", [-s]
+
+
+def yaw(rng):
+    a = signed(rng, 25, 175)
+    return {"calibration.yaml": value(r"rpy_deg: \[0, 0, 0\]", f"rpy_deg: [0, 0, {a:.1f}]")}, "yaw of sightings:front", [math.radians(3 - a)]
+
+
+def place(rng):
+    x, y = signed(rng, 0.25, 0.8), signed(rng, 0.25, 0.8)
+    return {"calibration.yaml": value(r"xyz_m: \[0.1, 0, 0.2\]", f"xyz_m: [{0.1 + x:.3f}, {y:.3f}, 0.2]")}, "place of sightings:front", [-x, -y]
+
+
+def tick(rng):
+    f = rng.uniform(1.2, 1.9)
+    return {"calibration.yaml": value(r"radius_m: 0.05", f"radius_m: {0.05 * f:.5f}")}, "way of a tick", [1 / f]
+
+
+def track(rng):
+    f = rng.uniform(1.5, 3)
+    return {"calibration.yaml": value(r"track_m: 0.3", f"track_m: {0.3 * f:.4f}")}, "wheels.track_m", [1 / f]
+
+
+def ranges(rng):
+    f = 1 + signed(rng, 0.12, 0.3)
+    return {"sightings.csv": each(range_m=lambda r: f * r)}, "ranges of sightings:front", [1 / f]
+
+
+def exchange(rng):
+    a, b = sorted(rng.sample(range(1, 13), 2))
+    return {"sightings.csv": each(id=lambda i: {a: b, b: a}.get(int(i), int(i)))}, f"landmarks {a} and {b}", [1.0]
+
+
+def lag(rng):
+    rate = rng.uniform(0.008, 0.04)
+    begin = small_robot.START_NS
+    return {"sightings.csv": stamps(lambda t: t + round(rate * (t - begin)))}, "drift of sightings:front", [rate / (1 + rate)]
+
+
+def bearings(rng):
+    return {"sightings.csv": each(bearing_rad=lambda b: -b)}, "bearings of sightings:front times -1", [1.0]
+
+
+def gyro(rng):
+    return {"can-signals.yaml": value("signal: GYRO_Z", "signal: GYRO_Z, scale: -1")}, "yaw_rate times -1", [1.0]
+
+
+def antenna(rng):
+    x, y = signed(rng, 0.8, 2), signed(rng, 0.8, 2)
+    return {"calibration.yaml": value(r"\[0.3, 0, 1\]", f"[{0.3 + x:.3f}, {y:.3f}, 1]")}, "place of gnss", [-x, -y]
+
+
+def receiver(rng):
+    s = signed(rng, 1.2, 4)
+    return {"gnss.csv": stamps(lambda t: t + round(s * 1e9))}, "clock of gnss", [-s]
+
+
+def mirrored(rng):
+    return {"gnss.csv": each(y_m=lambda y: -y)}, "y of gnss", [1.0]
+
+
+def turn_rate(rng):
+    return {"motion.csv": each(w_radps=lambda w: -w)}, "turn rate times -1", [1.0]
+
+
+def none(rng):
+    return {}, None, []
+
+
+PLANTED = [(landmarks_robot, m) for m in (none, map_scale, clock, yaw, place, tick, track, ranges, exchange, lag, bearings, gyro)]
+PLANTED += [(satellites_robot, m) for m in (none, antenna, receiver, mirrored, turn_rate)]
+ALIKE = (lambda folder, seed: satellites_robot(folder, seed, True), receiver)  # at one speed: a clock, or a place along the way
+
+
+# ── judgement ────────────────────────────────────────────────────────────────────────────────────────────────────────
+
+def is_size(name, named, planted):
+    """Within a quarter of the planted mistake: of a factor, of its distance from 1; of an angle, within a turn."""
+    neutral = 1 if name.startswith(("scale", "ranges", "way", "wheels")) else 0
+    pairs = [(math.remainder(a - b, 2 * math.pi) if name.startswith("yaw") else a - b, b - neutral) for a, b in zip(named, planted)]
+    return len(named) == len(planted) and all(abs(d) <= SIZE_WITHIN * max(abs(b), 0.02) for d, b in pairs)
+
+
+def judge(options, robot, mistake, seed, folder):
+    recording, made, fixed = folder / "right", folder / "made", folder / "fixed"
+    robot(recording, seed)
+    changes, name, size = mistake(random.Random(seed))
+    if changes:
+        replays.copy_changed(recording, made, changes)
+    made = made if changes else recording
+    config = options.source_dir / "config/robot.yaml"
+    begun = time.monotonic()
+    done = subprocess.run([options.bin_dir / "waymark", "causes", config, made, "--json", "--apply", fixed], capture_output=True, text=True)
+    row = {"robot": robot.__name__, "planted": mistake.__name__, "seed": seed, "size": size, "seconds": round(time.monotonic() - begun, 1)}
+    if done.returncode == 1:
+        return row | {"named": done.stderr.strip(), "is_right": False, "is_wrong": False}
+    found = json.loads(done.stdout)
+    causes = found["causes"]
+    row["named"] = "; ".join(f"{c['name']} {c['size']}" for c in causes) or ("either: " + " | ".join(c["name"] for c in found["undecided"]) if found["undecided"] else "-")
+    row["drives"] = found["drives"]
+    row["is_wrong"] = bool(causes) and causes[0]["name"] != name
+    row["is_right"] = not causes if name is None else [c["name"] for c in causes] == [name] and is_size(name, causes[0]["size"], size)
+    row["fixed"] = corrected(options, config, fixed) if fixed.is_dir() else "-"
+    return row
+
+
+def corrected(options, config, fixed):
+    done = subprocess.run([options.bin_dir / "waymark", "check", config, fixed, "--quick"], capture_output=True, text=True)
+    return "good" if done.returncode == 0 else "bad"
+
+
+def show(options, row):
+    text = json.dumps(row) if options.json else (f"{row['robot']:17} {row['planted']:10} seed {row['seed']:3}  {'right' if row['is_right'] else 'WRONG' if row['is_wrong'] else 'none':5} "
+                                                 f"fixed {row.get('fixed', '-'):4} {row['seconds']:5.1f} s  planted {[round(s, 3) for s in row['size']]}: {row['named']}")
+    print(text, flush=True)
+
+
+def main():
+    parser = replays.parser(__doc__, "mistakes whose name contains one of the words", has_data=False)
+    parser.add_argument("--rounds", type=int, default=3, help="sizes of each")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--alike", action="store_true", help="also the drive that cannot tell")
+    options = parser.parse_args()
+    small_robot.DURATION_S = 60.0
+    rows = []
+    for number in range(options.rounds):
+        for robot, mistake in PLANTED:
+            if replays.is_chosen(options, mistake.__name__):
+                with tempfile.TemporaryDirectory() as folder:
+                    rows.append(judge(options, robot, mistake, options.seed + number, pathlib.Path(folder)))
+                show(options, rows[-1])
+    if options.alike:
+        with tempfile.TemporaryDirectory() as folder:
+            row = judge(options, *ALIKE, options.seed, pathlib.Path(folder))
+        rows.append(row | {"is_right": row["named"].startswith("either") or row["named"] == "-", "is_wrong": row["named"][0] not in "e-"})
+        show(options, rows[-1])
+    right, wrong = sum(r["is_right"] for r in rows), sum(r["is_wrong"] for r in rows)
+    bad = sum(r.get("fixed") == "bad" for r in rows)
+    print(f"{len(rows)} drives, {right} right, {wrong} with a wrong cause, {bad} corrected copies that are not right", file=sys.stderr)
+    return int(wrong > 0 or bad > 0 or right < 0.85 * len(rows))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,337 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Changes of a recording's files and of its configuration, and a copy of the recording that has them. The copy links to the
+unchanged files; the originals are only read."""
+
+import io
+import math
+import re
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import yaml
+from PIL import Image
+
+CONFIG = ""
+"""In place of a file's name: the configuration."""
+
+
+class Impossible(ValueError):
+    """The file has nothing that the change is for."""
+
+
+@dataclass(frozen=True)
+class Edit:
+    """A change of one file."""
+
+    file: str
+
+    def apply(self, before: bytes) -> bytes:
+        """The changed file."""
+        raise NotImplementedError
+
+    def words(self) -> str:
+        """What is done to a table or a picture; "" where the changed line shows it."""
+        return ""
+
+    def line(self, before: bytes, after: bytes) -> str:
+        """FILE:LINE: what to write."""
+        old, new = before.decode("utf-8", "replace").splitlines(), after.decode("utf-8", "replace").splitlines()
+        number = next((i for i, text in enumerate(new) if i >= len(old) or text != old[i]), 0)
+        words = self.words()
+        shown = new[number].strip() if new else ""
+        shown = shown if len(shown) <= 90 else shown[:87] + "..."
+        return f"{self.file}:{number + 1}: {words + ': ' if words else ''}`{shown}`{' and so each row' if words else ''}"
+
+
+# ── tables ───────────────────────────────────────────────────────────────────────────────────────────────────────────
+
+@dataclass(frozen=True)
+class Rows(Edit):
+    """Fields of each row by a function; `only` rows of this sensor."""
+
+    columns: tuple[str, ...]
+    change: Callable[..., Sequence[str]]
+    said: str
+    only: str = ""
+    optional: bool = False
+
+    def words(self) -> str:
+        return self.said
+
+    def apply(self, before: bytes) -> bytes:
+        head, *lines = before.decode().splitlines()
+        names = head.strip().split(",")
+        if not set(self.columns) <= set(names):
+            if self.optional:
+                return before
+            raise Impossible(f"{self.file} has no {', '.join(self.columns)}")
+        at = [names.index(name) for name in self.columns]
+        sensor = names.index("sensor") if self.only and "sensor" in names else -1
+        out = [head]
+        for line in lines:
+            row = line.split(",")
+            if len(row) > max(at) and (sensor < 0 or row[sensor] == self.only):
+                for i, value in zip(at, self.change(*(row[i] for i in at))):
+                    row[i] = value
+                line = ",".join(row)
+            out.append(line)
+        return ("\n".join(out) + "\n").encode()
+
+
+def _number(factor: float, offset: float, text: str) -> str:
+    try:
+        if re.fullmatch(r"[+-]?\d+", text) and float(factor).is_integer() and float(offset).is_integer():
+            return str(int(text) * int(factor) + int(offset))
+        return f"{factor * float(text) + offset:.12g}"
+    except ValueError:
+        return text  # empty, or no number: stays
+
+
+def column(file: str, name: str, factor: float = 1, offset: float = 0, only: str = "", optional: bool = False) -> Rows:
+    """A column's numbers times `factor` plus `offset`."""
+    if offset and factor != 1:
+        said = f"{name} = {offset:.9g} {factor:+.9g} {name}"
+    else:
+        said = f"{name} {offset:+.12g}" if offset else f"{name} times {factor:.9g}"
+    return Rows(file, (name,), lambda text: [_number(factor, offset, text)], said, only, optional)
+
+
+def stretched(file: str, name: str, rate: float, begin: int, only: str = "", optional: bool = False) -> Rows:
+    """Stamps less `rate` times the time since `begin`, ns."""
+    def change(text: str) -> list[str]:
+        return [str(int(text) - round(rate * (int(text) - begin)))] if re.fullmatch(r"-?\d+", text) else [text]
+    return Rows(file, (name,), change, f"{name} less {rate:.5g} times the time since the start", only, optional)
+
+
+def swapped(file: str, a: str, b: str) -> Rows:
+    """Two columns exchanged."""
+    return Rows(file, (a, b), lambda x, y: (y, x), f"swap the columns {a} and {b}")
+
+
+def identities(file: str, table: dict[int, int], only: str = "") -> Rows:
+    """Other identities."""
+    sums = {a + b for a, b in table.items()}
+    said = f"id = {sums.pop()} - id: " if len(sums) == 1 and len(table) > 2 else ""
+    said += "id " + ", ".join(f"{a} -> {b}" for a, b in sorted(table.items()))
+    return Rows(file, ("id",), lambda text: [str(table.get(int(text), int(text))) if re.fullmatch(r"-?\d+", text) else text],
+                said, only)
+
+
+@dataclass(frozen=True)
+class Sorted(Edit):
+    """Rows in the order of their stamps."""
+
+    def words(self) -> str:
+        return "sort the rows by t_ns"
+
+    def apply(self, before: bytes) -> bytes:
+        head, *lines = before.decode().splitlines()
+        at = head.split(",").index("t_ns")
+        lines.sort(key=lambda line: int(line.split(",")[at]))
+        return ("\n".join([head, *lines]) + "\n").encode()
+
+
+# ── YAML ─────────────────────────────────────────────────────────────────────────────────────────────────────────────
+
+@dataclass(frozen=True)
+class Value(Edit):
+    """A value of a YAML file at a path of keys and indices; other text, and comments, stay."""
+
+    path: tuple[str | int, ...]
+    text: str
+
+    def apply(self, before: bytes) -> bytes:
+        text = before.decode()
+        node, walked = yaml.compose(text, yaml.SafeLoader), 0
+        for step in self.path:
+            below = _child(node, step)
+            if below is None:
+                break
+            node, walked = below, walked + 1
+        if walked == len(self.path):
+            return (text[:node.start_mark.index] + self.text + text[_end(text, node):]).encode()
+        return _inserted(text, node, self.path[walked:], self.text, self.file).encode()
+
+    def line(self, before: bytes, after: bytes) -> str:
+        whole = super().line(before, after)
+        return f"{':'.join(whole.split(':')[:2])}: `{self.path[-1]}: {self.text}`"
+
+    def dotted(self) -> str:
+        """The path as a key of the configuration."""
+        return ".".join(str(step) for step in self.path)
+
+
+def _end(text: str, node: yaml.Node) -> int:
+    end: int = node.end_mark.index
+    while end > node.start_mark.index and text[end - 1].isspace():
+        end -= 1
+    return end
+
+
+def _child(node: yaml.Node | None, step: str | int) -> yaml.Node | None:
+    if isinstance(node, yaml.SequenceNode) and isinstance(step, int) and step < len(node.value):
+        return node.value[step]  # type: ignore[no-any-return]
+    if isinstance(node, yaml.MappingNode):
+        return next((value for key, value in node.value if key.value == step), None)
+    return None
+
+
+def _inserted(text: str, node: yaml.Node | None, path: tuple[str | int, ...], value: str, file: str) -> str:
+    for step in reversed(path[1:]):
+        value = f"{{{step}: {value}}}"
+    if node is None:
+        return f"{text.rstrip()}\n{path[0]}: {value}\n".lstrip()
+    if not isinstance(node, yaml.MappingNode) or isinstance(path[0], int):
+        raise Impossible(f"{file} has no {'.'.join(map(str, path))}")
+    if node.flow_style:
+        at = node.start_mark.index + 1
+        return f"{text[:at]}{path[0]}: {value}{', ' if node.value else ''}{text[at:]}"
+    at = node.value[0][0].start_mark
+    return f"{text[:at.index]}{path[0]}: {value}\n{' ' * at.column}{text[at.index:]}"
+
+
+def numbers(values: Iterable[float]) -> str:
+    """A list of numbers in YAML."""
+    return "[" + ", ".join(f"{value + 0.0:.6g}" for value in values) + "]"
+
+
+# ── DBC ──────────────────────────────────────────────────────────────────────────────────────────────────────────────
+
+_LAYOUT = re.compile(r"(\d+)\|(\d+)@([01])([+-])\s*\(([^,]+),([^)]+)\)")
+
+
+@dataclass(frozen=True)
+class Signal(Edit):
+    """A signal of a DBC: the other byte order (of the same bytes, or of the same first bit), the other sign, or a first bit that
+    is off by some."""
+
+    message: str
+    signal: str
+    layout: str  # "order", "order, start", "sign", "bit"
+    shift: int = 0
+
+    def apply(self, before: bytes) -> bytes:
+        text = before.decode("utf-8", "replace")
+        found = re.search(rf"(?m)^\s*BO_ \d+ {re.escape(self.message)}\s*:(?:(?!^\s*BO_ ).|\n)*?^\s*SG_ {re.escape(self.signal)}\s[^:]*:\s*", text)
+        layout = _LAYOUT.match(text, found.end()) if found else None
+        if not layout:
+            raise Impossible(f"{self.file} has no signal {self.signal}")
+        start, bits, order, sign, scale, offset = layout.groups()
+        first = int(start) + self.shift
+        if first < 0:
+            raise Impossible("no bit before the first")
+        if self.layout == "order":  # Intel counts from a byte's lowest bit, Motorola begins at its highest one
+            first = first // 8 * 8 + (7 if order == "1" else 0)
+        order = {"0": "1", "1": "0"}[order] if self.layout.startswith("order") else order
+        sign = {"+": "-", "-": "+"}[sign] if self.layout == "sign" else sign
+        return f"{text[:layout.start()]}{first}|{bits}@{order}{sign} ({scale},{offset}){text[layout.end():]}".encode()
+
+
+# ── pictures ─────────────────────────────────────────────────────────────────────────────────────────────────────────
+
+@dataclass(frozen=True)
+class Mirrored(Edit):
+    """A floor plan's picture with left and right, or top and bottom, exchanged."""
+
+    upside_down: bool
+
+    def words(self) -> str:
+        return f"mirror the picture ({'top and bottom' if self.upside_down else 'left and right'})"
+
+    def apply(self, before: bytes) -> bytes:
+        out = io.BytesIO()
+        way = Image.Transpose.FLIP_TOP_BOTTOM if self.upside_down else Image.Transpose.FLIP_LEFT_RIGHT
+        with Image.open(io.BytesIO(before)) as picture:
+            picture.transpose(way).save(out, "PNG")
+        return out.getvalue()
+
+    def line(self, before: bytes, after: bytes) -> str:
+        return f"{self.file}: {self.words()}"
+
+
+# ── a copy ───────────────────────────────────────────────────────────────────────────────────────────────────────────
+
+@dataclass
+class Files:
+    """Where the files are: of the recording, those that the configuration or the command line names in their place, and the
+    configuration. `named`: by the file's name in a recording."""
+
+    recording: Path
+    config: Path
+    named: dict[str, Path] = field(default_factory=dict)
+
+    def read(self, file: str) -> bytes:
+        """A file as it is."""
+        path = self.config if file == CONFIG else self.named.get(file, self.recording / file)
+        if not path.is_file():
+            raise Impossible(f"{path} is not there")
+        return path.read_bytes()
+
+    def edited(self, edits: Sequence[Edit], file: str) -> bytes:
+        """A file with all of its edits."""
+        data = self.read(file)
+        for edit in edits:
+            data = edit.apply(data) if edit.file == file else data
+        return data
+
+    def copy(self, edits: Sequence[Edit], out: Path) -> dict[str, Path]:
+        """Makes the folder `out`: the recording with the edits. Returns the changed ones of the `named` files."""
+        changed = {edit.file for edit in edits if edit.file != CONFIG}
+        _link(self.recording.resolve(), out, "", changed)
+        for file in changed:
+            (out / file).parent.mkdir(parents=True, exist_ok=True)
+            (out / file).write_bytes(self.edited(edits, file))
+        return {file: out / file for file in changed if file in self.named}
+
+    def lines(self, edits: Sequence[Edit]) -> str:
+        """What to write, and where."""
+        out = []
+        for edit in edits:
+            before = self.read(edit.file)
+            after = edit.apply(before)
+            if after != before and not (isinstance(edit, Rows) and edit.optional):
+                line = edit.line(before, after)
+                out.append(f"{self.config}{line}" if edit.file == CONFIG else line)
+        return "; ".join(out)
+
+    def apply(self, edits: Sequence[Edit], out: Path) -> Path | None:
+        """Writes the corrected copy that a person asked for: with a comment at what was changed. Returns the configuration in it
+        where that is changed, or names a file that is."""
+        if out.exists():
+            raise FileExistsError(f"{out}: is there already; name a new folder")
+        moved = self.copy(edits, out)
+        notes = [f"# waymark check --apply: {edit.file}: {edit.words() or edit.line(self.read(edit.file), edit.apply(self.read(edit.file)))}"
+                 for edit in edits if edit.file != CONFIG]
+        meta = out / "recording.yaml"
+        text = meta.read_text()
+        meta.unlink()
+        meta.write_text(text.rstrip() + "\n" + "\n".join(notes) + "\n")
+        if not moved and not any(edit.file == CONFIG for edit in edits):
+            return None
+        config = self.edited(edits, CONFIG)
+        for file, path in {**self.named, **moved}.items():
+            key = NAMED[file]
+            config = Value(CONFIG, (key,), f'"{path.resolve()}"').apply(config)
+        (out / self.config.name).write_bytes(config)
+        return out / self.config.name
+
+
+NAMED = {"calibration.yaml": "calibration", "landmarks.csv": "landmarks", "vehicle.dbc": "dbc", "can-signals.yaml": "can_signals",
+         "map/map.yaml": "map"}
+"""Files of a recording that a configuration may name in their place, by its keys."""
+
+
+def _link(original: Path, out: Path, inner: str, changed: set[str]) -> None:
+    out.mkdir(parents=True)
+    for path in original.iterdir():
+        name = f"{inner}{path.name}"
+        if path.is_dir() and any(file.startswith(f"{name}/") for file in changed):
+            _link(path, out / path.name, f"{name}/", changed)
+        elif name not in changed:
+            (out / path.name).symlink_to(path)
+
+
+def degrees(radians: float) -> float:
+    """Within half a turn."""
+    return math.degrees(math.remainder(radians, 2 * math.pi))

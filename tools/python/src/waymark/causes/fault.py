@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A row of the table of mistakes."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from .changes import Edit
+
+DEG = math.pi / 180
+LENGTHS = (0.001, 0.01, 0.0254, 0.3048, 0.1, 1000.0)
+"""Factors from mm, cm, inches, feet, dm, and of metres that were taken for mm."""
+NEAR = (0.8, 0.9, 0.95, 1.05, 1.1, 1.25)
+"""Factors of a scale that is some per cent off; between them its size is fitted."""
+NAMED = 0.04  # of a factor: within it of a unit's, it is that unit
+_UNITS = {0.001: "in mm", 0.01: "in cm", 0.0254: "in inches", 0.3048: "in feet", 0.1: "in dm", 1000.0: "in km", DEG: "in degrees", 1 / DEG: "in rad",
+          1 / 3.6: "in km/h", 0.44704: "in mph"}
+
+Size = tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A mistake. `start`: sizes to begin with. With `step` its size is fitted, in logarithms where `is_log`, to `smallest`. `group`:
+    rows of one group have one effect; where a drive cannot tell them apart, the likeliest is named with the others. `prior`: log
+    odds against the other rows. `is_slow`: it shows over a whole drive only. `is_blind`: it explains that nothing was seen."""
+
+    name: str
+    start: tuple[Size, ...]
+    edits: Callable[[Size], list[Edit]]
+    say: Callable[[Size], str]
+    step: tuple[float, ...] = ()
+    smallest: tuple[float, ...] = ()
+    is_log: bool = False
+    is_possible: Callable[[Size], bool] = lambda size: True
+    group: str = ""
+    named: Sequence[float] = ()
+    prior: float = 0.0
+    is_slow: bool = False
+    is_blind: bool = False
+    settled: Callable[[Size, dict[str, float]], Size] = lambda size, states: size
+    """The size with what the filter's own calibration states took of it, by their names."""
+    other_places: Callable[[Size], list[list[Edit]]] = lambda size: []
+    """Other lines that would undo the same."""
+
+    def by_states(self, states: dict[str, float]) -> Size:
+        """The size that the filter's states alone tell of."""
+        return self.settled(tuple(1.0 if self.is_log else 0.0 for _ in self.step), states) if self.step else ()
+
+    def family(self) -> str:
+        """The group, or the row itself."""
+        return self.group or self.name
+
+    def moved(self, size: Size, axis: int, way: float) -> Size:
+        """A size `way` further on one axis."""
+        return tuple((s * math.exp(way) if self.is_log else s + way) if k == axis else s for k, s in enumerate(size))
+
+    def neat(self, size: Size) -> Size:
+        """The size of a unit, where it is nearly one."""
+        for factor in self.named:
+            if self.is_log and size[0] > 0 and abs(math.log(size[0] / factor)) < NAMED:
+                return (factor, *size[1:])
+        return size
+
+
+def discrete(name: str, edits: Callable[[Size], list[Edit]], say: Callable[[Size], str], *, group: str = "", size: float = 1.0,
+             prior: float = 0.0, is_blind: bool = False) -> Fault:
+    """A mistake that is there or not."""
+    return Fault(name, ((size,),), edits, say, group=group, prior=prior, is_blind=is_blind)
+
+
+def factor_words(factor: float) -> str:
+    """What a value is that has to be taken `factor` times."""
+    unit = next((words for value, words in _UNITS.items() if abs(math.log(abs(factor) / value)) < 1e-6), None)
+    if unit:
+        return unit
+    wrong = 1 / factor
+    if 0.5 < wrong < 2 and abs(wrong - 1) < 0.45:
+        return f"{abs(wrong - 1) * 100:.2g} % too {'large' if wrong > 1 else 'small'}"
+    return f"{wrong:.3g} times the true one"

@@ -1,0 +1,291 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The usual mistakes, a row each: the sizes to begin with, the limits of what can be, the edits that undo it, and how it is said.
+A size is what undoes the mistake: s to add to stamps, a factor of ranges, m to add to a mounting."""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from . import motion_faults
+from .changes import CONFIG, Edit, Impossible, Mirrored, Sorted, Value, column, degrees, identities, numbers, stretched, swapped
+from .fault import DEG, LENGTHS, NEAR, Fault, Size, discrete, factor_words
+from .robot import Robot, Source
+
+PLACE_MOST_M = 6.0  # of a sensor from base_link: half of a lorry
+PLACE_LEAST_M = 0.05  # of one that was measured at all
+CLOCK_MOST_S = 60.0
+CLOCKS_S = tuple(sign * s for s in (0.15, 0.4, 0.8, 1.2, 1.6, 2.0, 2.5, 3.0, 3.5, 4.0, 5.0, 10.0, 18.0, 37.0) for sign in (-1, 1))
+"""The last ones: leap seconds of GPS, of TAI."""
+DRIFTS = (-0.01, 0.01, 0.04)  # of a clock that is too fast, or of a lag that grows, s/s
+CRUMB = 0.03  # of a map's breadth
+FAMILIES = ("tag36h11", "tag25h9", "tag16h5", "tagStandard41h12")
+
+
+def all_faults(robot: Robot) -> list[Fault]:
+    """Every row that this robot has something of; first what it has few of: a long list may not be tried to its end."""
+    found = [*_maps(robot), *motion_faults.all_of(robot), *_markers(robot), *_satellites(robot)]
+    for source in robot.sources:
+        found += [*_clocks(robot, source), *_values(robot, source), *_ids(robot, source)]
+        if source.kind not in ("heading", "points", "stereo"):
+            found += _mountings(robot, source)
+    return found
+
+
+# ── clocks ───────────────────────────────────────────────────────────────────────────────────────────────────────────
+
+def _stamps(source: Source, factor: float, offset_ns: float) -> list[Edit]:
+    only = source.sensor if source.kind != "pictures" else ""
+    return [column(source.file, name, factor, offset_ns, only, name == "arrival_ns") for name in ("t_ns", "arrival_ns")]
+
+
+def _clocks(robot: Robot, source: Source) -> Iterator[Fault]:
+    stamps = robot.rows(source).get("t_ns")
+    if stamps is None or not len(stamps):
+        return
+    name, span = source.name, robot.motion_span
+    arrivals = robot.rows(source).get("arrival_ns", stamps)
+    if (np.diff(arrivals) < 0).any():
+        yield discrete(f"order of {name}", lambda _: [Sorted(source.file)], lambda _: f"the rows of {name} are not in the order of their stamps")
+
+    def shift(size: Sequence[float]) -> list[Edit]:
+        return _stamps(source, 1, round(size[0] * 1e9))
+
+    def late(size: Sequence[float]) -> str:
+        return f"the stamps of {name} are {abs(size[0]):.2f} s too {'late' if size[0] < 0 else 'early'}: its clock is off"
+
+    if span and (stamps.max() < span[0] or stamps.min() > span[1]):
+        gap = (span[0] - int(stamps.min())) * 1e-9
+        for factor, unit in ((1e3, "us"), (1e6, "ms"), (1e9, "s")):
+            yield discrete(f"unit of the stamps of {name}, {unit}", lambda _, f=factor: _stamps(source, f, 0),
+                           lambda _, u=unit: f"the stamps of {name} are in {u}", group=f"clock of {name}")
+        yield Fault(f"clock of {name}", ((gap,), (float(round(gap)),)), shift, late)
+        return
+    yield Fault(f"clock of {name}", tuple((s,) for s in CLOCKS_S), shift, late, step=(0.25,), smallest=(0.01,),
+                is_possible=lambda size: abs(size[0]) <= CLOCK_MOST_S, group=f"along the way of {name}",
+                settled=lambda size, states: (size[0] - states.get(f"{source.sensor or source.kind}.time_offset_s", 0.0),))
+    begin, only = int(stamps.min()), source.sensor if source.kind != "pictures" else ""
+    yield Fault(f"drift of {name}", tuple((rate,) for rate in DRIFTS),
+                lambda size: [stretched(source.file, n, size[0], begin, only, n == "arrival_ns") for n in ("t_ns", "arrival_ns")],
+                lambda size: f"the stamps of {name} run away: {abs(size[0]) * 1e3:.3g} ms {'more' if size[0] > 0 else 'less'} each second "
+                             "(a queue that nobody empties, or a clock of its own)",
+                step=(0.004,), smallest=(1e-4,), is_possible=lambda size: abs(size[0]) < 0.3, is_slow=True, group=f"along the way of {name}")
+
+
+# ── values ───────────────────────────────────────────────────────────────────────────────────────────────────────────
+
+def _values(robot: Robot, source: Source) -> Iterator[Fault]:
+    table, name, file, only = robot.rows(source), source.name, source.file, source.sensor
+    if source.kind == "sightings":
+        for f, words in ((-1.0, "positive to the right"), (DEG, "in degrees"), (-DEG, "positive to the right and in degrees"),
+                         (1 / DEG, "in another unit")):
+            yield discrete(f"bearings of {name} times {f:.4g}", lambda _, f=f: [column(file, "bearing_rad", f, only=only)],
+                           lambda _, w=words: f"the bearings of {name} are {w}")
+        if np.isfinite(table.get("range_m", np.array([np.nan]))).any():
+            yield Fault(f"ranges of {name}", tuple((f,) for f in (*_likely_units(robot, 1), *NEAR)), lambda s: [column(file, "range_m", s[0], only=only)],
+                        lambda s: f"the ranges of {name} are {factor_words(s[0])}", step=(0.03,), smallest=(0.003,), is_log=True,
+                        named=LENGTHS, is_possible=lambda s: 5e-4 <= s[0] <= 2000,
+                        settled=lambda s, states: (s[0] / states.get(f"{only}.range_scale", 1.0),))
+            node = (robot.calibration.get("sensors") or {}).get(source.sensor)
+            is_depth = isinstance(node, dict) and node.get("range_is") == "depth"
+            if isinstance(node, dict):
+                yield discrete(f"range of {name} is", lambda _: [Value("calibration.yaml", ("sensors", only, "range_is"), "distance" if is_depth else "depth")],
+                               lambda _: f"the ranges of {name} are {'distances, not depths' if is_depth else 'depths'} along the sensor's x axis")
+    if source.kind == "gnss":
+        yield discrete("x and y of gnss", lambda _: [swapped(file, "x_m", "y_m")], lambda _: f"x (east) and y (north) of {name} are swapped")
+        for axis in "xy":
+            yield discrete(f"{axis} of gnss", lambda _, a=axis: [column(file, f"{a}_m", -1)],
+                           lambda _, a=axis: f"{a} of {name} has the wrong sign: x is east, y is north")
+    if source.kind == "stereo":
+        yield discrete("sides of stereo", lambda _: [swapped(file, "ul_px", "ur_px"), swapped(file, "vl_px", "vr_px")],
+                       lambda _: "left and right of the stereo pair are swapped")
+
+
+def _likely_units(robot: Robot, way: int) -> list[float]:
+    """Units of ranges (way 1) or of the map (-1) with which a usual range is within the map, and more than a crumb of it."""
+    landmarks, ranges = robot.table("landmarks.csv"), robot.table("sightings.csv").get("range_m", np.array([]))
+    ranges = ranges[np.isfinite(ranges)]
+    if len(landmarks.get("x_m", ())) < 2 or not len(ranges):
+        return list(LENGTHS)
+    breadth = math.hypot(np.ptp(landmarks["x_m"]), np.ptp(landmarks["y_m"]))
+    return [f for f in LENGTHS if CRUMB * breadth < float(np.median(ranges)) * f**way < 2 * breadth]
+
+
+# ── identities ───────────────────────────────────────────────────────────────────────────────────────────────────────
+
+def _ids(robot: Robot, source: Source) -> Iterator[Fault]:
+    ids, known = robot.rows(source).get("id"), robot.table("landmarks.csv").get("id")
+    if ids is None or known is None or source.kind not in ("sightings", "markers", "corners") or not (ids >= 0).any():
+        return
+    mine, theirs = np.unique(ids[ids >= 0]), np.unique(known)
+    shifts = {-1, 1, int(theirs[0] - mine[0]), int(theirs[-1] - mine[-1])}
+    if len(mine) < 300 and len(theirs) < 2000:  # then those that give the most known landmarks
+        all_shifts, counts = np.unique((theirs[:, None] - mine[None, :]).ravel(), return_counts=True)
+        shifts |= {int(s) for s in all_shifts[np.argsort(-counts, kind="stable")[:5]]}
+    for shift in sorted(shifts - {0}, key=abs):
+        yield discrete(f"identities of {source.name} {shift:+d}", lambda _, s=shift: [column(source.file, "id", 1, s, source.sensor)],
+                       lambda _, s=shift: f"the ids of {source.name} are off by {-s:d}", group=f"identities of {source.name}")
+
+
+def exchanged(robot: Robot, source: Source, table: dict[int, int]) -> Fault:
+    """Identities by a table that was found; a pair: two landmarks are exchanged."""
+    pairs = sorted(table.items())
+    if len(pairs) == 2 and pairs[0] == pairs[1][::-1]:
+        a, b = pairs[0]
+        return discrete(f"landmarks {a} and {b}", lambda _: [identities("landmarks.csv", table)],
+                        lambda _: f"landmarks {a} and {b} are exchanged on the map (or their numbers where they stand)", group=f"identities {pairs}")
+    return discrete(f"identities of {source.name} by a table", lambda _: [identities(source.file, table, source.sensor)],
+                    lambda _: f"the ids of {source.name} are permuted against those of the map", group=f"identities {pairs}", prior=-4.0)
+
+
+# ── mountings ────────────────────────────────────────────────────────────────────────────────────────────────────────
+
+def _mountings(robot: Robot, source: Source) -> Iterator[Fault]:
+    path, place, angles = robot.mounting(source)
+    who = source.sensor or "the antenna"
+
+    def placed(size: Sequence[float]) -> list[Edit]:
+        return [Value("calibration.yaml", (*path, "xyz_m"), numbers(np.round(place + [size[0], size[1], 0], 3)))]
+
+    def place_words(size: Sequence[float]) -> str:
+        sides = [f"{abs(size[k]):.2f} m further to the {words[size[k] < 0]}" for k, words in ((0, ("front", "rear")), (1, ("left", "right")))
+                 if abs(size[k]) >= 0.02]
+        return f"{who} is {' and '.join(sides)} than its mounting says"
+
+    mirrored = [(-2 * float(place[0]), 0.0)] * (abs(place[0]) > 0.05) + [(0.0, -2 * float(place[1]))] * (abs(place[1]) > 0.05)
+    def settled(size: Size, states: dict[str, float]) -> Size:
+        here = [states.get(f"gnss.antenna_{axis}_m") if source.kind == "gnss" else None for axis in "xy"]
+        return tuple(s if state is None else state - float(place[k]) for k, (s, state) in enumerate(zip(size, here)))
+
+    yield Fault(f"place of {source.name}", ((-0.3, 0.0), (0.3, 0.0), (0.0, -0.3), (0.0, 0.3), (-1.0, 0.0), (1.0, 0.0), (0.0, -1.0), (0.0, 1.0), *mirrored), placed, place_words,
+                step=(0.3, 0.3), smallest=(0.02, 0.02), settled=settled, group=f"along the way of {source.name}",
+                is_possible=lambda s: bool(np.hypot(*(place[:2] + s)) <= PLACE_MOST_M and np.hypot(*s) >= 0.05))
+    for f, unit in ((0.01, "cm"), (0.001, "mm")):
+        if PLACE_LEAST_M < f * float(np.linalg.norm(place)) < PLACE_MOST_M and math.hypot(*place[:2]) > 0.5:
+            yield discrete(f"place of {source.name} in {unit}", lambda _, f=f: [Value("calibration.yaml", (*path, "xyz_m"), numbers(place * f))],
+                           lambda _, u=unit: f"the mounting of {who} is in {u}", group=f"place of {source.name}")
+    if source.kind == "gnss":
+        return
+
+    def turned(axis: int) -> Callable[[Sequence[float]], list[Edit]]:
+        def edits(size: Sequence[float]) -> list[Edit]:
+            new = [degrees(a + (size[0] if k == axis else 0)) for k, a in enumerate(angles)]
+            return [Value("calibration.yaml", (*path, "rpy_deg"), numbers(np.round(new, 2)))]
+        return edits
+
+    def say(words: str) -> Callable[[Sequence[float]], str]:
+        return lambda size: f"the mounting of {who} is turned by {degrees(size[0]):.3g} degrees ({words})"
+
+    yaws = [math.pi, math.pi / 2, -math.pi / 2, math.pi / 4, -math.pi / 4, 0.35, -0.35] + [-2 * float(angles[2])] * (abs(angles[2]) > 0.02)
+    yield Fault(f"yaw of {source.name}", tuple((y,) for y in yaws), turned(2), say("yaw"), step=(0.15,), smallest=(0.01,),
+                settled=lambda size, states: (size[0] + states.get(f"{source.sensor}.yaw_rad", 0.0),),
+                is_possible=lambda s: abs(math.remainder(s[0], 2 * math.pi)) > 0.03)
+    if source.kind in ("pictures", "corners", "markers") or abs(angles[1]) > 0.02:
+        pitches = [-2 * float(angles[1])] * (abs(angles[1]) > 0.02) + [-0.15, 0.15]
+        yield Fault(f"pitch of {source.name}", tuple((p,) for p in pitches), turned(1), say("pitch: positive looks down"), step=(0.05,), smallest=(0.005,),
+                    is_possible=lambda s: abs(s[0]) > 0.01)
+    if source.kind == "pictures" or abs(angles[0]) > 0.02:
+        yield discrete(f"roll of {source.name}", turned(0), say("roll"), size=math.pi)
+    largest = float(np.degrees(np.abs(angles).max()))
+    if 0.02 < largest < 2 * math.pi:
+        yield discrete(f"angles of {source.name}", lambda _: [Value("calibration.yaml", (*path, "rpy_deg"), numbers(np.degrees(np.degrees(angles))))],
+                       lambda _: f"the mounting's angles of {who} are in radians")
+
+
+# ── maps ─────────────────────────────────────────────────────────────────────────────────────────────────────────────
+
+def _maps(robot: Robot) -> Iterator[Fault]:
+    landmarks, file = robot.table("landmarks.csv"), "landmarks.csv"
+    if len(landmarks.get("x_m", ())):
+        directed = bool(np.isfinite(landmarks.get("yaw_rad", np.array([np.nan]))).any())
+
+        def with_yaw(edits: list[Edit], factor: float, offset: float) -> list[Edit]:
+            return edits + ([column(file, "yaw_rad", factor, offset)] if directed else [])
+
+        yield discrete("axes of the map", lambda _: with_yaw([swapped(file, "x_m", "y_m")], -1, math.pi / 2), lambda _: "x and y of the map are swapped",
+                       group="mirrored map")
+        for axis, offset in (("x", math.pi), ("y", 0.0)):
+            yield discrete(f"{axis} of the map", lambda _, a=axis, o=offset: with_yaw([column(file, f"{a}_m", -1)], -1, o),
+                           lambda _, a=axis: f"the map is mirrored: {a} has the wrong sign (x, y and z make a right-handed frame)", group="mirrored map")
+        yield discrete("half a turn of the map", lambda _: with_yaw([column(file, "x_m", -1), column(file, "y_m", -1)], 1, math.pi),
+                       lambda _: "the map is turned by half a turn against the start")
+        yield Fault("scale of the map", tuple((f,) for f in (*_likely_units(robot, -1), *NEAR)),
+                    lambda s: [column(file, "x_m", s[0]), column(file, "y_m", s[0])],
+                    lambda s: f"the map is {factor_words(s[0])}", step=(0.02,), smallest=(0.002,), is_log=True, named=LENGTHS,
+                    is_possible=lambda s: 5e-4 <= s[0] <= 2000 and abs(math.log(s[0])) > 0.004,
+                    settled=lambda s, states: (s[0] * next((v for name, v in states.items() if name.endswith(".range_scale")), 1.0),))
+    resolution, origin = robot.plan.get("resolution"), robot.plan.get("origin")
+    if not isinstance(resolution, int | float):
+        return
+
+    def plan(size: Sequence[float], moves: bool) -> list[Edit]:
+        edits: list[Edit] = [Value("map/map.yaml", ("resolution",), f"{resolution * size[0]:.6g}")]
+        if moves and isinstance(origin, list):
+            edits.append(Value("map/map.yaml", ("origin",), numbers([origin[0] * size[0], origin[1] * size[0], *origin[2:]])))
+        return edits
+
+    for moves in (False, True):
+        yield Fault(f"scale of the plan{' and its origin' * moves}", tuple((f,) for f in (*NEAR, 0.5, 2, 0.1, 10, 0.0254)), lambda s, m=moves: plan(s, m),
+                    lambda s: f"the floor plan is {factor_words(s[0])}", step=(0.02,), smallest=(0.003,), is_log=True,
+                    is_possible=lambda s: 0.001 <= resolution * s[0] <= 1 and abs(math.log(s[0])) > 0.006, group="scale of the plan")
+    pictures = [robot.plan.get("image"), *((robot.plan.get("layers") or {}).get(name) for name in ("edges", "drivable"))]
+    names = sorted({f"map/{p}" for p in pictures if isinstance(p, str) and "/" not in p})
+    for upside_down in (False, True):
+        yield discrete(f"plan mirrored {upside_down}", lambda _, u=upside_down: [Mirrored(name, u) for name in names],
+                       lambda _, u=upside_down: f"the floor plan is mirrored: {'top and bottom' if u else 'left and right'} are swapped")
+
+
+# ── markers, lenses, satellites ──────────────────────────────────────────────────────────────────────────────────────
+
+def _calibrated(name: str, path: tuple[str, ...], value: float, grid: Sequence[float], words: str, file: str = "calibration.yaml") -> Fault:
+    return Fault(name, tuple((f,) for f in grid), lambda s: [Value(file, path, f"{value * s[0]:.6g}")],
+                 lambda s: f"{words} is {factor_words(s[0])}", step=(0.04,), smallest=(0.004,), is_log=True, named=LENGTHS,
+                 is_possible=lambda s: abs(math.log(s[0])) > 0.01)
+
+
+def _markers(robot: Robot) -> Iterator[Fault]:
+    sees_tags = any(source.kind in ("corners", "markers") or source.detector == "apriltag" for source in robot.sources)
+    mine = robot.setting("vision", "apriltag", "size_m")
+    size = mine or robot.number("markers", "size_m")
+    # The white frame taken for the edge, or the reverse: 8 of 10 cells.
+    if sees_tags and size and any(source.kind == "corners" or source.detector for source in robot.sources):
+        yield _calibrated("size of the markers", ("vision", "apriltag", "size_m") if mine else ("markers", "size_m"), size,
+                          (0.8, 1.25, *NEAR, 0.5, 2, *LENGTHS), "the markers' size", CONFIG if mine else "calibration.yaml")
+    family = (robot.calibration.get("markers") or {}).get("family")
+    if any(source.detector == "apriltag" for source in robot.sources):
+        for other in FAMILIES:
+            if other != family:
+                yield discrete(f"family {other}", lambda _, o=other: [Value("calibration.yaml", ("markers", "family"), o)],
+                               lambda _, o=other: f"the markers are of the family {o}", is_blind=True)
+    baseline = robot.number("stereo", "baseline_m")
+    if baseline:
+        yield _calibrated("stereo baseline", ("stereo", "baseline_m"), baseline, (0.5, 2, 0.1, 0.001, *NEAR), "the stereo pair's baseline")
+    for source in robot.sources:
+        camera = (robot.calibration.get("cameras") or {}).get(source.sensor)
+        lens = camera.get("intrinsics") if isinstance(camera, dict) else None
+        if source.kind != "pictures" or not isinstance(lens, list) or camera.get("model") not in (None, "pinhole", "radtan", "equidistant", "kb4"):
+            continue
+        yield Fault(f"lens of {source.sensor}", ((0.5,), (2.0,)),
+                    lambda s, lens=lens, name=source.sensor: [Value("calibration.yaml", ("cameras", name, "intrinsics"), numbers(np.array(lens, float) * s[0]))],
+                    lambda s, name=source.sensor: f"the lens of {name} is of another resolution: its intrinsics are {1 / s[0]:.3g} times the true ones",
+                    is_log=True)
+
+
+def _satellites(robot: Robot) -> Iterator[Fault]:
+    bound: dict[Any, int] = {item.get("quantity"): number for number, item in enumerate(robot.bindings)}
+    latitude, longitude = bound.get("gnss_latitude"), bound.get("gnss_longitude")
+    if latitude is None or longitude is None:
+        return
+    yield discrete("latitude and longitude", lambda _: [Value("can-signals.yaml", (latitude, "quantity"), "gnss_longitude"),
+                                                        Value("can-signals.yaml", (longitude, "quantity"), "gnss_latitude")],
+                   lambda _: "latitude and longitude of the bindings are swapped")
+    origin = (robot.calibration.get("gnss") or {}).get("origin")
+    if isinstance(origin, list) and len(origin) > 1:
+        text = f"[{', '.join(str(v) for v in (origin[1], origin[0], *origin[2:]))}]"
+        yield discrete("latitude and longitude of the origin", lambda _: [Value("calibration.yaml", ("gnss", "origin"), text)],
+                       lambda _: "latitude and longitude of the map's origin are swapped")
+
+
+__all__ = ["Impossible", "all_faults", "exchanged"]

@@ -1,0 +1,400 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which mistake explains a drive: all rows on a part of it, the best on more, their sizes fitted on every other block of time, and a
+judgement on the blocks between."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from statistics import NormalDist
+
+import numpy as np
+
+from ..tables import Array
+from .faults import all_faults, exchanged
+from .fault import Fault, Size
+from .robot import Robot
+from .trial import Blocks, Change, Drive, Trials, likelihoods
+
+BUDGET_S = 50.0  # of processor time a processor; after it no further round is begun
+SCREEN_SHARE, SCREEN_MIN_S, SCREEN_MAX_S = 0.3, 10.0, 20.0
+FIT_MAX_S = 40.0  # of the drive, for sizes
+ROWS_KEPT, ROWS_FITTED, ROWS_JUDGED = 10, 4, 6
+FIT_ROUNDS, SETTLED_MOST = 4, 3
+REACH = 0.3  # of the best row's gain: below it no size makes a row the best
+FIT_GAIN_MIN = 0.03  # nats an update that the best row gains before its size is fitted; below, none explains the drive
+BLOCK_S, BLOCKS_MIN = 2.0, 20  # longer than errors that last, as the correlated ones of a sighting; of short drives shorter
+NAMED_FROM = 0.99  # probability that a cause predicts better than each other, and than none
+GAIN_MIN = 0.1  # nats an update, over no mistake
+APART_MIN = 0.02  # nats an update, over another cause: below, the drive does not tell them apart
+# A drive is right with: 14 % of the updates refused, a mean square of 1.34, lost for 0.5 %: the most of 29 good drives.
+EXPLAINED_MIN, SQUARES_MOST, LOST_MOST, DEGRADED_MOST = 0.85, 1.7, 0.02, 0.2
+STATES_MIN, STATES_APART = 6.0, 6.0  # nats of calibration states: odds of 400 to 1
+EXPLAINED_ALL = 0.97  # then nothing is left for a second mistake
+LONGEST = 6.0  # of a drive's time without changes; one that searches for its pose all the time is no right one
+CAUSES_MOST = 3
+FIRSTS = 3  # where none helps alone: the best first ones, each together with all others
+VOTES_MIN, VOTES_SHARE = 4, 0.5  # of sightings that fit a landmark of another number
+UNEXPLAINED = 0.8  # share of the updates that fit, below which a table of identities is looked for
+CONTRADICTED = 0.5  # share of a landmark's updates that are refused, where it may be exchanged with another
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A row with its size, and its drive."""
+
+    fault: Fault
+    size: Size
+    drive: Drive
+
+
+@dataclass
+class Verdict:
+    """What was found: `causes` together explain the drive; `undecided` would each, and the drive does not tell them apart."""
+
+    before: Drive | None
+    after: Drive | None = None
+    causes: list[Change] = field(default_factory=list)
+    undecided: list[Change] = field(default_factory=list)
+    probability: float = 0.0
+    gain: float = 0.0  # nats an update
+    rows: int = 0
+    drives: int = 0
+
+
+def _fit(blocks: int) -> Array:
+    return np.arange(blocks) % 2 == 0
+
+
+class Search:
+    """A search over the rows of one robot."""
+
+    def __init__(self, robot: Robot, trials: Trials, progress: Callable[[float], None] = lambda share: None):
+        self.robot, self.trials, self.progress = robot, trials, progress
+        self.rows: list[Fault] = []
+        self.cost = 0.0  # processor time of a second of the drive
+        self.duration_s = 0.0
+
+    def left_s(self) -> float:
+        """Of the budget."""
+        return BUDGET_S * self.trials.at_once - self.trials.spent_s
+
+    def part_s(self, drives: int, share: float, most_s: float) -> float:
+        """How much of the drive so many trials may take; 0: all of it."""
+        affordable = share * self.left_s() / max(1e-9, drives * self.cost)
+        part = min(most_s, max(SCREEN_MIN_S, affordable))
+        return 0.0 if part >= self.duration_s else part
+
+    def run(self) -> Verdict:
+        """Searches."""
+        self.rows = all_faults(self.robot)
+        before = self._begin()
+        verdict = Verdict(before, rows=len(self.rows))
+        if before is None:
+            return verdict
+        fixed: list[Change] = []
+        now: Drive = before
+        firsts: list[Candidate] = []
+        while len(fixed) < CAUSES_MOST:
+            found = self._round(fixed, now)
+            if not fixed:
+                firsts = found[:FIRSTS]
+            if not found or not self._helps(found[0].drive, now):
+                break
+            best, tied, probability = self._judge(found, now)
+            if tied:
+                if self._is_right(best.drive) and not fixed:
+                    verdict.undecided = [(c.fault, c.size) for c in (best, *tied)]
+                break
+            if probability < NAMED_FROM:
+                break
+            best = self._settled(best, fixed)
+            fixed.append((best.fault, best.size))
+            verdict.probability = min(probability, verdict.probability or 1.0)
+            now = best.drive
+            if now.explained >= EXPLAINED_ALL and self._is_right(now) or self.left_s() <= 0:
+                break
+        if not self._is_right(now) and not verdict.undecided:
+            fixed, now = self._pairs(firsts, before, verdict) or (fixed, now)
+        if fixed and self._is_right(now) and not verdict.undecided:
+            verdict.causes, verdict.after, verdict.gain = fixed, now, self._gain(now, before)
+        verdict.drives = self.trials.drives
+        return verdict
+
+    def _begin(self) -> Drive | None:
+        """The drive as it is."""
+        estimate, cpu_s = self.trials.alone()
+        stamps = estimate.published["t_ns"] if len(estimate.published["t_ns"]) else estimate.innovations["t_ns"]
+        if len(stamps) < 2:
+            return None
+        self.duration_s = float(stamps[-1] - stamps[0]) * 1e-9
+        length = min(BLOCK_S, self.duration_s / BLOCKS_MIN)
+        self.trials.blocks = Blocks(int(stamps[0]), length, max(2, math.ceil(self.duration_s / length)))
+        self.cost = cpu_s / self.duration_s
+        self.trials.spent_s += cpu_s
+        return self.trials.run([[]], keeps=True, has_states=True)[0]
+
+    # ── a round ──────────────────────────────────────────────────────────────────────────────────────────────────────
+
+    def _round(self, fixed: list[Change], now: Drive) -> list[Candidate]:
+        """The best rows beside those that are fixed, each with its fitted size, on the whole drive; the best first."""
+        used = {fault.name for fault, _ in fixed}
+        rows = [row for row in self.rows if row.name not in used]
+        starts = [(row, size) for row in rows if not row.is_slow for size in row.start if row.is_possible(size)]
+        self.trials.settings = self._without_search()
+        part_s = self.part_s(len(starts), SCREEN_SHARE, SCREEN_MAX_S)
+        base = self._drives([], fixed, part_s, plain=True)[0] or now
+        kept = self._within_reach(self._best_sizes(self._tried(starts, fixed, part_s), part_s), base, part_s)[:ROWS_KEPT]
+        slow: list[Change] = []
+        if not any(self._is_right(c.drive) for c in kept):  # else what shows over a part of the drive is enough
+            slow = [(row, size) for row in rows if row.is_slow for size in row.start] + self._proposals(fixed, now)
+        fit_s = self.part_s(ROWS_KEPT + len(slow) + 9 * ROWS_FITTED, 0.5, FIT_MAX_S)
+        over_s = self._whole(fit_s) if slow else fit_s
+        base = self._drives([], fixed, over_s, plain=True)[0] or now
+        more = self._tried([*((c.fault, c.size) for c in kept), *slow], fixed, over_s)
+        ordered = self._within_reach(self._best_sizes(more, over_s), base, over_s)
+        fitted = self._fitted(ordered[:ROWS_FITTED], fixed, fit_s)
+        others = [(c.fault, c.size) for c in ordered[ROWS_FITTED:ROWS_JUDGED]]
+        self.trials.settings = {}
+        final = self._tried([*fitted, *others, *self._by_states(rows, now)], fixed, 0.0, has_states=True)
+        return self._ordered(final)
+
+    def _by_states(self, rows: list[Fault], now: Drive) -> list[Change]:
+        """Rows that a calibration state took up: their sizes are what the state says."""
+        if now.unusual < STATES_MIN:
+            return []
+        sizes = [(row, row.by_states(now.states)) for row in rows if row.step and row.smallest]
+        nothing = {row.name: row.by_states({}) for row, _ in sizes}
+        return [(row, row.neat(size)) for row, size in sizes if row.is_possible(size)
+                and any(abs(a - b) > 3 * least for a, b, least in zip(size, nothing[row.name], row.smallest))]
+
+    def _within_reach(self, ordered: list[Candidate], now: Drive, until_s: float) -> list[Candidate]:
+        """The rows that gain, and that a fitted size may make the best."""
+        assert self.trials.blocks is not None
+        part, least = self.trials.blocks.part(until_s), self._score(now, until_s)
+        most = max((self._score(c.drive, until_s) - least for c in ordered), default=0.0)
+        updates = max([1, int(now.seen[:part].sum()), *(int(c.drive.seen[:part].sum()) for c in ordered)]) / 2
+        return [c for c in ordered if most >= FIT_GAIN_MIN * updates and self._score(c.drive, until_s) - least >= REACH * most]
+
+    def _whole(self, fit_s: float) -> float:
+        return 0.0 if self.cost * self.duration_s * 30 < self.left_s() else fit_s
+
+    def _tried(self, changes: Sequence[Change], fixed: list[Change], until_s: float, has_states: bool = False) -> list[Candidate]:
+        drives = self._drives(changes, fixed, until_s, has_states=has_states)
+        self.progress(min(0.99, self.trials.spent_s / (BUDGET_S * self.trials.at_once)))
+        return [Candidate(fault, size, drive) for (fault, size), drive in zip(changes, drives) if drive is not None]
+
+    def _score(self, drive: Drive, until_s: float) -> float:
+        """On the blocks of a part that are for fitting."""
+        assert self.trials.blocks is not None
+        part = self.trials.blocks.part(until_s)
+        return float(drive.gain[:part][_fit(part)].sum())
+
+    def _best_sizes(self, tried: list[Candidate], until_s: float) -> list[Candidate]:
+        """Of each row its best size; the best rows first."""
+        best: dict[str, tuple[float, Candidate]] = {}
+        for candidate in tried:
+            score = self._score(candidate.drive, until_s) + candidate.fault.prior
+            if candidate.fault.name not in best or score > best[candidate.fault.name][0]:
+                best[candidate.fault.name] = score, candidate
+        return [candidate for _, candidate in sorted(best.values(), key=lambda pair: -pair[0])]
+
+    def _fitted(self, candidates: Sequence[Candidate], fixed: list[Change], until_s: float) -> list[Change]:
+        """Sizes of the largest likelihood, by a parabola through three sizes on each axis, with ever smaller steps."""
+        state = {c.fault.name: [c.fault, c.size, list(c.fault.step)] for c in candidates}
+        known: dict[tuple[str, Size], float] = {}
+        axes = max((len(c.fault.step) for c in candidates), default=0)
+        for axis in [k for _ in range(FIT_ROUNDS) for k in range(axes)]:
+            active = [s for s in state.values() if axis < len(s[2]) and s[2][axis] >= s[0].smallest[axis]]
+            threes = [[(fault, fault.moved(size, axis, way)) for way in (-steps[axis], 0.0, steps[axis])] for fault, size, steps in active]
+            jobs = {(fault.name, size): (fault, size) for three in threes for fault, size in three if (fault.name, size) not in known}
+            for (key, _), drive in zip(jobs.items(), self._drives(list(jobs.values()), fixed, until_s)):
+                known[key] = self._score(drive, until_s) if drive else -math.inf
+            for entry, three in zip(active, threes):
+                entry[1], entry[2][axis] = _parabola(entry[0], entry[1], axis, entry[2][axis], [known[fault.name, size] for fault, size in three])
+        return [(fault, self._neat(fault, size)) for fault, size, _ in state.values()]
+
+    @staticmethod
+    def _neat(fault: Fault, size: Size) -> Size:
+        return fault.neat(size) if fault.step else size
+
+    def _drives(self, jobs: Sequence[Change], fixed: list[Change], until_s: float, plain: bool = False,
+                has_states: bool = False) -> list[Drive | None]:
+        """With each of the jobs beside what is fixed; `plain`: with nothing beside it."""
+        changes: list[list[Change]] = [[*fixed]] if plain else [[*fixed, job] for job in jobs]
+        if self.left_s() <= 0:
+            return [None] * len(changes)
+        return self.trials.run(changes, until_s, most_s=2 + LONGEST * self.cost * (until_s or self.duration_s), has_states=has_states)
+
+    def _without_search(self) -> dict[str, str]:
+        """Settings with which a filter that starts at a known pose does not look for it elsewhere: a copy that is wrong need not be
+        driven well, and most of its time would go there."""
+        estimator, vehicle = self.robot.config.get("estimator"), self.robot.vehicle
+        return {f"{estimator}.recover.on": "false"} if estimator in ("landmark_ekf", "slam") and "initial_pose" in vehicle else {}
+
+    # ── proposals that the data make ─────────────────────────────────────────────────────────────────────────────────
+
+    def _proposals(self, fixed: list[Change], now: Drive) -> list[Change]:
+        """Exchanged landmarks and tables of identities."""
+        out: list[Change] = []
+        rows = now.estimate.innovations if now.estimate and not fixed else None
+        for source in self.robot.sources:
+            if source.kind not in ("sightings", "markers", "corners") or not len(self.robot.table("landmarks.csv").get("id", ())):
+                continue
+            if rows is not None:
+                out += [(exchanged(self.robot, source, {a: b, b: a}), (1.0,)) for a, b in _contradicted(rows)]
+            table = self._table(source, fixed) if source.kind == "sightings" and now.explained < UNEXPLAINED else {}
+            if table:
+                out.append((exchanged(self.robot, source, table), (1.0,)))
+        unique = {change[0].name: change for change in out if change[0].name not in {f.name for f, _ in fixed}}
+        return list(unique.values())
+
+    def _table(self, source: object, fixed: list[Change]) -> dict[int, int]:
+        """Which landmark the sightings of each number fit, where they are associated by their place."""
+        from .changes import column
+        from .fault import discrete
+        from .robot import Source
+
+        assert isinstance(source, Source)
+        table = self.robot.rows(source)
+        if (table["id"] < 0).all() or "bearing_rad" not in table:
+            return {}
+        blind = discrete("no identities", lambda _: [column(source.file, "id", 0, -1, source.sensor)], lambda _: "")
+        drive = self.trials.run([[*fixed, (blind, (1.0,))]], self._whole(FIT_MAX_S), keeps=True)[0] if self.left_s() > 0 else None
+        if drive is None or drive.estimate is None:
+            return {}
+        given = {(int(t), round(float(b), 5)): int(i) for t, b, i in zip(table["t_ns"], table["bearing_rad"], table["id"])}
+        rows, votes = drive.estimate.innovations, {}
+        for t, observed, landmark, kind, verdict in zip(rows["t_ns"], rows["observed"], rows["landmark"], rows["residual"], rows["verdict"]):
+            mine = given.get((int(t), round(float(observed), 5))) if kind == "bearing" and verdict == "fused" else None
+            if mine is not None and mine >= 0 and landmark >= 0:
+                votes.setdefault(mine, {}).setdefault(int(landmark), []).append(1)
+        out = {}
+        for mine, of in votes.items():
+            landmark, most = max(((k, len(v)) for k, v in of.items()), key=lambda pair: pair[1])
+            if most >= VOTES_MIN and most > VOTES_SHARE * sum(map(len, of.values())):
+                out[mine] = landmark
+        is_unique = len(set(out.values())) == len(out)
+        changed = {a: b for a, b in out.items() if a != b}
+        return changed if is_unique or len(changed) > 2 else {}
+
+    def _settled(self, best: Candidate, fixed: list[Change]) -> Candidate:
+        """The size with what the filter's states took of it, where the drive is as good with it."""
+        for _ in range(SETTLED_MOST if best.fault.step else 0):
+            drive = self.trials.run([[*fixed, (best.fault, best.size)]], has_states=True)[0]
+            size = best.fault.neat(best.fault.settled(best.size, drive.states if drive else {}))
+            if not best.fault.is_possible(size) or all(abs(a - b) < least for a, b, least in zip(size, best.size, best.fault.smallest)):
+                break
+            again = self.trials.run([[*fixed, (best.fault, size)]], has_states=True)[0]
+            if not again or self._judging(again, best.drive)[0] < -APART_MIN or not self._is_right(again):
+                break
+            best = Candidate(best.fault, size, again)
+        return best
+
+    # ── judgement ────────────────────────────────────────────────────────────────────────────────────────────────────
+
+    def _judging(self, a: Drive, b: Drive) -> tuple[float, float]:
+        """Gain of a over b, nats an update, and the probability that a predicts better: by the difference on each block for judging and
+        its scatter over the blocks [Vuong1989]."""
+        blocks = ~_fit(len(a.gain))
+        difference = (a.gain - b.gain)[blocks]
+        updates = max(1, int(np.maximum(a.seen, b.seen)[blocks].sum()))
+        mean, error = float(difference.mean()), float(difference.std(ddof=1)) / math.sqrt(len(difference))
+        if error == 0:
+            return float(difference.sum()) / updates, 0.5 if mean == 0 else float(mean > 0)
+        return float(difference.sum()) / updates, _student(mean / error, len(difference) - 1)
+
+    def _gain(self, a: Drive, b: Drive) -> float:
+        return self._judging(a, b)[0]
+
+    def _beats(self, a: Drive, b: Drive, least: float) -> tuple[bool, float]:
+        """Whether a predicts better than b by `least` nats an update, or as well with calibration states that are nearer to where they began;
+        and with which probability."""
+        gain, probability = self._judging(a, b)
+        if gain >= least and probability >= NAMED_FROM:
+            return True, probability
+        nearer = min(50.0, b.unusual - a.unusual)
+        if gain > -APART_MIN and nearer >= STATES_APART:
+            return True, 1 / (1 + math.exp(-nearer))
+        return False, probability
+
+    def _ordered(self, found: list[Candidate]) -> list[Candidate]:
+        """The best first: that which no other one beats."""
+        left = sorted(found, key=lambda c: -(float(c.drive.gain.sum()) - c.drive.unusual + c.fault.prior))
+        best = next((c for c in left if not any(self._beats(o.drive, c.drive, APART_MIN)[0] for o in left if o is not c)), left[0] if left else None)
+        return [c for c in left if c is best] + [c for c in left if c is not best]
+
+    def _helps(self, drive: Drive, now: Drive) -> bool:
+        return self._beats(drive, now, GAIN_MIN)[0]
+
+    def _judge(self, found: list[Candidate], now: Drive) -> tuple[Candidate, list[Candidate], float]:
+        """The best, the rows of other families that explain the drive as well, and the probability against all others."""
+        best, tied = found[0], []
+        _, probability = self._beats(best.drive, now, GAIN_MIN)
+        for other in found[1:]:
+            if other.fault.name == best.fault.name:
+                continue  # the same with another size
+            is_better, better = self._beats(best.drive, other.drive, APART_MIN)
+            is_same = other.fault.family() == best.fault.family() and "along the way" not in best.fault.family()
+            if is_better:
+                probability = min(probability, better)
+            elif not is_same and (self._is_right(other.drive) or not self._is_right(best.drive)):
+                tied.append(other)
+        return best, tied, probability
+
+    @staticmethod
+    def _is_right(drive: Drive) -> bool:
+        return (drive.explained >= EXPLAINED_MIN and drive.squares <= SQUARES_MOST and drive.lost <= LOST_MOST
+                and drive.degraded <= DEGRADED_MOST)
+
+    def _pairs(self, firsts: list[Candidate], before: Drive, verdict: Verdict) -> tuple[list[Change], Drive] | None:
+        """Two mistakes of which neither explains the drive alone."""
+        for first in firsts:
+            if self.left_s() < 0.2 * BUDGET_S * self.trials.at_once:
+                break
+            fixed: list[Change] = [(first.fault, first.size)]
+            found = self._round(fixed, first.drive)
+            if not found or not self._helps(found[0].drive, first.drive) or not self._helps(found[0].drive, before):
+                continue
+            best, tied, probability = self._judge(found, first.drive)
+            if tied or probability < NAMED_FROM or not self._is_right(best.drive):
+                continue
+            verdict.probability = probability
+            return [*fixed, (best.fault, best.size)], best.drive
+        return None
+
+
+def _contradicted(rows: dict[str, Array]) -> list[tuple[int, int]]:
+    """Pairs of landmarks of which most updates are refused; the most refused first, no more than six pairs."""
+    known = rows["landmark"] >= 0
+    ids, at = np.unique(rows["landmark"][known], return_inverse=True)
+    refused = np.bincount(at, rows["verdict"][known] != "fused", len(ids))
+    seen = np.bincount(at, minlength=len(ids))
+    bad = [int(i) for i in ids[np.argsort(-refused, kind="stable")] if refused[ids == i][0] > CONTRADICTED * seen[ids == i][0] and seen[ids == i][0] >= 10]
+    bad = bad[:4] if len(bad) < max(3, len(ids) // 2) else []
+    return [(a, b) for k, a in enumerate(bad) for b in bad[k + 1:]]
+
+
+def _parabola(fault: Fault, size: Size, axis: int, step: float, scores: Sequence[float]) -> tuple[Size, float]:
+    """The next size and step: to the top of the parabola, at most two steps away; where there is no top, to the better side."""
+    low, middle, high = scores
+    if not all(map(math.isfinite, scores)):
+        return size, step / 2
+    curve = low - 2 * middle + high
+    if curve < 0:
+        way = max(-2.0, min(2.0, 0.5 * (low - high) / curve)) * step
+    elif max(low, high) > middle:
+        way = 2 * step if high > low else -2 * step
+    else:
+        way = 0.0
+    new = fault.moved(size, axis, way)
+    return (new, step / 3 if abs(way) < step else step) if fault.is_possible(new) else (size, step / 3)
+
+
+def _student(t: float, freedom: int) -> float:
+    """Probability below t of Student's distribution, by the normal one [Wallace1959]."""
+    freedom = max(1, freedom)
+    z = math.copysign((8 * freedom + 1) / (8 * freedom + 3) * math.sqrt(freedom * math.log1p(t * t / freedom)), t)
+    return NormalDist().cdf(z)
+
+
+__all__ = ["Search", "Verdict", "likelihoods"]
