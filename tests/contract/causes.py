@@ -28,14 +28,13 @@ def landmarks_robot(folder, seed):
     small_robot.write(folder, seed)
 
 
-def satellites_robot(folder, seed, constant=False):
-    """Twist and positions of an antenna (0.3, 0, 1) m; curves and changes of speed, or one speed on a straight."""
+def satellites_robot(folder, seed):
+    """Twist and positions of an antenna (0.3, 0, 1) m, over curves and changes of speed."""
     rng, duration_s, step = random.Random(seed), 60.0, 0.02
     x, y, heading, motion, gnss = 0.0, 0.0, 0.3, [], []
     for k in range(round(duration_s / step)):
         t = k * step
-        v = 1.5 if constant else 1.2 + 0.7 * math.sin(0.5 * t)
-        w = 0.0 if constant else 0.5 * math.sin(0.23 * t) + 0.25 * math.sin(0.9 * t)
+        v, w = 1.2 + 0.7 * math.sin(0.5 * t), 0.5 * math.sin(0.23 * t) + 0.25 * math.sin(0.9 * t)
         stamp = small_robot.START_NS + round(t * 1e9)
         motion.append({"t_ns": stamp, "v_mps": v + rng.gauss(0, 0.02), "w_radps": w + rng.gauss(0, 0.005)})
         if k % 10 == 0:
@@ -155,7 +154,6 @@ def none(rng):
 
 PLANTED = [(landmarks_robot, m) for m in (none, map_scale, clock, yaw, place, tick, track, ranges, exchange, lag, bearings, gyro)]
 PLANTED += [(satellites_robot, m) for m in (none, antenna, receiver, mirrored, turn_rate)]
-ALIKE = (lambda folder, seed: satellites_robot(folder, seed, True), receiver)  # at one speed: a clock, or a place along the way
 
 
 # ── judgement ────────────────────────────────────────────────────────────────────────────────────────────────────────
@@ -190,6 +188,57 @@ def judge(options, robot, mistake, seed, folder):
     return row
 
 
+def turning_robot(folder, seed):
+    """The robot of landmarks turns on the spot: neither its wheels nor its way have a length."""
+    twist, small_robot._twist = small_robot._twist, lambda t: (0.0, 0.5 * min(max(t - 1, 0), 1))
+    small_robot.write(folder, seed)
+    small_robot._twist = twist
+
+
+def judge_alike(options):
+    """A map that is too large about the place where the robot turns is ranges that are too short: neither is named."""
+    with tempfile.TemporaryDirectory() as folder:
+        right, made = pathlib.Path(folder) / "right", pathlib.Path(folder) / "made"
+        turning_robot(right, options.seed)
+        replays.copy_changed(right, made, {"landmarks.csv": each(x_m=lambda x: 1.15 * x, y_m=lambda y: 1.15 * y)})
+        done = subprocess.run([options.bin_dir / "waymark", "causes", options.source_dir / "config/robot.yaml", made, "--json"], capture_output=True, text=True)
+    found = json.loads(done.stdout)
+    named, undecided = ([c["name"] for c in found[key]] for key in ("causes", "undecided"))
+    return {"robot": "turning_robot", "planted": "alike", "seed": options.seed, "size": [1 / 1.15], "seconds": 0.0, "named": "; ".join(named or undecided),
+            "is_right": not named and {"scale of the map", "ranges of sightings:front"} <= set(undecided), "is_wrong": bool(named)}
+
+
+ANSWER = {"rows": 46, "drives": 9, "causes": [], "undecided": [{"name": "a", "what": "the map is 15 % too large", "size": [0.87], "fix": "landmarks.csv:2"},
+                                                               {"name": "b", "what": "the ranges are 13 % too small", "size": [1.15], "fix": "sightings.csv:2"}]}
+
+
+def judge_answers(options):
+    """What check makes of an engine's answers, and of none: findings of their kinds, and the answer itself for programs."""
+    failures = []
+    with tempfile.TemporaryDirectory() as folder:
+        here = pathlib.Path(folder)
+        small_robot.DURATION_S = 20.0
+        small_robot.write(here / "right")
+        replays.copy_changed(here / "right", here / "made", {"sightings.csv": each(bearing_rad=lambda b: -b)})
+        (here / "waymark").write_bytes((options.bin_dir / "waymark").read_bytes())
+        (here / "waymark").chmod(0o755)
+        cause = {**ANSWER["undecided"][0], "fix": "F"}
+        for answer, identifier, count in ((ANSWER, "cause-undecided", 2), ({**ANSWER, "causes": [cause], "undecided": [], "told": ": so"}, "likely-cause", 1),
+                                          ("no JSON: {", None, 0), (None, None, 0)):
+            engine = here / "waymark-causes"
+            engine.unlink(missing_ok=True)
+            if answer is not None:
+                engine.write_text(f"#!/bin/sh\ncat <<'E'\n{json.dumps(answer) if isinstance(answer, dict) else answer}\nE\n")
+                engine.chmod(0o755)
+            done = subprocess.run([here / "waymark", "check", options.source_dir / "config/robot.yaml", here / "made", "--json"], capture_output=True, text=True,
+                                  env={"PATH": "/usr/bin:/bin"})
+            report = json.loads(done.stdout)
+            mine = [f for f in report["findings"] if f["about"] == "cause"]
+            if [f["id"] for f in mine] != [identifier] * count or report["causes"] != (answer if isinstance(answer, dict) else None):
+                failures.append(f"{identifier}: {mine}, causes {report['causes']}")
+    return failures
+
+
 def corrected(options, config, fixed):
     done = subprocess.run([options.bin_dir / "waymark", "check", config, fixed, "--quick"], capture_output=True, text=True)
     return "good" if done.returncode == 0 else "bad"
@@ -207,6 +256,8 @@ def main():
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--alike", action="store_true", help="also the drive that cannot tell")
     options = parser.parse_args()
+    if not replays.has_causes(options.bin_dir):
+        return 77
     small_robot.DURATION_S = 60.0
     rows = []
     for number in range(options.rounds):
@@ -216,14 +267,14 @@ def main():
                     rows.append(judge(options, robot, mistake, options.seed + number, pathlib.Path(folder)))
                 show(options, rows[-1])
     if options.alike:
-        with tempfile.TemporaryDirectory() as folder:
-            row = judge(options, *ALIKE, options.seed, pathlib.Path(folder))
-        rows.append(row | {"is_right": row["named"].startswith("either") or row["named"] == "-", "is_wrong": row["named"][0] not in "e-"})
+        rows.append(judge_alike(options))
         show(options, rows[-1])
+    failures = judge_answers(options) if options.alike else []
+    print("\n".join(failures), end="\n" if failures else "")
     right, wrong = sum(r["is_right"] for r in rows), sum(r["is_wrong"] for r in rows)
     bad = sum(r.get("fixed") == "bad" for r in rows)
     print(f"{len(rows)} drives, {right} right, {wrong} with a wrong cause, {bad} corrected copies that are not right", file=sys.stderr)
-    return int(wrong > 0 or bad > 0 or right < 0.85 * len(rows))
+    return int(bool(failures) or wrong > 0 or bad > 0 or right < 0.85 * len(rows))
 
 
 if __name__ == "__main__":

@@ -328,6 +328,8 @@ def main():
     parser.add_argument("--named", action="store_true", help="of check alone, without replays")
     parser.add_argument("--followed", action="store_true", help="replays alone: whether a pose is followed that the sensors contradict")
     options = parser.parse_args()
+    if not options.followed and not replays.has_causes(options.bin_dir):
+        return 77
     rows = []
     with tempfile.TemporaryDirectory() as scratch:
         base = pathlib.Path(scratch) / "small-robot"

@@ -32,6 +32,14 @@ def command(*words):
     return done.stdout
 
 
+def has_causes(bin_dir):
+    """Whether the engine for causes runs here: it needs the Python package's dependencies. Says so where it does not."""
+    is_there = subprocess.run([bin_dir / "waymark-causes", "--help"], capture_output=True).returncode == 0
+    if not is_there:
+        print("without causes: waymark-causes does not run here (tests/judges/setup.sh makes the tests' Python)")
+    return is_there
+
+
 def rows(path):
     head, *lines = path.read_text().splitlines()
     names = head.split(",")
