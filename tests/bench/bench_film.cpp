@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "simulate/film.h"
+#include "timing.h"
 
 using namespace wm;
 
@@ -31,7 +32,7 @@ int main(int argc, char **argv) {
   wm_error err{};
   if (sim::load_scenario(argc > 1 ? argv[1] : "config/worlds/corridor-easy.yaml", scenario, &err) != WM_OK)
     return std::fprintf(stderr, "%s\n", err.text), 1;
-  scenario.duration_s = 4;
+  scenario.duration_s = bench::is_short() ? 0.6 : 4;
   scenario.pictures.samples = 1;
   if (sim::prepare(scenario, scenario.seed, film, &err) != WM_OK) return std::fprintf(stderr, "%s\n", err.text), 1;
 
@@ -58,5 +59,5 @@ int main(int argc, char **argv) {
               1e3 * took_s, 1 / took_s, 1e3 * cpu_s);
   std::printf("%-44s %16.1f frames/s  limit %.0f: %s\n", "with all of this machine's cores at most", idle_hz, kLimitHz,
               idle_hz >= kLimitHz ? "met" : "missed");
-  return idle_hz >= kLimitHz ? 0 : 1;
+  return idle_hz >= kLimitHz || bench::is_short() ? 0 : 1;
 }

@@ -13,6 +13,7 @@
 #include "drawn_search.h"
 #include "drawn_street.h"
 #include "landmark_drive.h"
+#include "plain_ekf.h"
 #include "vision/edges_hough/hough.hpp"
 
 // Callgrind counts inside of this function alone.
@@ -28,6 +29,39 @@ int times = 1;
 void count(const std::function<void()> &work) {
   work();
   for (int i = 0; i < times; i++) wm_counted(&work);
+}
+
+// A prediction and a bearing of landmark_ekf. For 10 s a stated start is weighed (`start`); the rest of the drive is as
+// the steps after 12 s are.
+void landmark_steps(const std::vector<bench::setting> &settings, bool start) {
+  bench::landmark_drive drive(settings, false);
+  std::vector<bench::landmark_drive::step> steps;  // as many however often it is counted
+  for (int i = 0; i < 1000; i++) steps.push_back(drive.at(i));
+  size_t i = 0;
+  while (!start && i < 600) {
+    drive.predict(steps[i]);
+    (void)drive.correct(steps[i++]);
+  }
+  count([&] {
+    const auto &now = steps[i++ % steps.size()];
+    drive.predict(now);
+    (void)drive.correct(now);
+  });
+}
+
+// The same of a plain EKF.
+void plain_steps() {
+  const bench::landmark_drive drive({}, false);
+  bench::plain_ekf filter(3, 0, 1.5707963, 0.05, 0.05);
+  std::vector<bench::landmark_drive::step> steps;
+  for (int i = 0; i < 1000; i++) steps.push_back(drive.at(i));
+  size_t i = 0;
+  count([&] {
+    const auto &now = steps[i++ % steps.size()];
+    filter.predict(0.02, now.twist.as.twist2.v_mps, now.twist.as.twist2.w_radps, 1e-4, 1e-4);
+    const wm_landmark &l = drive.landmark(now.seen.as.sighting.landmark_id);
+    filter.bearing(l.p_m[0], l.p_m[1], now.seen.as.sighting.bearing_rad, 4e-4);
+  });
 }
 
 void windows() {
@@ -60,20 +94,13 @@ int main(int argc, char **argv) {
       work.resample();
     });
   } else if (!std::strcmp(what, "landmark_step") || !std::strcmp(what, "landmark_start")) {
-    bench::landmark_drive drive(bench::kCalibrationStates, false);
-    std::vector<bench::landmark_drive::step> steps;  // as many however often it is counted
-    for (int i = 0; i < 1000; i++) steps.push_back(drive.at(i));
-    size_t i = 0;
-    // For 10 s a stated start is weighed; the rest of the drive is as these steps are.
-    while (!std::strcmp(what, "landmark_step") && i < 600) {
-      drive.predict(steps[i]);
-      (void)drive.correct(steps[i++]);
-    }
-    count([&] {
-      const auto &now = steps[i++ % steps.size()];
-      drive.predict(now);
-      (void)drive.correct(now);
-    });
+    landmark_steps(bench::kCalibrationStates, !std::strcmp(what, "landmark_start"));
+  } else if (!std::strcmp(what, "landmark_pose")) {
+    landmark_steps(bench::pose_alone(), false);
+  } else if (!std::strcmp(what, "landmark_defaults")) {
+    landmark_steps({}, false);
+  } else if (!std::strcmp(what, "plain_step")) {
+    plain_steps();
   } else if (!std::strcmp(what, "window_50x50")) {
     windows();
   } else if (!std::strcmp(what, "own_map_cycle") || !std::strcmp(what, "own_map_search")) {
@@ -110,7 +137,8 @@ int main(int argc, char **argv) {
   } else {
     std::fprintf(stderr,
                  "usage: wm_instructions "
-                 "landmark_step|landmark_start|particles_200|particles_2000|particle_step_200|particle_step_2000|"
+                 "landmark_step|landmark_start|landmark_pose|landmark_defaults|plain_step|particles_200|particles_2000|"
+                 "particle_step_200|particle_step_2000|"
                  "window_50x50|picture_rays|picture_windows|picture_lines|picture_landmarks|picture_landmarks_lost|"
                  "edge_scans_tracking|edge_scans_searching|own_map_cycle|own_map_search [TIMES]\n");
     return 2;

@@ -15,11 +15,11 @@ namespace {
 using namespace bench;
 
 void whole(const drawn_street &street, bool lost) {
-  constexpr int kRounds = 60;
+  const int calls = rounds(60);
   street_at_work work(street);
   std::vector<double> times;
   size_t found = 0;
-  for (int k = 0; k < kRounds; k++) {
+  for (int k = 0; k < calls; k++) {
     const double begin = thread_us();
     found += work.look(lost);
     times.push_back(thread_us() - begin);
@@ -29,12 +29,12 @@ void whole(const drawn_street &street, bool lost) {
       "landmarks_1280x720%s_ms median %.2f, largest %.2f (%.1f of %d found; %.1f MB); two cameras at 30 Hz take %.0f "
       "%% of a core\n",
       lost ? "_without_a_pose" : "", one_ms, *std::max_element(times.begin(), times.end()) * 1e-3,
-      static_cast<double>(found) / kRounds, kSigns, static_cast<double>(work.bytes()) * 1e-6, one_ms * 60 * 0.1);
+      static_cast<double>(found) / calls, kSigns, static_cast<double>(work.bytes()) * 1e-6, one_ms * 60 * 0.1);
 }
 
 // The same pictures without a pose: searched everywhere.
 void everywhere(const drawn_street &street) {
-  constexpr int kRounds = 40;
+  const int calls = rounds(40);
   wm::mounted_camera camera;
   wm::mounted_camera_init(&camera, street.rig.cameras[0]);
   std::vector<uint8_t> levels(wm::pyramid_bytes(kStreetWidth, kStreetHeight) + wm::kReadBehind), looks[kSigns];
@@ -55,7 +55,7 @@ void everywhere(const drawn_street &street) {
   search.around.make(camera, memory.data());
   std::vector<double> take, compare;
   int places = 0;
-  for (int k = 0; k < kRounds; k++) {
+  for (int k = 0; k < calls; k++) {
     const double begin = thread_us();
     search.around.take(pyramid);
     const double taken = thread_us();
@@ -70,7 +70,7 @@ void everywhere(const drawn_street &street) {
 
 // One sign, 5 m away: its stages.
 void stages(const drawn_street &street) {
-  constexpr int kRounds = 60;
+  const int calls = rounds(60);
   wm::mounted_camera camera;
   wm::camera_guess guess;
   wm::mounted_camera_init(&camera, street.rig.cameras[0]);
@@ -99,7 +99,7 @@ void stages(const drawn_street &street) {
   static wm::drawn_view drawn;
   static wm::align_work work;
   std::vector<double> times[4];
-  for (int k = 0; k < kRounds; k++) {
+  for (int k = 0; k < calls; k++) {
     double at[5] = {thread_us()};
     std::copy(street.picture.begin(), street.picture.end(), pyramid.level[0].grey);
     wm::pyramid_build(&pyramid, row.data());

@@ -17,7 +17,7 @@
 #define FRAME_HZ 10
 #define SEEN 4
 #define EVENTS (SECONDS * (MOTION_HZ + FRAME_HZ * SEEN))
-#define ROUNDS 41
+#define ROUNDS 41  // one where the tests run it (WM_BENCH_SHORT), which judge no times
 
 static const char kConfig[] =
     "format: waymark-config/1\nestimator: landmark_ekf\nmerge: {horizon_ms: 300, lateness_max_ms: 300}\n";
@@ -131,7 +131,8 @@ int main(void) {
   assembly.source_count = 2;
   assembly.sources[0].merge = (wm_merge_source){.is_motion = 1, .in_order = 1, .lateness_max_ns = 300 * MS};
   assembly.sources[1].merge = (wm_merge_source){.rank = 1, .in_order = 1, .lateness_max_ns = 300 * MS};
-  for (int round = 0; round < ROUNDS; round++)
+  const int is_short = getenv("WM_BENCH_SHORT") != NULL, rounds = is_short ? 1 : ROUNDS;
+  for (int round = 0; round < rounds; round++)
     for (int k = 0; k < 3; k++) {
       make_events(kLate_ns[k]);
       took_ns[k][round] = drive(&assembly, &fused[k]);
@@ -139,13 +140,13 @@ int main(void) {
   int bad = 0;
   double median_ns[3];
   for (int k = 0; k < 3; k++) {
-    qsort(took_ns[k], ROUNDS, sizeof took_ns[k][0], by_size);
-    median_ns[k] = (double)took_ns[k][ROUNDS / 2];
+    qsort(took_ns[k], (size_t)rounds, sizeof took_ns[k][0], by_size);
+    median_ns[k] = (double)took_ns[k][rounds / 2];
     double ratio = median_ns[k] / median_ns[0];
     (void)printf(
         "frames %3lld ms late: %6.0f ns a frame of %d sightings with its motion and poses, ratio %.3f, %llu fused\n",
         (long long)(kLate_ns[k] / MS), median_ns[k] / (SECONDS * FRAME_HZ), SEEN, ratio, (unsigned long long)fused[k]);
-    bad |= ratio > 1.2 || fused[k] != SECONDS * FRAME_HZ * SEEN;
+    bad |= (ratio > 1.2 && !is_short) || fused[k] != SECONDS * FRAME_HZ * SEEN;
   }
   if (bad) (void)puts("FAILED: a late frame costs more than 1.2 times a fresh one, or isn't fused");
   free(events);

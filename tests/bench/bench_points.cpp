@@ -11,7 +11,7 @@
 namespace {
 
 void measure(const char *what, bool fisheye, int32_t tracks) {
-  constexpr int kPictures = 40, kRounds = 3;
+  const int pictures_a_round = bench::is_short() ? 3 : 40, rounds = bench::is_short() ? 1 : 3;
   wm_rig rig;
   sea::make_rig(&rig, fisheye);
   const int32_t cameras[2] = {0, 1};
@@ -21,8 +21,8 @@ void measure(const char *what, bool fisheye, int32_t tracks) {
   const sea::floor_grain grain(1);
   wm::mounted_camera eyes[2];
   for (int i = 0; i < 2; i++) wm::mounted_camera_init(&eyes[i], rig.cameras[i]);
-  std::vector<std::vector<uint8_t>> pictures(2 * kPictures);
-  for (int k = 0; k < kPictures; k++) {
+  std::vector<std::vector<uint8_t>> pictures(2 * static_cast<size_t>(pictures_a_round));
+  for (int k = 0; k < pictures_a_round; k++) {
     sea::view_of_floor seen(grain);
     seen.map_base = sea::swim(0.125 * k);
     for (int i = 0; i < 2; i++)
@@ -30,9 +30,9 @@ void measure(const char *what, bool fisheye, int32_t tracks) {
   }
   std::vector<double> times, first;
   size_t told = 0;
-  for (int round = 0; round < kRounds; round++) {
+  for (int round = 0; round < rounds; round++) {
     stereo.again();
-    for (int k = 0; k < kPictures; k++) {
+    for (int k = 0; k < pictures_a_round; k++) {
       wm_frame frames[2];
       for (int i = 0; i < 2; i++)
         frames[i] = bench::frame_of(pictures[static_cast<size_t>(2 * k + i)], 640, 480, i, INT64_C(125000000) * k);

@@ -105,7 +105,7 @@ void measure(const char *title, int count, int seen, bool known, double limit_us
 
   std::vector<double> cost;
   size_t fused = 0, rejected = 0;
-  const int steps = known ? 20000 : 600;
+  const int steps = bench::is_short() ? 30 : known ? 20000 : 600;
   uint64_t draw = 0;
   for (int i = 0; i < steps; i++) {
     const double t = 0.1 * i, place[2] = {0.05 * sin(0.7 * t), 0.05 * (1 - cos(0.7 * t))};

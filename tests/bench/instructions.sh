@@ -10,7 +10,7 @@ record=$(dirname "$(readlink -f "$0")")/instructions.txt
 command -v valgrind >/dev/null || { echo "instructions: not counted, there is no valgrind (Debian: valgrind)"; exit 0; }
 fresh=$(mktemp)
 trap 'rm -f "$fresh"' EXIT
-for work in landmark_step particles_200 particles_2000 window_50x50 picture_rays picture_windows picture_lines picture_landmarks own_map_cycle; do
+for work in plain_step landmark_pose landmark_defaults landmark_step particles_200 particles_2000 window_50x50 picture_rays picture_windows picture_lines picture_landmarks own_map_cycle; do
   count=$(valgrind --tool=callgrind --callgrind-out-file=/dev/null --collect-atstart=no --toggle-collect=wm_counted \
     "$program" "$work" 2>&1 | sed -n 's/.*Collected : *//p')
   echo "$work $count" >>"$fresh"

@@ -26,6 +26,20 @@ inline const std::vector<setting> kCalibrationStates = {
     {"states.sensor_yaw_sigma_rad", 0.05},      {"states.sensor_time_offset_sigma_s", 0.05},
 };
 
+// What switches off all that is estimated beside the pose: calibration, slots of errors in time and of the map, factors
+// of noise.
+inline std::vector<setting> pose_alone() {
+  std::vector<setting> out = {{"correlated.slots", 0}, {"states.map_slots", 0}, {"correlated.gnss_m", 0}};
+  for (const wm_param_table *table :
+       {&wm_motion_params_table, &wm_sighting_params_table, &wm_estimator_find("landmark_ekf")->params})
+    for (size_t i = 0; i < table->count; i++) {
+      const char *key = table->params[i].key;
+      const bool is_state = std::strncmp(key, "states.", 7) == 0 && std::strstr(key, "_sigma");
+      if (is_state || std::strcmp(key, "noise.adapt_log_sigma") == 0) out.push_back({key, 0});
+    }
+  return out;
+}
+
 class landmark_drive {
  public:
   landmark_drive(const std::vector<setting> &settings, bool range)
@@ -82,6 +96,12 @@ class landmark_drive {
     seen.as.sighting.bearing_rad = std::remainder(std::atan2(dy, dx) - turn, 6.283185307179586);
     if (range_) seen.as.sighting.range_m = std::hypot(dx, dy);
     return {twist, seen};
+  }
+  const wm_landmark &landmark(int id) const { return landmarks_[id]; }
+  // How many values the filter lists beside the pose.
+  size_t listed() const {
+    wm_calibration_value values[64];
+    return ekf_->calibration(state_, values, 64);
   }
   void predict(const step &now) { ekf_->predict(state_, &now.twist); }
   // True if the sighting was fused.

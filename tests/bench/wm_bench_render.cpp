@@ -40,6 +40,7 @@ double measure(const char *name, const Scene &scene, const Camera &camera, const
   Image image;
   std::vector<double> times, cpu;
   renderer->render(shot_of(0, exposure_ns), image);
+  if (bench::is_short()) frames = 1;
   for (int i = 1; i <= frames; i++) {
     const double begin = seconds(), cpu_begin = cpu_seconds();
     renderer->render(shot_of(static_cast<uint64_t>(i), exposure_ns), image);
@@ -87,7 +88,7 @@ int main(int argc, char **argv) {
   std::vector<double> develop, compress;
   AutoExposure gain(0.18, 0.3, 0.01, 1);
   Jpeg jpeg;
-  for (int i = 0; i < 9; i++) {
+  for (int i = 0; i < bench::rounds(9); i++) {
     const double start = seconds();
     const Exposure exposure{.gain = gain.next(image, static_cast<uint64_t>(i))};
     sensor.develop(image, exposure, static_cast<uint64_t>(i), picture);
