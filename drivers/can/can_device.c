@@ -196,7 +196,7 @@ wm_status can_device_make(const char *interface, wm_can_decoder *decoder, const 
     return wm_fail(err, WM_IO, "%s: no memory to open it", interface);
   }
   self->base.ops = &kCanDevice;
-  self->base.is_motion = self->base.is_live = self->base.in_order = 1;
+  self->base.is_motion = self->base.is_live = self->base.in_order = self->base.is_bus = 1;
   self->base.kinds = WM_EVENT_BIT(WM_EVENT_QUANTITIES);
   self->decoder = decoder;
   self->io = io;

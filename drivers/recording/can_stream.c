@@ -166,7 +166,7 @@ wm_status can_stream_open(const char *log, const can_buses *buses, size_t bus, w
   }
   self->base.ops = &kCan;
   self->base.is_motion = part == WM_CAN_MOTION;
-  self->base.in_order = 1;
+  self->base.in_order = self->base.is_bus = 1;
   self->base.kinds = WM_EVENT_BIT(part == WM_CAN_GNSS ? WM_EVENT_POSITION : WM_EVENT_QUANTITIES);
   self->part = part;
   wm_can_gnss_init(&self->gnss, gnss_origin);

@@ -86,7 +86,7 @@ static void choose_quantities(wm_assembly *self) {
       wm_assembled_source *less = &self->sources[i];
       const wm_assembled_source *taken = &self->sources[k];
       const uint32_t both = less->source->quantities & taken->source->quantities & ~less->drops;
-      if (both == 0 || strncmp(taken->name, "can", 3) == 0) continue;
+      if (both == 0 || taken->source->is_bus) continue;
       less->drops |= both;
       (void)snprintf(leave_out(self, less->name, WM_UNUSED_QUANTITY)->text, sizeof self->unused[0].text,
                      "%s is taken from %.16s", wm_quantity_name((unsigned)__builtin_ctz(both)), taken->name);

@@ -95,7 +95,7 @@ wm_status pushed_can_open(const char *name, const char *interface, const char *d
   self->decoder = decoder;
   self->part = part;
   self->base.is_motion = part == WM_CAN_MOTION;
-  self->base.in_order = 1;
+  self->base.in_order = self->base.is_bus = 1;
   self->base.kinds = WM_EVENT_BIT(part == WM_CAN_MOTION ? WM_EVENT_QUANTITIES : WM_EVENT_POSITION);
   if (part == WM_CAN_MOTION) self->quantities = wm_can_decoder_quantities(decoder);
   wm_can_gnss_init(&self->gnss, gnss_origin);

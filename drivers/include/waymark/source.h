@@ -58,11 +58,13 @@ struct wm_source {
   uint8_t is_live;                // a device: its data arrive in real time
   uint8_t event_driven;           // sends on demand: its silence is no fault
   uint8_t in_order;               // its stamps never go back (a file without arrival_ns, a CAN bus)
+  uint8_t is_bus;                 // decoded from a CAN bus
   uint8_t sample_at_next;         // of a CSV of motion: each row's values get the stamp of the row after it
   wm_time_ns ready_after_ns;      // of recorded pictures: from a picture's arrival to that of its observations
   double lateness_max_ms;         // default where the configuration doesn't name the source; 0: merge.lateness_max_ms
   uint32_t kinds;                 // WM_EVENT_BIT of what it hands out
   uint32_t quantities;            // bit per wm_quantity that it may give
+  const struct wm_detector *detector;  // that finds its events in pictures; NULL: they are given
   wm_source_counts counts;
   wm_time_ns from_ns, until_ns;  // of the interval that a run takes: search outcomes outside of it aren't counted
   // NULL where nothing may be skipped. Pictures are large and slow to process: those that are no longer the newest at
