@@ -160,13 +160,8 @@ static void measure_lateness(wm_merge_counts *counts, wm_time_ns lateness_ns) {
   if (lateness_ns > counts->lateness_worst_ns) counts->lateness_worst_ns = lateness_ns;
 }
 
-// Hash of stamp, kind and content in their encoding (without padding and order of arrival).
 static int seen_before(source_state *s, const wm_event *event) {
-  uint8_t bytes[WM_EVENT_ENCODED_MAX];
-  size_t length = wm_event_encode(event, bytes, sizeof bytes);
-  uint8_t *after_seq = bytes + 8;  // version, kind, source, seq
-  memset(after_seq + 8, 0, 8);     // arrival
-  uint64_t hash = wm_hash(WM_HASH_START + event->kind, after_seq, length - 8);
+  const uint64_t hash = wm_event_hash(event);
   for (size_t i = 0; i < WM_MERGE_RECENT; i++)
     if (s->recent[i] == hash) return 1;
   s->recent[s->recent_next++ % WM_MERGE_RECENT] = hash;
@@ -233,19 +228,18 @@ wm_merge_verdict wm_merge_push(wm_merge *self, const wm_event *event) {
   return WM_MERGE_TAKEN;
 }
 
-const wm_event *wm_merge_front(wm_merge *self) {
-  if (self->waiting == 0 || self->heap[0].t_ns >= self->watermark_ns) return NULL;
-  return (const wm_event *)(self->slots + self->heap[0].slot * self->slot_bytes);
-}
-
-void wm_merge_pop(wm_merge *self) {
-  uint32_t slot = self->heap[0].slot;
-  const wm_event *event = (const wm_event *)(self->slots + slot * self->slot_bytes);
-  self->sources[event->source].waiting--;
+int wm_merge_take(wm_merge *self, wm_event *out) {
+  if (self->waiting == 0 || self->heap[0].t_ns >= self->watermark_ns) return 0;
+  const uint32_t slot = self->heap[0].slot;
+  const void *narrow = self->slots + slot * self->slot_bytes;  // less than a wm_event has
+  memcpy(out, narrow, WM_EVENT_SMALL_BYTES);
+  memcpy(out, narrow, wm_event_bytes(out));
+  self->sources[out->source].waiting--;
   self->waiting--;
   self->free_slots[self->capacity - 1 - self->waiting] = slot;
   self->heap[0] = self->heap[self->waiting];
   if (self->waiting > 0) sift_down(self->heap, self->waiting, 0);
+  return 1;
 }
 
 // ── what is known of the sources ────────────────────────────────────────────────────────────────────────────────────

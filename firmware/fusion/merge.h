@@ -70,9 +70,8 @@ WM_REALTIME wm_merge_verdict wm_merge_push(wm_merge *self, const wm_event *event
 WM_REALTIME void wm_merge_advance(wm_merge *self, wm_time_ns now_ns);
 // No event will follow: all that wait are final.
 WM_REALTIME void wm_merge_flush(wm_merge *self);
-// The next final event, or NULL; valid until the pop.
-WM_REALTIME const wm_event *wm_merge_front(wm_merge *self);
-WM_REALTIME void wm_merge_pop(wm_merge *self);
+// The next final event into *out, of which the bytes behind wm_event_bytes() stay as they are. 0: there is none yet.
+WM_REALTIME int wm_merge_take(wm_merge *self, wm_event *out);
 
 // Everything before this stamp is final. WM_TIME_NONE before the first advance.
 WM_REALTIME wm_time_ns wm_merge_watermark(const wm_merge *self);

@@ -85,8 +85,7 @@ static void tell_predictor(wm_pipeline *self) {
 
 static void fuse_final(wm_pipeline *self) {
   uint64_t before = self->fuser.events;
-  for (const wm_event *event; (event = wm_merge_front(self->merge)) != NULL; wm_merge_pop(self->merge))
-    wm_fuser_feed(&self->fuser, event);
+  while (wm_merge_take(self->merge, &self->next)) wm_fuser_feed(&self->fuser, &self->next);
   if (self->fuser.events != before) tell_predictor(self);
 }
 

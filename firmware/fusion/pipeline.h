@@ -27,6 +27,7 @@ typedef struct wm_pipeline {
   const wm_assembly *assembly;
   wm_output output;
   wm_merge *merge;
+  wm_event next;  // out of the merge
   wm_fuser fuser;
   wm_predictor predictor;
   wm_budget budget;

@@ -62,6 +62,41 @@ size_t wm_event_encode(const wm_event *event, void *out, size_t capacity) {
   return w.full ? 0 : w.used;
 }
 
+// ── hash ────────────────────────────────────────────────────────────────────────────────────────────────────────────
+
+static uint64_t hash_quantities(uint64_t hash, const wm_quantities *q) {
+  const size_t count = q->count < WM_QUANTITIES_MAX ? q->count : WM_QUANTITIES_MAX;
+  hash = wm_hash(hash, &q->doubt, sizeof q->doubt);
+  hash = wm_hash(hash, &q->lost_before, sizeof q->lost_before);
+  hash = wm_hash(hash, q->id, count * sizeof q->id[0]);
+  return wm_hash(hash, q->value, count * sizeof q->value[0]);
+}
+
+static uint64_t hash_points(uint64_t hash, const wm_points *p) {
+  const size_t bytes = (p->count < WM_POINTS_MAX ? p->count : WM_POINTS_MAX) * sizeof p->x_m[0];
+  hash = wm_hash(hash, &p->dropped, sizeof p->dropped);
+  hash = wm_hash(hash, &p->camera, sizeof p->camera);
+  hash = wm_hash(hash, p->x_m, bytes);
+  hash = wm_hash(hash, p->y_m, bytes);
+  hash = wm_hash(hash, p->normal_rad, bytes);
+  return wm_hash(hash, p->sigma_m, bytes);
+}
+
+uint64_t wm_event_hash(const wm_event *event) {
+  static const uint8_t kBytes[] = {
+      [WM_FIELD_F64] = 8, [WM_FIELD_I64] = 8, [WM_FIELD_U64] = 8, [WM_FIELD_I32] = 4, [WM_FIELD_U16] = 2};
+  size_t count;
+  const wm_event_field *fields = wm_event_fields(event->kind, &count);
+  uint64_t hash = wm_hash(WM_HASH_START + event->kind, &event->t_ns, sizeof event->t_ns);
+  if (event->kind == WM_EVENT_QUANTITIES) hash = hash_quantities(hash, &event->as.quantities);
+  if (event->kind == WM_EVENT_POINTS) hash = hash_points(hash, &event->as.points);
+  for (size_t i = 0; i < count; i++)
+    hash = wm_hash(hash, (const char *)event + fields[i].offset, (size_t)kBytes[fields[i].type] * fields[i].count);
+  return hash;
+}
+
+// ── from bytes ──────────────────────────────────────────────────────────────────────────────────────────────────────
+
 static void get_quantities(wm_reader *r, wm_quantities *q) {
   q->count = wm_get_u8(r);
   q->doubt = wm_get_u8(r);

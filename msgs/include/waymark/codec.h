@@ -25,6 +25,8 @@ extern "C" {
 #define WM_INNOVATION_ENCODED_MAX 80
 
 size_t wm_event_encode(const wm_event *event, void *out, size_t capacity);
+// Of stamp, kind and content: equal where the same datum is sent again, whatever its source, number and arrival.
+uint64_t wm_event_hash(const wm_event *event);
 wm_status wm_event_decode(const void *data, size_t size, wm_event *out, size_t *used);
 
 size_t wm_published_encode(const wm_published *published, void *out, size_t capacity);

@@ -45,9 +45,9 @@ static wm_merge_verdict arrive(int source, wm_time_ns t_ns, wm_time_ns arrival_n
 static const char *final_ms(void) {
   static char text[4096];
   text[0] = '\0';
-  for (const wm_event *e; (e = wm_merge_front(merge)) != NULL; wm_merge_pop(merge))
+  for (wm_event e; wm_merge_take(merge, &e);)
     (void)snprintf(text + strlen(text), sizeof text - strlen(text), "%s%lld/%u", text[0] ? " " : "",
-                   (long long)(e->t_ns / MS), e->source);
+                   (long long)(e.t_ns / MS), e.source);
   return text;
 }
 
@@ -145,10 +145,9 @@ static void events_of_one_stamp_keep_their_order_where_numbers_wrap(void) {
   wm_merge_flush(merge);
   const uint32_t numbers[] = {UINT32_MAX - 2, UINT32_MAX - 1, UINT32_MAX, 0, 1, 2};
   for (int i = 0; i < 6; i++) {
-    const wm_event *e = wm_merge_front(merge);
-    TEST_ASSERT_NOT_NULL(e);
-    TEST_ASSERT_EQUAL_UINT32(numbers[i], e->seq);
-    wm_merge_pop(merge);
+    wm_event e;
+    TEST_ASSERT_TRUE(wm_merge_take(merge, &e));
+    TEST_ASSERT_EQUAL_UINT32(numbers[i], e.seq);
   }
 }
 
@@ -267,7 +266,7 @@ static void a_full_queue_drops_the_newest_and_counts(void) {
   TEST_ASSERT_EQUAL(QUEUE, wm_merge_waiting(merge));
   wm_merge_flush(merge);
   int count = 0;
-  for (; wm_merge_front(merge); wm_merge_pop(merge)) count++;
+  while (wm_merge_take(merge, &e)) count++;
   TEST_ASSERT_EQUAL(QUEUE, count);
 }
 
@@ -381,8 +380,7 @@ static void random_lateness_below_the_bound_gives_exactly_the_sorted_stream(void
       TEST_ASSERT_EQUAL_MESSAGE(WM_MERGE_TAKEN, wm_merge_push(merge, &e), "in time, and yet not taken");
       if (random_below(3)) wm_merge_advance(merge, e.arrival_ns);  // how often one looks doesn't matter
       if (i + 1 == count) wm_merge_flush(merge);
-      for (const wm_event *f; (f = wm_merge_front(merge)) != NULL; wm_merge_pop(merge))
-        out[given++] = (datum){f->t_ns, f->arrival_ns, f->source, 0, 0, f->seq};
+      for (wm_event f; wm_merge_take(merge, &f);) out[given++] = (datum){f.t_ns, f.arrival_ns, f.source, 0, 0, f.seq};
     }
     TEST_ASSERT_EQUAL(count, given);
     qsort(data, count, sizeof data[0], by_stamp);
@@ -406,9 +404,9 @@ static void any_input_comes_out_in_order_and_is_accounted_for(void) {
       wm_time_ns t = now - (wm_time_ns)random_below(400) * MS + (random_below(50) == 0 ? 500 * MS : 0);
       arrive((int)random_below(3), t, now);
       pushed++;
-      for (const wm_event *e; (e = wm_merge_front(merge)) != NULL; wm_merge_pop(merge)) {
-        TEST_ASSERT_GREATER_OR_EQUAL_INT64(last, e->t_ns);
-        last = e->t_ns;
+      for (wm_event e; wm_merge_take(merge, &e);) {
+        TEST_ASSERT_GREATER_OR_EQUAL_INT64(last, e.t_ns);
+        last = e.t_ns;
         given++;
       }
     }

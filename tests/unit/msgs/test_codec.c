@@ -126,6 +126,72 @@ static void every_event_comes_back_as_it_was(void) {
     }
 }
 
+// Changes one bit of each number of each field in turn.
+static void the_hash_of_an_event_sees_its_fields_and_its_stamp_alone(void) {
+  static const size_t kBytes[] = {
+      [WM_FIELD_F64] = sizeof(double), [WM_FIELD_I64] = 8, [WM_FIELD_U64] = 8, [WM_FIELD_I32] = 4, [WM_FIELD_U16] = 2};
+  static wm_event event, other;
+  for (unsigned kind = 1; kind < WM_EVENT_KIND_COUNT; kind++) {
+    fill(&event, kind);
+    const uint64_t hash = wm_event_hash(&event);
+    other = event;
+    other.arrival_ns++;
+    other.seq++;
+    other.source++;
+    TEST_ASSERT_EQUAL_HEX64(hash, wm_event_hash(&other));
+    other.t_ns++;
+    TEST_ASSERT_TRUE(hash != wm_event_hash(&other));
+    size_t count;
+    const wm_event_field *fields = wm_event_fields(kind, &count);
+    for (size_t i = 0; i < count; i++)
+      for (size_t k = 0; k < fields[i].count; k++) {
+        other = event;
+        ((char *)&other)[fields[i].offset + k * kBytes[fields[i].type]] ^= 1;
+        TEST_ASSERT_TRUE_MESSAGE(hash != wm_event_hash(&other), fields[i].name);
+      }
+  }
+  fill(&event, WM_EVENT_SIGHTING);
+  other = event;
+  other.kind = WM_EVENT_LOOKED;  // has the same first field
+  TEST_ASSERT_TRUE(wm_event_hash(&event) != wm_event_hash(&other));
+}
+
+// Lists count up to their length, and no further.
+static void the_hash_of_a_list_sees_each_of_its_numbers(void) {
+  static wm_event event, other;
+  memset(&event, 0, sizeof event);
+  event.kind = WM_EVENT_QUANTITIES;
+  event.as.quantities.count = 2;
+  uint64_t hash = wm_event_hash(&event);
+  for (int what = 0; what < 6; what++) {
+    other = event;
+    wm_quantities *q = &other.as.quantities;
+    if (what == 0) q->id[1] = 1;
+    if (what == 1) q->value[1] = 1;
+    if (what == 2) q->doubt = 1;
+    if (what == 3) q->lost_before = 1;
+    if (what == 4) q->count = 1;
+    if (what == 5) q->value[2] = 1, q->id[2] = 1;
+    TEST_ASSERT_EQUAL_MESSAGE(what == 5, hash == wm_event_hash(&other), "quantities");
+  }
+  event.kind = WM_EVENT_POINTS;
+  event.as.points.count = 2;
+  hash = wm_event_hash(&event);
+  for (int what = 0; what < 8; what++) {
+    other = event;
+    wm_points *p = &other.as.points;
+    if (what == 0) p->x_m[1] = 1;
+    if (what == 1) p->y_m[1] = 1;
+    if (what == 2) p->normal_rad[1] = 1;
+    if (what == 3) p->sigma_m[1] = 1;
+    if (what == 4) p->dropped = 1;
+    if (what == 5) p->camera = 1;
+    if (what == 6) p->count = 1;
+    if (what == 7) p->x_m[2] = 1;
+    TEST_ASSERT_EQUAL_MESSAGE(what == 7, hash == wm_event_hash(&other), "points");
+  }
+}
+
 static void a_cut_event_is_refused_at_every_length(void) {
   for (unsigned kind = 1; kind < WM_EVENT_KIND_COUNT; kind++) {
     wm_event in, out;
@@ -491,6 +557,8 @@ int main(void) {
   RUN_TEST(fields_cover_their_structs);
   RUN_TEST(a_sighting_without_numbers_has_none);
   RUN_TEST(every_event_comes_back_as_it_was);
+  RUN_TEST(the_hash_of_an_event_sees_its_fields_and_its_stamp_alone);
+  RUN_TEST(the_hash_of_a_list_sees_each_of_its_numbers);
   RUN_TEST(a_cut_event_is_refused_at_every_length);
   RUN_TEST(noise_never_gives_an_event_with_indices_out_of_bounds);
   RUN_TEST(another_version_is_refused);
