@@ -301,3 +301,8 @@ wm_status wm_odometry_carry(const wm_odometry *self, const wm_estimate *fused, w
   }
   return WM_OK;
 }
+
+wm_pose2 wm_odometry_jump(const wm_pose2 *map_before, const wm_pose2 *odom_before, const wm_pose2 *map_now,
+                          const wm_pose2 *odom_now) {
+  return wm::between(wm::compose(*map_before, wm::between(*odom_before, *odom_now)), *map_now);
+}

@@ -42,15 +42,19 @@ inline constexpr wm_motion_calibration kNeutralCalibration = {
 inline double speed_of(const planar_twist &t) { return t.u == 0.0 ? std::fabs(t.v) : std::sqrt(t.v * t.v + t.u * t.u); }
 
 // The twist and its derivatives by the calibration; only the first `count` entries of `index`, `v_by`, `u_by`, `w_by`
-// are set. The lag is not among them: it moves the ends of the interval.
+// are set. A term beyond the capacity is counted in `missing`, as in core/row.hpp; no model has so many. The lag is not
+// among them: it moves the ends of the interval.
 struct motion_twist : planar_twist {
   static constexpr int kMax = 13;  // capacity; a model has fewer terms
-  int count;
+  int count, missing;
   int index[kMax];
   double v_by[kMax], u_by[kMax], w_by[kMax];
 
   void add(int term, double v_by_term, double w_by_term, double u_by_term = 0.0) {
-    if (count == kMax) return;
+    if (count == kMax) {
+      missing++;
+      return;
+    }
     index[count] = term;
     v_by[count] = v_by_term;
     u_by[count] = u_by_term;

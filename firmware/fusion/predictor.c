@@ -23,25 +23,11 @@ void wm_predictor_fused(wm_predictor *self, const wm_estimate *fused, const wm_m
   wm_odometry_calibrate(self->odometry, calibration);
 }
 
-static double wrapped(double angle_rad) { return remainder(angle_rad, 2 * M_PI); }
-
-// The pose of base_link in map at present if map had not moved against odom since the last message.
-static wm_pose2 carried(const wm_pose2 *map_base, const wm_pose2 *odom_base, const wm_pose2 *odom_now) {
-  double dx = odom_now->x_m - odom_base->x_m, dy = odom_now->y_m - odom_base->y_m;
-  double turn = map_base->heading_rad - odom_base->heading_rad;
-  double c = cos(turn), s = sin(turn);
-  return (wm_pose2){.x_m = map_base->x_m + c * dx - s * dy,
-                    .y_m = map_base->y_m + s * dx + c * dy,
-                    .heading_rad = wrapped(odom_now->heading_rad + turn)};
-}
-
 // A jump is a move of map against odom between two messages, or a pose that was set.
 static void announce_jump(wm_predictor *self, wm_published *out, const wm_pose2 *map_now) {
   if (self->has_published) {
-    wm_pose2 expected = carried(&self->map_base, &self->odom_base, &out->pose_odom_base);
-    double dx = map_now->x_m - expected.x_m, dy = map_now->y_m - expected.y_m;
-    double moved_m = sqrt(dx * dx + dy * dy);
-    double turned_rad = fabs(wrapped(map_now->heading_rad - expected.heading_rad));
+    const wm_pose2 by = wm_odometry_jump(&self->map_base, &self->odom_base, map_now, &out->pose_odom_base);
+    const double moved_m = sqrt(by.x_m * by.x_m + by.y_m * by.y_m), turned_rad = fabs(by.heading_rad);
     if (moved_m > self->params.jump_m || turned_rad > self->params.jump_rad || out->now.resets != self->resets) {
       self->jumps++;
       self->last_jump_m = moved_m;

@@ -121,6 +121,11 @@ wm_time_ns wm_odometry_newest_ns(const wm_odometry *self);
 wm_status wm_odometry_carry(const wm_odometry *self, const wm_estimate *fused, wm_time_ns t_ns, wm_estimate *out,
                             wm_odom_point *odom);
 
+// By how much map has moved against odom between two times, as a motion of base_link on its own axes: 0 where the pose
+// in map moved as the one in odom did. The same bits on every machine.
+wm_pose2 wm_odometry_jump(const wm_pose2 *map_before, const wm_pose2 *odom_before, const wm_pose2 *map_now,
+                          const wm_pose2 *odom_now);
+
 #ifdef __cplusplus
 }
 #endif

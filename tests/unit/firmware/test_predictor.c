@@ -92,6 +92,21 @@ static void odom_is_turned_into_the_map(void) {
   }
 }
 
+// The same bits on every machine: numbers that another sine or cosine rounds otherwise would differ.
+static void a_jump_is_measured_by_the_estimators_own_algebra(void) {
+  const wm_pose2 map_before = {1.25, -0.5, 3.0}, odom_before = {10.0, 4.0, -3.0}, odom_now = {10.5, 4.25, 3.0};
+  const wm_pose2 map_now = {1.75, -0.25, -3.0};
+  const wm_pose2 by = wm_odometry_jump(&map_before, &odom_before, &map_now, &odom_now);
+  // In double precision by another library: odom moved by R(3) (0.5, 0.25), turned by 6 - 2 pi; map as far, turned by
+  // 2 pi - 6.
+  const double turn = 6.0 - 2.0 * M_PI;
+  const double dx = cos(3.0) * 0.5 - sin(3.0) * 0.25, dy = sin(3.0) * 0.5 + cos(3.0) * 0.25;
+  const double x = 1.25 + cos(3.0) * dx - sin(3.0) * dy, y = -0.5 + sin(3.0) * dx + cos(3.0) * dy, h = 3.0 + turn;
+  TEST_ASSERT_DOUBLE_WITHIN(1e-14, cos(h) * (1.75 - x) + sin(h) * (-0.25 - y), by.x_m);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-14, cos(h) * (-0.25 - y) - sin(h) * (1.75 - x), by.y_m);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-14, -2.0 * turn, by.heading_rad);
+}
+
 static void a_move_of_map_against_odom_is_announced_once(void) {
   wm_published p;
   for (int ms = 0; ms <= 100; ms += 10) move(ms, 1, 0.5);
@@ -226,6 +241,7 @@ int main(void) {
   RUN_TEST(stamps_rise_strictly);
   RUN_TEST(odom_is_turned_into_the_map);
   RUN_TEST(a_move_of_map_against_odom_is_announced_once);
+  RUN_TEST(a_jump_is_measured_by_the_estimators_own_algebra);
   RUN_TEST(a_move_as_large_as_the_bounds_is_no_jump);
   RUN_TEST(a_message_overwrites_all_of_its_memory);
   RUN_TEST(a_pose_set_anew_is_announced_however_small_the_move);
