@@ -232,7 +232,7 @@ wm_status slam::follow_ray(const context &at, bearing_tracks::track *track, cons
   const int inverse = ray_state(*track) + 1;
   const bool is_known = !sees_many() || joint_.variance(inverse) < square(kKnownShare * joint_.value(inverse));
   const wm_verdict verdict = fuse_rows(at, v, g, &block, is_known ? -1 : inverse);
-  note_rotation(g.passed, v.innovation[0], false, track->last_ns);
+  note_rotation(g.passed, v.innovation[0], picture_outliers::kBearings, track->last_ns);
   if (verdict != WM_FUSED) {
     if (++track->misfits >= kMaxMisfits) end_ray(track);
     return WM_OK;

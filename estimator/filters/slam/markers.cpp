@@ -255,7 +255,7 @@ void slam::fuse_known_marker(const context &at, const wm_marker &m, const marker
     return (void)reject(at.records, at.record, WM_REJECTED_SEARCHING);
   const wm_verdict verdict = fuse_rows(at, v, g, &block);
   landmark_note &marker = note(landmark);
-  if (r.has_heading) note_rotation(g.passed, v.innovation[2], true, marker.last_ns);
+  if (r.has_heading) note_rotation(g.passed, v.innovation[2], picture_outliers::kMarkers, marker.last_ns);
   if (!g.passed) return note_misfit(landmark, true);
   if (verdict != WM_FUSED) return;
   const bool may_change = !map_is_held();

@@ -271,7 +271,8 @@ void slam::fuse_known(const context &at, const wm_sighting &s, const reading &r,
   if (g.passed && r.bearing && r.range && !is_point && add_bend(at, landmark, &v))
     joint_.prepare(v.row, v.innovation, v.noise, v.count, &block);
   const wm_verdict verdict = fuse_rows(at, v, g, &block);
-  if (r.bearing && !is_point) note_rotation(g.passed, v.innovation[0], false, note(landmark).last_ns);
+  if (r.bearing && !is_point)
+    note_rotation(g.passed, v.innovation[0], picture_outliers::kBearings, note(landmark).last_ns);
   if (!g.passed) return note_misfit(landmark, r.range);
   if (verdict == WM_FUSED) {
     if (!r.range && note(landmark).last_ns != WM_TIME_NONE)

@@ -270,7 +270,7 @@ void slam::start_again() {
   moved_.clear();
   ambiguous_.clear();
   outliers_.t_ns = WM_TIME_NONE;
-  outliers_.fused = outliers_.rejected = outliers_.before = 0;
+  outliers_ = {};
   const bool given = params_.map != WM_SLAM_MAP_NONE;
   life_.begin(!given || !params_.recover || (place && heading));
   begin_evidence(given ? kStartWrong : kOwnFramePrior);
@@ -380,8 +380,7 @@ size_t slam::list_calibration(wm_calibration_value *out, size_t capacity) const 
   joint_.list_motion_states(&list);
   slots_.list(*setup_, joint_, &list);
   for (size_t i = 0; i < setup_->sensor_count; i++)
-    if (finite(bloom_px_[i])) list.add(setup_->sensors[i].name, "bloom_px", bloom_px_[i], std::nan(""));
-  return list.count();
+    if (finite(bloom_px_[i])) list->add(setup_->sensors[i].name, "bloom_px", bloom_px_[i], std::nan(""));
 }
 
 size_t slam::list_counters(wm_counter *out, size_t capacity) const {

@@ -68,13 +68,17 @@ struct slam_counts {
   uint64_t joined, left, moved, ambiguous, no_room, merged, rotation_outliers;
 };
 
-// Innovations of one picture's outliers: of bearings to known landmarks, or of markers' headings.
+// Innovations of one picture's outliers: of bearings to known landmarks, and of markers' headings.
 struct picture_outliers {
   static constexpr int kCapacity = 32;  // further ones are not looked at
+  enum kind { kBearings, kMarkers, kKinds };
+  struct of_kind {
+    double innovation_rad[kCapacity];
+    int fused, rejected;
+  };
   wm_time_ns t_ns;
-  int fused, rejected, before;  // before: both, in the picture before
-  bool of_markers;
-  double innovation_rad[kCapacity];
+  of_kind of[kKinds];
+  int before[kKinds];  // fused and rejected in the picture before
 };
 
 // Of a landmark that is seen for the first time.
@@ -189,7 +193,8 @@ class slam {
   void note_calibrated(int sensor, unsigned exact);
   bool has_standard() const;
   void follow_scale();
-  bool sees_many() const { return outliers_.before >= kManyBearings; }  // in the picture before
+  // In the picture before.
+  bool sees_many() const { return outliers_.before[0] + outliers_.before[1] >= kManyBearings; }
   bool has_headings() const { return joint_.layout().landmark_width == 3; }
   bool has_lines() const { return joint_.layout().clones > 0; }
   void take_headings();
@@ -299,7 +304,8 @@ class slam {
   // trust.cpp
   bool is_plausible(int landmark, const joint_state::innovation_block &block, double noise);
   bool is_ambiguous(int32_t id, int landmark, int sensor);
-  void note_rotation(bool fused, double innovation_rad, bool of_marker, wm_time_ns last_ns);
+  void note_rotation(bool fused, double innovation_rad, picture_outliers::kind kind, wm_time_ns last_ns);
+  bool is_turned(picture_outliers::kind kind, double *turn_rad) const;
   void end_picture(wm_time_ns t_ns);
   void note_fused(int landmark, int sensor);
   void note_misfit(int landmark, bool ranged);

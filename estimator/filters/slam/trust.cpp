@@ -56,50 +56,58 @@ bool slam::is_ambiguous(int32_t id, int landmark, int sensor) {
 
 // `last_ns`: when this landmark fitted last. A tracker that lost its lines for some pictures finds them again under
 // each other's numbers, all shifted alike: that is no rotation of the robot.
-void slam::note_rotation(bool fused, double innovation_rad, bool of_marker, wm_time_ns last_ns) {
-  outliers_.of_markers = of_marker;
+void slam::note_rotation(bool fused, double innovation_rad, picture_outliers::kind kind, wm_time_ns last_ns) {
   if (!fused && rejoins_ && wm_seconds_between(last_ns, joint_.now_ns()) > kContinuous_s) return;
+  picture_outliers::of_kind &of = outliers_.of[kind];
   if (fused)
-    outliers_.fused++;
-  else if (outliers_.rejected < picture_outliers::kCapacity)
-    outliers_.innovation_rad[outliers_.rejected++] = innovation_rad;
+    of.fused++;
+  else if (of.rejected < picture_outliers::kCapacity)
+    of.innovation_rad[of.rejected++] = innovation_rad;
 }
 
-// A new stamp: the picture before is complete. If most of its bearings or markers were rejected by the same angle, the
-// landmarks stand where they stood and the robot was turned, by a wheel that slipped or by hand. Its covariance is
-// inflated by that angle. False detections scatter.
+// Most of the picture's bearings, or of its markers, were rejected by the same angle.
+bool slam::is_turned(picture_outliers::kind kind, double *turn_rad) const {
+  const picture_outliers::of_kind &of = outliers_.of[kind];
+  const bool of_markers = kind == picture_outliers::kMarkers;
+  const double least = of_markers ? kMarkerHeading_rad : 0.0;
+  int most = 0;
+  for (int i = 0; i < of.rejected; i++) {
+    const double by = of.innovation_rad[i];
+    if (std::fabs(by) < least) continue;
+    int alike = 0;
+    double sum = 0.0;
+    for (int j = 0; j < of.rejected; j++)
+      if (std::fabs(of.innovation_rad[j] - by) < kAlike * std::fabs(by) + least) {
+        alike++;
+        sum += of.innovation_rad[j];
+      }
+    if (alike > most) {
+      most = alike;
+      *turn_rad = sum / alike;
+    }
+  }
+  const int seen = of.fused + of.rejected;
+  if (most < (of_markers ? kAlikeMarkers : kAlikeBearings) || 2 * most <= seen) return false;
+  // In the dark a tracker finds a few of its lines where others are, all shifted alike.
+  return of_markers || 2 * seen > outliers_.before[kind];
+}
+
+// A new stamp: the picture before is complete. If it is turned, the landmarks stand where they stood and the robot was
+// turned, by a wheel that slipped or by hand. Its covariance is inflated by that angle. False detections scatter.
 void slam::end_picture(wm_time_ns t_ns) {
   if (t_ns == outliers_.t_ns) return;
   first_.count = first_.settled = 0;
   end_bearings(t_ns);
-  const double least = outliers_.of_markers ? kMarkerHeading_rad : 0.0;
-  int most = 0;
-  double turn = 0.0;
-  for (int i = 0; i < outliers_.rejected; i++) {
-    const double by = outliers_.innovation_rad[i];
-    if (std::fabs(by) < least) continue;
-    int alike = 0;
-    double sum = 0.0;
-    for (int j = 0; j < outliers_.rejected; j++)
-      if (std::fabs(outliers_.innovation_rad[j] - by) < kAlike * std::fabs(by) + least) {
-        alike++;
-        sum += outliers_.innovation_rad[j];
-      }
-    if (alike > most) {
-      most = alike;
-      turn = sum / alike;
-    }
-  }
-  const int seen = outliers_.fused + outliers_.rejected;
-  const bool enough = most >= (outliers_.of_markers ? kAlikeMarkers : kAlikeBearings) && 2 * most > seen;
-  // In the dark a tracker finds a few of its lines where others are, all shifted alike.
-  if (enough && (outliers_.of_markers || 2 * seen > outliers_.before)) {
-    joint_.inflate_pose(square(kLever_m * turn), square(turn));
+  double turn_rad = 0.0;
+  if (is_turned(picture_outliers::kMarkers, &turn_rad) || is_turned(picture_outliers::kBearings, &turn_rad)) {
+    joint_.inflate_pose(square(kLever_m * turn_rad), square(turn_rad));
     counts_.rotation_outliers++;
   }
-  outliers_.before = seen;
   outliers_.t_ns = t_ns;
-  outliers_.fused = outliers_.rejected = 0;
+  for (int k = 0; k < picture_outliers::kKinds; k++) {
+    outliers_.before[k] = outliers_.of[k].fused + outliers_.of[k].rejected;
+    outliers_.of[k].fused = outliers_.of[k].rejected = 0;
+  }
 }
 
 void slam::note_fused(int landmark, int sensor) {

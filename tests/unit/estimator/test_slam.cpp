@@ -286,6 +286,39 @@ void test_a_robot_that_was_turned_does_not_turn_its_map(void) {
   }
 }
 
+// Two markers are rejected by the same angle: the robot was turned. A bearing of the same stamp, which comes last, is
+// one of another kind and needs others like it.
+void test_bearings_beside_markers_do_not_hide_that_the_robot_was_turned(void) {
+  for (const bool with_bearing : {false, true}) {
+    leave_room();
+    make_room();
+    coded = true;
+    params.marker_heading_sigma_rad = 0.01;
+    begin();
+    drive(30.0);
+    truth.heading_rad = wm::wrap(truth.heading_rad + 0.3);
+    int markers = 0;
+    const wm_pose2 eye = wm::compose(truth, {0.2, 0, 0});
+    double bearing[kCount];
+    for (int i = 0; i < kCount; i++) {
+      const double dx = place[i][0] - eye.x_m, dy = place[i][1] - eye.y_m;
+      bearing[i] = wm::wrap(wm::atan2(dy, dx) - truth.heading_rad);
+      if (std::fabs(bearing[i]) > 1.0 || markers == 2) continue;
+      const double r = std::sqrt(dx * dx + dy * dy);
+      wm_event seen = make::empty(now_s, WM_EVENT_MARKER);
+      seen.as.marker =
+          marker(10 + i, r * wm::cos(bearing[i]), r * wm::sin(bearing[i]), 2.2, wm::wrap(0.5 * i - truth.heading_rad));
+      TEST_ASSERT_EQUAL(WM_REJECTED_GATE, see(seen));
+      markers++;
+      if (with_bearing && markers == 2) (void)see(make::sighting(now_s, 10 + i, bearing[i], kAbsent));
+    }
+    TEST_ASSERT_EQUAL(2, markers);
+    now_s += 0.2;
+    drive(0.2);
+    TEST_ASSERT_EQUAL_DOUBLE(1, counted(WM_COUNTER_ROTATION_OUTLIERS));
+  }
+}
+
 // Two markers of five or six in view are turned by somebody, alike: the others say that it wasn't the robot.
 void test_markers_that_were_turned_do_not_turn_the_robot(void) {
   coded = true;
@@ -438,6 +471,7 @@ int main(void) {
   RUN_TEST(test_a_landmark_that_moved_leaves_is_counted_and_joins_anew);
   RUN_TEST(test_a_marker_that_moved_is_told_and_pulls_nothing);
   RUN_TEST(test_a_robot_that_was_turned_does_not_turn_its_map);
+  RUN_TEST(test_bearings_beside_markers_do_not_hide_that_the_robot_was_turned);
   RUN_TEST(test_markers_that_were_turned_do_not_turn_the_robot);
   RUN_TEST(test_most_markers_seen_where_none_are_is_survived);
   RUN_TEST(test_most_sightings_false_are_survived);
