@@ -98,8 +98,8 @@ void print_report(const wm_run_report *r, const char *name, const char *out_dir,
   (void)printf("%s: %.1f s, %" PRIu64 " events, %" PRIu64 " poses; %.1f MB of memory; took %.2f s\n", name,
                r->recorded_s, r->events, r->poses, (double)r->memory_bytes * 1e-6, took_s);
   for (uint32_t i = 0; i < r->health.source_count; i++) print_source(&r->health.sources[i]);
-  for (uint32_t i = 0; i < r->health.calibration_count; i++) {
-    const wm_calibration_value *v = &r->health.calibration[i];
+  for (uint32_t i = 0; i < wm_health_calibration_count(&r->health); i++) {
+    const wm_calibration_value *v = wm_health_calibration(&r->health, i);
     (void)printf("  %-32s %10.5g", v->name, v->value);
     if (v->sigma > 0.0) (void)printf("  +- %.2g", v->sigma);
     (void)putchar('\n');

@@ -66,6 +66,22 @@ void wm_fuser_estimate(const wm_fuser *self, wm_estimate *out) {
 
 static uint32_t at_most(size_t count, uint32_t most) { return count < most ? (uint32_t)count : most; }
 
+static uint32_t list_alarms(const wm_fuser *self, wm_alarm out[WM_ALARMS_MAX]) {
+  if (!self->estimator->alarms) return 0;
+  return at_most(self->estimator->alarms(self->state, out, WM_ALARMS_MAX), WM_ALARMS_MAX);
+}
+
+static void put_calibration(const wm_fuser *self, wm_health *out) {
+  wm_calibration_value all[2 * WM_HEALTH_CALIBRATION_MAX];
+  if (!self->estimator->calibration) return;
+  const uint32_t count = at_most(self->estimator->calibration(self->state, all, 2 * WM_HEALTH_CALIBRATION_MAX),
+                                 2 * WM_HEALTH_CALIBRATION_MAX);
+  out->calibration_count = at_most(count, WM_HEALTH_CALIBRATION_MAX);
+  out->more_count = count - out->calibration_count;
+  memcpy(out->calibration, all, out->calibration_count * sizeof all[0]);
+  memcpy(out->more_calibration, all + out->calibration_count, out->more_count * sizeof all[0]);
+}
+
 void wm_fuser_health(const wm_fuser *self, wm_health *out) {
   const wm_estimator *e = self->estimator;
   wm_estimate estimate;
@@ -77,10 +93,9 @@ void wm_fuser_health(const wm_fuser *self, wm_health *out) {
   out->lost_probability = estimate.lost_probability;
   out->resets = estimate.resets;
   if (e->motion_health) out->motion_health = e->motion_health(self->state);
-  // Both return how many there are, possibly more than were written.
-  if (e->calibration)
-    out->calibration_count =
-        at_most(e->calibration(self->state, out->calibration, WM_HEALTH_CALIBRATION_MAX), WM_HEALTH_CALIBRATION_MAX);
+  // They return how many there are, possibly more than were written.
+  put_calibration(self, out);
+  out->alarm_count = list_alarms(self, out->alarms);
   if (e->counters)
     out->counter_count =
         at_most(e->counters(self->state, out->counters, WM_HEALTH_COUNTERS_MAX), WM_HEALTH_COUNTERS_MAX);
@@ -106,13 +121,9 @@ static void write_row(wm_fuser *self) {
 static void monitor(wm_fuser *self, const wm_event *event, const wm_innovation *records, size_t count) {
   if (!wm_monitor_take(&self->monitor, event, records, count)) return;
   wm_estimate estimate;
-  wm_calibration_value values[WM_HEALTH_CALIBRATION_MAX];
-  size_t known = 0;
+  wm_alarm alarms[WM_ALARMS_MAX];
   self->estimator->estimate(self->state, &estimate);
-  if (self->estimator->calibration)
-    known = at_most(self->estimator->calibration(self->state, values, WM_HEALTH_CALIBRATION_MAX),
-                    WM_HEALTH_CALIBRATION_MAX);
-  wm_monitor_step(&self->monitor, &estimate, values, known);
+  wm_monitor_step(&self->monitor, &estimate, alarms, list_alarms(self, alarms));
 }
 
 static wm_status predict(wm_fuser *self, const wm_event *event) {

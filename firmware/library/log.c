@@ -92,8 +92,9 @@ wm_status waymark_read_pose(const void *message, size_t length, wm_published *ou
 }
 
 wm_status waymark_read_health(const void *message, size_t length, wm_health *out, size_t bytes, wm_error *err) {
-  wm_status status = library_check_size("waymark_read_health", out, bytes, sizeof *out, err);
-  return status == WM_OK ? judge(wm_lcm_read_health(message, length, out), err) : status;
+  wm_health health;
+  wm_status status = judge(wm_lcm_read_health(message, length, &health), err);
+  return status == WM_OK ? library_put_health("waymark_read_health", &health, out, bytes, err) : status;
 }
 
 wm_status waymark_read_innovation(const void *message, size_t length, wm_innovation *out, size_t bytes, wm_error *err) {

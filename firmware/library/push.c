@@ -198,12 +198,11 @@ wm_status waymark_pose(waymark_session *self, wm_time_ns now_ns, wm_published *o
 
 wm_status waymark_health(waymark_session *self, wm_health *out, size_t bytes, wm_error *err) {
   wm_status status = check_started(self, "waymark_health", err);
-  if (status == WM_OK) status = library_check_size("waymark_health", out, bytes, sizeof *out, err);
   if (status != WM_OK) return status;
-  memset(out, 0, sizeof *out);
-  wm_pipeline_health(&self->pipeline, self->now_ns, out);
-  if (self->has_data) wm_source_readers_health(self->readers, self->assembly.source_count, out);
-  return WM_OK;
+  wm_health health = {0};
+  wm_pipeline_health(&self->pipeline, self->now_ns, &health);
+  if (self->has_data) wm_source_readers_health(self->readers, self->assembly.source_count, &health);
+  return library_put_health("waymark_health", &health, out, bytes, err);
 }
 
 const char *waymark_source_name(const waymark_session *self, uint32_t source) {

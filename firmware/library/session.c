@@ -2,6 +2,7 @@
 // Opening, starting and closing of a session.
 #include "library/session.h"
 
+#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -40,6 +41,13 @@ wm_status library_check_size(const char *function, const void *out, size_t bytes
   return wm_fail(err, WM_BAD_USAGE,
                  "%s: its struct has %zu bytes, this library's %zu: compile the program with this library's headers",
                  function, out ? bytes : 0, right_bytes);
+}
+
+wm_status library_put_health(const char *function, const wm_health *health, void *out, size_t bytes, wm_error *err) {
+  const size_t of_0_2 = offsetof(wm_health, more_count);
+  wm_status status = library_check_size(function, out, bytes, bytes == of_0_2 ? of_0_2 : sizeof *health, err);
+  if (status == WM_OK) memcpy(out, health, bytes);
+  return status;
 }
 
 waymark_record library_record(wm_output_kind kind) {

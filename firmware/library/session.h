@@ -34,6 +34,8 @@ wm_status library_take_options(const char *function, const void *given, size_t b
                                wm_error *err);
 // WM_BAD_USAGE where a result's struct has another size than the library's.
 wm_status library_check_size(const char *function, const void *out, size_t bytes, size_t right_bytes, wm_error *err);
+// wm_health has grown at its end: programs of 0.2 get the beginning that they know.
+wm_status library_put_health(const char *function, const wm_health *health, void *out, size_t bytes, wm_error *err);
 // The callback's kind of a record; 0: it has none.
 waymark_record library_record(wm_output_kind kind);
 

@@ -386,19 +386,6 @@ static void map_unused(const wm_assembly *assembly, wm_findings *out) {
   }
 }
 
-int evidence_scale_contradicts(const wm_assembly *assembly, const wm_calibration_value *c) {
-  const char *name = strrchr(c->name, '.');  // "motion.left_scale", "front.range_scale"
-  const size_t length = name ? strlen(name) : 0;
-  if (length < 6 || strcmp(name + length - 6, "_scale") != 0) return 0;
-  char key[96];
-  (void)snprintf(key, sizeof key, "states%.60s_sigma", name);
-  const int is_motion = strncmp(c->name, "motion.", 7) == 0;
-  const double sigma = is_motion ? number_of(&wm_motion_params_table, assembly->setup.motion, key)
-                                 : number_of(&wm_sighting_params_table, assembly->setup.sightings, key);
-  const double off = fabs(c->value - 1);
-  return sigma > 0 && off > 5 * fmax(sigma, c->sigma) && (c->value > 1.2 || c->value < 1 / 1.2);
-}
-
 static int is_skid_track(const wm_assembly *assembly, const wm_calibration_value *c) {
   const wm_param_table *table = &wm_motion_params_table;
   if (strcmp(c->name, "motion.track_scale") != 0) return 0;
@@ -437,8 +424,8 @@ static void calibration(const wm_assembly *assembly, const wm_health *health, wm
       {".time_offset_s", 0, -0.1, 0.1, -0.25, 0.25, "correct the stamps of this sensor by this time"},
       {".yaw_rad", 0, -0.17, 0.17, -0.8, 0.8, "turn the sensor's mounting (rpy_deg, the last number) by this angle"},
   };
-  for (uint32_t i = 0; i < health->calibration_count; i++) {
-    const wm_calibration_value *c = &health->calibration[i];
+  for (uint32_t i = 0; i < wm_health_calibration_count(health); i++) {
+    const wm_calibration_value *c = wm_health_calibration(health, i);
     const int skids = is_skid_track(assembly, c);
     const double value = judged_value(assembly, c);
     for (size_t k = 0; k < sizeof kLimits / sizeof kLimits[0]; k++) {
@@ -447,7 +434,7 @@ static void calibration(const wm_assembly *assembly, const wm_health *health, wm
       // Within two sigmas of skid steer's prior it is its base's; beyond, `track_m` is wrong.
       if (skids && fabs(c->value - WM_SKID_TRACK) <= 2 * WM_SKID_TRACK_SIGMA) continue;
       const int is_bad = !skids && (value < kLimits[k].bad_least || value > kLimits[k].bad_most ||
-                                    evidence_scale_contradicts(assembly, c));
+                                    wm_health_has_alarm(health, WM_ALARM_SCALE, i));
       wm_find(out, WM_FOUND_CALIBRATION_OFF, is_bad ? WM_SEVERITY_BAD : WM_SEVERITY_NOTE, "calibration", kLimits[k].fix,
               "%s is %.4g +- %.2g at the end; %g was expected", c->name, c->value, c->sigma,
               skids ? WM_SKID_TRACK : kLimits[k].expected)

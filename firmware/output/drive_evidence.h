@@ -51,9 +51,6 @@ uint64_t evidence_due(const drive_evidence *self, double publish_rate_hz);
 double evidence_share(const drive_evidence *self, wm_state state, uint64_t total);
 // Mean log likelihood of an update, nats: the larger the better the observations fit.
 double evidence_score(const drive_evidence *self);
-// Whether a scale of wheels, gyro or ranges ended where the calibration cannot be: off by more than a fifth, and by
-// more than five times the sigma that the configuration states for it.
-int evidence_scale_contradicts(const wm_assembly *assembly, const wm_calibration_value *value);
 // `health` as the drive ended.
 void evidence_judge(const drive_evidence *self, const wm_assembly *assembly, const wm_health *health, uint64_t total,
                     wm_findings *out);

@@ -145,8 +145,9 @@ static void put_stale(FILE *f, const wm_health *h) {
 
 static void put_calibration(FILE *f, const wm_health *h) {
   (void)fputs("  \"calibration\": {", f);
-  for (uint32_t i = 0; i < h->calibration_count; i++) {
-    const wm_calibration_value *c = &h->calibration[i];
+  const uint32_t count = wm_health_calibration_count(h);
+  for (uint32_t i = 0; i < count; i++) {
+    const wm_calibration_value *c = wm_health_calibration(h, i);
     (void)fputs(i ? ",\n    " : "\n    ", f);
     string(f, c->name);
     (void)fputs(": {\"value\": ", f);
@@ -155,7 +156,22 @@ static void put_calibration(FILE *f, const wm_health *h) {
     number(f, c->sigma);
     (void)fputs("}", f);
   }
-  (void)fputs(h->calibration_count ? "\n  },\n" : "},\n", f);
+  (void)fputs(count ? "\n  },\n" : "},\n", f);
+}
+
+static void put_alarms(FILE *f, const wm_health *h) {
+  (void)fputs("  \"alarms\": [", f);
+  for (uint32_t i = 0; i < h->alarm_count; i++) {
+    const wm_alarm *a = &h->alarms[i];
+    (void)fprintf(f, "%s{\"kind\": \"%s\", \"value\": ", i ? ", " : "", wm_alarm_name(a->kind));
+    number(f, a->value);
+    if (a->calibration >= 0) {
+      (void)fputs(", \"calibration\": ", f);
+      string(f, wm_health_calibration(h, (uint32_t)a->calibration)->name);
+    }
+    (void)fputs("}", f);
+  }
+  (void)fputs("],\n", f);
 }
 
 static void put_counters(FILE *f, const wm_health *h) {
@@ -201,6 +217,7 @@ wm_status wm_write_health_json(const char *dir, const wm_assembly *assembly, con
   put_motion_health(f, h->motion_health);
   put_stale(f, h);
   put_calibration(f, h);
+  put_alarms(f, h);
   put_counters(f, h);
   (void)fputs("  \"unused\": [", f);
   for (size_t i = 0; i < assembly->unused_count; i++) {

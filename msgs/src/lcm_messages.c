@@ -2,6 +2,7 @@
 #include "waymark/lcm_messages.h"
 #include "lcm_bytes.h"
 
+#include <math.h>
 #include <string.h>
 
 #include "waymark_health_t.h"
@@ -85,6 +86,33 @@ static void put_source(waymark_source_health_t *out, const wm_source_health *s) 
   for (int i = 0; i < WM_LOOK_COUNT; i++) out->looks[i] = (int64_t)s->looks[i];
 }
 
+static void put_calibration(waymark_health_t *m, const char *name, double value, double sigma) {
+  waymark_calibration_t *to = &m->calibration[m->calibration_count++];
+  put_name(to->name, sizeof to->name, name);
+  to->value = value;
+  to->sigma = sigma;
+}
+
+static int has_alarm(const wm_health *h, uint32_t i) {
+  for (unsigned kind = 0; kind < WM_ALARM_KIND_COUNT; kind++)
+    if (wm_health_has_alarm(h, kind, i)) return 1;
+  return 0;
+}
+
+// Where there are more values than room, those with an alarm come first, and the last one states how many are left out.
+static void put_all_calibration(waymark_health_t *m, const wm_health *h) {
+  const uint32_t count = wm_health_calibration_count(h);
+  const int fits = count <= WM_HEALTH_CALIBRATION_MAX;
+  const int32_t room = WM_HEALTH_CALIBRATION_MAX - !fits;
+  for (int pass = 0; pass < 2; pass++)
+    for (uint32_t i = 0; i < count && m->calibration_count < room; i++) {
+      const wm_calibration_value *c = wm_health_calibration(h, i);
+      const int is_first = fits || has_alarm(h, i);
+      if (is_first == (pass == 0)) put_calibration(m, c->name, c->value, c->sigma);
+    }
+  if (!fits) put_calibration(m, WM_LCM_CALIBRATION_LEFT, count - (double)room, (double)NAN);
+}
+
 size_t wm_lcm_health(const wm_health *h, void *out, size_t capacity) {
   waymark_health_t m = {
       .t_ns = h->t_ns,
@@ -112,13 +140,7 @@ size_t wm_lcm_health(const wm_health *h, void *out, size_t capacity) {
   put_name(m.host, sizeof m.host, h->host);
   m.source_count = (int32_t)(h->source_count < WM_HEALTH_SOURCES_MAX ? h->source_count : WM_HEALTH_SOURCES_MAX);
   for (int32_t i = 0; i < m.source_count; i++) put_source(&m.sources[i], &h->sources[i]);
-  m.calibration_count =
-      (int32_t)(h->calibration_count < WM_HEALTH_CALIBRATION_MAX ? h->calibration_count : WM_HEALTH_CALIBRATION_MAX);
-  for (int32_t i = 0; i < m.calibration_count; i++) {
-    put_name(m.calibration[i].name, sizeof m.calibration[i].name, h->calibration[i].name);
-    m.calibration[i].value = h->calibration[i].value;
-    m.calibration[i].sigma = h->calibration[i].sigma;
-  }
+  put_all_calibration(&m, h);
   m.counter_count = (int32_t)(h->counter_count < WM_HEALTH_COUNTERS_MAX ? h->counter_count : WM_HEALTH_COUNTERS_MAX);
   for (int32_t i = 0; i < m.counter_count; i++) {
     m.counters[i].kind = (int32_t)h->counters[i].kind;

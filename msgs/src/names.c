@@ -32,6 +32,7 @@ static const char *const kResiduals[] = {"bearing", "range",      "x",     "y", 
                                          "heading", "standstill", "pixel", "elevation"};
 static const char *const kVerdicts[] = {"fused",      "gate",     "unknown_id", "no_association", "out_of_range",
                                         "not_finite", "singular", "searching",  "by_config",      "numeric"};
+static const char *const kAlarms[] = {"noise", "scale", "lengths", "lasting_error", "turn"};
 static const char *const kCounters[] = {"landmarks",       "landmarks_added",   "landmarks_removed",
                                         "landmarks_moved", "landmarks_merged",  "identities_ambiguous",
                                         "map_full",        "rotation_outliers", "motion_outliers",
@@ -57,6 +58,7 @@ const char *wm_state_name(unsigned state) { return state < COUNT(kStates) ? kSta
 const char *wm_cause_name(unsigned cause) { return cause < COUNT(kCauses) ? kCauses[cause] : "?"; }
 const char *wm_residual_name(unsigned r) { return r < COUNT(kResiduals) ? kResiduals[r] : "?"; }
 const char *wm_verdict_name(unsigned v) { return v < COUNT(kVerdicts) ? kVerdicts[v] : "?"; }
+const char *wm_alarm_name(unsigned kind) { return kind < COUNT(kAlarms) ? kAlarms[kind] : "?"; }
 const char *wm_counter_name(unsigned kind) { return kind < COUNT(kCounters) ? kCounters[kind] : "?"; }
 const char *wm_device_state_name(unsigned s) { return s < COUNT(kDeviceStates) ? kDeviceStates[s] : "?"; }
 

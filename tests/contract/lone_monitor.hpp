@@ -24,7 +24,8 @@ struct lone {
   wm_landmark landmark{};
   wm_raster map{};
   wm_estimate estimate{};
-  wm_calibration_value value{};
+  wm_alarm alarm{};
+  bool has_alarm = false;
   wm_time_ns now_ns = 0;
 
   explicit lone(bool has_landmarks, bool has_map = false) {
@@ -47,7 +48,7 @@ struct lone {
       e.kind = static_cast<uint8_t>(of);
       e.t_ns = out.t_ns = now_ns;
       e.as.position.sigma_xy_m = NAN;
-      if (wm_monitor_take(&monitor, &e, records, count)) wm_monitor_step(&monitor, &out, &value, value.name[0] != '\0');
+      if (wm_monitor_take(&monitor, &e, records, count)) wm_monitor_step(&monitor, &out, &alarm, has_alarm);
     };
     for (const wm_time_ns until_ns = now_ns + wm_ns_from_seconds(seconds); now_ns < until_ns;
          now_ns += 100 * WM_NS_PER_MS) {

@@ -72,7 +72,7 @@ struct ledger {
   }
 };
 
-constexpr wm_calibration_value kWrong = {"gnss.lasting_error", 5.0, NAN};
+constexpr wm_alarm kWrong = {WM_ALARM_LASTING_ERROR, 0, 5.0};
 
 // A drive of which each step is drawn: stretches of agreement, contradiction and silence, of driving and of standing;
 // searches that find a pose.

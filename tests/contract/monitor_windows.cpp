@@ -106,7 +106,8 @@ void a_contradicted_calibration_names_no_source(void) {
   lone robot(true);
   (void)robot.drive(20, WM_FUSED);
   TEST_ASSERT_EQUAL(0, robot.drive(8, WM_REJECTED_GATE).cause_source);
-  robot.value = {"gnss.lasting_error", 5.0, NAN};
+  robot.alarm = {WM_ALARM_LASTING_ERROR, 0, 5.0};
+  robot.has_alarm = true;
   const wm_estimate out = robot.drive(20, WM_FUSED);
   TEST_ASSERT_EQUAL(WM_CAUSE_INCONSISTENT, out.cause);
   TEST_ASSERT_EQUAL(-1, out.cause_source);

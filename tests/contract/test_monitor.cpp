@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "drives.hpp"
+#include "filters/core/calibration_list.hpp"
 #include "lone_monitor.hpp"
 #include "parameter_sweep.hpp"
 #include "unity.h"
@@ -27,7 +28,7 @@ struct seen {
   double turn_s = INFINITY;                        // the first time that the turn is the cause
   double confident_s = 0.0;                        // tracking, since the observations contradict
   bool has_cause = true;
-  bool is_lasting = false;        // the lasting error of positions is a value of the calibration
+  bool is_lasting = false;        // there was an alarm about the lasting error of positions
   uint8_t cause = WM_CAUSE_NONE;  // at the first doubt
   double sigma_m = 0.0;           // at the end
 };
@@ -96,12 +97,11 @@ seen drive(const char *name, drives::scene &scene, const std::vector<parameters:
     if (status != WM_OK && count == 0) continue;
     wm_estimate estimate;
     of.estimate(state.get(), &estimate);
-    wm_calibration_value values[WM_HEALTH_CALIBRATION_MAX];
-    const size_t listed = of.calibration ? of.calibration(state.get(), values, WM_HEALTH_CALIBRATION_MAX) : 0;
-    const size_t known = listed < WM_HEALTH_CALIBRATION_MAX ? listed : WM_HEALTH_CALIBRATION_MAX;
-    for (size_t i = 0; i < known; i++)
-      out.is_lasting = out.is_lasting || std::strcmp(values[i].name, "gnss.lasting_error") == 0;
-    if (wm_monitor_take(&monitor, &e, records, count)) wm_monitor_step(&monitor, &estimate, values, known);
+    wm_alarm alarms[WM_ALARMS_MAX];
+    const size_t known = of.alarms(state.get(), alarms, WM_ALARMS_MAX);
+    TEST_ASSERT_TRUE(known <= WM_ALARMS_MAX);
+    for (size_t i = 0; i < known; i++) out.is_lasting = out.is_lasting || alarms[i].kind == WM_ALARM_LASTING_ERROR;
+    if (wm_monitor_take(&monitor, &e, records, count)) wm_monitor_step(&monitor, &estimate, alarms, known);
     wm_monitor_judge(&monitor, &estimate);
     note(estimate, t_s, t_s - last_s, &out);
     last_s = t_s;
@@ -278,8 +278,27 @@ void a_turn_that_no_vehicle_can_drive_is_degraded(void) {
   TEST_ASSERT_EQUAL(WM_CAUSE_TURN, out.cause);
 }
 
-// State after five seconds with this value of the calibration; `position`: the verdict of one that came before, or -1.
-uint8_t state_with(const wm_setup &setup, const wm_calibration_value &value, int position = -1) {
+// A scale of the motion, or of any sensor's ranges.
+struct scale_value {
+  int term;  // kRange: of ranges
+  double value, sigma;
+};
+constexpr int kRange = -1;
+
+std::vector<wm_alarm> alarms_about(const wm_setup &setup, const scale_value &scale) {
+  std::vector<wm_alarm> out(WM_ALARMS_MAX);
+  wm::calibration_list list(out.data(), out.size());
+  list.add("scale", scale.value, scale.sigma);
+  list.judge_scale(scale.term == kRange
+                       ? wm::judge_range_scale(*setup.sightings, scale.value, scale.sigma)
+                       : wm::judge_motion_scale(setup.motion->states, scale.term, scale.value, scale.sigma),
+                   scale.value);
+  out.resize(list.finish_alarms());
+  return out;
+}
+
+// State after five seconds with these alarms; `position`: the verdict of one that came before, or -1.
+uint8_t state_with(const wm_setup &setup, const std::vector<wm_alarm> &alarms, int position = -1) {
   wm_monitor monitor;
   wm_monitor_init(&monitor, &setup, 1);
   if (position >= 0) {
@@ -293,10 +312,21 @@ uint8_t state_with(const wm_setup &setup, const wm_calibration_value &value, int
   out.state = WM_STATE_TRACKING;
   for (int i = 1; i < 5; i++) {
     out.t_ns = i * WM_NS_PER_S;
-    wm_monitor_step(&monitor, &out, &value, 1);
+    wm_monitor_step(&monitor, &out, alarms.data(), alarms.size());
   }
   wm_monitor_judge(&monitor, &out);
   return out.state;
+}
+uint8_t state_with(const wm_setup &setup, const scale_value &scale, int position = -1) {
+  return state_with(setup, alarms_about(setup, scale), position);
+}
+
+// Each kind of alarm; lengths count where no map decides (below).
+void each_alarm_is_degraded(void) {
+  const wm_setup setup{};
+  for (uint32_t kind = 0; kind < WM_ALARM_KIND_COUNT; kind++)
+    TEST_ASSERT_EQUAL_MESSAGE(WM_STATE_DEGRADED, state_with(setup, std::vector<wm_alarm>{{kind, -1, 5.0}}),
+                              wm_alarm_name(kind));
 }
 
 // Markers that are measured with their frame bend the scales of both wheels; a receiver's lasting error is one of a
@@ -305,9 +335,9 @@ void values_far_from_what_is_stated_are_degraded(void) {
   const parameters::values motion(wm_motion_params_table, {{"states.left_scale_sigma", 0.02}});
   wm_setup setup{};
   setup.motion = static_cast<const wm_motion_params *>(static_cast<const void *>(motion.data()));
-  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, state_with(setup, {"motion.left_scale", 1.05, 0.003}));
-  TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, {"motion.left_scale", 1.25, 0.003}));
-  TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, {"gnss.lasting_error", 5.0, NAN}));
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, state_with(setup, scale_value{WM_LEFT_SCALE, 1.05, 0.003}));
+  TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, scale_value{WM_LEFT_SCALE, 1.25, 0.003}));
+  TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, std::vector<wm_alarm>{{WM_ALARM_LASTING_ERROR, 0, 5.0}}));
 }
 
 // The speed's scale against its prior of 5 %. A known map or fused positions decide which length is wrong; the robot's
@@ -316,16 +346,16 @@ void lengths_that_contradict_each_other_are_degraded(void) {
   const parameters::values motion(wm_motion_params_table, {});
   wm_setup setup{};
   setup.motion = static_cast<const wm_motion_params *>(static_cast<const void *>(motion.data()));
-  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, state_with(setup, {"motion.speed_scale", 1.16, 0.005}));
-  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, state_with(setup, {"motion.speed_scale", 1.19, 0.06}));
-  TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, {"motion.speed_scale", 1.19, 0.005}));
-  TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, {"motion.speed_scale", 0.81, 0.005}));
-  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, state_with(setup, {"motion.speed_scale", 1.19, 0.005}, WM_FUSED));
-  TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, {"motion.speed_scale", 1.19, 0.005}, WM_REJECTED_GATE));
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, state_with(setup, scale_value{WM_SPEED_SCALE, 1.16, 0.005}));
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, state_with(setup, scale_value{WM_SPEED_SCALE, 1.19, 0.06}));
+  TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, scale_value{WM_SPEED_SCALE, 1.19, 0.005}));
+  TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, scale_value{WM_SPEED_SCALE, 0.81, 0.005}));
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, state_with(setup, scale_value{WM_SPEED_SCALE, 1.19, 0.005}, WM_FUSED));
+  TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, scale_value{WM_SPEED_SCALE, 1.19, 0.005}, WM_REJECTED_GATE));
   const wm_landmark post{};
   setup.landmarks = &post;
   setup.landmark_count = 1;
-  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, state_with(setup, {"motion.speed_scale", 1.19, 0.005}));
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, state_with(setup, scale_value{WM_SPEED_SCALE, 1.19, 0.005}));
 }
 
 // On a known map a scale is off from a fifth on; one of 0.88 is five sigmas, and no other unit or size.
@@ -336,10 +366,10 @@ void a_scale_that_is_off_by_less_than_a_fifth_is_no_contradiction(void) {
   setup.motion = static_cast<const wm_motion_params *>(static_cast<const void *>(motion.data()));
   setup.landmarks = &post;
   setup.landmark_count = 1;
-  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, state_with(setup, {"motion.left_scale", 0.88, 0.003}));
-  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, state_with(setup, {"motion.left_scale", 1.12, 0.003}));
-  TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, {"motion.left_scale", 0.82, 0.003}));
-  TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, {"motion.left_scale", 1.22, 0.003}));
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, state_with(setup, scale_value{WM_LEFT_SCALE, 0.88, 0.003}));
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, state_with(setup, scale_value{WM_LEFT_SCALE, 1.12, 0.003}));
+  TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, scale_value{WM_LEFT_SCALE, 0.82, 0.003}));
+  TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, scale_value{WM_LEFT_SCALE, 1.22, 0.003}));
 }
 
 // Of any sensor, against the prior of all of them.
@@ -350,10 +380,9 @@ void a_scale_of_ranges_is_held_against_the_sensors_prior(void) {
   setup.sightings = reinterpret_cast<const wm_sighting_params *>(sightings.data());
   setup.landmarks = &post;
   setup.landmark_count = 1;
-  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, state_with(setup, {"eye.range_scale", 1.12, 0.003}));
-  TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, {"eye.range_scale", 1.25, 0.003}));
-  TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, {"left.eye.range_scale", 0.79, 0.003}));
-  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, state_with(setup, {"eye.range_scales", 1.25, 0.003}));
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, state_with(setup, scale_value{kRange, 1.12, 0.003}));
+  TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, scale_value{kRange, 1.25, 0.003}));
+  TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, scale_value{kRange, 0.79, 0.003}));
 }
 
 // Its effective track is 1.5 +- 0.25 of the distance of its wheels. The third value of `drive` is skid_steer.
@@ -361,10 +390,10 @@ void the_wide_track_of_skid_steer_is_its_prior(void) {
   const parameters::values plain(wm_motion_params_table, {}), skids(wm_motion_params_table, {{"drive", 2}});
   wm_setup setup{};
   setup.motion = static_cast<const wm_motion_params *>(static_cast<const void *>(plain.data()));
-  TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, {"motion.track_scale", 1.7, 0.01}));
+  TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, scale_value{WM_TRACK_SCALE, 1.7, 0.01}));
   setup.motion = static_cast<const wm_motion_params *>(static_cast<const void *>(skids.data()));
-  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, state_with(setup, {"motion.track_scale", 1.7, 0.01}));
-  TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, {"motion.track_scale", 2.9, 0.01}));
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, state_with(setup, scale_value{WM_TRACK_SCALE, 1.7, 0.01}));
+  TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, scale_value{WM_TRACK_SCALE, 2.9, 0.01}));
 }
 
 // Contradicted for 10 s: any heading, whose variance is pi^2 / 3.
@@ -513,6 +542,7 @@ int main(void) {
   RUN_TEST(positions_that_may_be_mirrored_widen_the_covariance);
   RUN_TEST(sparse_positions_show_no_mirror_image);
   RUN_TEST(a_turn_that_no_vehicle_can_drive_is_degraded);
+  RUN_TEST(each_alarm_is_degraded);
   RUN_TEST(values_far_from_what_is_stated_are_degraded);
   RUN_TEST(lengths_that_contradict_each_other_are_degraded);
   RUN_TEST(a_scale_that_is_off_by_less_than_a_fifth_is_no_contradiction);

@@ -8,7 +8,7 @@
 //  - void estimate(wm_estimate *) const
 //  - wm_motion_calibration motion_calibration() const
 //  - uint32_t motion_health() const
-//  - size_t list_calibration(wm_calibration_value *, size_t) const
+//  - void list_calibration(calibration_list *) const
 //  - where it has any: list_counters(wm_counter *, size_t), list_landmarks(), list_particles(), list_hypotheses()
 //
 // `keeper_of<filter, params>()` does so for a filter that keeps its map (waymark/keeper.h): kept_bytes_max(), keep(),
@@ -18,6 +18,7 @@
 
 #include <type_traits>
 
+#include "filters/core/calibration_list.hpp"
 #include "filters/core/counter_list.hpp"
 #include "filters/core/record_list.hpp"
 #include "waymark/estimator.h"
@@ -56,7 +57,14 @@ wm_estimator estimator_of(const char *name, const char *about, uint32_t takes, w
     *out = static_cast<const filter *>(state)->motion_calibration();
   };
   e.calibration = [](const void *state, wm_calibration_value *out, size_t capacity) {
-    return static_cast<const filter *>(state)->list_calibration(out, capacity);
+    calibration_list list(out, capacity);
+    static_cast<const filter *>(state)->list_calibration(&list);
+    return list.count();
+  };
+  e.alarms = [](const void *state, wm_alarm *out, size_t capacity) {
+    calibration_list list(out, capacity);
+    static_cast<const filter *>(state)->list_calibration(&list);
+    return list.finish_alarms();
   };
   e.motion_health = [](const void *state) { return static_cast<const filter *>(state)->motion_health(); };
   if constexpr (requires(const filter &f) { f.list_counters(nullptr, 0); })

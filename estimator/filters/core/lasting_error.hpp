@@ -4,20 +4,21 @@
 #ifndef WAYMARK_ESTIMATOR_CORE_LASTING_ERROR_HPP
 #define WAYMARK_ESTIMATOR_CORE_LASTING_ERROR_HPP
 
-#include <cstring>
+#include <limits>
 
-#include "waymark/estimator.h"
+#include "filters/core/calibration_list.hpp"
 
 namespace wm {
 
-inline constexpr char kLastingErrorName[] = "gnss.lasting_error";
 // Probability 1e-4 of two normal variables. Five good drives reach at most 3.0 (a receiver among high houses), a speed
 // in km/h 11.9.
 inline constexpr double kLastingMost = 4.29;
 
-// It is a value of the calibration while it is larger than that.
-inline bool lasting_error_contradicts(const wm_calibration_value &v) {
-  return std::strcmp(v.name, kLastingErrorName) == 0;
+// It is a value, and an alarm, while it is larger than that.
+inline void list_lasting_error(double sigmas, calibration_list *out) {
+  if (!(sigmas > kLastingMost)) return;
+  out->add("gnss.lasting_error", sigmas, std::numeric_limits<double>::quiet_NaN());
+  out->alarm(WM_ALARM_LASTING_ERROR, sigmas);
 }
 
 }  // namespace wm

@@ -11,10 +11,6 @@
 #include "filters/core/chi_square.hpp"
 #include "filters/core/course_test.hpp"
 #include "filters/core/landmark_bias.hpp"
-#include "filters/core/lasting_error.hpp"
-#include "filters/core/noise_adaption.hpp"
-#include "filters/core/scale_test.hpp"
-#include "filters/core/turn_check.hpp"
 #include "math/elementary.hpp"
 
 namespace wm {
@@ -311,16 +307,13 @@ int32_t silent_source(const wm_monitor &self, wm_time_ns t_ns) {
 // real and simulated, the largest factor is 15.5 (plaza-1).
 // Or they bend a scale, or the lasting error of positions, far from what the configuration states. Where no map and no
 // position gives a length, less is enough: the map has the scale of either of two that contradict each other.
-bool test_calibration(wm_monitor *self, const wm_calibration_value *values, size_t count) {
+bool test_calibration(wm_monitor *self, const wm_alarm *alarms, size_t count) {
   self->is_calibration_contradicted = 0;
-  double lengths = 0.0;
   for (size_t i = 0; i < count; i++) {
-    lengths += length_contradiction(self->scales, values[i]);
-    if (noise_adaption::is_at_limit(values[i]) || scale_contradicts(self->scales, values[i]) ||
-        lasting_error_contradicts(values[i]))
-      self->is_calibration_contradicted = 1;
+    if (alarms[i].kind == WM_ALARM_TURN) continue;
+    const bool is_decided_by_others = alarms[i].kind == WM_ALARM_LENGTHS && (self->is_map_known || self->has_positions);
+    if (!is_decided_by_others) self->is_calibration_contradicted = 1;
   }
-  if (!self->is_map_known && !self->has_positions && lengths_contradict(lengths)) self->is_calibration_contradicted = 1;
   if (!self->is_calibration_contradicted) return false;
   self->cause = WM_CAUSE_INCONSISTENT;
   self->source = -1;
@@ -328,9 +321,9 @@ bool test_calibration(wm_monitor *self, const wm_calibration_value *values, size
 }
 
 // The sign or the unit of the measured turn, by the innovations or by positions.
-bool test_turn(wm_monitor *self, const wm_calibration_value *values, size_t count) {
+bool test_turn(wm_monitor *self, const wm_alarm *alarms, size_t count) {
   bool contradicts = course_contradicts(self->course);
-  for (size_t i = 0; i < count; i++) contradicts = contradicts || turn_check::contradicts(values[i]);
+  for (size_t i = 0; i < count; i++) contradicts = contradicts || alarms[i].kind == WM_ALARM_TURN;
   if (!contradicts) return false;
   self->cause = WM_CAUSE_TURN;
   self->source = -1;
@@ -454,7 +447,6 @@ void wm_monitor_init(wm_monitor *self, const wm_setup *setup, uint64_t observers
     self->is_map_known = setup->landmark_count > 0;
   }
   wm::course_begin(&self->course);
-  wm::scales_begin(*setup, self->scales);
   wm::clear(self);
 }
 
@@ -478,7 +470,7 @@ int wm_monitor_take(wm_monitor *self, const wm_event *event, const wm_innovation
   return 1;
 }
 
-void wm_monitor_step(wm_monitor *self, const wm_estimate *e, const wm_calibration_value *calibration, size_t count) {
+void wm_monitor_step(wm_monitor *self, const wm_estimate *e, const wm_alarm *alarms, size_t count) {
   wm::course_move(&self->course, *e);
   wm::weigh_mirror_image(self, *e);
   const bool is_first = self->stepped_ns == WM_TIME_NONE;
@@ -499,8 +491,8 @@ void wm_monitor_step(wm_monitor *self, const wm_estimate *e, const wm_calibratio
   self->lost_s = is_lost ? self->lost_s + dt_s : 0.0;
   if (!self->is_map_known) wm::widen_box(self, e->pose_map_base.p_m[0], e->pose_map_base.p_m[1]);
   bool fits, is_mild;
-  const bool is_noisy = wm::test_calibration(self, calibration, count);
-  const bool is_turned = wm::test_turn(self, calibration, count);
+  const bool is_noisy = wm::test_calibration(self, alarms, count);
+  const bool is_turned = wm::test_turn(self, alarms, count);
   const bool are_biased = wm::test_landmarks(self, e->t_ns);
   const bool others = is_noisy || is_turned || are_biased;
   const bool contradicts = wm::test_sources(self, e->t_ns, &fits, &is_mild) || others;

@@ -26,13 +26,6 @@ const char *const kNames[noise_adaption::kFactors] = {"noise.way_factor", "noise
 
 }  // namespace
 
-bool noise_adaption::is_at_limit(const wm_calibration_value &v) {
-  if (v.value <= 0.99 * kMostFactor) return false;
-  for (const char *name : kNames)
-    if (std::strcmp(v.name, name) == 0) return true;
-  return false;
-}
-
 void noise_adaption::init(double log_sigma) {
   std::memset(static_cast<void *>(this), 0, sizeof *this);
   log_sigma_ = log_sigma;
@@ -57,8 +50,11 @@ void noise_adaption::restart(bool and_factors) {
 }
 
 void noise_adaption::list(calibration_list *out) const {
-  for (int k = 0; k < kFactors && is_on(); k++)
-    if (is_used(k)) out->add(kNames[k], scale(k), scale(k) * std::sqrt(covariance_[k][k]));
+  for (int k = 0; k < kFactors && is_on(); k++) {
+    if (!is_used(k)) continue;
+    out->add(kNames[k], scale(k), scale(k) * std::sqrt(covariance_[k][k]));
+    if (scale(k) > 0.99 * kMostFactor) out->alarm(WM_ALARM_NOISE, scale(k));
+  }
 }
 
 // F = I but for the heading's column.

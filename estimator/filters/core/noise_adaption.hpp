@@ -22,8 +22,6 @@ class noise_adaption {
   enum factor { kWay, kTurn, kBearings, kRanges, kPlace, kFactors, kNone = kFactors };
   static constexpr int kPose = 3, kBlock = 5;  // x, y, heading; a position's time-correlated error on each axis
   static constexpr double kMostFactor = 16.0;  // of a variance: sigmas stated four times too small
-  // Whether a value of list() is a factor at its limit, which is forgotten by 1 % in 4 s.
-  static bool is_at_limit(const wm_calibration_value &v);
 
   // A row of an innovation. `by`: derivatives by the block's states. `gain`: their rows of the Kalman gain that the
   // update applies. `variance`: of the innovation; `own`: the share of it that `kind` scales.
@@ -56,6 +54,7 @@ class noise_adaption {
   void update(const row &r);
   // Time passes.
   void forget(wm_time_ns t_ns);
+  // With an alarm for a factor at its limit, which is forgotten by 1 % in 4 s.
   void list(calibration_list *out) const;
   // The pose has become another one; `and_factors`: what was learned may be wrong, too.
   void restart(bool and_factors);

@@ -1,20 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
-// Scales of wheels, gyro and ranges against their priors, for the monitor: the same limits as those of `waymark check`
-// at the end of a drive.
+// Scales of wheels, gyro and ranges against their priors.
 #ifndef WAYMARK_ESTIMATOR_CORE_SCALE_TEST_HPP
 #define WAYMARK_ESTIMATOR_CORE_SCALE_TEST_HPP
 
-#include "waymark/monitor.h"
+#include "motion/motion_params.h"
+#include "sensors/sighting_params.h"
 
 namespace wm {
 
-void scales_begin(const wm_setup &setup, wm_monitor_scale scales[WM_MONITOR_SCALES]);
-// Whether a value of a calibration is a scale that is off its prior by more than a fifth, and by more than five times
-// the prior's sigma and its own.
-bool scale_contradicts(const wm_monitor_scale scales[WM_MONITOR_SCALES], const wm_calibration_value &value);
-// Where a robot maps by itself, wheels and ranges are its only standards of length. Square of how far a scale of one of
-// them is off its prior, in sigmas (chi-square, one degree of freedom); 0 of any other value.
-double length_contradiction(const wm_monitor_scale scales[WM_MONITOR_SCALES], const wm_calibration_value &value);
+struct scale_judgement {
+  // It is off its prior by more than a fifth, and by more than five times the prior's sigma and its own.
+  bool contradicts;
+  // Where a robot maps by itself, wheels and ranges are its only standards of length. Square of how far a scale of one
+  // of them is off its prior, in sigmas (chi-square, one degree of freedom); 0 of any other scale.
+  double length_square;
+};
+
+// Of a term of the motion's calibration; one that is no scale contradicts nothing.
+scale_judgement judge_motion_scale(const wm_motion_states &states, int term, double value, double sigma);
+scale_judgement judge_range_scale(const wm_sighting_params &sightings, double value, double sigma);
 // Whether the sum over all values is too large for the priors.
 bool lengths_contradict(double squares);
 

@@ -81,9 +81,14 @@ class sensor_slots {
 
   template <class Filter>
   void list(const wm_setup &setup, const Filter &filter, calibration_list *out) const {
-    for (size_t i = 0; i < setup.sensor_count; i++)
-      slots_.list(
-          static_cast<int>(i), setup.sensors[i].name, filter, [](int k) { return kSensorStateSpecs[k].name; }, out);
+    for (int i = 0; i < static_cast<int>(setup.sensor_count); i++)
+      for (int k = 0; k < kSensorStates; k++) {
+        const int slot = at(i, k);
+        if (slot < 0) continue;
+        const double value = filter.value(slot), sigma = std::sqrt(filter.variance(slot));
+        out->add(setup.sensors[i].name, kSensorStateSpecs[k].name, value, sigma);
+        if (k == kRangeScale) out->judge_scale(judge_range_scale(*setup.sightings, value, sigma), value);
+      }
   }
 
   // Of the default's sigma of a range's scale, for times of flight without a map: 10 %. The speed of sound varies by

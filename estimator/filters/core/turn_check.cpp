@@ -2,7 +2,6 @@
 #include "filters/core/turn_check.hpp"
 
 #include <cmath>
-#include <cstring>
 #include <limits>
 
 namespace wm {
@@ -15,7 +14,6 @@ constexpr double kLinear_rad = 0.5;  // a larger shift of the heading is beyond 
 // Nats. On 30 good drives (docs/reports/2026-11-26-turn-rates.md) the sum stays below 12, where commands are obeyed by
 // half; mistakes reach the most, which other evidence takes back within as many observations.
 constexpr double kAlarm = 20.0, kMost = 40.0;
-const char kName[] = "motion.turn_factor";
 
 double clipped(double z) {
   const double nis = square(z);
@@ -58,9 +56,9 @@ void turn_check::update(const noise_adaption::row &r) {
 
 void turn_check::list(calibration_list *out) const {
   const int best = nats_[0] >= nats_[1] ? 0 : 1;
-  if (nats_[best] > kAlarm) out->add(kName, kFactor[best], std::numeric_limits<double>::quiet_NaN());
+  if (nats_[best] <= kAlarm) return;
+  out->add("motion.turn_factor", kFactor[best], std::numeric_limits<double>::quiet_NaN());
+  out->alarm(WM_ALARM_TURN, kFactor[best]);
 }
-
-bool turn_check::contradicts(const wm_calibration_value &v) { return std::strcmp(v.name, kName) == 0; }
 
 }  // namespace wm

@@ -21,9 +21,8 @@ class turn_check {
   void update(const noise_adaption::row &r);
   // The pose has become another one: what the turn did to it no longer counts.
   void restart();
-  // The factor that explains the innovations, once it is certain that it is not 1.
+  // The factor that explains the innovations, once it is certain that it is not 1: a value, and an alarm.
   void list(calibration_list *out) const;
-  static bool contradicts(const wm_calibration_value &v);
 
  private:
   static constexpr int kBlock = noise_adaption::kBlock, kAlternatives = 2;

@@ -213,17 +213,15 @@ void edge_mcl::estimate(wm_estimate *out) const {
   out->covariance[wm_cov_index(1, 1)] += disagreement[2];
 }
 
-size_t edge_mcl::list_calibration(wm_calibration_value *out, size_t capacity) const {
+void edge_mcl::list_calibration(calibration_list *list) const {
 #define WM_CAMERA_NAME(state, key, unit, name, ...) name,
   static constexpr const char *kNames[] = {WM_CAMERA_STATES(WM_CAMERA_NAME)};
-  calibration_list list(out, capacity);
-  filter_.list_motion_states(&list);
+  filter_.list_motion_states(list);
   for (int c = 0; c < camera_count_; c++)
     slots_.list(
-        c, setup_->rig->cameras[c].name, filter_, [](int k) { return kNames[k]; }, &list);
+        c, setup_->rig->cameras[c].name, filter_, [](int k) { return kNames[k]; }, list);
   if (edge_state_ >= 0)
-    list.add("edges", kNames[kEdgeOffset], filter_.value(edge_state_), std::sqrt(filter_.variance(edge_state_)));
-  return list.count();
+    list->add("edges", kNames[kEdgeOffset], filter_.value(edge_state_), std::sqrt(filter_.variance(edge_state_)));
 }
 
 size_t edge_mcl::list_counters(wm_counter *out, size_t capacity) const {

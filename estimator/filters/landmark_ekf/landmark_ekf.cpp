@@ -2,7 +2,6 @@
 #include "filters/landmark_ekf/landmark_ekf.hpp"
 
 #include <cstring>
-#include <limits>
 
 #include "filters/core/contract.hpp"
 #include "filters/core/lasting_error.hpp"
@@ -237,23 +236,20 @@ void landmark_ekf::add_start_mixture(wm_estimate *out) const {
     }
 }
 
-size_t landmark_ekf::list_calibration(wm_calibration_value *out, size_t capacity) const {
-  calibration_list list(out, capacity);
-  filter_.list_motion_states(&list);
-  slots_.list(*setup_, filter_, &list);
+void landmark_ekf::list_calibration(calibration_list *list) const {
+  filter_.list_motion_states(list);
+  slots_.list(*setup_, filter_, list);
   if (gnss_time_state_ >= 0)
-    list.add("gnss", "time_offset_s", filter_.value(gnss_time_state_), std::sqrt(filter_.variance(gnss_time_state_)));
+    list->add("gnss", "time_offset_s", filter_.value(gnss_time_state_), std::sqrt(filter_.variance(gnss_time_state_)));
   static const char *const kAntenna[] = {"antenna_x_m", "antenna_y_m"};
   for (int i = 0; i < 2 && antenna_state_ >= 0 && receiver_.is_used(); i++)
-    list.add("gnss", kAntenna[i], antenna_m_[i] + filter_.value(antenna_state_ + i),
-             std::sqrt(filter_.variance(antenna_state_ + i)));
+    list->add("gnss", kAntenna[i], antenna_m_[i] + filter_.value(antenna_state_ + i),
+              std::sqrt(filter_.variance(antenna_state_ + i)));
   if (heading_state_ >= 0 && has_heading_)
-    list.add("heading", "bias_rad", filter_.value(heading_state_), std::sqrt(filter_.variance(heading_state_)));
-  filter_.noise().list(&list);
-  filter_.turn_test().list(&list);
-  if (const double sigmas = lasting_error(); sigmas > kLastingMost)
-    list.add(kLastingErrorName, sigmas, std::numeric_limits<double>::quiet_NaN());
-  return list.count();
+    list->add("heading", "bias_rad", filter_.value(heading_state_), std::sqrt(filter_.variance(heading_state_)));
+  filter_.noise().list(list);
+  filter_.turn_test().list(list);
+  list_lasting_error(lasting_error(), list);
 }
 
 size_t landmark_ekf::list_counters(wm_counter *out, size_t capacity) const {

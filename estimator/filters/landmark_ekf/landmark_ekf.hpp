@@ -22,6 +22,7 @@
 #include "filters/relocalize/pose_search.hpp"
 #include "maps/landmark_index.hpp"
 #include "sensors/sighting.hpp"
+#include "waymark/health.h"
 #include "waymark/internal/memory/layout.hpp"
 
 namespace wm {
@@ -34,7 +35,7 @@ class landmark_ekf {
   wm_status predict(const wm_event &motion);
   wm_status correct(const wm_event &event, record_list records);
   void estimate(wm_estimate *out) const;
-  size_t list_calibration(wm_calibration_value *out, size_t capacity) const;
+  void list_calibration(calibration_list *list) const;
   size_t list_counters(wm_counter *out, size_t capacity) const;
   const wm_motion_calibration &motion_calibration() const { return filter_.calibration(); }
   uint32_t motion_health() const { return filter_.motion_health(); }
@@ -47,6 +48,8 @@ class landmark_ekf {
   static_assert(kPoseStates + kMaxCalibration + 2 * kErrorSlots + 3 * kMapSlots + 2 <= kMaxStates);
 
   static_assert(kMaxSensors * kSensorStates <= kMaxSensorStates);
+  // In list_calibration() beside them: the antenna's place, the heading's bias, factors of noise, turn, lasting error.
+  static_assert(kMaxCalibration + 3 + noise_adaption::kFactors + 2 <= 2 * WM_HEALTH_CALIBRATION_MAX);
   // Pose, sensor, time-correlated error, landmark, tilt.
   static_assert(kPoseStates + kSensorStates + 2 + 3 + 2 <= planar_row::kMax);
 

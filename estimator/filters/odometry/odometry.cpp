@@ -64,11 +64,7 @@ class odometry {
     list.add(WM_COUNTER_MOTION_OUTLIERS, filter_.motion_outliers());
     return list.count();
   }
-  size_t list_calibration(wm_calibration_value *out, size_t capacity) const {
-    calibration_list list(out, capacity);
-    filter_.list_motion_states(&list);
-    return list.count();
-  }
+  void list_calibration(calibration_list *list) const { filter_.list_motion_states(list); }
 
  private:
   planar_filter_of<kPoseStates + kCalibrationCount + 2> filter_;  // 2: the wheels' heading and difference

@@ -23,7 +23,7 @@ class pf_edges {
   wm_status predict(const wm_event &motion);
   wm_status correct(const wm_event &event, record_list records);
   void estimate(wm_estimate *out) const;
-  size_t list_calibration(wm_calibration_value *, size_t) const { return 0; }
+  void list_calibration(calibration_list *) const {}
   size_t list_counters(wm_counter *out, size_t capacity) const;
   size_t list_particles(wm_particle *out, size_t capacity) const;
   const wm_motion_calibration &motion_calibration() const { return odometry_.calibration(); }

@@ -18,7 +18,7 @@
 
 namespace wm {
 
-// Errors of sensors that are states, of all sensors together (landmark_ekf asserts it).
+// Errors of sensors that are states, of all sensors together (filters with sensors assert it).
 inline constexpr int kMaxSensorStates = 192;
 
 // Sigma of a start's coordinate or heading, m and rad, where none is stated: a robot put on a mark by hand. Not swept.
@@ -160,8 +160,11 @@ class planar_motion {
   template <class Filter>
   void list_motion_states_of(const Filter &filter, calibration_list *out) const {
     for (int i = 0; i < kMotionStates; i++)
-      if (const int state = motion_state_[i]; state >= 0)
-        out->add(motion_state_name(i), filter.value(state), std::sqrt(filter.variance(state)));
+      if (const int state = motion_state_[i]; state >= 0) {
+        const double value = filter.value(state), sigma = std::sqrt(filter.variance(state));
+        out->add(motion_state_name(i), value, sigma);
+        out->judge_scale(judge_motion_scale(front_.params().states, i, value, sigma), value);
+      }
   }
 
   motion_front_end front_;

@@ -7,6 +7,7 @@
 #include "filters/planar/set_pose.hpp"
 #include "filters/registry.h"
 #include "math/arc.hpp"
+#include "waymark/health.h"
 
 namespace wm {
 namespace {
@@ -269,8 +270,8 @@ void slam::start_again() {
   slips_.begin();
   moved_.clear();
   ambiguous_.clear();
-  outliers_.t_ns = WM_TIME_NONE;
   outliers_ = {};
+  outliers_.t_ns = WM_TIME_NONE;
   const bool given = params_.map != WM_SLAM_MAP_NONE;
   life_.begin(!given || !params_.recover || (place && heading));
   begin_evidence(given ? kStartWrong : kOwnFramePrior);
@@ -375,10 +376,12 @@ void slam::estimate(wm_estimate *out) const {
   if (!life_.tracking()) widen(out);
 }
 
-size_t slam::list_calibration(wm_calibration_value *out, size_t capacity) const {
-  calibration_list list(out, capacity);
-  joint_.list_motion_states(&list);
-  slots_.list(*setup_, joint_, &list);
+void slam::list_calibration(calibration_list *list) const {
+  static_assert(kMaxSensors * kSensorStates <= kMaxSensorStates);
+  // Motion, means of the wheels' scales; of each sensor its states and the bloom.
+  static_assert(kMotionStates + 2 + kMaxSensors * (kSensorStates + 1) <= 2 * WM_HEALTH_CALIBRATION_MAX);
+  joint_.list_motion_states(list);
+  slots_.list(*setup_, joint_, list);
   for (size_t i = 0; i < setup_->sensor_count; i++)
     if (finite(bloom_px_[i])) list->add(setup_->sensors[i].name, "bloom_px", bloom_px_[i], std::nan(""));
 }

@@ -119,7 +119,7 @@ class slam {
   wm_status predict(const wm_event &motion);
   wm_status correct(const wm_event &event, record_list records);
   void estimate(wm_estimate *out) const;
-  size_t list_calibration(wm_calibration_value *out, size_t capacity) const;
+  void list_calibration(calibration_list *list) const;
   size_t list_counters(wm_counter *out, size_t capacity) const;
   size_t list_landmarks(wm_landmark *out, double (*covariance)[4], size_t capacity) const;
   const wm_motion_calibration &motion_calibration() const { return joint_.calibration(); }

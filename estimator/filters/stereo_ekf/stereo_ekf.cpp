@@ -262,21 +262,18 @@ size_t stereo_ekf::list_counters(wm_counter *out, size_t capacity) const {
   return list.count();
 }
 
-size_t stereo_ekf::list_calibration(wm_calibration_value *out, size_t capacity) const {
-  calibration_list list(out, capacity);
+void stereo_ekf::list_calibration(calibration_list *list) const {
   for (int k = 0; k < kHeadStates; k++) {
     const bool is_receivers = k == kReceiverOffset || k == kAntenna;
     const int first = is_receivers && !receiver_.is_used() ? -1 : filter_.at(k);
     for (int i = 0; first >= 0 && kHeadSpecs[k].name[0] && i < kHeadSpecs[k].width; i++) {
       const double about = k == kAntenna ? antenna_m_[i] : 0.0;
-      list.add(kHeadSpecs[k].name[i], about + filter_.head(first + i) + filter_.pending1(first + i),
-               std::sqrt(filter_.variance(first + i)));
+      list->add(kHeadSpecs[k].name[i], about + filter_.head(first + i) + filter_.pending1(first + i),
+                std::sqrt(filter_.variance(first + i)));
     }
   }
   const vec3 error = filter_.head3(kReceiverError);
-  if (const double sigmas = std::sqrt(square(error.x) + square(error.y)); sigmas > kLastingMost)
-    list.add(kLastingErrorName, sigmas, kAbsent);
-  return list.count();
+  list_lasting_error(std::sqrt(square(error.x) + square(error.y)), list);
 }
 
 }  // namespace wm

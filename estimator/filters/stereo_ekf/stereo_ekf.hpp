@@ -4,6 +4,7 @@
 #ifndef WAYMARK_ESTIMATOR_STEREO_EKF_HPP
 #define WAYMARK_ESTIMATOR_STEREO_EKF_HPP
 
+#include "filters/core/calibration_list.hpp"
 #include "filters/core/landmark_evidence.hpp"
 #include "filters/core/lifecycle.hpp"
 #include "filters/core/receiver_error.hpp"
@@ -31,7 +32,7 @@ class stereo_ekf {
   wm_status predict(const wm_event &motion);
   wm_status correct(const wm_event &event, record_list records);
   void estimate(wm_estimate *out) const;
-  size_t list_calibration(wm_calibration_value *out, size_t capacity) const;
+  void list_calibration(calibration_list *list) const;
   size_t list_counters(wm_counter *out, size_t capacity) const;
   size_t list_landmarks(wm_landmark *out, double (*covariance)[4], size_t capacity) const;
   wm_motion_calibration motion_calibration() const;

@@ -77,6 +77,9 @@ typedef struct wm_estimator {
   void (*motion)(const void *state, wm_motion_calibration *out);
   // Calibration states with their sigmas; returns how many there are, of which at most `capacity` are written.
   size_t (*calibration)(const void *state, wm_calibration_value *out, size_t capacity);
+  // What contradicts itself by these values; returns how many there are, at most WM_ALARMS_MAX, of which at most
+  // `capacity` are written. NULL where the estimator has none.
+  size_t (*alarms)(const void *state, wm_alarm *out, size_t capacity);
   // Health flags of the motion sensors: bits of WM_MOTION_HEALTH_*.
   uint32_t (*motion_health)(const void *state);
   // Counters; returns how many there are, of which at most `capacity` are written. NULL where the estimator has none.

@@ -43,7 +43,6 @@ typedef struct wm_monitor_source {
 } wm_monitor_source;
 
 #define WM_MONITOR_COURSE_SLOTS 33
-#define WM_MONITOR_SCALES 7
 
 // Positions near in time, and the mean of the dead reckoning at their stamps.
 typedef struct wm_monitor_course_slot {
@@ -86,17 +85,11 @@ typedef struct wm_monitor_landmarks {
   int32_t contradicts;
 } wm_monitor_landmarks;
 
-// Prior of a calibration's scale; a sigma of 0: it is not a state.
-typedef struct wm_monitor_scale {
-  double value, sigma;
-} wm_monitor_scale;
-
 typedef struct wm_monitor {
   wm_monitor_source sources[WM_MONITOR_SOURCES];
   uint64_t observers;  // bit for each source that may give observations
   wm_monitor_course course;
-  wm_monitor_landmarks landmarks;  // of a known map
-  wm_monitor_scale scales[WM_MONITOR_SCALES];
+  wm_monitor_landmarks landmarks;     // of a known map
   double mirrored_m2, mirrored_rad2;  // what the chance of a mirror image adds to the covariance
   double spread_m2;                   // variance of a place anywhere on the map, each axis
   double low_m[2], high_m[2];         // the map, else the way so far
@@ -122,10 +115,8 @@ typedef struct wm_monitor {
 void wm_monitor_init(wm_monitor *self, const wm_setup *setup, uint64_t observers);
 // After each event that the estimator was given: the records of its update. True: a step is due.
 int wm_monitor_take(wm_monitor *self, const wm_event *event, const wm_innovation *records, size_t count);
-// With the estimator's own estimate, a few times a second of the events' time. `calibration`: its values, of which the
-// adapted noises are tested.
-void wm_monitor_step(wm_monitor *self, const wm_estimate *estimate, const wm_calibration_value *calibration,
-                     size_t count);
+// With the estimator's own estimate and alarms, a few times a second of the events' time.
+void wm_monitor_step(wm_monitor *self, const wm_estimate *estimate, const wm_alarm *alarms, size_t count);
 // State, cause, covariance and probability of being lost, as the monitor finds them. Without doubt nothing changes.
 void wm_monitor_judge(const wm_monitor *self, wm_estimate *estimate);
 // Whether the pose is in doubt.

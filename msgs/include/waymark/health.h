@@ -17,7 +17,7 @@ extern "C" {
 #endif
 
 #define WM_HEALTH_SOURCES_MAX 32
-#define WM_HEALTH_CALIBRATION_MAX 128  // 8 sensors with all their states and the motion's
+#define WM_HEALTH_CALIBRATION_MAX 128  // of `calibration`, and of `more_calibration`: 16 sensors with all their states
 #define WM_HEALTH_COUNTERS_MAX 16
 #define WM_HEALTH_NAME_MAX 48
 #define WM_HEALTH_HOST_MAX 64
@@ -73,8 +73,8 @@ typedef struct wm_health {
   uint32_t motion_health;  // bits of WM_MOTION_HEALTH_*
   uint32_t source_count;
   wm_source_health sources[WM_HEALTH_SOURCES_MAX];
-  uint32_t calibration_count;
-  wm_calibration_value calibration[WM_HEALTH_CALIBRATION_MAX];
+  uint32_t calibration_count;                                   // wm_health_calibration_count() has all of them
+  wm_calibration_value calibration[WM_HEALTH_CALIBRATION_MAX];  // the first ones
   uint32_t counter_count;
   wm_counter counters[WM_HEALTH_COUNTERS_MAX];
   uint64_t loops, deadlines_missed;
@@ -88,7 +88,27 @@ typedef struct wm_health {
   int32_t pid;                            // its process
   char host[WM_HEALTH_HOST_MAX];          // its computer
   uint32_t other_runs, other_runs_total;  // that publish on the same channels: now, and since the start
+  // From here on unknown to programs of 0.2, and not in messages over LCM.
+  uint32_t more_count;  // calibration values behind the first ones
+  wm_calibration_value more_calibration[WM_HEALTH_CALIBRATION_MAX];
+  uint32_t alarm_count;
+  wm_alarm alarms[WM_ALARMS_MAX];
 } wm_health;
+
+static inline uint32_t wm_health_calibration_count(const wm_health *health) {
+  return health->calibration_count + health->more_count;
+}
+// The value `i` of that many.
+static inline const wm_calibration_value *wm_health_calibration(const wm_health *health, uint32_t i) {
+  return i < health->calibration_count ? &health->calibration[i]
+                                       : &health->more_calibration[i - health->calibration_count];
+}
+// Whether there is an alarm of this kind about the calibration value `i`.
+static inline int wm_health_has_alarm(const wm_health *health, wm_alarm_kind kind, uint32_t i) {
+  for (uint32_t k = 0; k < health->alarm_count; k++)
+    if (health->alarms[k].kind == (uint32_t)kind && health->alarms[k].calibration == (int32_t)i) return 1;
+  return 0;
+}
 
 // The counter of this kind, or a null pointer where the estimator has none.
 static inline const wm_counter *wm_health_counter(const wm_health *health, wm_counter_kind kind) {

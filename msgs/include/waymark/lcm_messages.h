@@ -23,6 +23,8 @@ extern "C" {
 
 // `sent_ns`: now, on the clock of published->made_ns, which is when the pose was made.
 size_t wm_lcm_pose(const wm_published *published, wm_time_ns sent_ns, void *out, size_t capacity);
+// Name of the last calibration value of a message that has no room for all: how many are left out.
+#define WM_LCM_CALIBRATION_LEFT "calibration.left_out"
 size_t wm_lcm_health(const wm_health *health, void *out, size_t capacity);
 // Messages to the robot: NULL and *out (t_ns 0: now; arrival unset), or a text with the fault. Constant cost.
 const char *wm_lcm_read_set_pose(const void *message, size_t length, wm_event *out);

@@ -134,6 +134,28 @@ typedef struct wm_calibration_value {
   double sigma;  // NaN where it is not estimated
 } wm_calibration_value;
 
+// What contradicts itself by the estimator's own values. The numbers and names are stable.
+typedef enum wm_alarm_kind {
+  WM_ALARM_NOISE = 0,      // a factor on a variance is at its limit: sources disagree; value: the factor
+  WM_ALARM_SCALE,          // a scale is far from its prior; value: the scale
+  WM_ALARM_LENGTHS,        // wheels and ranges together are far from their priors; value: sigmas
+  WM_ALARM_LASTING_ERROR,  // a receiver's lasting error is far larger than stated; value: over its sigma
+  WM_ALARM_TURN,           // the measured turn has another sign or unit; value: the factor that explains the rest
+  WM_ALARM_KIND_COUNT
+} wm_alarm_kind;
+
+typedef struct wm_alarm {
+  uint32_t kind;        // wm_alarm_kind
+  int32_t calibration;  // index of the calibration value that it is about; -1: none
+  double value;
+} wm_alarm;
+
+// Room for all that an estimator of 16 sensors may have (estimator/filters/core/scale_test.cpp counts it).
+#define WM_ALARMS_MAX 32
+
+// "noise", "scale" ...; "?" beyond.
+const char *wm_alarm_name(unsigned kind);
+
 // What an estimator counts, for health and report. Counts are since the start, unless "now" is stated.
 typedef enum wm_counter_kind {
   WM_COUNTER_LANDMARKS = 0,         // landmarks in the map now

@@ -82,7 +82,14 @@ struct turns {
     wm::calibration_list list(&value, 1);
     check.list(&list);
     if (list.count() == 0) return NAN;
-    TEST_ASSERT_TRUE_MESSAGE(wm::turn_check::contradicts(value), value.name);
+    TEST_ASSERT_EQUAL_STRING("motion.turn_factor", value.name);
+    wm_alarm alarm{};
+    wm::calibration_list alarms(&alarm, 1);
+    check.list(&alarms);
+    TEST_ASSERT_EQUAL(1, alarms.finish_alarms());
+    TEST_ASSERT_EQUAL(WM_ALARM_TURN, alarm.kind);
+    TEST_ASSERT_EQUAL(0, alarm.calibration);
+    TEST_ASSERT_EQUAL_DOUBLE(value.value, alarm.value);
     return value.value;
   }
   double expected_listed() const {

@@ -291,23 +291,28 @@ static void a_silence_that_is_skipped_is_not_due(void) {
   TEST_ASSERT_UINT64_WITHIN(1, 995, evidence_due(&evidence, 50));
 }
 
-// Against the sigma that the configuration states for it.
-static void a_scale_far_from_its_stated_one_contradicts(void) {
-  void *motion = malloc(wm_motion_params_table.bytes);
-  const wm_assembly assembly = {.setup.motion = motion};
-  TEST_ASSERT_NOT_NULL(motion);
-  wm_calibration_value scale = {.name = "motion.left_scale", .value = 1.25, .sigma = 0.003};
-  wm_params_defaults(&wm_motion_params_table, motion);
-  for (size_t i = 0; i < wm_motion_params_table.count; i++)
-    if (strcmp(wm_motion_params_table.params[i].key, "states.left_scale_sigma") == 0)
-      *(double *)((char *)motion + wm_motion_params_table.params[i].offset) = 0.02;
-  TEST_ASSERT_TRUE(evidence_scale_contradicts(&assembly, &scale));
-  scale.value = 1.15;  // as far as tyres may be off
-  TEST_ASSERT_FALSE(evidence_scale_contradicts(&assembly, &scale));
-  scale.value = 1.25;
-  scale.sigma = 0.1;  // not observed
-  TEST_ASSERT_FALSE(evidence_scale_contradicts(&assembly, &scale));
-  free(motion);
+// A scale within 1.8 is a note, unless the estimator has an alarm about it: also one behind the first values.
+static void a_scale_with_an_alarm_is_bad(void) {
+  static drive_evidence evidence;
+  static wm_config config;
+  static const wm_estimator kAny = {.name = "landmark_ekf"};
+  const wm_assembly assembly = {.config = &config, .setup.start.p_m[0] = (double)NAN};
+  config.estimator = &kAny;
+  for (int i = 0; i < 4; i++) {
+    memset(&health, 0, sizeof health);
+    memset(&found, 0, sizeof found);
+    const uint32_t at = i < 2 ? 0 : WM_HEALTH_CALIBRATION_MAX;
+    health.calibration_count = i < 2 ? 1 : WM_HEALTH_CALIBRATION_MAX;
+    health.more_count = i >= 2;
+    *(i < 2 ? &health.calibration[0] : &health.more_calibration[0]) =
+        (wm_calibration_value){.name = "motion.left_scale", .value = 1.25, .sigma = 0.003};
+    health.alarm_count = 1;
+    health.alarms[0] = (wm_alarm){i % 2 ? WM_ALARM_SCALE : WM_ALARM_NOISE, (int32_t)at, 1.25};
+    evidence_judge(&evidence, &assembly, &health, 0, &found);
+    TEST_ASSERT_EQUAL(1, found.count);
+    TEST_ASSERT_EQUAL(WM_FOUND_CALIBRATION_OFF, found.at[0].id);
+    TEST_ASSERT_EQUAL(i % 2 ? WM_SEVERITY_BAD : WM_SEVERITY_NOTE, found.at[0].severity);
+  }
 }
 
 // A map that the configuration names and does not use, one that it uses, and a recording's own.
@@ -408,7 +413,7 @@ int main(void) {
   RUN_TEST(no_lateness_is_advised_that_no_transport_has);
   RUN_TEST(a_start_that_is_given_is_not_asked_for);
   RUN_TEST(a_silence_that_is_skipped_is_not_due);
-  RUN_TEST(a_scale_far_from_its_stated_one_contradicts);
+  RUN_TEST(a_scale_with_an_alarm_is_bad);
   RUN_TEST(a_map_that_is_named_and_not_read_is_found);
   RUN_TEST(a_finding_of_the_drive_is_not_repeated_by_the_health);
   RUN_TEST(a_log_has_each_finding_once_in_ten_minutes);

@@ -119,15 +119,25 @@ static size_t many_counters(const void *self, wm_counter *out, size_t capacity) 
   return 1000;
 }
 
+static size_t many_alarms(const void *self, wm_alarm *out, size_t capacity) {
+  (void)self;
+  for (size_t i = 0; i < capacity && i < 1000; i++) out[i] = (wm_alarm){WM_ALARM_TURN, (int32_t)i, 1};
+  return 1000;
+}
+
 static void health_holds_no_more_values_than_it_has_room_for(void) {
   static wm_health health;
   wm_estimator generous = kTiny;
   generous.calibration = many_values;
   generous.counters = many_counters;
+  generous.alarms = many_alarms;
   wm_fuser_init(&fuser, &generous, &state, wm_driving_choose(WM_EVENT_BIT(WM_EVENT_TWIST2), 0), (wm_output){put, NULL});
   twist(10, 1);
   wm_fuser_health(&fuser, &health);
   TEST_ASSERT_EQUAL(WM_HEALTH_CALIBRATION_MAX, health.calibration_count);
+  TEST_ASSERT_EQUAL(WM_HEALTH_CALIBRATION_MAX, health.more_count);
+  TEST_ASSERT_EQUAL(WM_ALARMS_MAX, health.alarm_count);
+  TEST_ASSERT_TRUE(wm_health_has_alarm(&health, WM_ALARM_TURN, WM_ALARMS_MAX - 1));
   TEST_ASSERT_EQUAL(WM_HEALTH_COUNTERS_MAX, health.counter_count);
   TEST_ASSERT_EQUAL(WM_STATE_TRACKING, health.state);
   TEST_ASSERT_EQUAL_INT64(10 * MS, health.fused_until_ns);

@@ -2,6 +2,7 @@
 // A session gives what the replay of the same data gives, bit by bit: rows, events, CAN frames, pictures. Then changed
 // values, event logs, sizes and refusals.
 #include <math.h>
+#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -407,6 +408,12 @@ static void test_sizes_are_checked(void) {
   TEST_ASSERT_EQUAL(WM_BAD_USAGE, waymark_health(session, &health, sizeof health + 8, &err));
   TEST_ASSERT_EQUAL(WM_BAD_USAGE, waymark_push_event(session, source, &event, sizeof event + 8, &err));
   TEST_ASSERT_EQUAL(WM_AGAIN, waymark_pose(session, 0, &pose, sizeof pose, &err));
+  // A program of 0.2 knows the beginning of wm_health: that is filled, and nothing behind it.
+  const size_t known = offsetof(wm_health, more_count);
+  memset(&health, 0x55, sizeof health);
+  ok(waymark_health(session, &health, known, &err));
+  TEST_ASSERT_EQUAL(2, health.source_count);
+  TEST_ASSERT_EACH_EQUAL_HEX8(0x55, (char *)&health + known, sizeof health - known);
   ok(waymark_close(session, &err));
 }
 

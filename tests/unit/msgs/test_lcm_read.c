@@ -141,6 +141,25 @@ static void a_full_health(void) {
   TEST_ASSERT_EQUAL_UINT64(21, read.loops);
 }
 
+// Of more values than a message has room for, those with an alarm come first, and the last one states how many are
+// left.
+static void a_health_with_more_values_than_room(void) {
+  static wm_health h, read;
+  h = (wm_health){.calibration_count = WM_HEALTH_CALIBRATION_MAX, .more_count = 3, .alarm_count = 2};
+  for (int i = 0; i < WM_HEALTH_CALIBRATION_MAX; i++) h.calibration[i].value = i;
+  for (int i = 0; i < 3; i++) h.more_calibration[i].value = WM_HEALTH_CALIBRATION_MAX + i;
+  h.alarms[0] = (wm_alarm){WM_ALARM_TURN, WM_HEALTH_CALIBRATION_MAX + 2, -1};
+  h.alarms[1] = (wm_alarm){WM_ALARM_LENGTHS, -1, 4};
+  const size_t length = wm_lcm_health(&h, bytes, sizeof bytes);
+  TEST_ASSERT_NULL(wm_lcm_read_health(bytes, length, &read));
+  TEST_ASSERT_EQUAL(WM_HEALTH_CALIBRATION_MAX, read.calibration_count);
+  TEST_ASSERT_EQUAL(0, read.more_count);
+  TEST_ASSERT_EQUAL_DOUBLE(WM_HEALTH_CALIBRATION_MAX + 2, read.calibration[0].value);
+  for (int i = 1; i < WM_HEALTH_CALIBRATION_MAX - 1; i++) TEST_ASSERT_EQUAL_DOUBLE(i - 1, read.calibration[i].value);
+  TEST_ASSERT_EQUAL_STRING(WM_LCM_CALIBRATION_LEFT, read.calibration[WM_HEALTH_CALIBRATION_MAX - 1].name);
+  TEST_ASSERT_EQUAL_DOUBLE(4, read.calibration[WM_HEALTH_CALIBRATION_MAX - 1].value);
+}
+
 static void innovation(void) {
   const wm_innovation i = {.t_ns = 1,
                            .source = 2,
@@ -320,6 +339,7 @@ int main(void) {
   RUN_TEST(pose);
   RUN_TEST(health);
   RUN_TEST(a_full_health);
+  RUN_TEST(a_health_with_more_values_than_room);
   RUN_TEST(innovation);
   RUN_TEST(a_pose_that_is_set);
   RUN_TEST(sigmas_of_a_pose_have_limits);
