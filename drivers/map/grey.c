@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "waymark/map.h"
+#include "picture.h"
 #include "waymark/text.h"
 
 #define FILE_BYTES_MAX ((size_t)1 << 30)  // above the largest map that is read (400 million pixels)
@@ -18,7 +18,7 @@ static wm_status check_size(uint64_t width, uint64_t height, const char *path, w
   return WM_OK;
 }
 
-static wm_status allocate(uint64_t width, uint64_t height, const char *path, wm_grey *out, wm_error *err) {
+wm_status picture_allocate(uint64_t width, uint64_t height, const char *path, wm_grey *out, wm_error *err) {
   wm_status status = check_size(width, height, path, err);
   if (status != WM_OK) return status;
   out->width_px = (uint32_t)width;
@@ -72,7 +72,7 @@ static wm_status read_pgm(const uint8_t *bytes, size_t size, const char *path, w
     return wm_fail(err, WM_BAD_DATA,
                    "%s: the PGM is truncated: its head states %zu pixels of %zu bytes, but %zu bytes are left", path,
                    count, depth, size - t.at);
-  status = allocate(width, height, path, out, err);
+  status = picture_allocate(width, height, path, out, err);
   if (status != WM_OK) return status;
   for (size_t i = 0; i < count; i++) {
     uint32_t value = 0;
@@ -88,38 +88,45 @@ static wm_status read_pgm(const uint8_t *bytes, size_t size, const char *path, w
   return WM_OK;
 }
 
-// ── PNG ─────────────────────────────────────────────────────────────────────────────────────────────────────────────
+// ── either ──────────────────────────────────────────────────────────────────────────────────────────────────────────
 
-static wm_status read_png(const uint8_t *bytes, size_t size, const char *path, wm_grey *out, wm_error *err) {
-  png_image png = {.version = PNG_IMAGE_VERSION};
-  if (!png_image_begin_read_from_memory(&png, bytes, size))
-    return wm_fail(err, WM_BAD_DATA, "%s: a broken PNG: %s", path, png.message);
-  wm_status status = allocate(png.width, png.height, path, out, err);
-  if (status != WM_OK) {
-    png_image_free(&png);
-    return status;
-  }
-  const png_color white = {255, 255, 255};
-  png.format = PNG_FORMAT_GRAY;
-  if (!png_image_finish_read(&png, &white, out->pixels, 0, NULL))
-    return wm_fail(err, WM_BAD_DATA, "%s: a broken PNG: %s", path, png.message);
-  return WM_OK;
-}
-
-wm_status wm_grey_decode(const void *data, size_t size, const char *path, wm_grey *out, wm_error *err) {
+wm_status picture_decode(const void *data, size_t size, const char *path, picture_use use, wm_grey *out,
+                         uint8_t **opaque, wm_error *err) {
   const uint8_t *bytes = data;
   wm_status status;
   *out = (wm_grey){0};
+  if (opaque) *opaque = NULL;
   if (size >= 2 && bytes[0] == 'P' && (bytes[1] == '2' || bytes[1] == '5'))
     status = read_pgm(bytes, size, path, out, err);
   else if (size >= 4 && memcmp(bytes, "\x89PNG", 4) == 0)
-    status = read_png(bytes, size, path, out, err);
+    status = png_decode(bytes, size, path, use, out, opaque, err);
   else
-    return wm_fail(err, WM_BAD_DATA, "%s: neither PNG nor PGM (P2, P5); save it as one of these", path);
+    return wm_fail(err, WM_BAD_DATA, "%s: %s", path,
+                   size == 0 ? "is empty" : "neither PNG nor PGM (P2, P5); save it as one of these");
   if (status == WM_OK) return WM_OK;
   free(out->pixels);
   *out = (wm_grey){0};
   return status;
+}
+
+wm_status picture_load(const char *path, picture_use use, wm_grey *out, uint8_t **opaque, wm_error *err) {
+  char *bytes;
+  size_t size;
+  *out = (wm_grey){0};
+  if (opaque) *opaque = NULL;
+  wm_status status = wm_text_read_file(path, FILE_BYTES_MAX, &bytes, &size, err);
+  if (status != WM_OK) return status;
+  status = picture_decode(bytes, size, path, use, out, opaque, err);
+  free(bytes);
+  return status;
+}
+
+wm_status wm_grey_decode(const void *data, size_t size, const char *path, wm_grey *out, wm_error *err) {
+  return picture_decode(data, size, path, PICTURE_SEEN, out, NULL, err);
+}
+
+wm_status wm_grey_load(const char *path, wm_grey *out, wm_error *err) {
+  return picture_load(path, PICTURE_SEEN, out, NULL, err);
 }
 
 wm_status wm_grey_encode(const wm_grey *grey, const char *path, void **out, size_t *size, wm_error *err) {
@@ -134,15 +141,4 @@ wm_status wm_grey_encode(const wm_grey *grey, const char *path, void **out, size
   }
   *size = needed;
   return WM_OK;
-}
-
-wm_status wm_grey_load(const char *path, wm_grey *out, wm_error *err) {
-  char *bytes;
-  size_t size;
-  *out = (wm_grey){0};
-  wm_status status = wm_text_read_file(path, FILE_BYTES_MAX, &bytes, &size, err);
-  if (status != WM_OK) return status;
-  status = wm_grey_decode(bytes, size, path, out, err);
-  free(bytes);
-  return status;
 }

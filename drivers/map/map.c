@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/map.h"
-
 #include <float.h>
 #include <math.h>
 #include <stdio.h>
@@ -8,6 +6,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "picture.h"
 #include "waymark/yaml.h"
 
 struct wm_map {
@@ -60,7 +59,7 @@ static wm_status read_geometry(const wm_yaml_node *root, wm_raster *out, wm_erro
 }
 
 // A picture of the YAML, relative to the YAML's folder.
-static wm_status read_picture(const wm_yaml_node *node, wm_grey *out, wm_error *err) {
+static wm_status read_picture(const wm_yaml_node *node, wm_grey *out, uint8_t **opaque, wm_error *err) {
   char name[WM_PATH_MAX], path[WM_PATH_MAX];
   wm_status status = wm_yaml_string(node, name, sizeof name, err);
   if (status != WM_OK) return status;
@@ -69,37 +68,94 @@ static wm_status read_picture(const wm_yaml_node *node, wm_grey *out, wm_error *
   if (snprintf(path, sizeof path, "%.*s%s", folder, yaml, name) >= WM_PATH_MAX)
     return wm_yaml_fail(node, err, "the path is longer than %d bytes", WM_PATH_MAX - 1);
   if (access(path, R_OK) != 0) return wm_yaml_fail(node, err, "'%s' can't be read (looked for %s)", name, path);
-  status = wm_grey_load(path, out, err);
+  status = picture_load(path, PICTURE_MAP, out, opaque, err);
   return status == WM_OK ? WM_OK : wm_fail_in(err, "%s:%d: %s", yaml, wm_yaml_line(node), node->path);
 }
 
-static void to_two_values(wm_grey *grey) {
-  const size_t count = (size_t)grey->width_px * grey->height_px;
-  for (size_t i = 0; i < count; i++) grey->pixels[i] = grey->pixels[i] >= 128 ? 255 : 0;
+// A layer: white is in it; black, and what is transparent, is not.
+static wm_status read_layer(const wm_yaml_node *node, wm_grey *out, wm_error *err) {
+  uint8_t *opaque = NULL;
+  const wm_status status = read_picture(node, out, &opaque, err);
+  const size_t count = status == WM_OK ? (size_t)out->width_px * out->height_px : 0;
+  for (size_t i = 0; i < count; i++) out->pixels[i] = out->pixels[i] >= 128 && (!opaque || opaque[i]) ? 255 : 0;
+  free(opaque);
+  return status;
 }
 
-// map_server: a pixel's occupancy is (255 - grey)/255, or grey/255 with `negate`; below free_thresh it is free.
-static wm_status drivable_of_image(const wm_yaml_node *root, wm_grey *out, wm_error *err) {
-  wm_yaml_node image = wm_yaml_get(root, "image"), negate = wm_yaml_get(root, "negate");
+// ── the image's cells, as map_server has them ───────────────────────────────────────────────────────────────────────
+
+// "trinary" and "scale" part free and occupied by the thresholds alike; what scale grades between them is unknown here.
+typedef enum map_mode { MODE_TRINARY, MODE_SCALE, MODE_RAW } map_mode;
+static const char *const kModes[] = {"trinary", "scale", "raw", NULL};
+
+typedef struct meaning {
+  int32_t mode, negate;
+  double free_thresh, occupied_thresh;
+} meaning;
+
+// 0 or 1, or a truth value.
+static wm_status read_negate(const wm_yaml_node *node, int32_t *out, wm_error *err) {
+  int64_t number = 0;
+  int truth = 0;
+  if (wm_yaml_bool(node, &truth, NULL) == WM_OK) {
+    *out = truth;
+    return WM_OK;
+  }
+  const wm_status status = wm_yaml_i64(node, 0, 1, &number, err);
+  *out = (int32_t)number;
+  return status;
+}
+
+static wm_status read_meaning(const wm_yaml_node *root, meaning *out, wm_error *err) {
+  wm_yaml_node mode = wm_yaml_get(root, "mode"), negate = wm_yaml_get(root, "negate");
   wm_yaml_node free_below = wm_yaml_get(root, "free_thresh"), occupied_above = wm_yaml_get(root, "occupied_thresh");
-  int64_t negated = 0;
-  double free_thresh = 0.196, occupied_thresh = 0.65;
+  *out = (meaning){.free_thresh = 0.196, .occupied_thresh = 0.65};
   wm_status status = WM_OK;
-  if (wm_yaml_there(&negate)) status = wm_yaml_i64(&negate, 0, 1, &negated, err);
-  if (status == WM_OK && wm_yaml_there(&free_below)) status = wm_yaml_f64(&free_below, 0, 1, &free_thresh, err);
+  if (wm_yaml_there(&mode)) status = wm_yaml_choice(&mode, kModes, &out->mode, err);
+  if (status == WM_OK && wm_yaml_there(&negate)) status = read_negate(&negate, &out->negate, err);
+  if (status == WM_OK && wm_yaml_there(&free_below)) status = wm_yaml_f64(&free_below, 0, 1, &out->free_thresh, err);
   if (status == WM_OK && wm_yaml_there(&occupied_above))
-    status = wm_yaml_f64(&occupied_above, 0, 1, &occupied_thresh, err);
-  if (status == WM_OK && free_thresh > occupied_thresh)
-    return wm_yaml_fail(&free_below, err, "%g is above occupied_thresh (%g); it must be below", free_thresh,
-                        occupied_thresh);
-  if (status != WM_OK || out->pixels || !wm_yaml_there(&image)) return status;
-  status = read_picture(&image, out, err);
+    status = wm_yaml_f64(&occupied_above, 0, 1, &out->occupied_thresh, err);
+  if (status == WM_OK && out->free_thresh > out->occupied_thresh)
+    return wm_yaml_fail(&free_below, err, "%g is above occupied_thresh (%g); it must be below", out->free_thresh,
+                        out->occupied_thresh);
+  if (status == WM_OK && out->mode == MODE_RAW && out->negate)
+    return wm_yaml_fail(&negate, err, "the map servers of ROS 1 and 2 differ in what it means with mode raw; write 0");
+  return status;
+}
+
+#define RAW_OCCUPIED 100  // per cent; raw values above are unknown
+
+static int8_t cell_of(const meaning *m, int grey) {
+  if (m->mode == MODE_RAW && grey > RAW_OCCUPIED) return WM_CELL_UNKNOWN;
+  const double occupied = m->mode == MODE_RAW ? grey / (double)RAW_OCCUPIED : (m->negate ? grey : 255 - grey) / 255.0;
+  return occupied > m->occupied_thresh ? WM_CELL_OCCUPIED : occupied < m->free_thresh ? WM_CELL_FREE : WM_CELL_UNKNOWN;
+}
+
+// Cells of `image`, in the place of its pixels.
+static wm_status read_cells(const wm_yaml_node *root, const wm_yaml_node *image, wm_grey *out, wm_error *err) {
+  meaning m;
+  uint8_t *opaque = NULL;
+  wm_status status = read_meaning(root, &m, err);
+  if (status == WM_OK) status = read_picture(image, out, &opaque, err);
   if (status != WM_OK) return status;
   const size_t count = (size_t)out->width_px * out->height_px;
-  uint8_t value_of[256];
-  for (int grey = 0; grey < 256; grey++) value_of[grey] = (negated ? grey : 255 - grey) / 255.0 < free_thresh ? 255 : 0;
-  for (size_t i = 0; i < count; i++) out->pixels[i] = value_of[out->pixels[i]];
+  uint8_t cell[256];
+  for (int grey = 0; grey < 256; grey++) cell[grey] = (uint8_t)cell_of(&m, grey);
+  for (size_t i = 0; i < count; i++)
+    out->pixels[i] = opaque && !opaque[i] ? (uint8_t)WM_CELL_UNKNOWN : cell[out->pixels[i]];
+  free(opaque);
   return WM_OK;
+}
+
+static wm_status drivable_of_image(const wm_yaml_node *root, wm_grey *out, wm_error *err) {
+  wm_yaml_node image = wm_yaml_get(root, "image");
+  meaning ignored;
+  if (out->pixels || !wm_yaml_there(&image)) return read_meaning(root, &ignored, err);
+  const wm_status status = read_cells(root, &image, out, err);
+  const size_t count = status == WM_OK ? (size_t)out->width_px * out->height_px : 0;
+  for (size_t i = 0; i < count; i++) out->pixels[i] = (int8_t)out->pixels[i] == WM_CELL_FREE ? 255 : 0;
+  return status;
 }
 
 static wm_status read_layers(const wm_yaml_node *root, wm_warn_fn warn, void *context, wm_map *self, wm_error *err) {
@@ -108,14 +164,8 @@ static wm_status read_layers(const wm_yaml_node *root, wm_warn_fn warn, void *co
     if (!wm_yaml_is_map(&layers)) return wm_yaml_fail(&layers, err, "{edges: FILE, drivable: FILE} is needed");
     wm_status status = check_keys(&layers, kLayers, warn, context, err);
     wm_yaml_node edges = wm_yaml_get(&layers, "edges"), drivable = wm_yaml_get(&layers, "drivable");
-    if (status == WM_OK && wm_yaml_there(&edges)) {
-      status = read_picture(&edges, &self->edges, err);
-      if (status == WM_OK) to_two_values(&self->edges);
-    }
-    if (status == WM_OK && wm_yaml_there(&drivable)) {
-      status = read_picture(&drivable, &self->drivable, err);
-      if (status == WM_OK) to_two_values(&self->drivable);
-    }
+    if (status == WM_OK && wm_yaml_there(&edges)) status = read_layer(&edges, &self->edges, err);
+    if (status == WM_OK && wm_yaml_there(&drivable)) status = read_layer(&drivable, &self->drivable, err);
     if (status != WM_OK) return status;
   }
   wm_status status = drivable_of_image(root, &self->drivable, err);
@@ -167,3 +217,25 @@ void wm_map_free(wm_map *self) {
 }
 
 const wm_raster *wm_map_raster(const wm_map *self) { return &self->raster; }
+
+// ── for the desk ────────────────────────────────────────────────────────────────────────────────────────────────────
+
+wm_status wm_map_cells_load(const char *path, wm_raster *place, int8_t **cells, wm_error *err) {
+  wm_yaml *doc;
+  wm_grey image = {0};
+  *place = (wm_raster){0};
+  *cells = NULL;
+  wm_status status = wm_yaml_load(path, &doc, err);
+  if (status != WM_OK) return status;
+  wm_yaml_node root = wm_yaml_root(doc), node;
+  if (!wm_yaml_is_map(&root)) status = wm_yaml_fail(&root, err, "a map with image, resolution and origin is needed");
+  if (status == WM_OK) status = read_geometry(&root, place, err);
+  if (status == WM_OK) status = need(&root, "image", "the picture of the map is needed", &node, err);
+  if (status == WM_OK) status = read_cells(&root, &node, &image, err);
+  wm_yaml_free(doc);
+  if (status != WM_OK) return status;
+  place->width_px = image.width_px;
+  place->height_px = image.height_px;
+  *cells = (int8_t *)image.pixels;
+  return WM_OK;
+}

@@ -90,7 +90,10 @@ CASES = {
     "covariance": (run.covariance, [{"t_ns": np.array([1]), **PLANE}]),
     "field_text": (lambda value: float(tables.field_text(value) or "nan"), [0.5]),
     "write_table": (written_table, [{"t_ns": np.array([1.0, 2.0]), "x_m": np.array([1.0, 2.0]), "id": np.array([1.0, 2.0])}]),
-    "RecordingWriter.table": (written_recording, [{"t_ns": np.array([1.0, 2.0]), "v_mps": np.array([1.0, 2.0]), "arrival_ns": np.array([1.0, 2.0])}]),
+    "RecordingWriter.table": (written_recording, [{"t_ns": np.array([1.0, 2.0]), "v_mps": np.array([1.0, 2.0]), "w_radps": np.array([0.0, 0.0]),
+                                                    "arrival_ns": np.array([1.0, 2.0])}]),
+    "as_column": (lambda values: tables.as_column("x_m", values, "a"), [np.array([1.0, 2.0])]),
+    "as_table": (lambda table: tables.as_table(table, "a"), [{"t_ns": np.array([1.0]), "x_m": np.array([2.0])}]),
     "RecordingWriter.picture": (written_picture, [1.0, 2.0]),
 }
 WITHOUT_NUMBERS = {

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Plans read.
 #include <algorithm>
-#include <cmath>
+#include <cstdlib>
 #include <filesystem>
+#include <memory>
 
 #include "common/failure.h"
-#include "common/yaml.h"
 #include "map/layers.h"
+#include "waymark/map.h"
 
 namespace wm::tools {
 
@@ -19,38 +20,22 @@ Plan plan_from_picture(const GreyPicture &picture, int walls_below) {
 }
 
 Plan plan_from_occupancy(const std::string &map_yaml) {
-  namespace fs = std::filesystem;
-  if (!fs::exists(map_yaml)) throw Failure(map_yaml + ": there is no such file", kUsage);
-  const Yaml yaml(map_yaml);
-  const auto number = [&](const char *key, double fallback) {
-    const std::string text = yaml.text(key);
-    if (text.empty()) return fallback;
-    char *end = nullptr;
-    const double value = std::strtod(text.c_str(), &end);
-    if (*end != '\0' || !std::isfinite(value))
-      throw Failure(map_yaml + ": " + key + ": '" + text + "' is not a number");
-    return value;
-  };
-  const std::string image = yaml.text("image");
-  if (image.empty()) throw Failure(map_yaml + ": image: the picture of the map is missing");
+  if (!std::filesystem::exists(map_yaml)) throw Failure(map_yaml + ": there is no such file", kUsage);
+  wm_raster place{};
+  int8_t *read = nullptr;
+  wm_error error{};
+  const wm_status status = wm_map_cells_load(map_yaml.c_str(), &place, &read, &error);
+  const std::unique_ptr<int8_t, void (*)(void *)> cells(read, std::free);
+  if (status != WM_OK) throw Failure(error.text);
   Plan out;
-  out.resolution_m = number("resolution", 0);
-  if (!(out.resolution_m > 0)) throw Failure(map_yaml + ": resolution: metres of a pixel, above 0, are needed");
-  const std::vector<double> origin = yaml.numbers("origin");
-  if (origin.size() != 3) throw Failure(map_yaml + ": origin: [x, y, yaw] is needed");
-  out.origin_x_m = origin[0], out.origin_y_m = origin[1], out.origin_yaw_rad = origin[2];
-  const double occupied = number("occupied_thresh", 0.65), free = number("free_thresh", 0.196);
-  const bool negate = number("negate", 0) != 0;
-  try {
-    out.picture = load_picture(fs::path(map_yaml).parent_path() / image);
-  } catch (const Failure &failure) {
-    throw Failure(map_yaml + ": image: " + failure.what());
-  }
-  out.unknown.resize(out.picture.pixels.size());
-  for (size_t i = 0; i < out.unknown.size(); i++) {
-    const double shade = out.picture.pixels[i] / 255.0, wall = negate ? shade : 1 - shade;
-    out.unknown[i] = wall <= occupied && wall >= free ? 1 : 0;
-    out.picture.pixels[i] = wall > occupied ? 0 : 255;
+  out.resolution_m = place.resolution_m;
+  out.origin_x_m = place.origin_x_m, out.origin_y_m = place.origin_y_m, out.origin_yaw_rad = place.origin_yaw_rad;
+  const size_t count = static_cast<size_t>(place.width_px) * place.height_px;
+  out.picture = {static_cast<int>(place.width_px), static_cast<int>(place.height_px), std::vector<uint8_t>(count)};
+  out.unknown.resize(count);
+  for (size_t i = 0; i < count; i++) {
+    out.unknown[i] = cells.get()[i] == WM_CELL_UNKNOWN ? 1 : 0;
+    out.picture.pixels[i] = cells.get()[i] == WM_CELL_OCCUPIED ? 0 : 255;
   }
   return out;
 }

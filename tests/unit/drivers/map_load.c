@@ -126,7 +126,7 @@ static void wrong_pictures(void) {
     size_t size;
     const char *what;
   } kCases[] = {
-      {"", 0, "neither PNG nor PGM"},
+      {"", 0, "is empty"},
       {"GIF89a", 6, "neither PNG nor PGM"},
       {"P6\n3 2\n255\n", 11, "neither PNG nor PGM"},
       {"P5\n3 2\n", 7, "head of the PGM is broken"},

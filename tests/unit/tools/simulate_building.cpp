@@ -119,9 +119,10 @@ void test_mistakes_are_told() {
          "empty.yaml:1: neither a plan (`format: waymark-plan/1`) nor a ROS map (`image: FILE`)");
   refuse("kind: corridor, plan: white.pgm", along,
          "world.plan: white.pgm is a picture: `resolution_m`, metres of a pixel, is needed beside it");
-  refuse("kind: corridor, plan: unscaled.yaml", along, "unscaled.yaml:1: `resolution`, metres of a pixel, is missing");
+  refuse("kind: corridor, plan: unscaled.yaml", along,
+         "unscaled.yaml:1: resolution: is missing; the metres of a pixel are needed");
   refuse("kind: corridor, plan: white.yaml", along,
-         "white.pgm: no pixel is occupied (darker than grey 90); is `negate` right?");
+         "white.yaml: no pixel is occupied; are `negate` and the thresholds right?");
   refuse("kind: corridor, plan: room.yaml", "route: {start: {x_m: 1, y_m: 2}, points: [[5.5, 2]]}\n",
          "route: 10.3 s after the start, at (4.90, 2.00), the robot (0.70 m wide, from 1.10 m before "
          "base_link to 0.20 m behind it; `body` of `robot` sets these) is inside of a wall or touches it");

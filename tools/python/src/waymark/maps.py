@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import yaml
@@ -74,22 +75,45 @@ class FloorPlan:
         return self.origin[0] + c * along - s * across, self.origin[1] + s * along + c * across
 
 
-def _grey(path: Path, about: Path) -> Array:
-    """A picture's grey levels, the lowest row first."""
+def _levels(picture: Image.Image) -> tuple[Array, Array | None]:
+    """Grey levels of 8 bits as the runtime has them, the mean of colours; and where the picture isn't transparent at all."""
+    if picture.mode.startswith("I"):  # 16 bits
+        return (np.asarray(picture, dtype=np.int64) * 255 + 32767) // 65535, None
+    if picture.mode in ("RGBA", "LA", "PA") or "transparency" in picture.info:
+        colours = np.asarray(picture.convert("RGBA"), dtype=np.int64)
+        return (2 * colours[..., :3].sum(axis=2) + 3) // 6, colours[..., 3] == 255
+    if picture.mode in ("L", "1"):
+        return np.asarray(picture.convert("L"), dtype=np.int64), None
+    return (2 * np.asarray(picture.convert("RGB"), dtype=np.int64).sum(axis=2) + 3) // 6, None
+
+
+def _grey(path: Path, about: Path) -> tuple[Array, Array]:
+    """A picture's grey levels and where it is opaque, the lowest row first."""
     try:
         with Image.open(path) as picture:
             if max(picture.size) > _SIDE_MAX_PX:
                 raise ValueError(f"{path}: {picture.size[0]} x {picture.size[1]} pixels; up to {_SIDE_MAX_PX} a side are read")
-            if picture.mode.startswith("I"):  # 16 bits, whose convert("L") cuts at 255
-                return np.round(np.asarray(picture, dtype=np.float64) / 257).astype(np.uint8)[::-1]
-            opaque: Image.Image = picture
-            if picture.has_transparency_data:  # lies on white, as it does for the programs
-                opaque = Image.alpha_composite(Image.new("RGBA", picture.size, "white"), picture.convert("RGBA"))
-            return np.asarray(opaque.convert("L"))[::-1].copy()
+            grey, opaque = _levels(picture)
     except FileNotFoundError:
         raise FileNotFoundError(f"{about}: its picture {path} is not there") from None
-    except (OSError, Image.DecompressionBombError) as error:
-        raise ValueError(f"{path}: {error}") from None
+    except (OSError, SyntaxError, Image.DecompressionBombError):
+        raise ValueError(f"{path}: this is no picture that can be read, or it is cut off") from None
+    return grey[::-1], np.ones(grey.shape, dtype=bool) if opaque is None else opaque[::-1]
+
+
+def _cells(mode: str, shares: dict[str, float], path: Path, file: Path) -> Array:
+    """What the pixels of `image` mean, by the rules of map_server that the runtime has, too (wm_map_cells_load)."""
+    if mode not in ("trinary", "scale", "raw"):
+        raise ValueError(f"{file}: mode: '{mode}' is none of trinary, scale, raw")
+    if mode == "raw" and shares["negate"]:
+        raise ValueError(f"{file}: negate: the map servers of ROS 1 and 2 differ in what it means with mode raw; write 0")
+    grey, opaque = _grey(path, file)
+    dark = grey / 100.0 if mode == "raw" else (grey if shares["negate"] else 255 - grey) / 255.0
+    cells = np.full(grey.shape, UNKNOWN, dtype=np.int8)
+    cells[dark > shares["occupied_thresh"]] = OCCUPIED
+    cells[dark < shares["free_thresh"]] = FREE
+    cells[~opaque | ((mode == "raw") & (grey > 100))] = UNKNOWN
+    return cells
 
 
 def read_floor_plan(path: str | Path) -> FloorPlan:
@@ -111,12 +135,15 @@ def read_floor_plan(path: str | Path) -> FloorPlan:
             raise ValueError(f"{file}: {key} is {value}; it has to be from 0 to 1")
     cells = None
     if about.get("image") and (file.parent / str(about["image"])).is_file() or not layers:
-        grey = _grey(file.parent / str(about.get("image", "")), file) / 255.0
-        dark = grey if shares["negate"] else 1.0 - grey
-        cells = np.full(dark.shape, UNKNOWN, dtype=np.int8)
-        cells[dark > shares["occupied_thresh"]] = OCCUPIED
-        cells[dark < shares["free_thresh"]] = FREE
-    masks = {name: _grey(file.parent / layers[name], file) >= 128 if name in layers else None for name in ("edges", "drivable")}
+        cells = _cells(str(about.get("mode", "trinary")), shares, file.parent / str(about.get("image", "")), file)
+
+    def mask(name: str) -> Array | None:
+        if name not in layers:
+            return None
+        grey, opaque = _grey(file.parent / layers[name], file)
+        return np.asarray((grey >= 128) & opaque)
+
+    masks = {name: mask(name) for name in ("edges", "drivable")}
     return FloorPlan(resolution_m, (x_m, y_m, yaw), cells, masks["edges"], masks["drivable"])
 
 

@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Recordings: folders with the data of a robot's sensors (docs/recording-format.md)."""
 
+import dataclasses
+import difflib
 import io
+import itertools
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -14,16 +17,42 @@ from PIL import Image
 
 from .avi import AviWriter, read_jpegs
 from .maps import FloorPlan, read_floor_plan, read_landmarks, write_floor_plan, write_landmarks
-from .tables import Array, Table, read_table, write_table
+from .tables import Array, Table, as_table, read_table, write_table
 
 FORMAT = "waymark-recording/1"
 STREAMS = ("motion.csv", "motion6.csv", "increments.csv", "ticks.csv", "speeds.csv", "steering.csv", "imu.csv", "heading.csv",
            "depth.csv", "sightings.csv", "markers.csv", "marker-corners.csv", "stereo.csv", "points.csv", "gnss.csv")
 """Streams of sensors that are tables, in the order of the format's table."""
 
+_COVARIANCE = ("cov_xx", "cov_xy", "cov_yy", "cov_xt", "cov_yt", "cov_tt")
+_PLACED = ("x_m", "y_m", "z_m")
+_AXES = ("wx_radps", "wy_radps", "wz_radps", "ax_mps2", "ay_mps2", "az_mps2")
+COLUMNS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "motion.csv": (("v_mps", "w_radps"), ("vy_mps",)),
+    "motion6.csv": (("vx_mps", "vy_mps", "vz_mps", "wx_radps", "wy_radps", "wz_radps"), ()),
+    "increments.csv": (("from_ns", "dx_m", "dy_m", "dheading_rad"), _COVARIANCE),
+    "ticks.csv": (("left", "right"), ()),
+    "speeds.csv": (("left_mps", "right_mps"), ()),
+    "steering.csv": (("v_mps", "road_wheel_rad"), ()),
+    "imu.csv": (_AXES[:3], (*_AXES[3:], *(f"sigma_{name}" for name in _AXES), "temperature_c")),
+    "heading.csv": (("heading_rad", "sigma_rad"), ()),
+    "depth.csv": (("depth_m", "sigma_m"), ()),
+    "sightings.csv": (("sensor", "id"), ("bearing_rad", "range_m", "bearing_sigma_rad", "range_sigma_m", "elevation_rad", "elevation_sigma_rad",
+                                         "cov_xx_m2", "cov_xy_m2", "cov_yy_m2")),
+    "markers.csv": (("sensor", "id", *_PLACED, "yaw_rad"), ()),
+    "marker-corners.csv": (("sensor", "id", *(f"{axis}{i}_px" for i in range(4) for axis in "uv")), ("sigma_px",)),
+    "stereo.csv": (("id", "ul_px", "vl_px", "ur_px", "vr_px"), ("appearance",)),
+    "points.csv": (("x_m", "y_m"), ()),
+    "gnss.csv": (("x_m", "y_m", "sigma_xy_m"), ("z_m", "sigma_z_m")),
+    "truth.csv": ((*_PLACED, "qx", "qy", "qz", "qw"), ()),
+}
+"""Columns of each table of the format beside t_ns and arrival_ns: needed ones, and others that it may have."""
+
 _JPEG_QUALITY = 95  # the error of a pixel stays below a grey level's noise
 _ERROR_FLAG = 0x20000000  # CAN_ERR_FLAG of linux/can.h, which candump prints in the identifier
-_CAN_LINE = re.compile(r"\((\d+)\.(\d{6})\) (\S+) ([0-9A-Fa-f]+)#(#[0-9A-Fa-f])?(R\d?|[0-9A-Fa-f]*)(?: [RT])?\s*$")
+_CAN_DATE = re.compile(r"\((\d{4}-\d\d-\d\d)[ T](\d\d:\d\d:\d\d)")
+_CAN_LINE = re.compile(r"\((\d+)(?:\.(\d{1,9}))?\)\s+(\S+)\s+([0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})#(#[0-9A-Fa-f])?([Rr]\d?|[0-9A-Fa-f.]*)(?:_[9A-Fa-f])?"
+                       r"(?:\s+[RT])?$")
 
 
 @dataclass(frozen=True)
@@ -47,6 +76,22 @@ class CanFrame:
     flags: int | None = None
     remote: bool = False
     error: bool = False
+
+
+def _known_columns(name: str, table: Table, where: str) -> None:
+    """ValueError for a column that the runtime wouldn't read, or that it needs."""
+    if name not in COLUMNS:
+        return
+    needed, others = COLUMNS[name]
+    known = ("t_ns", "arrival_ns", *needed, *others)
+    for column in table:
+        if column not in known:
+            near = difflib.get_close_matches(column, known, n=1)
+            meant = f"; did you mean {near[0]}?" if near else f"; it has {', '.join(known)}"
+            raise ValueError(f"{where}: the column {column} is not one of this table{meant}")
+    missing = [column for column in ("t_ns", *needed) if column not in table]
+    if missing:
+        raise ValueError(f"{where}: the column {missing[0]} is missing")
 
 
 def _read_yaml(path: Path) -> dict[str, Any]:
@@ -106,24 +151,49 @@ class Recording:
         return read_floor_plan(self.path)
 
     def can(self) -> Iterator[CanFrame]:
-        """The frames of can.log."""
+        """The frames of can.log; times that are differences (candump -td) are summed up, as the runtime does."""
         path = self.path / "can.log"
         if not path.is_file():
             return
-        with path.open(encoding="ascii", errors="replace") as file:
-            for row, line in enumerate(file, start=1):
-                if not line.strip():
-                    continue
-                match = _CAN_LINE.match(line)
-                if not match:
-                    raise ValueError(f"{path}:{row}: this is not a line of `candump -l`")
-                seconds, micros, interface, identifier, flags, data = match.groups()
-                remote = data.startswith("R")
-                number = int(identifier, 16)
-                error = bool(number & _ERROR_FLAG)
-                yield CanFrame(int(seconds) * 10**9 + int(micros) * 1000, interface, number & ~_ERROR_FLAG,
-                               len(identifier) > 3 and not error, b"" if remote else bytes.fromhex(data),
-                               int(flags[1], 16) if flags else None, remote, error)
+        first = [frame.t_ns for frame in itertools.islice(_can_frames(path), _DIFFERENCES_LOOK)]
+        differences = _are_differences(first)
+        total = 0
+        for frame in _can_frames(path):
+            total = total + frame.t_ns if differences else frame.t_ns
+            yield dataclasses.replace(frame, t_ns=total) if differences else frame
+
+
+_DIFFERENCES_LOOK = 50_000
+"""Frames of a log that are looked at for what its times are."""
+
+
+def _are_differences(stamps: list[int]) -> bool:
+    """Stamps of a log that begins at 0 rise; differences go up and down (wm_can_survey_has_differences)."""
+    later = sum(b > a for a, b in zip(stamps, stamps[1:]))
+    minute = 60 * 10**9
+    within = len(stamps) >= 8 and 0 <= stamps[0] <= minute and 0 <= stamps[-1] < minute
+    return within and 4 * (len(stamps) - 1 - later) >= len(stamps)
+
+
+def _can_frames(path: Path) -> Iterator[CanFrame]:
+    with path.open(encoding="utf-8-sig", errors="replace") as file:
+        for number, line in enumerate(file, start=1):
+            text = line.strip()
+            if not text or text.startswith("#"):
+                continue
+            if date := _CAN_DATE.match(text):  # candump -L -tA: taken as UTC
+                seconds = np.datetime64(f"{date[1]}T{date[2]}", "s").astype(np.int64)
+                text = f"({int(seconds)}{text[date.end():]}"
+            match = _CAN_LINE.match(text)
+            if not match:
+                raise ValueError(f"{path}:{number}: this is not a line of `candump -l`")
+            whole, fraction, interface, identifier, flags, data = match.groups()
+            remote = data.upper().startswith("R")
+            t_ns = int(whole) * 10**9 + int((fraction or "").ljust(9, "0"))
+            code = int(identifier, 16)
+            error = bool(code & _ERROR_FLAG)
+            yield CanFrame(t_ns, interface, code & ~_ERROR_FLAG, len(identifier) > 3 and not error,
+                           b"" if remote else bytes.fromhex(data.replace(".", "")), int(flags[1], 16) if flags else None, remote, error)
 
 
 def can_line(frame: CanFrame) -> str:
@@ -176,11 +246,17 @@ class RecordingWriter:
         self._can: TextIO | None = None
 
     def table(self, name: str, table: Table) -> None:
-        """Writes a stream or another table of the format, sorted by arrival (else by stamp) as the format wants it."""
+        """Writes a stream or another table of the format, sorted by arrival (else by stamp) as the format wants it.
+
+        Stamps are int64 in nanoseconds, or datetime64 of any unit. ValueError names a column of another table, of another length, or with
+        values that can't be written.
+        """
+        _known_columns(name, table, name)
+        table = as_table(table, name)
         key = table.get("arrival_ns", table.get("t_ns"))
         if key is not None:
             order = np.argsort(key, kind="stable")
-            table = {column: np.asarray(values)[order] for column, values in table.items()}
+            table = {column: values[order] for column, values in table.items()}
         path = self.path / name
         path.parent.mkdir(parents=True, exist_ok=True)
         write_table(path, table)

@@ -2,6 +2,7 @@
 """CSV files of recordings and runs as columns: read and written without a loss."""
 
 import csv
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -48,7 +49,7 @@ def _column(name: str, fields: list[str], path: Path) -> Array:
 def read_table(path: str | Path) -> Table:
     """The columns of a CSV file. ValueError names file and line of what can't be read."""
     path = Path(path)
-    with path.open(newline="", encoding="utf-8") as file:
+    with path.open(newline="", encoding="utf-8-sig") as file:
         rows = csv.reader(file)
         names = next(rows, None)
         if not names:
@@ -73,22 +74,72 @@ def field_text(value: Any) -> str:
     return "" if np.isnan(value) else repr(float(value))
 
 
-def _to_write(path: str | Path, name: str, column: Array) -> Array:
-    if is_text(name) or not is_integer(name) or column.dtype.kind != "f":
-        return column
-    whole = np.isfinite(column) & (column == np.round(column))
+_NS_MOST = 4_000_000_000_000_000_000
+"""ns, about 127 years: the runtime reads stamps up to this."""
+
+
+def _stamps(name: str, column: Array, where: str) -> Array:
+    """datetime64 or timedelta64 of any unit as whole nanoseconds."""
+    kind = "datetime64" if column.dtype.kind == "M" else "timedelta64"
+    if not name.endswith("_ns"):
+        raise ValueError(f"{where}: {name} holds {column.dtype}; only stamps (columns that end in _ns) are times")
+    unit = np.datetime_data(column.dtype)[0]
+    if unit in ("generic", "Y", "M"):
+        raise ValueError(f"{where}: {name} is {column.dtype}, which has no length in nanoseconds; {kind}[ns] has")
+    if np.isnat(column).any():
+        raise ValueError(f"{where}: {name} has no time (NaT) in row {int(np.argmax(np.isnat(column)))}")
+    seconds = column.astype(f"{kind}[s]").astype(np.int64)
+    if len(seconds) and max(abs(int(seconds.min())), abs(int(seconds.max()))) > _NS_MOST // 10**9:
+        raise ValueError(f"{where}: {name} has a time that doesn't fit into 64-bit nanoseconds")
+    return column.astype(f"{kind}[ns]").astype(np.int64)
+
+
+def _whole(name: str, column: Array, where: str) -> Array:
+    """Floating point as whole numbers."""
+    whole = np.isfinite(column) & (column == np.floor(column)) & (np.abs(column) <= _NS_MOST)
     if not whole.all():
         row = int(np.argmin(whole))
-        raise ValueError(f"{path}: column {name} holds whole numbers, but row {row} has {column[row]}")
+        unit = "; are these seconds? (1e9 * t).round().astype(np.int64) makes nanoseconds of them" if name.endswith("_ns") else ""
+        raise ValueError(f"{where}: column {name} holds whole numbers, but row {row} has {float(column[row])!r}{unit}")
     return column.astype(np.int64)
 
 
-def write_table(path: str | Path, table: Table) -> None:
-    """Writes columns of equal lengths as CSV. ValueError: their lengths differ, or a column of integers has something else, as NaN."""
-    columns = [_to_write(path, name, np.asarray(column)) for name, column in table.items()]
-    if len({len(column) for column in columns}) > 1:
-        raise ValueError(f"{path}: the columns have different lengths")
+def as_column(name: str, values: Any, where: str) -> Array:
+    """Values as a column of a table of that name: int64, float64 or str. ValueError in words where they can't be one."""
+    column = np.asarray(values)
+    if column.ndim != 1:
+        raise ValueError(f"{where}: {name} has the shape {column.shape}; a column is one-dimensional")
+    if column.dtype.kind in "Mm":
+        return _stamps(name, column, where)
+    if column.dtype.kind == "S":
+        column = np.char.decode(column, "utf-8")
+    if column.dtype.kind == "U":
+        bad = next((text for text in sorted(set(column.tolist())) if any(mark in text for mark in ',"\r\n')), None)
+        if bad is not None:
+            raise ValueError(f"{where}: {name} is {bad!r}; names have no comma, quote or line end")
+        return column
+    if column.dtype.kind not in "biuf":
+        kind = type(column.flat[0]).__name__ if column.dtype.kind == "O" and column.size else str(column.dtype)
+        needed = "whole nanoseconds (int64) or datetime64" if name.endswith("_ns") else "numbers or names"
+        raise ValueError(f"{where}: {name} holds {kind}; {needed} are needed")
+    return _whole(name, column, where) if is_integer(name) and column.dtype.kind == "f" else column
+
+
+def as_table(table: Mapping[str, Any], where: str) -> Table:
+    """Columns of one length, each as `as_column` makes it."""
+    out = {name: as_column(name, values, where) for name, values in table.items()}
+    lengths = {name: len(column) for name, column in out.items()}
+    if len(set(lengths.values())) > 1:
+        usual = max(lengths.values(), key=list(lengths.values()).count)
+        other = ", ".join(f"{name} {count}" for name, count in lengths.items() if count != usual)
+        raise ValueError(f"{where}: the columns have different lengths: {other} where others have {usual}")
+    return out
+
+
+def write_table(path: str | Path, table: Mapping[str, Any]) -> None:
+    """Writes columns of equal lengths as CSV; stamps may be datetime64 of any unit. ValueError names the column that can't be written."""
+    columns = as_table(table, str(path))
     with Path(path).open("w", newline="", encoding="utf-8") as file:
-        file.write(",".join(table) + "\n")
-        for row in zip(*(column.tolist() for column in columns)):
+        file.write(",".join(columns) + "\n")
+        for row in zip(*(column.tolist() for column in columns.values())):
             file.write(",".join(map(field_text, row)) + "\n")

@@ -1,0 +1,209 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""What goes into the package: columns of any kind of array, pictures of maps, candump logs. Taken right, or refused in words.
+
+    test_inputs.py BIN_DIR"""
+
+import datetime
+import io
+import shutil
+import subprocess
+import tempfile
+import unittest
+import zlib
+from pathlib import Path
+
+import numpy as np
+from common import BIN, CONFIG
+from PIL import Image
+
+import waymark
+from waymark.maps import FREE, OCCUPIED, UNKNOWN
+from waymark.recording import COLUMNS, STREAMS
+
+STAMPS = [1_700_000_000_000_000_000, 1_700_000_000_020_000_000]
+T_S = 1_700_000_000
+
+
+class Folder(unittest.TestCase):
+    def setUp(self):
+        self.folder = Path(tempfile.mkdtemp(prefix="waymark-inputs-"))
+        self.addCleanup(shutil.rmtree, self.folder)
+
+
+class Columns(Folder):
+    def written(self, stamps, **others):
+        """motion.csv of these stamps, read back."""
+        count = len(stamps)
+        with waymark.RecordingWriter(self.folder / "rec") as writer:
+            writer.table("motion.csv", {"t_ns": stamps, "v_mps": np.ones(count), "w_radps": np.zeros(count), **others})
+        table = waymark.Recording(self.folder / "rec").table("motion.csv")
+        shutil.rmtree(self.folder / "rec")
+        return table
+
+    def test_stamps_of_any_unit_are_nanoseconds(self):
+        micros = np.array([1_700_000_000_000_000, 1_700_000_000_020_000])
+        for stamps in (np.array(STAMPS), STAMPS, np.array(STAMPS, dtype="datetime64[ns]"), micros.astype("datetime64[us]"),
+                       (micros // 1000).astype("datetime64[ms]"), np.array(STAMPS).astype("timedelta64[ns]"),
+                       micros.astype("timedelta64[us]"), np.array(STAMPS, dtype=np.uint64), np.array(STAMPS, dtype=np.float64)):
+            table = self.written(stamps)
+            self.assertEqual(table["t_ns"].dtype, np.int64)
+            self.assertEqual(table["t_ns"].tolist(), STAMPS, np.asarray(stamps).dtype)
+        self.assertEqual(self.written(np.array([T_S, T_S + 1], dtype="datetime64[s]"))["t_ns"].tolist(), [T_S * 10**9, (T_S + 1) * 10**9])
+        self.assertEqual(self.written(np.array(["2023-11-14T22:13"], dtype="datetime64[m]"))["t_ns"].tolist(), [(T_S - 20) * 10**9])
+        self.assertEqual(self.written(np.array(["2023-11-14"], dtype="datetime64[D]"))["t_ns"].tolist(), [1_699_920_000 * 10**9])
+
+    def test_what_is_no_stamp_is_refused(self):
+        date = datetime.datetime(2023, 11, 14, tzinfo=datetime.timezone.utc)
+        for stamps, words in ((np.array([date, date]), "t_ns holds datetime; whole nanoseconds"),
+                              (np.array(["2023-11", "2023-12"], dtype="datetime64[M]"), "has no length in nanoseconds"),
+                              (np.array(["2023-11-14", "NaT"], dtype="datetime64[s]"), "NaT. in row 1"),
+                              (np.array(["2623-11-14", "2623-11-15"], dtype="datetime64[s]"), "doesn't fit into 64-bit"),
+                              (np.array([1.7e9, 1.7e9 + 0.02]), "holds whole numbers, but row 1 has 1700000000.02; are these seconds"),
+                              (np.array([1e18, np.nan]), "row 1 has nan"),
+                              (np.array([1e18, 1e30]), "row 1 has 1e.30"),
+                              (np.zeros((2, 2)), "has the shape .2, 2."),
+                              (np.array([1j, 2j]), "holds complex128")):
+            with self.assertRaisesRegex(ValueError, words):
+                self.written(stamps)
+
+    def test_other_columns_and_lengths_are_refused(self):
+        for others, words in (({"vx_mps": np.zeros(2)}, "column vx_mps is not one of this table; did you mean v_mps"),
+                              ({"temperature": np.zeros(2)}, "temperature is not one of this table; it has t_ns, arrival_ns, v_mps"),
+                              ({"vy_mps": np.zeros(3)}, "different lengths: vy_mps 3 where others have 2"),
+                              ({"vy_mps": np.array(STAMPS, dtype="datetime64[ns]")}, "only stamps .columns that end in _ns. are times"),
+                              ({"vy_mps": np.array([None, 1.0])}, "vy_mps holds NoneType; numbers or names")):
+            with self.assertRaisesRegex(ValueError, words):
+                self.written(STAMPS, **others)
+        with self.assertRaisesRegex(ValueError, "w_radps is missing"), waymark.RecordingWriter(self.folder / "b") as writer:
+            writer.table("motion.csv", {"t_ns": np.array(STAMPS), "v_mps": np.ones(2)})
+        with self.assertRaisesRegex(ValueError, "names have no comma"):
+            waymark.write_table(self.folder / "a.csv", {"t_ns": np.array([1]), "sensor": np.array(["a,b"])})
+        waymark.write_table(self.folder / "a.csv", {"id": np.array([7.0, -1.0]), "sensor": np.array([b"a", b"b"])})
+        self.assertEqual(waymark.read_table(self.folder / "a.csv")["id"].tolist(), [7, -1])
+
+    def test_the_runtime_knows_every_column(self):
+        self.assertEqual(set(STREAMS) - set(COLUMNS), set())
+        (self.folder / "robot.yaml").write_text(CONFIG)
+        for name, (needed, others) in COLUMNS.items():
+            if name not in STREAMS:
+                continue
+            columns = ("t_ns", "arrival_ns", *needed, *others)
+            with waymark.RecordingWriter(self.folder / name) as writer:
+                writer.table(name, {column: np.array(["front"] if column == "sensor" else ["0" * 64] if column == "appearance" else [1])
+                                    for column in columns})
+            done = subprocess.run([BIN / "waymark", "check", self.folder / "robot.yaml", self.folder / name, "--quick"], capture_output=True,
+                                  text=True, check=False)
+            self.assertNotIn("unknown column", done.stdout + done.stderr, name)
+            self.assertNotRegex(done.stdout + done.stderr, "column '.*' is missing", name)
+
+    def test_a_byte_order_mark_is_no_part_of_a_name(self):
+        (self.folder / "a.csv").write_bytes(b"\xef\xbb\xbft_ns,x_m\r\n1,2\r\n")
+        self.assertEqual(list(waymark.read_table(self.folder / "a.csv")), ["t_ns", "x_m"])
+        (self.folder / "recording.yaml").write_bytes(b"\xef\xbb\xbfformat: waymark-recording/1\nname: a\nstreams: []\n")
+        self.assertEqual(waymark.Recording(self.folder).meta["name"], "a")
+
+
+def png(levels, bits=8, kind=0, gamma=None):
+    """A PNG by its bytes: levels (rows, columns[, channels]) of 8 bits, widened to 16."""
+    def chunk(name, data):
+        return len(data).to_bytes(4, "big") + name + data + zlib.crc32(name + data).to_bytes(4, "big")
+    values = levels.astype(np.uint16) * 257 if bits == 16 else levels
+    rows = b"".join(b"\0" + np.ascontiguousarray(row.astype(">u2" if bits == 16 else "u1")).tobytes() for row in values)
+    head = levels.shape[1].to_bytes(4, "big") + levels.shape[0].to_bytes(4, "big") + bytes([bits, kind, 0, 0, 0])
+    extra = chunk(b"gAMA", round(gamma * 100000).to_bytes(4, "big")) if gamma else b""
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + extra + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b"")
+
+
+def saved(picture, ending, **options):
+    """A picture's bytes by Pillow."""
+    out = io.BytesIO()
+    picture.save(out, ending, **options)
+    return out.getvalue()
+
+
+class Maps(Folder):
+    """The cells of a picture by the package, and how much of it is drivable by the runtime, which has its own reader."""
+
+    def setUp(self):
+        super().setUp()
+        self.grey = np.full((100, 100), 205, dtype=np.uint8)
+        self.grey[20:80, 20:80] = 254
+        self.grey[20:80, [20, 79]] = self.grey[[20, 79], 20:80] = 0
+        self.meant = np.select([self.grey == 254, self.grey == 0], [FREE, OCCUPIED], UNKNOWN)[::-1]
+
+    def pictures(self):
+        grey, clear = self.grey, np.where(self.grey == 205, 0, 255)
+        hidden = np.where(self.grey == 205, 254, self.grey)
+        palette = Image.fromarray(np.select([grey == 254, grey == 0], [0, 1], 2).astype(np.uint8), "P")
+        palette.putpalette([254] * 3 + [0] * 3 + [205] * 3)
+        return {"grey": png(grey), "grey16": png(grey, 16), "gamma": png(grey, gamma=1.0), "grey16-gamma": png(grey, 16, gamma=1.0),
+                "rgb": png(np.repeat(grey[:, :, None], 3, 2), kind=2),
+                "rgb-tint": png(np.stack([grey, grey, np.minimum(grey, 250)], 2), kind=2),
+                "rgb16": png(np.repeat(grey[:, :, None], 3, 2), 16, 2),
+                "rgba": png(np.stack([hidden, hidden, hidden, clear], 2), kind=6), "grey-alpha": png(np.stack([hidden, clear], 2), kind=4),
+                "rgba-opaque": png(np.stack([grey, grey, grey, np.full_like(grey, 255)], 2), kind=6),
+                "palette": saved(palette, "PNG"), "palette-clear": saved(palette, "PNG", transparency=2),
+                "pgm": b"P5\n# by a robot\n100 100\n255\n" + grey.tobytes(),
+                "pgm16": b"P5 100 100 65535\n" + (grey.astype(">u2") * 257).astype(">u2").tobytes()}
+
+    def both(self, name, picture, keys=""):
+        """Cells by the package, and the area in m2 that `waymark map check` states."""
+        file = self.folder / f"{name}.{'pgm' if picture[:1] == b'P' else 'png'}"
+        file.write_bytes(picture)
+        about = self.folder / f"{name}.yaml"
+        about.write_bytes(b"\xef\xbb\xbf" + f"image: {file.name}\nresolution: 0.05\norigin: [0, 0, 0.5]\n{keys}".encode())
+        done = subprocess.run([BIN / "waymark-map", "check", about], capture_output=True, text=True, check=False)
+        area = next(line for line in done.stdout.splitlines() if line.startswith("drivable:"))
+        return waymark.read_floor_plan(about).cells, float(area.split()[1])
+
+    def test_one_map_as_every_kind_of_picture(self):
+        for name, picture in self.pictures().items():
+            cells, area = self.both(name, picture)
+            np.testing.assert_array_equal(cells, self.meant, name)
+            self.assertAlmostEqual(area, float((self.meant == FREE).sum()) * 0.0025, delta=0.051, msg=name)
+
+    def test_modes(self):
+        raw = np.select([self.grey == 254, self.grey == 0], [0, 100], 255).astype(np.uint8)
+        for name, picture, keys in (("trinary", png(self.grey), "mode: trinary\n"), ("scale", png(self.grey), "mode: scale\n"),
+                                    ("negated", png(255 - self.grey), "negate: 1\n"), ("truth", png(255 - self.grey), "negate: true\n"),
+                                    ("raw", png(raw), "mode: raw\n")):
+            cells, area = self.both(name, picture, keys)
+            np.testing.assert_array_equal(cells, self.meant, name)
+            self.assertAlmostEqual(area, float((self.meant == FREE).sum()) * 0.0025, delta=0.051, msg=name)
+
+    def test_what_is_refused(self):
+        (self.folder / "a.png").write_bytes(png(self.grey)[:60])
+        (self.folder / "b.png").write_bytes(png(self.grey))
+        for keys, words in (("image: a.png\n", "a.png: this is no picture that can be read, or it is cut off"),
+                            ("image: b.png\nmode: graded\n", "mode: 'graded' is none of trinary"),
+                            ("image: b.png\nmode: raw\nnegate: 1\n", "negate: the map servers")):
+            (self.folder / "map.yaml").write_text(f"resolution: 0.05\norigin: [0, 0, 0]\n{keys}")
+            with self.assertRaisesRegex(ValueError, words):
+                waymark.read_floor_plan(self.folder / "map.yaml")
+
+
+class CanLogs(Folder):
+    def frames(self, *lines):
+        (self.folder / "recording.yaml").write_text("format: waymark-recording/1\nname: a\nstreams: [can.log]\n")
+        (self.folder / "can.log").write_text("".join(line + "\n" for line in lines))
+        return list(waymark.Recording(self.folder).can())
+
+    def test_forms_of_a_line(self):
+        got = self.frames("(2020-12-19 12:04:45.485261) received_messages 123#0102", "", "# a comment", "(1608379486) can0 00000123#R8 T",
+                          "(1608379486.5) can0 123#0011223344556677_9", "(1608379487.000001) can0 123##1AABB")
+        self.assertEqual([frame.t_ns for frame in got],
+                         [1608379485485261000, 1608379486000000000, 1608379486500000000, 1608379487000001000])
+        self.assertEqual([frame.interface for frame in got][:2], ["received_messages", "can0"])
+        self.assertEqual([(frame.remote, frame.extended, frame.flags, len(frame.data)) for frame in got],
+                         [(False, False, None, 2), (True, True, None, 0), (False, False, None, 8), (False, False, 1, 2)])
+
+    def test_differences_are_summed_up(self):
+        got = self.frames("(000.000000) can0 100#00", *("(000.010000) can0 100#00" for _ in range(20)))
+        self.assertEqual([frame.t_ns for frame in got], [10_000_000 * i for i in range(21)])
+        got = self.frames(*(f"(000.{10000 * i:06d}) can0 100#00" for i in range(20)))  # candump -tz
+        self.assertEqual([frame.t_ns for frame in got], [10_000_000 * i for i in range(20)])
+
+
+if __name__ == "__main__":
+    unittest.main()
