@@ -196,6 +196,18 @@ class Contradictions(BagTest):
         self.assertNotIn("finding", said)
         self.assertEqual(recording.streams(), ["motion.csv"])
 
+    def test_a_twist_that_is_a_running_mean_yields_to_the_poses(self):
+        """Turns to the left and to the right; the twist is their mean over 1 s."""
+        bag, heading, rates = self.bag(), 0.0, []
+        for t in times(10):
+            rates.append(0.6 * np.sin(1.5 * t))
+            bag.odometry(ns(t), ns(t), (0, 0, heading), (0, 0, 0), (0, 0, np.mean(rates[-10:])))
+            heading += 0.1 * rates[-1]
+        recording, said = self.take(bag)
+        self.assertIn("0.50 s later than its poses", said)
+        self.assertNotIn("finding", said)
+        self.assert_end(recording, said, end=(0, 0, heading - 0.1 * rates[-1]))
+
     def test_messages_that_repeat_are_said(self):
         bag = self.bag()
         for i, t in enumerate(times(50)):

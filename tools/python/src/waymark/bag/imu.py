@@ -21,6 +21,7 @@ from .tables import without_arrival
 _G = 9.80665  # m/s2
 _UNITS = {_G: ("", 1.0), 1.0: ("g", _G), 1000.0: ("thousandths of g", _G / 1000), 100 * _G: ("cm/s2", 0.01)}
 _UNIT_SHARE = 0.12  # how far the mean may be from gravity: biases and scales of cheap accelerometers
+_STEADY = 0.9  # length of the mean acceleration in that of a single one, below which the IMU changes its attitude
 _SAME, _NEAR = np.cos(np.radians(20)), np.cos(np.radians(30))  # directions that are one axis; by gravity, on slopes
 _FITS, _LIKE = 0.8, 0.5  # correlation from which on gyro and motion say the same; below the second they have nothing in common
 _EXACT_SHARE, _EXACT_R = 0.03, 0.98  # half or double is a unit's fault only where it is exact: the turns of skid steer are off by as much
@@ -113,18 +114,21 @@ def _gravity(imu: Imu) -> Array | None:
     if not ok.any() or not imu.accelerometer[ok].any():
         return None
     mean = imu.accelerometer[ok].mean(axis=0)
-    size = float(np.linalg.norm(mean))
+    size, steady = float(np.median(np.linalg.norm(imu.accelerometer[ok], axis=1))), float(np.linalg.norm(mean))
     for value, (name, scale) in sorted(_UNITS.items(), key=lambda unit: abs(np.log(size / unit[0]))):
         if abs(size / value - 1) < _UNIT_SHARE:
             if name:
                 imu.say(f"its accelerometer shows {size:.3g} at rest, so it is in {name}, not in m/s2: converted")
                 imu.accelerometer *= scale
                 imu.sigmas[:, 3:] *= scale
-            return np.asarray(mean / size)
+            if steady < _STEADY * size:
+                imu.say("it is turned over on the way: its accelerometer does not show how it is mounted", finding=False)
+                return None
+            return np.asarray(mean / steady)
     if size < 0.3 * _G:
-        imu.say(f"its accelerometer has no gravity (mean {size:.2f} m/s2): it does not show which axis is up", finding=False)
+        imu.say(f"its accelerometer has no gravity ({size:.2f} m/s2): it does not show which axis is up", finding=False)
     else:
-        imu.say(f"its accelerometer's mean is {size:.3g} m/s2, and gravity is 9.81")
+        imu.say(f"its accelerometer shows {size:.3g} m/s2, and gravity is 9.81")
     return None
 
 
@@ -147,11 +151,11 @@ def _fit(imu: Imu, motion: Motion) -> _Fit | str:
     for lag in range(-compare.LAG_MAX, compare.LAG_MAX + 1):
         gyro = compare.held(imu.t_ns, imu.gyro, borders, lag)
         ok = np.isfinite(gyro).all(axis=1) & np.isfinite(rate)
-        power = float(np.sum(gyro[ok] ** 2))
         if ok.sum() < compare.WINDOWS_MIN or not rate[ok].any():
             continue
         vector = rate[ok] @ gyro[ok] / (rate[ok] @ rate[ok])
-        fits.append(_Fit(vector, float(np.linalg.norm(vector) * np.sqrt(rate[ok] @ rate[ok] / power)) if power else 0.0, lag))
+        along = gyro[ok] @ vector
+        fits.append(_Fit(vector, compare.likeness(along, rate[ok]).r, lag))
     if not fits:
         return "not observable"
     still = next((fit for fit in fits if fit.lag == 0), fits[0])
@@ -258,7 +262,11 @@ def _by_gravity(imu: Imu, gravity: Array | None, motion: Motion | None) -> None:
     expected = _UP if imu.rotation is None else imu.rotation[2]
     if gravity @ expected > _NEAR:
         return
-    if gravity @ expected < -_NEAR:
+    if gravity @ expected < -_NEAR and imu.rotation is None:
+        known = _set_up(imu, gravity, motion)
+        imu.say(f"its accelerometer shows it upside down (REP 145: +9.81 upwards), and no mounting is stated: {_line(imu)}; {known}. If it is upright, "
+                "its accelerometer has the other sign: write [0, 0, 0]")
+    elif gravity @ expected < -_NEAR:
         imu.say("its accelerometer shows it upside down, or has the other sign; the drive has no turns that tell which: nothing is changed")
     elif imu.rotation is None:
         known = _set_up(imu, gravity, motion)

@@ -27,9 +27,12 @@ _FITS = 0.9  # least correlation of poses and twists that say the same
 _BETTER = 0.25  # the other frame is taken where its squared residuals are below this share
 _SILENT = 0.15  # a part of the twist with less than this share of the poses' is not filled
 _AGREES = 1.05  # largest factor between poses and twists that say the same: the numbers of one message come from the same wheels
+_LAG_GAIN = 0.02  # a lag is one where the correlation grows by more
+_LATE_AGREES = 1.25  # largest factor where the twist is smoothed: a mean over a turn is smaller than the turn
 _REPEATS = 0.5  # share of messages that repeat the one before, from which on it is said
 _LATE_MAX_NS = 100_000_000  # differences are known at their end: as twists only where that is soon enough to be fused
 _POSE_UNITS = {1000.0: "mm", 100.0: "cm", 39.37: "inches"}
+_FLAT = 1e-3  # m/s, rad/s: a part of the twist that stays below is none: the floats' own, or that of poses as text
 _NAMES = ("x", "y", "z")
 
 
@@ -111,10 +114,22 @@ class _Odometry:
         if not turns and compare.turns(by_twist[:, 5]):
             self.say("its poses never turn while its twist does: the twist is used; --motion-by poses takes its poses", finding=True)
             return self.twist
+        if turns and self._is_late(by_pose, borders):
+            return rates
         out = self._linear(rates, by_pose, by_twist, borders) if moves else self.twist
         if turns and not self.by_poses:
             out = self._angular(out, rates, by_pose, by_twist)
         return rates if self.by_poses else out
+
+    def _is_late(self, by_pose: Array, borders: Array) -> bool:
+        """Whether the turns of the twist come late, as of a running mean: the poses show when they were."""
+        alike = [compare.likeness(compare.held(self.t, self.twist[:, 5:], borders, lag)[:, 0], by_pose[:, 5]) for lag in range(compare.LAG_MAX + 1)]
+        lag = max(range(len(alike)), key=lambda k: alike[k].r)
+        self.by_poses = lag > 0 and alike[lag].r > max(alike[0].r + _LAG_GAIN, _FITS) and not alike[lag].differs(_LATE_AGREES)
+        if self.by_poses:
+            self.say(f"its twist turns {lag * compare.WINDOW_S:.2f} s later than its poses, as a running mean does (r {alike[lag].r:.2f}, at once "
+                     f"{alike[0].r:.2f}): the differences of its poses are used; --motion-by twists takes its twists")
+        return self.by_poses
 
     def _linear(self, rates: Array, by_pose: Array, by_twist: Array, borders: Array) -> Array:
         """Frame, empty axes and size of the speeds."""
@@ -292,7 +307,8 @@ def _increments(motion: Motion) -> Table:
 
 def _twists(motion: Motion) -> tuple[str, Table]:
     """motion.csv, or motion6.csv where the robot moves sideways, vertically or leans."""
-    twist = np.where(np.abs(motion.twist) < 1e-9, 0.0, motion.twist)
+    twist = motion.twist.copy()
+    twist[:, np.nan_to_num(np.abs(twist)).max(axis=0) < _FLAT] = 0.0
     ok = np.isfinite(twist[:, [0, 5]]).all(axis=1)
     t, twist, arrival = motion.t_ns[ok], np.nan_to_num(twist[ok]), motion.arrival_ns[ok]
     if twist[:, 1:5].any():
