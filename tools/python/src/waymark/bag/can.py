@@ -3,9 +3,15 @@
 
 import heapq
 import re
+import struct
+import tempfile
+from collections.abc import Callable, Mapping
 from typing import Any
 
+import numpy as np
+
 from ..recording import CanFrame, RecordingWriter
+from ..tables import Array
 from .decoding import BadMessage
 
 _ERROR, _REMOTE, _EXTENDED, _ID = 0x20000000, 0x40000000, 0x80000000, 0x1FFFFFFF  # of linux/can.h, where a driver leaves them in the id
@@ -13,6 +19,9 @@ _STANDARD_MAX = 0x7FF
 _NAME_MAX = 15  # letters of an interface: IFNAMSIZ without its end
 _FD_LENGTHS = (0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64)
 _HELD = 20_000  # frames that are put in order; senders' stamps and the log differ by milliseconds
+# A frame in the file: stamp, log, topic, identifier, flags (extended, remote, error, FD), length, data.
+_RECORD = struct.Struct("<qqHIBB64s")
+_ROW = np.dtype([("t_ns", "<i8"), ("log_ns", "<i8"), ("topic", "<u2"), ("id", "<u4"), ("flags", "u1"), ("length", "u1"), ("data", "S64")])
 # Parts of topics that name a direction and no bus: ros_canopen's, ros2_socketcan's.
 _DIRECTIONS = {"received_messages", "sent_messages", "from_can_bus", "to_can_bus", "from_can_bus_fd", "to_can_bus_fd", "can_rx", "can_tx",
                "frames", "can_frames", "can_frame", "rx", "tx"}
@@ -28,12 +37,11 @@ def interface(topic: str) -> str:
 
 
 class CanLog:
-    """Writes frames in the order of their stamps."""
+    """Frames in a file until the clocks of their topics are known; then can.log in the order of their times."""
 
     def __init__(self, writer: RecordingWriter):
         self._writer = writer
-        self._held: list[tuple[int, int, CanFrame]] = []
-        self._count = 0
+        self._spool = tempfile.TemporaryFile()
         self._names: dict[str, str] = {}
 
     def name(self, topic: str) -> str:
@@ -48,17 +56,35 @@ class CanLog:
             self._names[topic] = name
         return self._names[topic]
 
-    def put(self, frame: CanFrame) -> None:
-        """Takes a frame."""
-        self._count += 1
-        heapq.heappush(self._held, (frame.t_ns, self._count, frame))
-        if len(self._held) > _HELD:
-            self._writer.can(heapq.heappop(self._held)[2])
+    def put(self, topic: str, log_ns: int, frame: CanFrame) -> None:
+        """Takes a frame of a topic whose name was asked for."""
+        flags = frame.extended | frame.remote << 1 | frame.error << 2 | (frame.flags is not None) << 3
+        index = list(self._names).index(topic)
+        self._spool.write(_RECORD.pack(frame.t_ns, log_ns, index, frame.id, flags, len(frame.data), frame.data))
 
-    def finish(self) -> None:
-        """Writes those that are left."""
-        while self._held:
-            self._writer.can(heapq.heappop(self._held)[2])
+    def finish(self, clocks: Mapping[str, Callable[[Array, Array], tuple[Array, Array]]]) -> None:
+        """Writes can.log, with the times that the topics' clocks make of stamps and log."""
+        topics = list(self._names)
+        held: list[tuple[int, int, CanFrame]] = []
+        count = 0
+        self._spool.seek(0)
+        while block := self._spool.read(_RECORD.size * _HELD):
+            rows = np.frombuffer(block, dtype=_ROW)
+            t_ns = rows["t_ns"].copy()
+            for index in np.unique(rows["topic"]):
+                mine = rows["topic"] == index
+                t_ns[mine] = clocks[topics[index]](rows["t_ns"][mine], rows["log_ns"][mine])[0]
+            for t, row in zip(t_ns.tolist(), rows.tolist()):
+                _, _, index, identity, flags, length, data = row
+                frame = CanFrame(t, self._names[topics[index]], identity, bool(flags & 1), data.ljust(length, b"\0"), 1 if flags & 8 else None,
+                                 bool(flags & 2), bool(flags & 4))
+                count += 1
+                heapq.heappush(held, (t, count, frame))
+                if len(held) > _HELD:
+                    self._writer.can(heapq.heappop(held)[2])
+        while held:
+            self._writer.can(heapq.heappop(held)[2])
+        self._spool.close()
 
 
 def frame_of(t_ns: int, name: str, message: Any) -> CanFrame:

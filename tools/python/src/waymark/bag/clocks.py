@@ -63,6 +63,9 @@ class Clock:
         return t - shift_t, np.maximum(arrival - shift_a, t - shift_t)
 
 
+_LOST_NS = 3600 * 10**9  # farther apart than the bag is long and an hour, stamps and log have nothing in common
+
+
 def _spread(t: Array) -> Array:
     """Messages of one stamp evenly from it to the next stamp; those of the last one at the usual distance."""
     _, first, counts = np.unique(t, return_index=True, return_counts=True)
@@ -187,6 +190,19 @@ def _own_clock(topic: _Topic, reference_ns: int, say: Say) -> Clock:
 
 
 def _one(topic: _Topic, reference: list[_Topic], reference_ns: int, say: Say) -> Clock:
+    """A topic's clock; the times of the log where its stamps follow none."""
+    said: list[tuple[str, str]] = []
+    clock = _by_stamps(topic, reference, reference_ns, lambda name, text: said.append((name, text)))
+    t_ns, _ = clock(topic.stamp, topic.log)
+    if np.ptp(topic.log - t_ns) > np.ptp(topic.log) + _LOST_NS:
+        clock = Clock(by_log=True, delay_ns=0 if abs(reference_ns) <= OTHER_LOG_NS else reference_ns)
+        said = [(topic.name, "its stamps follow no clock: the times of the log are used")]
+    for name, text in said:
+        say(name, text)
+    return clock
+
+
+def _by_stamps(topic: _Topic, reference: list[_Topic], reference_ns: int, say: Say) -> Clock:
     missing = int((~topic.known).sum())
     if missing == len(topic.stamp):
         return Clock(by_log=True, delay_ns=0 if abs(reference_ns) <= OTHER_LOG_NS else reference_ns)

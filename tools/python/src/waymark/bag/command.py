@@ -5,7 +5,10 @@ import argparse
 import shutil
 import sys
 import time
+import warnings
 from pathlib import Path
+
+import numpy as np
 
 from ..mcapio import streams
 from ..recording import RecordingWriter
@@ -66,8 +69,8 @@ def import_bag(path: Path, out: Path, given: argparse.Namespace, progress: Progr
         for topic, rows in sorted(own.items()):
             columns = [name for name in rows[0].__dataclass_fields__ if name not in ("header", "__msgtype__")]
             writer.table(topic.removeprefix("/recording/").replace("_", "-") + ".csv", streams.rows_to_table(rows, columns))
-        into.can.finish()
         into.settle()
+        into.can.finish(into.clocks)
         if ours:  # an export of ours: what isn't taken follows from the recording
             into.refused.clear()
             if "/truth/pose" in into.samples.get("poses", {}):
@@ -128,7 +131,9 @@ def main(argv: list[str] | None = None) -> int:
         parser.error(f"{given.out} is not empty: give a new folder")
     progress = _Shown()
     try:
-        into = import_bag(given.bag, given.out, given, progress)
+        with warnings.catch_warnings(), np.errstate(all="ignore"):  # what libraries warn of, the import says in its own words
+            warnings.simplefilter("ignore")
+            into = import_bag(given.bag, given.out, given, progress)
     except (NoSuchTopic, Unreadable) as problem:
         return _failed(given, progress, str(problem))
     except MemoryError:

@@ -131,7 +131,13 @@ def _write_tags(into: Collection, found: list[cameras.Found], rectified: bool | 
             of_corners.add(name)
             if camera and (tags.READERS[rows.kind].is_of_rectified if rectified is None else rectified):
                 columns = _in_raw(into, topic, camera, columns, is_said=rectified is not None)
-            written["marker-corners.csv"].append(tags.corner_table(columns, name))
+            if camera and camera.lens.entry:
+                written["marker-corners.csv"].append(tags.corner_table(columns, name))
+            else:
+                file = f"marker-corners-{name}.csv"
+                written.setdefault(file, []).append(tags.corner_table(columns, name))
+                into.note(topic, f"its corners need the lens of camera {name}, which the bag doesn't have: they are kept in {file}; write the lens into "
+                                 "calibration.yaml (`waymark calibrate camera`) and name the file marker-corners.csv")
         elif name in of_corners:
             into.refuse(topic, "poses of tags whose corners are taken")
         elif not _is_optical(rows.frame, camera):

@@ -14,7 +14,8 @@ def can_frame(into: Collection, topic: str, message: Any, log_ns: int) -> None:
     name = into.can.name(topic)
     if name not in topic.split("/"):
         into.note(topic, f"its frames are those of interface {name} in can.log")
-    into.can.put(can.frame_of(stamp_ns(message, log_ns), name, message))
+    frame = can.frame_of(stamp_ns(message, log_ns), name, message)
+    into.can.put(topic, into.arrival_ns(topic, frame.t_ns, log_ns), frame)
 
 
 TAKERS = {
