@@ -1,20 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
-// A symmetric matrix of which only the upper half is kept, for covariances of hundreds of states. Rows 2k and 2k + 1
-// both begin at column 2k, so that every row begins at a pair of lanes; of each 2 x 2 block on the diagonal the lower
-// element is kept, too, with the same bits. Kernels run on portable vectors of two doubles; no sum runs across lanes,
-// so the scalar twins (namespace scalar) give the same bits on every machine.
+// A symmetric matrix of which only the upper half is kept, for covariances of up to thousands of states. Rows 2k and
+// 2k + 1 both begin at column 2k, so that every row begins at a pair of lanes; of each 2 x 2 block on the diagonal the
+// lower element is kept, too, with the same bits. Kernels run on portable vectors of two doubles, or of four where the
+// machine has them. No sum runs across lanes and the terms of each element are added in a fixed order, so the scalar
+// twins (namespace scalar) give the same bits on every machine.
 #ifndef WAYMARK_ESTIMATOR_MATH_HALF_COVARIANCE_HPP
 #define WAYMARK_ESTIMATOR_MATH_HALF_COVARIANCE_HPP
 
 #include <cstddef>
 
-#include "math/covariance.hpp"
-
 namespace wm {
 
+// Two lanes: SSE2 and NEON have them everywhere.
+typedef double pair __attribute__((vector_size(16), may_alias));
+
+constexpr int even(int n) { return (n + 1) & ~1; }
+
 // A view: the memory belongs to who made it, 16-byte aligned, doubles(capacity) long. `capacity` is even.
-struct half_covariance {
-  double *data;
+template <class number>
+struct half_matrix {
+  number *data;
   int capacity;
 
   static constexpr size_t doubles(int capacity) {
@@ -22,77 +27,73 @@ struct half_covariance {
   }
   // row(i)[j] is the element (i, j) for j from first(i) on.
   static constexpr int first(int i) { return i & ~1; }
-  double *row(int i) const {
+  number *row(int i) const {
     const std::ptrdiff_t k = i / 2;
     return data + 2 * k * (capacity - k + 1) + (i & 1) * (capacity - 2 * k) - 2 * k;
   }
   double at(int i, int j) const { return i <= j ? row(i)[j] : row(j)[i]; }
-  void set(int i, int j, double value) const {
+  void set(int i, int j, double value) {
     if (first(i) <= first(j)) row(i)[j] = value;
     if (first(j) <= first(i)) row(j)[i] = value;
   }
 };
+using half_covariance = half_matrix<double>;
+using half_view = half_matrix<const double>;  // to read
 
-// What one update does to the covariance: P - sum over k of w[k] w[k]' + e r' + r e'. `e` null: without the last two.
+// States of a matrix, in ascending order: those that are not empty, or those that an update moves.
+struct state_span {
+  int from, to;
+};
+template <int kMost>
+struct span_list {
+  int count = 0;
+  state_span span[kMost];
+
+  // Behind those that are there. A list that is full, and one of even bounds where the gap is of one pair, takes the
+  // gap along.
+  void add(int from, int to, int gap) {
+    if (count > 0 && (from - span[count - 1].to <= gap || count == kMost)) {
+      span[count - 1].to = to;
+    } else {
+      span[count++] = {from, to};
+    }
+  }
+};
+// With even bounds: an empty state between two others costs less than a new span.
+using filled_states = span_list<12>;
+
+// P - sum of w w' + sum of e r' + r e'; vectors of as many doubles as the matrix has states, made even.
 struct half_update {
-  static constexpr int kRows = 3;  // at most: a bearing, a range and an elevation
-  int rows;
-  const double *w[kRows];
-  const double *e, *r;
+  static constexpr int kRows = 4, kTurns = 3;
+  int rows, turns;
+  const double *w[kRows], *e[kTurns], *r[kTurns];
 };
 
 namespace vectors {
 
-template <int kRows, bool kTransport>
-inline void apply(const half_covariance &p, const half_update &u, int n) {
-  constexpr int kSlots = kRows + (kRows == 0);  // no array of nothing
-  const auto lanes = [](const double *v) { return reinterpret_cast<const pair *>(v); };
-  for (int i = 0; i < n; i += 2) {
-    pair *a = reinterpret_cast<pair *>(p.row(i) + i), *b = reinterpret_cast<pair *>(p.row(i + 1) + i);
-    const pair *w[kSlots], *e = nullptr, *r = nullptr;
-    pair wa[kSlots], wb[kSlots], ea{}, eb{}, ra{}, rb{};
-    for (int k = 0; k < kRows; k++) {
-      w[k] = lanes(u.w[k] + i);
-      wa[k] = pair{u.w[k][i], u.w[k][i]};
-      wb[k] = pair{u.w[k][i + 1], u.w[k][i + 1]};
-    }
-    if constexpr (kTransport) {
-      e = lanes(u.e + i);
-      r = lanes(u.r + i);
-      ea = pair{u.e[i], u.e[i]};
-      eb = pair{u.e[i + 1], u.e[i + 1]};
-      ra = pair{u.r[i], u.r[i]};
-      rb = pair{u.r[i + 1], u.r[i + 1]};
-    }
-    const int count = (n - i + 1) / 2;
-    for (int j = 0; j < count; j++) {
-      pair x = a[j], y = b[j];
-      for (int k = 0; k < kRows; k++) {
-        x -= wa[k] * w[k][j];
-        y -= wb[k] * w[k][j];
-      }
-      if constexpr (kTransport) {
-        x += ea * r[j] + ra * e[j];
-        y += eb * r[j] + rb * e[j];
-      }
-      a[j] = x;
-      b[j] = y;
-    }
-  }
+// out += factor * row, `count` doubles, an even number.
+inline void add_scaled(double *out, const double *row, double factor, int count) {
+  pair *o = reinterpret_cast<pair *>(out);
+  const pair *r = reinterpret_cast<const pair *>(row);
+  const pair f = {factor, factor};
+  for (int j = 0; j < count / 2; j++) o[j] += f * r[j];
 }
 
-inline void apply(const half_covariance &p, const half_update &u, int n) {
-  switch (u.rows + (u.e ? 4 : 0)) {
-    case 1: return apply<1, false>(p, u, n);
-    case 2: return apply<2, false>(p, u, n);
-    case 3: return apply<3, false>(p, u, n);
-    case 4: return apply<0, true>(p, u, n);
-    case 5: return apply<1, true>(p, u, n);
-    case 6: return apply<2, true>(p, u, n);
-    case 7: return apply<3, true>(p, u, n);
-    default: return;
-  }
+// out = factor * row.
+inline void set_scaled(double *out, const double *row, double factor, int count) {
+  pair *o = reinterpret_cast<pair *>(out);
+  const pair *r = reinterpret_cast<const pair *>(row);
+  const pair f = {factor, factor};
+  for (int j = 0; j < count / 2; j++) o[j] = f * r[j];
 }
+
+// out = the sum of factor[k] * column state[k] of P, in those rows; 0 in others up to `n`, made even.
+void project(const half_view &p, const int *state, const double *factor, int count, const filled_states &of, int n,
+             double *out);
+
+// The update of the rows and columns of those states. All others' elements of the vectors are 0, or their rows of P
+// are empty and stay so.
+void apply(const half_covariance &p, const half_update &u, const filled_states &of);
 
 }  // namespace vectors
 
@@ -103,9 +104,16 @@ inline void apply(const half_covariance &p, const half_update &u, int n) {
     for (int j = half_covariance::first(i); j < even(n); j++) {
       double x = p.row(i)[j];
       for (int k = 0; k < u.rows; k++) x -= u.w[k][i] * u.w[k][j];
-      if (u.e) x += u.e[i] * u.r[j] + u.r[i] * u.e[j];
+      for (int k = 0; k < u.turns; k++) x += u.e[k][i] * u.r[k][j] + u.r[k][i] * u.e[k][j];
       p.row(i)[j] = x;
     }
+}
+
+inline void project(const half_view &p, const int *state, const double *factor, int count, int n, double *out) {
+  for (int j = 0; j < n; j++) {
+    out[j] = 0.0;
+    for (int k = 0; k < count; k++) out[j] += factor[k] * p.at(j, state[k]);
+  }
 }
 
 }  // namespace scalar

@@ -7,7 +7,7 @@
 
 #include <cmath>
 
-#include "math/covariance.hpp"
+#include "math/half_covariance.hpp"
 #include "math/elementary.hpp"
 
 namespace wm {

@@ -75,10 +75,7 @@ struct filter {
       innovation[k] = 0.01 * wm_random_normal(2, (uint64_t)k, (uint64_t)step);
       noise[k] = 1e-4;
     }
-    const double none[3] = {};
-    joint_state::innovation_block block;
-    state->prepare(rows, innovation, noise, width, &block);
-    if (state->fuse(block, none, wm::joint_state::scope::all)) return;
+    if (state->fuse(state->prepare(rows, innovation, noise, width), nullptr, wm::joint_state::scope::all)) return;
     std::printf("step %d: the innovation's covariance is not positive definite: nothing is measured\n", step);
     std::exit(1);
   }
@@ -196,11 +193,13 @@ void bench_kernel(int n) {
   double *v = align(vectors);
   for (int i = 0; i < 5 * capacity; i++) v[i] = 1e-3 * wm_random_normal(3, 1, (uint64_t)i);
   const wm::half_covariance p = {align(data), capacity};
-  const wm::half_update u = {3, {v, v + capacity, v + 2 * capacity}, v + 3 * capacity, v + 4 * capacity};
+  const wm::half_update u = {3, 1, {v, v + capacity, v + 2 * capacity}, {v + 3 * capacity}, {v + 4 * capacity}};
+  wm::filled_states all;
+  all.add(0, capacity, 0);
   std::vector<double> fast, slow;
   for (int i = 0; i < bench::rounds(300); i++) {
     const int64_t a = bench::now_ns();
-    wm::vectors::apply(p, u, n);
+    wm::vectors::apply(p, u, all);
     const int64_t b = bench::now_ns();
     wm::scalar::apply(p, u, n);
     fast.push_back((double)(b - a));

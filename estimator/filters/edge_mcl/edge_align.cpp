@@ -397,10 +397,8 @@ void edge_mcl::describe(const normal_equations &scan, const alignment &a, wm_inn
     row.add(a.state[k], share);
     innovation += share * difference(k, a.value[k], filter_.value(a.state[k]));
   }
-  projection projected;
-  filter_.project(row, &projected);
   record->observed = innovation / length;
-  record->variance = (projected.variance + 1.0 / known) / square(length);
+  record->variance = (filter_.variance_of(row) + 1.0 / known) / square(length);
   record->nis = square(record->observed) / record->variance;
   record->gate_dof = 1;
 }
@@ -424,9 +422,7 @@ bool edge_mcl::fuse_information(const normal_equations &e, const alignment &a) {
       row.add(a.state[j], lower(j, i));
       innovation += lower(j, i) * difference(j, a.value[j], filter_.value(a.state[j]));
     }
-    projection projected;
-    filter_.project(row, &projected);
-    numeric &= filter_.update(projected, innovation, 1.0 / d[i], kPoseStates, considered_to);
+    numeric &= filter_.update(row, innovation, 1.0 / d[i], kPoseStates, considered_to);
   }
   return numeric;
 }

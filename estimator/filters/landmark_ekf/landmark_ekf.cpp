@@ -103,7 +103,7 @@ void landmark_ekf::init(const wm_landmark_ekf_params &params, const wm_setup &se
   error_ = correlated_slot_of(sightings());
   for (int i = 0; i < error_slots(setup) && error_.width > 0; i++) {
     errors_.add(filter_.states());
-    for (int k = 0; k < error_.width; k++) filter_.add_state(0.0, 1.0);
+    for (int k = 0; k < error_.width; k++) filter_.add_state(0.0, 0.0);
   }
   for (int i = 0; i < map_slots(params, setup); i++) {
     map_.add(filter_.states());
@@ -168,9 +168,7 @@ void landmark_ekf::start_again() {
 wm_status landmark_ekf::predict(const wm_event &motion) {
   const wm_status status = filter_.check_motion(motion);
   if (status != WM_OK) return status;
-  const bool had_lag = filter_.motion_state(kLag) >= 0;
-  filter_.move(motion);
-  if (!had_lag && filter_.motion_state(kLag) >= 0) slots_.begin_lag(*setup_, &filter_);
+  if (filter_.move(motion)) slots_.begin_lag(*setup_, &filter_);
   return status;
 }
 

@@ -45,8 +45,6 @@ class landmark_ekf {
   static constexpr int kGnssStates = 3;                   // time offset, time-correlated error on each axis
   static constexpr int kMaxCalibration =
       kCalibrationCount + 2 + kMaxSensors * kSensorStates + kGnssStates;  // 2: the wheels' heading
-  static_assert(kPoseStates + kMaxCalibration + 2 * kErrorSlots + 3 * kMapSlots + 2 <= kMaxStates);
-
   static_assert(kMaxSensors * kSensorStates <= kMaxSensorStates);
   // In list_calibration() beside them: the antenna's place, the heading's bias, factors of noise, turn, lasting error.
   static_assert(kMaxCalibration + 3 + noise_adaption::kFactors + 2 <= 2 * WM_HEALTH_CALIBRATION_MAX);
@@ -109,7 +107,8 @@ class landmark_ekf {
   // Gates one or two components jointly, weakens or rejects, updates, writes the records. Returns the log Bayes factor
   // of "anywhere in clutter_volume" against "as expected". `usable` false: the source is known to be wrong.
   double fuse(residual *rows, int count, double clutter_volume, bool usable, record_list records);
-  wm_verdict update(const residual *rows, int count, const gate_result &g, projection *first);
+  wm_verdict update(innovation &&prepared, const residual *rows, const gate_result &g);
+  innovation prepare(const residual *rows, int count);
   bool passes(const gate_result &g, int dof) const;
   void fuse_elevation(residual bearing_then_own[2], const double *before, record_list records);
 

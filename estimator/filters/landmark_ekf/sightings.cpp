@@ -216,11 +216,9 @@ int landmark_ekf::associate_nearest(const sighting_context &at) {
       planar_row row;
       add_past_pose(&row, by, at.past, slots_.at(s.sensor, kTimeOffset));
       slots_.add_to(&row, s.sensor, by);
-      projection p;
-      filter_.project(row, &p);
       const double on_map = square(map_sigma(i)) * (square(by[kByX]) + square(by[kByY]));
       const double difference = angle ? wrap(observed - expected) : observed - expected;
-      chi2 += square(difference) / (p.variance + variance + on_map);
+      chi2 += square(difference) / (filter_.variance_of(row) + variance + on_map);
     };
     test(s.bearing_rad, e.bearing_rad, e.bearing_by,
          square(at.reading.bearing_sigma_rad) + square(sightings().lateral_sigma_m / at_least(e.distance_m, kNear_m)),

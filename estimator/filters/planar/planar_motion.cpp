@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "filters/planar/planar_motion.hpp"
 
+#include <cstring>
+
+#include "filters/planar/past_pose.hpp"
 #include "math/arc.hpp"
 
 namespace wm {
@@ -153,14 +156,97 @@ double planar_motion::count_variance(wm_time_ns t_ns, const double by[3], double
   return square(by[0] * h.cos + by[1] * h.sin) * way_m2 + square(by[2]) * turn_rad2;
 }
 
-int planar_motion::beyond_limit(const double *states, double *back) const {
-  for (int i = 0; i < kCalibrationCount; i++) {
-    const int state = motion_state_[i];
-    if (state < 0) continue;
-    *back = motion_state_within_limits(i, states[state]) - states[state];
-    if (*back != 0.0) return state;
+// ---- the state ----
+
+void planar_motion::forget(int state, double value, double variance) {
+  state_.forget(state, 1, variance);
+  state_.set_value(state, value);
+  take_calibration(state_.mean());
+}
+
+void planar_motion::inflate_pose(double xy_m2, double heading_rad2) {
+  for (int i = 0; i < kPoseStates; i++) state_.add_variance(i, i == kHeading ? heading_rad2 : xy_m2);
+}
+
+void planar_motion::put_pose(const wm_pose2 &pose, const double covariance[3][3]) {
+  const double value[3] = {pose.x_m, pose.y_m, wrap(pose.heading_rad)};
+  for (int i = 0; i < 3; i++) forget(i, value[i], 0.0);
+  for (int i = 0; i < 3; i++)
+    for (int j = i; j < 3; j++) state_.set_covariance(i, j, covariance[i][j]);
+  twist_heading_rad_ = value[kHeading];
+}
+
+void planar_motion::estimate(wm_estimate *out) const {
+  std::memset(out, 0, sizeof *out);
+  out->t_ns = now_ns();
+  put_planar_estimate(
+      pose(), [this](int i, int j) { return covariance(i, j); }, out);
+  out->v_mps[0] = twist_.v;
+  out->v_mps[1] = twist_.u;
+  out->w_radps[2] = twist_.w;
+}
+
+void planar_motion::propagate(const motion_segment &piece, const motion_twist &twist, const motion_noise &noise) {
+  const pose_step step =
+      make_pose_step(piece, twist, noise, value(kHeading), twist_, twist_heading_rad_, motion_state_);
+  motion_row f[kPoseStates];
+  for (int i = 0; i < kPoseStates; i++) {
+    f[i].add(i, 1.0);
+    for (int k = 0; k < step.columns; k++) f[i].add(step.column[k], step.by[k][i]);
   }
-  return -1;
+  const sparse_row rows[kPoseStates] = {f[kX], f[kY], f[kHeading]};
+  const double values[kPoseStates] = {value(kX) + step.x_m, value(kY) + step.y_m,
+                                      wrap(value(kHeading) + step.turn_rad)};
+  state_.assign(kX, kPoseStates, rows, step.noise[0], kPoseStates, values);
+  take_step(piece, twist, noise, step, value(kHeading));
+}
+
+void planar_motion::begin_lag() {
+  double behind[kPoseStates];
+  put_age(twist(), sincos(value(kHeading)), behind);
+  motion_row f[kPoseStates];
+  for (int i = 0; i < kPoseStates; i++) {
+    f[i].add(i, 1.0);
+    f[i].add(motion_state_[kLag], behind[i]);
+  }
+  const sparse_row rows[kPoseStates] = {f[kX], f[kY], f[kHeading]};
+  const double values[kPoseStates] = {value(kX), value(kY), value(kHeading)};
+  state_.assign(kX, kPoseStates, rows, nullptr, 0, values);
+}
+
+void planar_motion::bound_heading() {
+  take_calibration(state_.mean());
+  if (variance(kHeading) > kAnyHeading_rad2)
+    state_.scale(kHeading, 1, std::sqrt(kAnyHeading_rad2 / variance(kHeading)));
+}
+
+void planar_motion::add_step() {
+  double *mean = state_.mean();
+  vectors::add_scaled(mean, state_.step(), 1.0, even(states()));
+  mean[kHeading] = wrap(mean[kHeading]);
+  take_calibration(mean);
+}
+
+void planar_motion::keep_limits(const innovation &i) {
+  double *step = state_.step();
+  for (int k = 0; k < kCalibrationCount; k++) {
+    const int state = motion_state_[k];
+    if (state < 0) continue;
+    const double to = value(state) + step[state], back = motion_state_within_limits(k, to) - to;
+    if (back == 0.0) continue;
+    const double *left = state_.column_left(i, state);
+    if (left[state] > 0.0) vectors::add_scaled(step, left, back / left[state], even(states()));
+    return;
+  }
+}
+
+void planar_motion::list_states(calibration_list *out) const {
+  for (int i = 0; i < kMotionStates; i++)
+    if (const int state = motion_state_[i]; state >= 0) {
+      const double sigma = std::sqrt(variance(state));
+      out->add(motion_state_name(i), value(state), sigma);
+      out->judge_scale(judge_motion_scale(front_.params().states, i, value(state), sigma), value(state));
+    }
 }
 
 void planar_motion::take_calibration(double *states) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Common part of planar filters, for any storage of the covariance: motion front end, calibration of the motion and its
-// states, odometry, and the check of an event's time.
+// Common part of planar filters: the error state, whose first states are the pose; motion front end, calibration of the
+// motion and its states, prediction, odometry, and the check of an event's time.
 #ifndef WAYMARK_ESTIMATOR_PLANAR_MOTION_HPP
 #define WAYMARK_ESTIMATOR_PLANAR_MOTION_HPP
 
@@ -14,6 +14,7 @@
 #include "motion/event_time.hpp"
 #include "motion/front_end.hpp"
 #include "motion/steady_rate.hpp"
+#include "state/error_state.hpp"
 #include "waymark/estimator.h"
 
 namespace wm {
@@ -77,7 +78,28 @@ class planar_motion {
   const turn_check &turn_test() const { return turn_test_; }
   int motion_state(int calibration_index) const { return motion_state_[calibration_index]; }  // -1: off
 
+  // ---- the state ----
+  wm_pose2 pose() const { return {value(kX), value(kY), value(kHeading)}; }
+  int states() const { return state_.states(); }
+  double value(int state) const { return state_.value(state); }
+  double covariance(int i, int j) const { return state_.covariance(i, j); }
+  double variance(int state) const { return state_.variance(state); }
+  double variance_of(const sparse_row &row) const { return state_.variance_of(row); }
+  double covariance_of(const sparse_row &a, const sparse_row &b) const { return state_.covariance_of(a, b); }
+  void set_value(int state, double value) { state_.set_value(state, value); }
+  // x := factor x + noise: a step of a Gauss-Markov process that no other state's motion depends on.
+  void fade(int state, double factor, double added_variance) { state_.fade(state, factor, added_variance); }
+  // The state becomes `value` with `variance`; its correlations are cut.
+  void forget(int state, double value, double variance);
+  // Adds variances of x and y, and of the heading, as noise of the motion does.
+  void inflate_pose(double xy_m2, double heading_rad2);
+  // Fills time, mean, covariance and twist.
+  void estimate(wm_estimate *out) const;
+
  protected:
+  // Of pose_step, and of a clone's heading.
+  using motion_row = jacobian_row<pose_step::kMaxColumns + 1>;
+
   // All calibration neutral, none of it a state.
   void init_motion(const wm_setup &setup);
   // Start variance and random walk of a calibration term; `state` is its index in the filter, -1: never a state. By
@@ -102,12 +124,10 @@ class planar_motion {
     return front_.speed_source_changed() ? motion_state_[kSpeedScale] : -1;
   }
   // By default a gyro's scale is no less certain than kGyroScaleSigma, also after a roll-back to its start.
-  template <class Filter>
-  void limit_gyro_scale(Filter *filter) const {
+  void limit_gyro_scale() {
     const int state = by_kind_[kYawRateScale] ? motion_state_[kYawRateScale] : -1;
     if (kind_ != kKindGyro || state < 0 || walk_[kYawRateScale] > 0.0) return;
-    if (filter->variance(state) > square(kGyroScaleSigma))
-      filter->forget(state, filter->value(state), square(kGyroScaleSigma));
+    if (variance(state) > square(kGyroScaleSigma)) forget(state, value(state), square(kGyroScaleSigma));
   }
   // At standstill the gyro measures its bias: innovation of that state and its variance. False: no measurement.
   bool standstill_bias(double *innovation, double *variance) const {
@@ -118,11 +138,36 @@ class planar_motion {
     return true;
   }
 
-  // propagate(segment, twist, noise) for each segment until `t_ns`, then walk(state, variance) for each calibration
-  // state.
-  // fade(state, factor, variance): a state of the velocity, x := factor x + noise.
-  template <class Propagate, class Walk, class Fade>
-  void advance(wm_time_ns t_ns, Propagate propagate, Walk walk, Fade fade) {
+  // Takes a motion event that check_motion() lets pass; the state goes to its t_ns. Returns whether the lag has become
+  // a state. restart(): the speed's scale has begun again, at its start; move_to(t_ns) is the filter's; fuse(row,
+  // innovation, variance): its update by a row.
+  template <class Restart, class Move, class Fuse>
+  bool move_by(const wm_event &motion, Restart restart, Move move_to, Fuse fuse) {
+    const int32_t kind = kind_;
+    const int had_lag = motion_state_[kLag];
+    if (const int state = feed(motion); state >= 0) {
+      forget(state, 1.0, start_variance_[kSpeedScale]);
+      restart();
+    }
+    if (kind_ != kind) take_calibration(state_.mean());  // values that a kept map brought along
+    limit_gyro_scale();
+    move_to(motion.t_ns);
+    const int lag = motion_state_[kLag];
+    // One of a kept map has a smaller variance: it stays, with its covariances.
+    const bool lag_begins = had_lag < 0 && lag >= 0 && variance(lag) >= start_variance_[kLag];
+    if (lag_begins) begin_lag();
+    double innovation, variance;
+    if (standstill_bias(&innovation, &variance)) {
+      motion_row row;
+      row.add(motion_state_[kYawRateBias], 1.0);
+      fuse(row, innovation, variance);
+    }
+    return lag_begins;
+  }
+  // Prediction to `t_ns`; walked(state, variance) for each calibration state whose walk has added this variance.
+  template <class Walked>
+  void predict_to(wm_time_ns t_ns, Walked walked) {
+    front_.set_position_variance(variance(kX) + variance(kY));
     if (now_ns() == WM_TIME_NONE) front_.set_now(t_ns);
     if (now_ns() < start_ns_) {  // the start pose is later: until then only the inputs that hold are kept
       front_.advance(t_ns < start_ns_ ? t_ns : start_ns_, calibration_,
@@ -130,20 +175,42 @@ class planar_motion {
     }
     // A walking velocity moves the pose by its own variance, so that long times are cut.
     const wm_time_ns longest = has_velocity() ? kVelocityStep_ns : INT64_MAX;
-    while (t_ns > now_ns()) advance_once(t_ns - now_ns() > longest ? now_ns() + longest : t_ns, propagate, walk, fade);
+    while (t_ns > now_ns()) predict_once(t_ns - now_ns() > longest ? now_ns() + longest : t_ns, walked);
+    if (has_velocity()) bound_heading();
   }
-  template <class Propagate, class Walk, class Fade>
-  void advance_once(wm_time_ns t_ns, Propagate propagate, Walk walk, Fade fade) {
+  template <class Walked>
+  void predict_once(wm_time_ns t_ns, Walked walked) {
     const double dt = wm_seconds_between(now_ns(), t_ns);
     front_.set_noise_factors({noise_.scale(noise_adaption::kWay), noise_.scale(noise_adaption::kTurn)});
-    front_.advance(t_ns, calibration_, propagate);
+    front_.advance(t_ns, calibration_,
+                   [this](const motion_segment &piece, const motion_twist &twist, const motion_noise &noise) {
+                     propagate(piece, twist, noise);
+                   });
     for (int i = 0; i < kCalibrationCount; i++)
-      if (motion_state_[i] >= 0) walk(motion_state_[i], walk_[i] * dt);
+      if (const int state = motion_state_[i]; state >= 0) {
+        state_.add_variance(state, walk_[i] * dt);
+        walked(state, walk_[i] * dt);
+      }
     for (int i = kVelocityX; has_velocity() && i < kMotionStates; i++)
       fade(motion_state_[i], exp(-dt / kVelocityTau_s), walk_[i] * dt);
     for (int i = 0; i < sensor_states_; i++)
-      if (sensor_state_[i].walk > 0.0) walk(sensor_state_[i].state, sensor_state_[i].walk * dt);
+      if (const sensor_state_limits &s = sensor_state_[i]; s.walk > 0.0) {
+        state_.add_variance(s.state, s.walk * dt);
+        walked(s.state, s.walk * dt);
+      }
   }
+  void propagate(const motion_segment &piece, const motion_twist &twist, const motion_noise &noise);
+  // The lag has become a state while the robot moves. The pose has been ahead by the lag since the robot stood.
+  void begin_lag();
+  // The heading's variance is at most that of any heading.
+  void bound_heading();
+  // The pose becomes a given one, independent of all other states.
+  void put_pose(const wm_pose2 &pose, const double covariance[3][3]);
+  // The mean moves by the update's step.
+  void add_step();
+  // A motion state that step() of an update moves beyond its limit stays there, and the others go along by the
+  // covariance that the update will leave: the projection on the limit [Simon2010].
+  void keep_limits(const innovation &i);
   // The kind of the motion has become known, or another one.
   void take_kind();
   // Whether a measured turn is more than its noise over kTurn_s and its unknown bias: both have no sign to be tested.
@@ -151,22 +218,12 @@ class planar_motion {
   // Odometry over one such segment.
   void take_step(const motion_segment &segment, const motion_twist &twist, const motion_noise &noise,
                  const pose_step &step, double heading_end_rad);
-  // The first motion state beyond its limit, and the change that brings it back; -1: none. A filter moves the states
-  // that are correlated with it along: the projection on the limit by the covariance [Simon2010].
-  int beyond_limit(const double *states, double *back) const;
   // The calibration takes the states' values, which are cut to their limits.
   void take_calibration(double *states);
 
-  template <class Filter>
-  void list_motion_states_of(const Filter &filter, calibration_list *out) const {
-    for (int i = 0; i < kMotionStates; i++)
-      if (const int state = motion_state_[i]; state >= 0) {
-        const double value = filter.value(state), sigma = std::sqrt(filter.variance(state));
-        out->add(motion_state_name(i), value, sigma);
-        out->judge_scale(judge_motion_scale(front_.params().states, i, value, sigma), value);
-      }
-  }
+  void list_states(calibration_list *out) const;
 
+  error_state state_;
   motion_front_end front_;
   wm_motion_calibration calibration_;
   int motion_state_[kMotionStates];   // -1: off, or not of this kind of motion

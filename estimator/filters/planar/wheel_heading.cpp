@@ -93,12 +93,11 @@ bool wheel_heading::fuse_gyro_heading(planar_filter &filter, const motion_front_
   planar_row row;
   row.add(kHeading, 1.0);
   row.add(heading_, -1.0);
-  projection projected;
-  filter.project(row, &projected);
+  const double variance = filter.variance_of(row);
   const double apart = wrap(filter.value(heading_) - filter.value(kHeading)), noise = rounding_rad2(filter, front);
-  note_innovation(apart / std::sqrt(projected.variance + noise));
-  if (square(apart) > kSlip_nis * (projected.variance + noise)) return false;
-  return filter.update(projected, apart, noise);
+  note_innovation(apart / std::sqrt(variance + noise));
+  if (square(apart) > kSlip_nis * (variance + noise)) return false;
+  return filter.update(row, apart, noise);
 }
 
 void wheel_heading::note_innovation(double normalised) {

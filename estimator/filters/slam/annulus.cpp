@@ -4,6 +4,8 @@
 // covariance with the robot is exact. While they wait, a range corrects each member with the robot considered
 // [Schmidt1966], and its likelihood multiplies the member's weight. Members of little weight leave, those that became
 // one are merged, and the last one is a landmark like any other.
+#include <utility>
+
 #include "filters/slam/slam.hpp"
 #include "math/arc.hpp"
 
@@ -99,10 +101,9 @@ void slam::weigh_members(const context &at, const wm_sighting &s, const reading 
     double density = 0.0;
     if (expect_sighting(s, r, at.past, pose_of(i), error_state, &v) == WM_FUSED) {
       v.noise[0] += curvature_variance(at, i, v);
-      joint_state::innovation_block block;
-      prepare(i, &v, &block);
+      innovation block = prepare(i, &v);
       density = block.density();
-      if (gate(block.nis, 1, gates()).passed) joint_.fuse_landmark(i, block);
+      if (gate(block.nis, 1, gates()).passed) joint_.fuse_landmark(i, std::move(block));
     }
     note(i).weight *= (1.0 - kOutlier) * density + kOutlier / kFalseRange_m;
     note(i).last_ns = joint_.now_ns();

@@ -204,14 +204,14 @@ wm_verdict slam::expect_ray(const context &at, const bearing_tracks::track &trac
 
 // Iterated for the inverse distance alone, of which the derivatives by the places are multiples.
 wm_verdict slam::prepare_ray(const context &at, const bearing_tracks::track &track, const line_bearing &seen,
-                             landmark_rows *v, joint_state::innovation_block *block) {
+                             landmark_rows *v, innovation *block) {
   const int state = ray_state(track) + 1;
   double inverse = joint_.value(state);
   for (int step = 0;; step++) {
     *v = {};
     const wm_verdict possible = expect_ray(at, track, seen, inverse, v);
     if (possible != WM_FUSED) return possible;
-    joint_.prepare(v->row, v->innovation, v->noise, 1, block);
+    *block = joint_.prepare(v->row, v->innovation, v->noise, 1);
     if (step == kIterations || !sees_many()) return WM_FUSED;
     inverse = larger(joint_.value(state) + joint_.change_of(state, *block), kLeastInverse_1pm);
   }
@@ -220,7 +220,7 @@ wm_verdict slam::prepare_ray(const context &at, const bearing_tracks::track &tra
 wm_status slam::follow_ray(const context &at, bearing_tracks::track *track, const line_bearing &seen) {
   const wm_pose2 from = sensor_pose(at.sensor, at.past);
   landmark_rows v;
-  joint_state::innovation_block block;
+  innovation block;
   const wm_verdict possible = prepare_ray(at, *track, seen, &v, &block);
   if (possible != WM_FUSED) return reject(at.records, at.record, possible);
   if (block.s[0][0] > square(kLinear_rad)) {

@@ -20,7 +20,7 @@ constexpr double kShared = 0.5;
 
 // True: it is taken later, with the one that agrees. Of `kCapacity` that all contradict each other none is better.
 bool slam::waits_for_another(const context &at, const line_bearing &seen, const landmark_rows &v,
-                             const joint_state::innovation_block &block) {
+                             const innovation &block) {
   const double variance = block.s[0][0];
   if (!rejoins_ || first_.settled || !sees_many() || !life_.tracking()) return false;
   if (variance < kByPose * v.noise[0] || v.row[0].missing > 0) return false;

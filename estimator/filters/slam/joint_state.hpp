@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The core of planar SLAM: robot, calibration, lent states and clones in front, landmarks of two or three numbers each
-// behind them, one joint covariance (upper half), all in one block of memory.
+// behind them, in one error state.
 //
 // Consistency: a plain EKF-SLAM evaluates its derivatives at estimates that move, and so gains false certainty of the
 // heading. Here every correction transports the covariance to the new places: P <- T P T', T = I + e h', h the heading,
@@ -14,12 +14,9 @@
 #ifndef WAYMARK_ESTIMATOR_SLAM_JOINT_STATE_HPP
 #define WAYMARK_ESTIMATOR_SLAM_JOINT_STATE_HPP
 
-#include "filters/core/row.hpp"
 #include "filters/planar/planar_motion.hpp"
 #include "filters/relocalize/line_search.hpp"
 #include "math/elementary.hpp"
-#include "math/half_covariance.hpp"
-#include "waymark/internal/memory/layout.hpp"
 
 namespace wm {
 
@@ -39,8 +36,8 @@ struct joint_layout {
 class joint_state : public planar_motion {
  public:
   using planar_motion::is_calibrated;
-  static constexpr int kMaxRobot = 192;             // capacity of states beside landmarks
-  static constexpr int kRows = half_update::kRows;  // of one correction
+  static constexpr int kMaxRobot = 192;  // capacity of states beside landmarks
+  static constexpr int kRows = 3;        // of one correction
 
   // Doubles that the arrays behind need.
   static size_t doubles(const joint_layout &layout);
@@ -84,26 +81,15 @@ class joint_state : public planar_motion {
   bool move(const wm_event &motion);
   void move_to(wm_time_ns t_ns);
   void list_motion_states(calibration_list *list) const;
-  void estimate(wm_estimate *out) const;
 
   // ---- the state ----
-  wm_pose2 pose() const { return {value(kX), value(kY), value(kHeading)}; }
-  int states() const { return n_; }
-  double value(int state) const { return x()[state]; }
-  double covariance(int i, int j) const { return p().at(i, j); }
-  double variance(int state) const { return p().at(state, state); }
-  void set_value(int state, double value) { x()[state] = value; }
   // For keep.cpp: the mean; a row of the covariance, whose elements from `state` on count; what a map brings along.
-  const double *values() const { return x(); }
-  const double *covariance_row(int state) const { return p().row(state); }
-  void set_covariance(int i, int j, double value) { p().set(i, j, value); }
+  const double *values() const { return state_.mean(); }
+  const double *covariance_row(int state) const { return state_.covariance_row(state); }
+  void set_covariance(int i, int j, double value) { state_.set_covariance(i, j, value); }
   const double *scale_origin_m() const { return scale_origin_m_; }
   bool is_velocity(int state) const;
   void take_kept(const double scale_origin_m[2]);
-  // The state becomes `value` with `variance`, independent of all others.
-  void forget(int state, double value, double variance);
-  // x := factor x + noise (Gauss-Markov), for a state that no other one's motion depends on.
-  void fade(int state, double factor, double added_variance);
   // x := mean + factor (x - mean) + noise, for such a state that wanders about another one.
   void draw_to(int state, int mean, double factor, double added_variance);
   // States first..first+count-1 become rows[k] of the state plus noise of covariance `noise`.
@@ -111,12 +97,10 @@ class joint_state : public planar_motion {
   void set_pose(const wm_pose2 &pose, const double covariance[3][3]);
   // The pose moves to `to`, whose covariance beyond the present one is `added`.
   void shift_pose(const wm_pose2 &to, const double added[3][3]);
-  // Adds variances of x and y, and of the heading, as noise of the motion does.
-  void inflate_pose(double xy_m2, double heading_rad2);
 
   // ---- landmarks ----
   int landmarks() const { return landmarks_; }
-  landmark_places places() const { return {x() + layout_.robot_states, landmarks_, layout_.landmark_width}; }
+  landmark_places places() const { return {values() + layout_.robot_states, landmarks_, layout_.landmark_width}; }
   int landmark_capacity() const { return layout_.landmarks; }
   int landmark_state(int landmark) const { return layout_.robot_states + landmark * layout_.landmark_width; }
   // Joins a landmark behind the others; there must be room.
@@ -125,63 +109,31 @@ class joint_state : public planar_motion {
   void remove_landmark(int landmark);
 
   // ---- correction ----
-  // P H' of up to three rows, S = H P H' + diag(noise), and the NIS; valid until the state changes.
-  struct innovation_block {
-    int rows;
-    double s[kRows][kRows];  // lower triangle
-    double innovation[kRows];
-    double nis;
-    double determinant;      // of S; 0: S is not positive definite, the NIS 1e300
-    double density() const;  // of the innovation, normal with covariance S
-  };
   // Which states a correction may change. Others are considered: their covariance counts, they stay [Schmidt1966].
   // `directions`: by one row, all but places and what scales with them; `own`: a state that is none of the latter.
   enum class scope { all, robot, pose, directions };
-  void prepare(const joint_row *rows, const double *innovations, const double *noise, int count, innovation_block *out);
+  innovation prepare(const joint_row *rows, const double *innovations, const double *noise, int count);
   // By how much the update by a single row prepared will change a state.
-  double change_of(int state, const innovation_block &block) const {
-    return column(1)[state] * block.innovation[0] / block.s[0][0];
-  }
-  // Fuses the rows prepared, with `added_noise[k]` for each. False: S is not positive definite, nothing changed.
-  [[nodiscard]] bool fuse(innovation_block &block, const double *added_noise, scope which, int own = -1);
+  double change_of(int state, const innovation &i) const { return state_.change_of(state, i); }
+  // Fuses the rows prepared, with `added_noise[k]` for each. False: they are stale, or their covariance is not positive
+  // definite; nothing changed.
+  [[nodiscard]] bool fuse(innovation &&i, const double *added_noise, scope which, int own = -1);
 
   // Adds `share` of d d' to the covariance of a landmark's place.
   void widen_landmark(int landmark, const double d[2], double share);
   // Corrects a landmark by the row prepared, of the block of rows the first one. All others are considered.
-  void fuse_landmark(int landmark, const innovation_block &block);
-
-  // P H' of a single row, without changing the rows prepared; n doubles.
-  void project(const joint_row &row, double *gain) const;
-  double dot(const joint_row &row, const double *gain) const;
-  double variance_of(const joint_row &row) const;  // H P H', without a pass over the state
-  double covariance_of(const joint_row &a, const joint_row &b) const;
+  void fuse_landmark(int landmark, innovation &&i);
 
  private:
-  // Behind the covariance: the mean, the gains, e and r.
-  half_covariance p() const { return {const_cast<double *>(arrays_.get()), capacity_}; }
-  double *column(int k) {
-    return arrays_.get() + half_covariance::doubles(capacity_) + static_cast<size_t>(k * capacity_);
-  }
-  const double *column(int k) const { return const_cast<joint_state *>(this)->column(k); }
-  double *x() { return column(0); }
-  const double *x() const { return column(0); }
-  double *gain(int k) { return column(1 + k); }
-
-  void propagate(const motion_segment &piece, const motion_twist &twist, const motion_noise &noise);
-  // The robot moves. The pose has been ahead by the lag since the robot stood.
-  void begin_lag();
-  void keep_places(int own, double *change);
-  void keep_limits(int rows, double *change);
+  moving_states all_but_places(int own) const;
   void move_mean(const double *change, double *e);
   void move_place(int state, const double *change, const sin_cos &turn, const double way[2], double *e);
-  void fuse_part(int states, int rows, const double *change);
   void anchor_scale_again();
   void hold_scale(double *e);
   void carry_scale(const double *before);
 
   void wander(double dt_s);
 
-  relative_array<double> arrays_;
   joint_layout layout_;
   wheel_slip slip_;
   int slip_mean_[2];  // states, of the left and the right wheel
@@ -191,7 +143,7 @@ class joint_state : public planar_motion {
   double scale_share_[kMaxRobot], scale_start_[kMaxRobot], scale_variance_[kMaxRobot];
   double scale_origin_m_[2];
   bool carries_scale_;
-  int capacity_, n_, landmarks_;
+  int landmarks_;
 };
 
 }  // namespace wm

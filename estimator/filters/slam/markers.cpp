@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Coded markers: place and heading of a marker from one observation [FengND, observation], as distance, direction and
 // heading, since a camera's errors belong to these.
+#include <utility>
+
 #include "filters/slam/slam.hpp"
 #include "math/arc.hpp"
 
@@ -158,8 +160,7 @@ void slam::expect_known_marker(const context &at, const marker_reading &r, int l
 double slam::marker_nis(const context &at, int landmark, const marker_reading &r) {
   landmark_rows v;
   expect_known_marker(at, r, landmark, 3, &v);
-  joint_state::innovation_block block;
-  prepare(landmark, &v, &block);
+  innovation block = prepare(landmark, &v);
   return block.nis;
 }
 
@@ -244,8 +245,7 @@ void slam::carry_marker_errors(const marker_reading &r, int error_state, landmar
 void slam::fuse_known_marker(const context &at, const wm_marker &m, const marker_reading &r, int landmark) {
   landmark_rows v;
   expect_known_marker(at, r, landmark, r.has_heading ? 3 : 2, &v);
-  joint_state::innovation_block block;
-  prepare(landmark, &v, &block);
+  innovation block = prepare(landmark, &v);
   const gate_result g = gate(block.nis, v.count, gates());
   const double volume = square(kClutter_m) * (r.has_heading ? kTwoPi : 1.0);
   const double log_bayes = g.passed ? landmark_evidence::log_bayes_factor(block.density(), volume)
@@ -301,12 +301,11 @@ void slam::fuse_height(int landmark, int sensor, const marker_reading &r) {
     row.add(pitch, by_pitch);
     row.add(roll, by_roll);
     const double expected = by_pitch * joint_.value(pitch) + by_roll * joint_.value(roll);
-    const double innovation = r.nominal[2] - mean[2] - expected;
-    const double noise = kAlike * (1.0 + 1.0 / marker.means) * r.z_noise, none = 0.0;
+    const double difference = r.nominal[2] - mean[2] - expected;
+    const double noise = kAlike * (1.0 + 1.0 / marker.means) * r.z_noise;
     if (joint_.variance_of(row) > kLeastInformation * noise) {
-      joint_state::innovation_block block;
-      joint_.prepare(&row, &innovation, &noise, 1, &block);
-      if (block.nis < kHeightGate_nis) (void)joint_.fuse(block, &none, scope_now());
+      innovation block = joint_.prepare(&row, &difference, &noise, 1);
+      if (block.nis < kHeightGate_nis) (void)joint_.fuse(std::move(block), nullptr, scope_now());
     }
   }
   marker.means += 1.0;

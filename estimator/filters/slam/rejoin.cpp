@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Lines that were lost and return under another number: two landmarks that are one line are merged. Constants were
 // chosen on hall-a; not swept.
+#include <utility>
+
 #include "filters/slam/slam.hpp"
 
 namespace wm {
@@ -89,16 +91,14 @@ void slam::merge_if_one(int fresh) {
   if (unsure > kUnsure_m2 || (unsure > kSure_m2 && !is_compatible_with_another(p))) return;
   joint_row rows[2];
   double noise[2], difference[2];
-  const double none[2] = {0.0, 0.0};
   for (int k = 0; k < 2; k++) {
     rows[k].add(p.fresh + k, 1.0);
     rows[k].add(p.lost + k, -1.0);
     noise[k] = square(kMerged_m);
     difference[k] = -p.apart[k];
   }
-  joint_state::innovation_block block;
-  joint_.prepare(rows, difference, noise, 2, &block);
-  if (!joint_.fuse(block, none, joint_state::scope::all)) return;
+  innovation block = joint_.prepare(rows, difference, noise, 2);
+  if (!joint_.fuse(std::move(block), nullptr, joint_state::scope::all)) return;
   landmark_note &kept = note(best);
   const landmark_note gone = note(fresh);
   kept.id = gone.id;

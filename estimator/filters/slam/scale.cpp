@@ -63,7 +63,7 @@ void joint_state::anchor_scale_again() {
 // All is scaled by 1 + s, s by one Newton step on the priors:
 // sum of ((value (1 + share s) - start) / sigma)^2. `e` holds how places have moved, as move_mean() leaves it.
 void joint_state::hold_scale(double *e) {
-  double *mean = x();
+  double *mean = state_.mean();
   double slope = 0.0, curve = 0.0;
   for (int j = kPoseStates; j < layout_.first_clone; j++) {
     if (!(scale_variance_[j] > 0.0)) continue;
@@ -89,25 +89,22 @@ void joint_state::hold_scale(double *e) {
 }
 
 // P <- T P T', T = I + d g', g picks the scale's own relative change, d = by how much each state that goes with the
-// scale has moved. e still holds how the places did.
+// scale has moved. The displacement still holds e, how the places did, turned by a right angle.
 void joint_state::carry_scale(const double *before) {
-  const half_covariance cov = p();
-  const double *e = column(1 + kRows), *now = x();
-  double *d = gain(0), *r = gain(1);
-  for (int j = 0; j < even(n_); j++) d[j] = 0.0;
-  const auto place = [&](int state) {
-    d[state] = e[state + 1];
-    d[state + 1] = -e[state];
+  double *d = state_.displacement(0);
+  const auto turn_back = [d](int state) {
+    const double x = d[state + 1];
+    d[state + 1] = -d[state];
+    d[state] = x;
   };
-  place(kX);
-  for (int j = kPoseStates; j < layout_.first_clone; j++) d[j] = scale_share_[j] * (now[j] - before[j]);
-  for (int c = 0; c < layout_.clones; c++) place(layout_.first_clone + 3 * c);
-  for (int i = 0; i < landmarks_; i++) place(landmark_state(i));
-  const double inverse = 1.0 / before[scale_state_];
-  for (int j = 0; j < even(n_); j++) r[j] = j < n_ ? inverse * cov.at(scale_state_, j) : 0.0;
-  vectors::add_scaled(r, d, 0.5 * inverse * r[scale_state_], even(n_));
-  const half_update update{0, {}, d, r};
-  vectors::apply(cov, update, n_);
+  turn_back(kX);
+  for (int j = kPoseStates; j < layout_.first_clone; j++) d[j] = scale_share_[j] * (value(j) - before[j]);
+  for (int c = 0; c < layout_.clones; c++) turn_back(layout_.first_clone + 3 * c);
+  for (int i = 0; i < landmarks_; i++) turn_back(landmark_state(i));
+  joint_row scale;
+  scale.add(scale_state_, 1.0 / before[scale_state_]);
+  const sparse_row g = scale;
+  state_.transport(&g, 1);
 }
 
 }  // namespace wm

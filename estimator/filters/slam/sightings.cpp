@@ -204,7 +204,7 @@ wm_verdict slam::expect_sighting(const wm_sighting &s, const reading &r, const p
 
 // Whether an identified sighting may be fused, or counted as an outlier. False: the landmark's index may be another.
 bool slam::weigh_identified(int landmark, const context &at, const wm_sighting &s, const reading &r,
-                            const landmark_rows &v, const joint_state::innovation_block &block, bool passed) {
+                            const landmark_rows &v, const innovation &block, bool passed) {
   if (weigh_slip(landmark, at, observation_of(s, r), passed)) return false;
   const double angle_rad = v.kind[0] == WM_RESIDUAL_BEARING ? v.innovation[0] : std::nan("");
   const double volume = v.kind[0] == WM_RESIDUAL_X ? kPi * square(kClutterRange_m) : clutter_volume(r);
@@ -262,14 +262,13 @@ void slam::fuse_known(const context &at, const wm_sighting &s, const reading &r,
   else if (possible != WM_FUSED)
     return (void)reject(at.records, at.record, possible);
   if (!r.bearing) v.noise[0] += curvature_variance(at, landmark, v);
-  joint_state::innovation_block block;
-  prepare(landmark, &v, &block);
+  innovation block = prepare(landmark, &v);
   if (r.bearing && !r.range && waits_for_another(at, line_bearing_of(s, r), v, block)) return;
   const gate_result g = gate(block.nis, v.count, gates());
   if (s.landmark_id >= 0 && !weigh_identified(landmark, at, s, r, v, block, g.passed))
     return (void)reject(at.records, at.record, WM_REJECTED_SEARCHING);
   if (g.passed && r.bearing && r.range && !is_point && add_bend(at, landmark, &v))
-    joint_.prepare(v.row, v.innovation, v.noise, v.count, &block);
+    block = joint_.prepare(v.row, v.innovation, v.noise, v.count);
   const wm_verdict verdict = fuse_rows(at, v, g, &block);
   if (r.bearing && !is_point)
     note_rotation(g.passed, v.innovation[0], picture_outliers::kBearings, note(landmark).last_ns);

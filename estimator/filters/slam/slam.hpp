@@ -233,9 +233,9 @@ class slam {
   int lend(const context &at);
   relative_place relative_place_of(const context &at, int landmark) const;
   gate_limits gates() const { return {sightings().gate_soft, sightings().gate_hard}; }
-  void prepare(int landmark, landmark_rows *v, joint_state::innovation_block *out);
-  wm_verdict fuse_rows(const context &at, const landmark_rows &v, const gate_result &g,
-                       joint_state::innovation_block *block, int unknown = -1);
+  innovation prepare(int landmark, landmark_rows *v);
+  wm_verdict fuse_rows(const context &at, const landmark_rows &v, const gate_result &g, innovation *block,
+                       int unknown = -1);
   int join(const context &at, const landmark_rows &v, const double inverse[3][3], const double place[3],
            double heading_variance);
 
@@ -254,7 +254,7 @@ class slam {
   wm_status take_sighting(const context &at, const wm_sighting &s, const reading &r, int landmark);
   line_bearing line_bearing_of(const wm_sighting &s, const reading &r) const;
   bool weigh_identified(int landmark, const context &at, const wm_sighting &s, const reading &r, const landmark_rows &v,
-                        const joint_state::innovation_block &block, bool passed);
+                        const innovation &block, bool passed);
   void expect_point(const context &at, const planar_observation &seen, int landmark, landmark_rows *out) const;
   bool add_bend(const context &at, int landmark, landmark_rows *v) const;
   void fuse_known(const context &at, const wm_sighting &s, const reading &r, int landmark);
@@ -272,7 +272,7 @@ class slam {
   wm_verdict expect_ray(const context &at, const bearing_tracks::track &track, const line_bearing &seen, double inverse,
                         landmark_rows *out);
   wm_verdict prepare_ray(const context &at, const bearing_tracks::track &track, const line_bearing &seen,
-                         landmark_rows *v, joint_state::innovation_block *block);
+                         landmark_rows *v, innovation *block);
   wm_status follow_ray(const context &at, bearing_tracks::track *track, const line_bearing &seen);
   void settle_ray(const context &at, const wm_pose2 &from, bearing_tracks::track *track);
   void end_ray(bearing_tracks::track *track);
@@ -302,7 +302,7 @@ class slam {
   void fuse_height(int landmark, int sensor, const marker_reading &r);
 
   // trust.cpp
-  bool is_plausible(int landmark, const joint_state::innovation_block &block, double noise);
+  bool is_plausible(int landmark, const innovation &block, double noise);
   bool is_ambiguous(int32_t id, int landmark, int sensor);
   void note_rotation(bool fused, double innovation_rad, picture_outliers::kind kind, wm_time_ns last_ns);
   bool is_turned(picture_outliers::kind kind, double *turn_rad) const;
@@ -315,8 +315,7 @@ class slam {
   void find_double(int landmark);
 
   // first_bearings.cpp
-  bool waits_for_another(const context &at, const line_bearing &seen, const landmark_rows &v,
-                         const joint_state::innovation_block &block);
+  bool waits_for_another(const context &at, const line_bearing &seen, const landmark_rows &v, const innovation &block);
   void take_waiting(const context &newest);
 
   // rejoin.cpp

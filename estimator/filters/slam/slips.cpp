@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A slip that the odometry does not show, noticed by the landmarks that it displaces alike (slip_search.hpp).
+#include <utility>
+
 #include "filters/slam/slam.hpp"
 #include "math/arc.hpp"
 
@@ -48,10 +50,8 @@ void slam::take_slip(const slip_hypothesis &found) {
     joint_row rows[2];
     for (int k = 0; k < 2; k++)
       for (int j = 0; j < 5; j++) rows[k].add(r.index[j], r.by[k][j]);
-    const double none[2] = {};
-    joint_state::innovation_block block;
-    joint_.prepare(rows, r.innovation, r.noise, 2, &block);
-    if (joint_.fuse(block, none, scope_now())) note(find_landmark(group.at(i).seen.key)).misfits = 0;
+    innovation block = joint_.prepare(rows, r.innovation, r.noise, 2);
+    if (joint_.fuse(std::move(block), nullptr, scope_now())) note(find_landmark(group.at(i).seen.key)).misfits = 0;
   }
   for (int i = joint_.landmarks() - 1; i >= 0 && found.since_ns != WM_TIME_NONE; i--)
     if (!note(i).surveyed && note(i).first_ns > found.since_ns) drop_landmark(i);

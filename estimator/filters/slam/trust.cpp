@@ -34,7 +34,7 @@ constexpr double kLever_m = 0.3;             // a turn by 1 rad moves base_link 
 // After a while without landmarks the gate is as wide as the pose is uncertain, and a misread code passes it and pulls
 // the pose away. So a surprising observation that would move the pose much is deferred until a second one of that
 // landmark: a code is misread once.
-bool slam::is_plausible(int landmark, const joint_state::innovation_block &block, double noise) {
+bool slam::is_plausible(int landmark, const innovation &block, double noise) {
   landmark_note &seen = note(landmark);
   const wm_time_ns now = joint_.now_ns();
   const auto lately = [now](wm_time_ns then) {

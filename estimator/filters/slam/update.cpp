@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // From the rows of an observation to its update, or to a new landmark.
+#include <utility>
+
 #include "filters/slam/slam.hpp"
 
 namespace wm {
@@ -63,16 +65,16 @@ int slam::lend(const context &at) {
 }
 
 // Completes the rows by the landmark's own derivatives; S and the NIS of all rows together.
-void slam::prepare(int landmark, landmark_rows *v, joint_state::innovation_block *out) {
+innovation slam::prepare(int landmark, landmark_rows *v) {
   const int state = joint_.landmark_state(landmark);
   for (int i = 0; i < v->count; i++)
     for (int k = 0; k < 3; k++) v->row[i].add(state + k, v->by_landmark[i][k]);  // 0 beyond the landmark's width
-  joint_.prepare(v->row, v->innovation, v->noise, v->count, out);
+  return joint_.prepare(v->row, v->innovation, v->noise, v->count);
 }
 
 // Fuses what passed the gate and writes the records: WM_FUSED, WM_REJECTED_GATE or WM_REJECTED_NUMERIC.
-wm_verdict slam::fuse_rows(const context &at, const landmark_rows &v, const gate_result &g,
-                           joint_state::innovation_block *block, int unknown) {
+wm_verdict slam::fuse_rows(const context &at, const landmark_rows &v, const gate_result &g, innovation *block,
+                           int unknown) {
   record_list records = at.records;
   double variance[3], added[3];
   for (int i = 0; i < v.count; i++) {
@@ -83,7 +85,7 @@ wm_verdict slam::fuse_rows(const context &at, const landmark_rows &v, const gate
   const joint_state::scope now = scope_now();
   const joint_state::scope which =
       unknown >= 0 && now == joint_state::scope::all ? joint_state::scope::directions : now;
-  if (!(block->determinant > 0.0) || (g.passed && !joint_.fuse(*block, added, which, unknown)))
+  if (!(block->determinant > 0.0) || (g.passed && !joint_.fuse(std::move(*block), added, which, unknown)))
     verdict = WM_REJECTED_NUMERIC;
   for (int i = 0; i < v.count; i++) {
     wm_innovation record = at.record;

@@ -2,11 +2,10 @@
 #include "filters/stereo_ekf/space_filter.hpp"
 
 #include <cstring>
+#include <utility>
 
 namespace wm {
 namespace {
-
-constexpr int kConsidered = 4;  // kPictureScale and kPictureDirection
 
 int head_size(const head_model models[kHeadStates]) {
   int n = kPose6;
@@ -18,17 +17,17 @@ int head_size(const head_model models[kHeadStates]) {
 }  // namespace
 
 size_t space_filter::doubles(const head_model models[kHeadStates], int points_max) {
-  const auto stride = (size_t)even(head_size(models) + 3 * points_max);
-  return (kRowsBefore + 1 + stride) * stride;
+  return error_state::doubles(head_size(models) + 3 * points_max, kScratch, kTurns) + (size_t)even(3 * points_max);
 }
 
 void space_filter::init(double *memory, const head_model models[kHeadStates], int points_max) {
-  memory_.set(memory);
   std::memcpy(models_, models, sizeof models_);
   points_max_ = points_max;
-  n_ = first_point_ = head_size(models);
-  stride_ = even(n_ + 3 * points_max);
-  std::memset(memory, 0, doubles(models, points_max) * sizeof(double));
+  first_point_ = head_size(models);
+  const int capacity = first_point_ + 3 * points_max;
+  state_.init({capacity, kScratch, kTurns, first_point_}, memory);
+  state_.append(first_point_);
+  points_.set(memory + error_state::doubles(capacity, kScratch, kTurns));
   int state = kPose6;
   for (int k = 0; k < kHeadStates; k++) {
     at_[k] = models[k].sigma > 0.0 ? state : -1;
@@ -78,76 +77,46 @@ vec3 space_filter::head3(int which) const { return at_[which] < 0 ? vec3{0, 0, 0
 double space_filter::head1(int which, double off) const { return at_[which] < 0 ? off : head_[at_[which]]; }
 
 void space_filter::decorrelate(int state, int width, double variance) {
-  for (int i = state; i < state + width; i++) {
-    for (int j = 0; j < i; j++) p()[j * stride_ + i] = 0.0;
-    for (int j = i; j < stride_; j++) p()[i * stride_ + j] = 0.0;
-    p()[i * stride_ + i] = variance;
-    correction()[i] = 0.0;
-  }
-}
-
-// gains = P H'. Rows that are not there are zero.
-void space_filter::project(const row_block &block) {
-  const int width = even(n_);
-  double *column = scratch();
-  for (int k = 0; k < kRank; k++) std::memset(gains() + k * stride_, 0, (size_t)width * sizeof(double));
-  for (int c = 0; c < block.columns; c++) {
-    copy_column(p(), block.index[c], column, n_, stride_);
-    if (width > n_) column[n_] = 0.0;
-    for (int k = 0; k < block.rows; k++)
-      if (block.by[k][c] != 0.0) vectors::add_scaled(gains() + k * stride_, column, block.by[k][c], width);
-  }
-}
-
-// The innovations with the pending correction taken off, and the lower triangle of H P H'.
-void space_filter::innovations_of(const row_block &block, factors *f, row_verdict *out) const {
-  for (int k = 0; k < block.rows; k++) {
-    const double *gain = gains() + k * stride_;
-    double expected_change = 0.0;
-    for (int c = 0; c < block.columns; c++) expected_change += block.by[k][c] * correction()[block.index[c]];
-    out->innovation[k] = block.innovation[k] - expected_change;
-    for (int l = k; l < block.rows; l++) {
-      double sum = 0.0;
-      for (int c = 0; c < block.columns; c++) sum += block.by[l][c] * gain[block.index[c]];
-      f->l[l][k] = sum;
-    }
-  }
+  state_.forget(state, width, variance);
+  for (int i = state; i < state + width; i++) state_.set_value(i, 0.0);
 }
 
 // Factorises the innovations' covariance row after row, L D L', and gates each row with its remaining innovation.
-bool space_filter::factorize_and_gate(const row_block &block, const gates &limits, factors *f, row_verdict *out) {
+bool space_filter::gate_rows(const innovation &i, const row_block &block, const gates &limits, double added[kRank],
+                             row_verdict *out) {
+  double l[kRank][kRank], d[kRank], left[kRank];
   for (int k = 0; k < block.rows; k++) {
-    double left = out->innovation[k], d = f->l[k][k] + block.noise[k];
     for (int m = 0; m < k; m++) {
-      left -= f->l[k][m] * f->left[m];
-      d -= square(f->l[k][m]) * f->d[m];
+      l[k][m] = i.s[k][m];
+      for (int o = 0; o < m; o++) l[k][m] -= l[k][o] * l[m][o] * d[o];
+      l[k][m] /= d[m];
     }
-    const double nis = square(left) / d;
-    out->innovation[k] = left;  // what the rows before it leave: its variance is that, too
-    out->variance[k] = d;
+    left[k] = i.value[k];
+    d[k] = i.s[k][k];
+    for (int m = 0; m < k; m++) {
+      left[k] -= l[k][m] * left[m];
+      d[k] -= square(l[k][m]) * d[m];
+    }
+    const double nis = square(left[k]) / d[k];
+    out->innovation[k] = left[k];  // what the rows before it leave: its variance is that, too
+    out->variance[k] = d[k];
     out->nis[k] = nis;
-    if (!(d > 0.0) || !finite(nis)) return false;
+    if (!(d[k] > 0.0) || !finite(nis)) return false;
     if (nis > limits.hard) {
       out->verdict = WM_REJECTED_GATE;
       return false;
     }
-    if (nis > limits.soft) {
-      out->doubtful = true;
-      d += block.noise[k] * (nis / limits.soft - 1.0);
-    }
-    f->left[k] = left;
-    f->d[k] = d;
-    for (int l = k + 1; l < block.rows; l++) {
-      for (int m = 0; m < k; m++) f->l[l][k] -= f->l[l][m] * f->l[k][m] * f->d[m];
-      f->l[l][k] /= d;
-    }
+    added[k] = nis > limits.soft ? block.noise[k] * (nis / limits.soft - 1.0) : 0.0;
+    out->doubtful = out->doubtful || nis > limits.soft;
+    d[k] += added[k];
   }
   return true;
 }
 
-space_filter::considered_states space_filter::considered() const {
+moving_states space_filter::corrected() const {
   const int scale = at_[kPictureScale], direction = at_[kPictureDirection];
-  return {scale >= 0 ? scale : direction, (scale >= 0 ? 1 : 0) + (direction >= 0 ? 3 : 0)};
+  const int first = scale >= 0 ? scale : direction >= 0 ? direction : 0;
+  return state_.all_but(first, first + (scale >= 0 ? 1 : 0) + (direction >= 0 ? 3 : 0));
 }
 
 row_verdict space_filter::fuse(const row_block &block, const gates &limits) {
@@ -155,27 +124,17 @@ row_verdict space_filter::fuse(const row_block &block, const gates &limits) {
   out.verdict = WM_REJECTED_NUMERIC;
   out.rows = block.rows;
   if (block.without_room > 0) return out;
-  project(block);
-  factors f;
-  innovations_of(block, &f, &out);
-  if (!factorize_and_gate(block, limits, &f, &out)) return out;
-  const int width = even(n_);
+  sparse_row rows[kRank];
+  double left[kRank], added[kRank];
   for (int k = 0; k < block.rows; k++) {
-    double *gain = gains() + k * stride_;
-    for (int m = 0; m < k; m++)  // the earlier ones are scaled by 1 / sqrt(d) already
-      vectors::add_scaled(gain, gains() + m * stride_, -f.l[k][m] * std::sqrt(f.d[m]), width);
-    vectors::add_scaled(correction(), gain, f.left[k] / f.d[k], width);
-    vectors::set_scaled(gain, gain, 1.0 / std::sqrt(f.d[k]), width);
+    rows[k] = block.view(k);
+    left[k] = block.innovation[k] - error_state::dot(rows[k], correction());
   }
-  const considered_states kept = considered();
-  double block_kept[kConsidered][kConsidered];
-  for (int i = 0; i < kept.count; i++)
-    for (int j = i; j < kept.count; j++) block_kept[i][j] = p()[(kept.first + i) * stride_ + kept.first + j];
-  vectors::subtract_gram(p(), gains(), n_, stride_);
-  for (int i = 0; i < kept.count; i++) {
-    for (int j = i; j < kept.count; j++) p()[(kept.first + i) * stride_ + kept.first + j] = block_kept[i][j];
-    correction()[kept.first + i] = 0.0;
-  }
+  innovation i = state_.prepare(rows, left, block.noise, block.rows);
+  const moving_states moving = corrected();
+  if (!gate_rows(i, block, limits, added, &out) || !state_.solve(&i, added, moving)) return out;
+  vectors::add_scaled(state_.mean(), state_.step(), 1.0, even(states()));
+  state_.correct(std::move(i), moving);
   pending_ = true;
   out.fused = true;
   out.verdict = WM_FUSED;
@@ -188,16 +147,17 @@ pose3 space_filter::pose() const {
   return {pose_.p + mean_turn(turn) * pending(kPlace), normalized(turn_by(turn) * pose_.q)};
 }
 
-// Moves the estimate by the pending correction. `a` (kTurns rows) gets, for each component of a camera's turn dc, its
+// Moves the estimate by the pending correction. The displacements get, for each component of a camera's turn dc, its
 // derivative of the displaced errors: -D x dc.
-void space_filter::apply_correction(double *a) {
+void space_filter::apply_correction() {
+  for (int k = 0; k < kTurns; k++) std::memset(state_.displacement(k), 0, (size_t)even(states()) * sizeof(double));
   const double *x = correction();
   const vec3 turn = vec_of(x + kTurn);
   const mat3 spread = mean_turn(turn);
   const auto moved = [&](int state, const vec3 &by) {
     const mat3 m = -1.0 * skew(by);
     for (int i = 0; i < 3; i++)
-      for (int k = 0; k < kTurns; k++) a[k * stride_ + state + i] = m.m[i][k];
+      for (int k = 0; k < kTurns; k++) state_.displacement(k)[state + i] = m.m[i][k];
   };
   const vec3 place = spread * vec_of(x + kPlace);
   pose_.p = pose_.p + place;
@@ -233,97 +193,49 @@ int space_filter::camera_turn_states(turning_state out[kTurningStates]) const {
 // The invariant error stays while the estimate moves. In plain coordinates dp' = dp - D x dc for the pose and each
 // point: D the displacement, dc the camera's turn in map axes. With the vehicle's turn alone, moved points would make
 // the camera's mounting and time offset observable, which they are not from pictures alone.
-// P' = M P M' with M = 1 + a e', dc = e' x: P + a b' + b a', b = P e + a e' P e / 2.
+// P' = T P T' with T = 1 + a e', dc = e' x.
 void space_filter::settle() {
   if (!pending_) return;
   pending_ = false;
-  double *a = gains(), *column = gains() + (ptrdiff_t)kTurns * stride_, *b = scratch();
-  const int width = even(n_);
-  std::memset(a, 0, (size_t)kTurns * (size_t)stride_ * sizeof(double));
-  apply_correction(a);
+  apply_correction();
   turning_state others[kTurningStates];
   const int count = camera_turn_states(others);
-  const auto copy = [&](int state, double *out) {
-    copy_column(p(), state, out, n_, stride_);
-    if (width > n_) out[n_] = 0.0;
-  };
+  jacobian_row<1 + kTurningStates> e[kTurns];
   for (int k = 0; k < kTurns; k++) {
-    double *turned = b + k * stride_;
-    copy(kTurn + k, turned);
-    for (int j = 0; j < count; j++) {
-      copy(others[j].state, column);
-      vectors::add_scaled(turned, column, others[j].by[k], width);
-    }
+    e[k].add(kTurn + k, 1.0);
+    for (int j = 0; j < count; j++) e[k].add(others[j].state, others[j].by[k]);
   }
-  double turn_block[kTurns][kTurns];  // e' P e
-  for (int k = 0; k < kTurns; k++)
-    for (int l = 0; l < kTurns; l++) {
-      turn_block[k][l] = b[k * stride_ + kTurn + l];
-      for (int j = 0; j < count; j++) turn_block[k][l] += others[j].by[l] * b[k * stride_ + others[j].state];
-    }
-  for (int k = 0; k < kTurns; k++)
-    for (int l = 0; l < kTurns; l++)
-      vectors::add_scaled(b + k * stride_, a + l * stride_, 0.5 * turn_block[k][l], width);
-  vectors::add_mixed(p(), a, b, n_, stride_);
-  std::memset(correction(), 0, (size_t)stride_ * sizeof(double));
+  const sparse_row turns[kTurns] = {e[0], e[1], e[2]};
+  state_.transport(turns, kTurns);
+  std::memset(state_.mean(), 0, (size_t)even(states()) * sizeof(double));
 }
 
 void space_filter::add_point(const vec3 &place, const row_block &block, const mat3 &A, const mat3 &noise) {
-  const int state = n_, width = even(n_);
-  project(block);
-  mat3 covariance = noise;
-  vec3 change;
-  for (int k = 0; k < 3; k++) {
-    change[k] = 0.0;
-    for (int c = 0; c < block.columns; c++) change[k] += block.by[k][c] * correction()[block.index[c]];
-    for (int l = 0; l < 3; l++)
-      for (int c = 0; c < block.columns; c++)
-        covariance.m[k][l] += block.by[l][c] * gains()[k * stride_ + block.index[c]];
-  }
-  covariance = transposed(A) * (covariance * A);
-  change = -1.0 * transposed_times(A, change);
+  const mat3 own = transposed(A) * (noise * A);
+  jacobian_row<row_block::kColumns> by[3];
+  double change[3];
   for (int i = 0; i < 3; i++) {
-    double *row = scratch();
-    vectors::set_scaled(row, gains(), -A.m[0][i], width);
-    vectors::add_scaled(row, gains() + stride_, -A.m[1][i], width);
-    vectors::add_scaled(row, gains() + 2 * stride_, -A.m[2][i], width);
-    for (int j = 0; j < state; j++) p()[j * stride_ + state + i] = row[j];
-    for (int j = i; j < 3; j++)
-      p()[(state + i) * stride_ + state + j] = 0.5 * (covariance.m[i][j] + covariance.m[j][i]);
-    correction()[state + i] = change[i];
-    points()[state - first_point_ + i] = place[i];
+    for (int c = 0; c < block.columns; c++)
+      by[i].add(block.index[c],
+                -(A.m[0][i] * block.by[0][c] + A.m[1][i] * block.by[1][c] + A.m[2][i] * block.by[2][c]));
+    change[i] = error_state::dot(by[i], correction());
   }
-  n_ += 3;
-  if (even(n_) > n_) correction()[n_] = 0.0;
+  const sparse_row rows[3] = {by[0], by[1], by[2]};
+  const int state = state_.append(3);
+  state_.assign(state, 3, rows, own.m[0], 3, change);
+  for (int i = 0; i < 3; i++) points()[state - first_point_ + i] = place[i];
 }
 
 void space_filter::add_point(const vec3 &place, double sigma_m) {
-  const int state = n_;
-  n_ += 3;
-  if (even(n_) > n_) correction()[n_] = 0.0;
+  const int state = state_.append(3);
   for (int i = 0; i < 3; i++) points()[state - first_point_ + i] = place[i];
-  decorrelate(state, 3, square(sigma_m));
+  state_.forget(state, 3, square(sigma_m));
 }
 
 void space_filter::remove_point(int slot) {
-  const int last = point_count() - 1, from = point_state(last), to = point_state(slot);
-  if (slot != last) {
-    for (int i = 0; i < 3; i++) {
-      for (int j = 0; j < from; j++) {
-        const double value = entry(p(), j, from + i, stride_);
-        if (j >= to && j < to + 3) continue;
-        if (j < to)
-          p()[j * stride_ + to + i] = value;
-        else
-          p()[(to + i) * stride_ + j] = value;
-      }
-      for (int j = i; j < 3; j++) p()[(to + i) * stride_ + to + j] = p()[(from + i) * stride_ + from + j];
-      points()[3 * slot + i] = points()[3 * last + i];
-      correction()[to + i] = correction()[from + i];
-    }
-  }
-  for (int i = 0; i < 3; i++) correction()[from + i] = 0.0;
-  n_ -= 3;
+  const int last = point_count() - 1;
+  for (int i = 0; i < 3; i++) points()[3 * slot + i] = points()[3 * last + i];
+  state_.remove(point_state(slot), 3);
 }
 
 void space_filter::set_pose(const pose3 &pose, const double covariance[6][6]) {
@@ -332,13 +244,13 @@ void space_filter::set_pose(const pose3 &pose, const double covariance[6][6]) {
   pose_ = {pose.p, normalized(pose.q)};
   r_ = matrix_of(pose_.q);
   for (int i = 0; i < kPose6; i++)
-    for (int j = i; j < kPose6; j++) p()[i * stride_ + j] = covariance[i][j];
+    for (int j = i; j < kPose6; j++) state_.set_covariance(i, j, covariance[i][j]);
 }
 
 void space_filter::inflate_pose(double place_m2, double turn_rad2) {
   for (int i = 0; i < 3; i++) {
-    p()[(kPlace + i) * stride_ + kPlace + i] += place_m2;
-    p()[(kTurn + i) * stride_ + kTurn + i] += turn_rad2;
+    state_.add_variance(kPlace + i, place_m2);
+    state_.add_variance(kTurn + i, turn_rad2);
   }
 }
 
@@ -346,25 +258,17 @@ void space_filter::estimate(wm_estimate *out) const {
   const pose3 at = pose();
   const mat3 r = matrix_of(at.q), swing = -1.0 * skew(at.p - pose_.p), turn = transposed(r);
   // Rows: position in map axes (moved by what is pending), rotation in the body's.
-  double m[kPose6][kPose6] = {};
-  for (int i = 0; i < 3; i++)
+  jacobian_row<4> row[kPose6];
+  for (int i = 0; i < 3; i++) {
+    row[i].add(kPlace + i, 1.0);
     for (int j = 0; j < 3; j++) {
-      m[i][j] = i == j;
-      m[i][kTurn + j] = swing.m[i][j];
-      m[kTurn + i][kTurn + j] = turn.m[i][j];
+      row[i].add(kTurn + j, swing.m[i][j]);
+      row[kTurn + i].add(kTurn + j, turn.m[i][j]);
     }
-  double half[kPose6][kPose6];
+  }
   for (int i = 0; i < kPose6; i++)
-    for (int j = 0; j < kPose6; j++) {
-      half[i][j] = 0.0;
-      for (int k = 0; k < kPose6; k++) half[i][j] += m[i][k] * covariance(k, j);
-    }
-  for (int i = 0; i < kPose6; i++)
-    for (int j = i; j < kPose6; j++) {
-      double sum = 0.0;
-      for (int k = 0; k < kPose6; k++) sum += half[i][k] * m[j][k];
-      out->covariance[wm_cov_index(i, j)] = out->covariance[wm_cov_index(j, i)] = sum;
-    }
+    for (int j = i; j < kPose6; j++)
+      out->covariance[wm_cov_index(i, j)] = out->covariance[wm_cov_index(j, i)] = state_.covariance_of(row[i], row[j]);
   for (int i = 0; i < 3; i++) {
     out->pose_map_base.p_m[i] = at.p[i];
     out->pose_map_base.q_xyzw[i] = at.q.v[i];

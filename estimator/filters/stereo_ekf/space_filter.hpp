@@ -15,8 +15,8 @@
 #include <cstddef>
 
 #include "filters/stereo_ekf/states.hpp"
-#include "math/symmetric.hpp"
 #include "motion/spatial.hpp"
+#include "state/error_state.hpp"
 #include "waymark/event.h"
 #include "waymark/internal/math/rotation.hpp"
 #include "waymark/internal/memory/layout.hpp"
@@ -27,6 +27,9 @@ namespace wm {
 // Sigmas of an unknown pose on each axis; prediction never makes a pose less certain. 1.8 rad is that of a rotation
 // angle uniform in (-pi, pi]; 1000 m is beyond any map that is searched. Neither was swept.
 inline constexpr double kUnknownPlace_m = 1000.0, kUnknownTurn_rad = 1.8;
+
+inline constexpr int kRank = innovation::kRows;  // of one observation: a stereo point has four numbers
+inline constexpr int kTurns = 3;                 // components of a rotation
 
 // Up to kRank rows of one observation: their derivatives by the states of its columns, column after column.
 // The widest block, a stereo point's, has 20 columns: place 3, rotation 3, camera 6, time offset 1, lens 4, point 3.
@@ -40,6 +43,8 @@ struct row_block {
   double observed[kRank];
   double innovation[kRank];  // observed - expected at the point of linearisation; angles wrapped
   double noise[kRank];       // variances
+
+  sparse_row view(int row) const { return {index, by[row], columns, without_room}; }
 
   // `width` (at most kWidest) columns for the states from `state` on; returns the first column.
   int add_columns(int state, int width) {
@@ -105,8 +110,8 @@ class space_filter {
   const pose3 &moved() const { return moved_; }
   void begin_increment();
   // Gates row after row, each with the innovation that the rows before leave; a row above the hard gate rejects all.
-  // Between the gates its noise is inflated in proportion. Sequential update of a Kalman filter by the LDL' factors of
-  // the innovations' covariance; P - G S^-1 G' is exact for this gain and symmetric by storage.
+  // Between the gates its noise is inflated in proportion. Sequential gates by the LDL' factors of the innovations'
+  // covariance, then one update.
   row_verdict fuse(const row_block &block, const gates &limits);
   // Applies the accumulated corrections.
   void settle();
@@ -125,7 +130,7 @@ class space_filter {
   double point_value(int state) const { return points()[state - first_point_]; }
   vec3 point(int slot) const { return vec_of(points() + 3 * slot); }
   int point_state(int slot) const { return first_point_ + 3 * slot; }
-  int point_count() const { return (n_ - first_point_) / 3; }
+  int point_count() const { return (states() - first_point_) / 3; }
   int point_capacity() const { return points_max_; }
 
   // Appends a point. `block`: three rows, D, the derivatives of its place in the sensor's frame; `A` rotates the map
@@ -135,10 +140,10 @@ class space_filter {
   void add_point(const vec3 &place, double sigma_m);
   // The last point takes the removed one's slot.
   void remove_point(int slot);
-  void remove_points() { n_ = first_point_; }
+  void remove_points() { state_.truncate(first_point_); }
   // Of a kept state, behind the pose; nothing may be pending.
   void set_head(int state, double value) { head_[state] = value; }
-  void set_covariance(int i, int j, double value) { p()[i < j ? i * stride_ + j : j * stride_ + i] = value; }
+  void set_covariance(int i, int j, double value) { state_.set_covariance(i, j, value); }
 
   // Points stay as they are, without correlation with the pose.
   void set_pose(const pose3 &pose, const double covariance[6][6]);
@@ -153,48 +158,33 @@ class space_filter {
   int calibration_begin() const { return movers() + (at_[kRates] >= 0 ? 6 : 0); }
   int calibration_end() const { return first_point_; }
   void inflate_pose(double place_m2, double turn_rad2);
-  double covariance(int i, int j) const { return entry(p(), i, j, stride_); }
-  double variance(int i) const { return p()[i * stride_ + i]; }
+  double covariance(int i, int j) const { return state_.covariance(i, j); }
+  double variance(int i) const { return state_.variance(i); }
   vec3 pending(int state) const { return vec_of(correction() + state); }
   double pending1(int state) const { return correction()[state]; }
-  int states() const { return n_; }
+  int states() const { return state_.states(); }
 
  private:
-  // Rows of the memory: correction, gains, scratch, points, then the covariance.
-  double *row(int i) { return memory_.get() + i * stride_; }
-  const double *row(int i) const { return memory_.get() + i * stride_; }
-  double *correction() { return row(0); }
-  const double *correction() const { return row(0); }
-  double *gains() { return row(1); }
-  const double *gains() const { return row(1); }
-  double *scratch() { return row(1 + kRank); }
-  double *points() { return row(kRowsBefore); }
-  const double *points() const { return row(kRowsBefore); }
-  double *p() { return row(kRowsBefore + 1); }
-  const double *p() const { return row(kRowsBefore + 1); }
-  static constexpr int kRowsBefore = 1 + kRank + 2 * kTurns;  // of the points
+  const double *correction() const { return state_.mean(); }
+  double *points() { return points_.get(); }
+  const double *points() const { return points_.get(); }
+  // Scratch vectors of the state beside those of three turns: assign() moves kMovers states.
+  static constexpr int kScratch = kMovers - 2 * kTurns;
 
   // States that motion moves: the pose, and the motion since the last picture where it is on.
   int movers() const { return at_[kMovedPlace] >= 0 ? kMovers : kPose6; }
 
   // Considered states keep their value and their own covariance [Schmidt1966]; all others are updated as ever.
-  struct considered_states {
-    int first, count;
-  };
-  considered_states considered() const;
+  moving_states corrected() const;
 
-  void project(const row_block &block);
-  struct factors {
-    double l[kRank][kRank], d[kRank], left[kRank];  // left: the innovation that the rows before leave
-  };
-  void innovations_of(const row_block &block, factors *f, row_verdict *out) const;
-  static bool factorize_and_gate(const row_block &block, const gates &limits, factors *f, row_verdict *out);
+  static bool gate_rows(const innovation &i, const row_block &block, const gates &limits, double added[kRank],
+                        row_verdict *out);
   static constexpr int kTurningStates = 4;  // the camera's rotation, and the time offset
   struct turning_state {
     int state;
     vec3 by;
   };
-  void apply_correction(double *a);
+  void apply_correction();
   int camera_turn_states(turning_state out[kTurningStates]) const;
 
   // space_propagate.cpp
@@ -203,11 +193,10 @@ class space_filter {
   step step_of(const body_stretch &s) const;
   void transition_of(const step &s, const body_stretch &twist, transition *f) const;
   void add_sensor_blocks(const step &s, const body_stretch &twist, transition *f) const;
-  void transform_head(const transition &f);
-  void transform_points(const transition &f);
-  void add_motion_noise(const step &s, const body_stretch &twist);
-  void add_increment_noise(int row, int column, const mat3 &noise, const mat3 &then);
-  void add_integrated_noise(int which, int into, const step &s);
+  void move(const transition &f, const double noise[kMovers][kMovers]);
+  void add_motion_noise(const step &s, const body_stretch &twist, double noise[kMovers][kMovers]) const;
+  void add_noise(int row, int column, const mat3 &block, const mat3 &then, double noise[kMovers][kMovers]) const;
+  void add_with_rate(int which, int into, double with_rate, const step &s);
   void walk(double dt_s);
   double pose_variance(int state) const;  // sum of three
   void bound_pose(int state, double limit, double before);
@@ -215,8 +204,9 @@ class space_filter {
   void decorrelate(int state, int width, double variance);
   void restart(int which);
 
-  relative_array<double> memory_;
-  int n_, stride_, first_point_, points_max_;
+  error_state state_;              // its mean: the correction that is pending
+  relative_array<double> points_;  // places
+  int first_point_, points_max_;
   int at_[kHeadStates];
   head_model models_[kHeadStates];
   bool pending_;

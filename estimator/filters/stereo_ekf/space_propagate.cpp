@@ -68,14 +68,6 @@ struct space_filter::transition {
     b.width = width;
     return b;
   }
-  // Row i of F times the columns that `column` gives, without the identity's.
-  template <class Column>
-  double row_sum(int i, Column column) const {
-    double sum = column(i);
-    for (int b = 0; b < count; b++)
-      for (int k = 0; k < blocks[b].width; k++) sum += blocks[b].by[i][k] * column(blocks[b].state + k);
-    return sum;
-  }
 };
 
 space_filter::step space_filter::step_of(const body_stretch &s) const {
@@ -147,70 +139,42 @@ void space_filter::add_sensor_blocks(const step &s, const body_stretch &twist, t
   if (at_[kVelocityDirection] >= 0) add_block(f->add(at_[kVelocityDirection], 3).by, kPlace, direction);
 }
 
-// P' = F P F' of the head: the pose and the states that move it.
-void space_filter::transform_head(const transition &f) {
-  double *P = p();
-  const int head = first_point_;
-  const int moving = movers();
-  double old_rows[kMovers][kHeadMax], new_rows[kMovers][kHeadMax];
-  for (int i = 0; i < moving; i++)
-    for (int j = 0; j < head; j++) old_rows[i][j] = entry(P, i, j, stride_);
-  for (int i = 0; i < moving; i++)
-    for (int j = 0; j < head; j++)
-      new_rows[i][j] = f.row_sum(i, [&](int k) { return k < moving ? old_rows[k][j] : entry(P, k, j, stride_); });
-  for (int i = 0; i < moving; i++) {
-    for (int j = i; j < moving; j++) P[i * stride_ + j] = f.row_sum(j, [&](int k) { return new_rows[i][k]; });
-    for (int j = moving; j < head; j++) P[i * stride_ + j] = new_rows[i][j];
-  }
-}
-
-// The same of the pose with the points. Rows of the place come first: those of the rotation are still the old ones.
-void space_filter::transform_points(const transition &f) {
-  const int head = first_point_;
-  if (n_ <= head) return;
-  double *P = p();
-  const int from = head & ~1, width = even(n_) - from;
-  const int moving = movers();
-  double keep[kMovers] = {};  // of an odd head the last column comes along, which is done already
-  for (int i = 0; i < moving; i++) keep[i] = P[i * stride_ + from];
-  for (int i = 0; i < moving; i++)
+// P' = F P F' + Q.
+void space_filter::move(const transition &f, const double noise[kMovers][kMovers]) {
+  constexpr int kMost = 1 + 3 * transition::kBlocks;
+  const double nothing[kMovers] = {};  // is pending
+  jacobian_row<kMost> by[kMovers];
+  sparse_row rows[kMovers];
+  for (int i = 0; i < movers(); i++) {
+    by[i].add(i, 1.0);
     for (int b = 0; b < f.count; b++)
-      for (int k = 0; k < f.blocks[b].width; k++)
-        if (const double by = f.blocks[b].by[i][k]; by != 0.0)
-          vectors::add_scaled(P + i * stride_ + from, P + (f.blocks[b].state + k) * stride_ + from, by, width);
-  if (from < head)
-    for (int i = 0; i < moving; i++) P[i * stride_ + from] = keep[i];
+      for (int k = 0; k < f.blocks[b].width; k++) by[i].add(f.blocks[b].state + k, f.blocks[b].by[i][k]);
+    rows[i] = by[i];
+  }
+  state_.assign(kPlace, movers(), rows, noise[0], kMovers, nothing);
 }
 
 // White noise along the step: a rotation error made evenly on the way displaces the end by half the way on average,
 // with a third of its square.
-void space_filter::add_motion_noise(const step &s, const body_stretch &twist) {
-  double *P = p();
+void space_filter::add_motion_noise(const step &s, const body_stretch &twist, double noise[kMovers][kMovers]) const {
   const mat3 place = turned_diagonal(s.mean, twist.place_m2), turn = turned_diagonal(s.mean, twist.turn_rad2);
   const mat3 cross_noise = -0.5 * (s.swing * turn);
   const mat3 lever_noise = (1.0 / 3) * (s.swing * (turn * transposed(s.swing)));
-  for (int i = 0; i < 3; i++)
-    for (int j = 0; j < 3; j++) {
-      if (i <= j) P[i * stride_ + j] += place.m[i][j] + lever_noise.m[i][j];
-      if (i <= j) P[(kTurn + i) * stride_ + kTurn + j] += turn.m[i][j];
-      P[i * stride_ + kTurn + j] += cross_noise.m[i][j];
-    }
-  if (movers() == kMovers) {
-    add_increment_noise(kPlace, kPlace, place + lever_noise, s.then);
-    add_increment_noise(kPlace, kTurn, cross_noise, s.then);
-    add_increment_noise(kTurn, kPlace, transposed(cross_noise), s.then);
-    add_increment_noise(kTurn, kTurn, turn, s.then);
-  }
+  add_noise(kPlace, kPlace, place + lever_noise, s.then, noise);
+  add_noise(kPlace, kTurn, cross_noise, s.then, noise);
+  add_noise(kTurn, kPlace, transposed(cross_noise), s.then, noise);
+  add_noise(kTurn, kTurn, turn, s.then, noise);
 }
 
-// The part of the pose's noise in map axes that has those rows and columns, of the motion since the last picture.
-void space_filter::add_increment_noise(int row, int column, const mat3 &noise, const mat3 &then) {
-  const mat3 crossed = noise * then, own = transposed(then) * crossed;
-  const int moved = at_[kMovedPlace];
+// A block of the pose's noise in map axes, and the same of the motion since the last picture.
+void space_filter::add_noise(int row, int column, const mat3 &block, const mat3 &then,
+                             double noise[kMovers][kMovers]) const {
+  const mat3 crossed = block * then, own = transposed(then) * crossed;
   for (int i = 0; i < 3; i++)
     for (int j = 0; j < 3; j++) {
-      p()[(row + i) * stride_ + moved + column + j] += crossed.m[i][j];
-      if (row + i <= column + j) p()[(moved + row + i) * stride_ + moved + column + j] += own.m[i][j];
+      noise[row + i][column + j] += block.m[i][j];
+      noise[row + i][kPose6 + column + j] += crossed.m[i][j];
+      noise[kPose6 + row + i][kPose6 + column + j] += own.m[i][j];
     }
 }
 
@@ -221,13 +185,19 @@ void space_filter::propagate(const body_stretch &twist) {
   const step s = step_of(twist);
   transition f;
   transition_of(s, twist, &f);
-  transform_head(f);
-  transform_points(f);
-  add_motion_noise(s, twist);
+  double noise[kMovers][kMovers] = {};
+  add_motion_noise(s, twist, noise);
+  const integrated_noise of_velocity = integrated_noise_of(models_[kVelocity], s.dt_s),
+                         of_rates = integrated_noise_of(models_[kRates], s.dt_s);
+  if (at_[kRates] >= 0) {
+    add_noise(kPlace, kPlace, of_velocity.variance * kIdentity3, s.then, noise);
+    add_noise(kTurn, kTurn, of_rates.variance * kIdentity3, s.then, noise);
+  }
+  move(f, noise);
   walk(s.dt_s);
   if (at_[kRates] >= 0) {
-    add_integrated_noise(kVelocity, kPlace, s);
-    add_integrated_noise(kRates, kTurn, s);
+    add_with_rate(kVelocity, kPlace, of_velocity.with_rate, s);
+    add_with_rate(kRates, kTurn, of_rates.with_rate, s);
   }
   bound_pose(kPlace, 3.0 * square(kUnknownPlace_m), place_before);
   bound_pose(kTurn, 3.0 * square(kUnknownTurn_rad), turn_before);
@@ -248,30 +218,20 @@ void space_filter::bound_pose(int state, double limit, double before) {
   if (before > limit) limit = before;
   const double now = pose_variance(state);
   if (!(now > limit)) return;
-  const double scale = std::sqrt(limit / now);
-  for (int i = state; i < state + 3; i++) {
-    for (int j = 0; j <= i; j++) p()[j * stride_ + i] *= scale;
-    for (int j = i; j < n_; j++) p()[i * stride_ + j] *= scale;
-  }
+  state_.scale(state, 3, std::sqrt(limit / now));
 }
 
-void space_filter::add_integrated_noise(int which, int into, const step &s) {
-  const integrated_noise noise = integrated_noise_of(models_[which], s.dt_s);
-  double *P = p();
-  for (int i = 0; i < 3; i++) {
-    P[(into + i) * stride_ + into + i] += noise.variance;
-    for (int j = 0; j < 3; j++) P[(into + i) * stride_ + at_[which] + j] += noise.with_rate * s.mean.m[i][j];
-  }
-  if (movers() < kMovers) return;
+// The covariance of what a rate's process noise has moved with that rate.
+void space_filter::add_with_rate(int which, int into, double with_rate, const step &s) {
   const mat3 mean = transposed(s.then) * s.mean;
-  add_increment_noise(into, into, noise.variance * kIdentity3, s.then);
   for (int i = 0; i < 3; i++)
-    for (int j = 0; j < 3; j++)
-      P[(at_[kMovedPlace] + into + i) * stride_ + at_[which] + j] += noise.with_rate * mean.m[i][j];
+    for (int j = 0; j < 3; j++) {
+      state_.add_covariance(into + i, at_[which] + j, with_rate * s.mean.m[i][j]);
+      if (movers() == kMovers) state_.add_covariance(kPose6 + into + i, at_[which] + j, with_rate * mean.m[i][j]);
+    }
 }
 
 void space_filter::walk(double dt_s) {
-  double *P = p();
   for (int k = 0; k < kHeadStates; k++) {
     if (at_[k] < 0) continue;
     const bool fades = models_[k].tau_s > 0.0;
@@ -279,12 +239,10 @@ void space_filter::walk(double dt_s) {
     const double added = fades ? (1.0 - left * left) * square(models_[k].sigma) : square(models_[k].walk) * dt_s;
     for (int i = at_[k]; i < at_[k] + kHeadSpecs[k].width; i++) {
       if (fades) {
-        for (int j = 0; j < i; j++) P[j * stride_ + i] *= left;
-        P[i * stride_ + i] *= left * left;
-        for (int j = i + 1; j < n_; j++) P[i * stride_ + j] *= left;
+        state_.fade(i, left, 0.0);
         head_[i] = kHeadSpecs[k].neutral + left * (head_[i] - kHeadSpecs[k].neutral);
       }
-      P[i * stride_ + i] += added;
+      state_.add_variance(i, added);
     }
   }
 }

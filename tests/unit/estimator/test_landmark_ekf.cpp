@@ -7,12 +7,12 @@
 #include <limits>
 
 #include "events.hpp"
-#include "filters/core/row.hpp"
 #include "filters/landmark_ekf/params.h"
 #include "math/arc.hpp"
 #include "math/elementary.hpp"
 #include "motion/motion_params.h"
 #include "sensors/sensor_model.hpp"
+#include "state/row.hpp"
 #include "unity.h"
 #include "waymark/estimator.h"
 #include "waymark/random.h"

@@ -8,7 +8,6 @@
 #include "events.hpp"
 #include "filters/planar/planar_filter.hpp"
 #include "math/arc.hpp"
-#include "math/covariance.hpp"
 #include "math/elementary.hpp"
 #include "motion/motion_params.h"
 #include "unity.h"
@@ -22,7 +21,6 @@ wm_motion_states states;
 wm_setup setup;
 wm::planar_filter_of<64> *filter;
 
-double random_number(uint64_t i) { return wm_random_normal(5, 2, i); }
 
 void make_setup(const wm_wheels &wheels) {
   make::exact_motion(&params);
@@ -48,30 +46,6 @@ void make_busy_filter() {
 void copy_covariance(double out[kMax][kMax]) {
   for (int i = 0; i < filter->states(); i++)
     for (int j = 0; j < filter->states(); j++) out[i][j] = filter->covariance(i, j);
-}
-
-void test_kernels_and_their_scalar_twins_give_the_same_bits(void) {
-  for (int n = 1; n <= 13; n++) {
-    const int stride = wm::even(n);
-    alignas(16) double p[14 * 14] = {}, q[14 * 14], k[14] = {}, b[14] = {};
-    for (int i = 0; i < n; i++) {
-      k[i] = random_number((uint64_t)(100 * n + i));
-      b[i] = random_number((uint64_t)(100 * n + 50 + i));
-      for (int j = 0; j <= i; j++)
-        p[i * stride + j] = p[j * stride + i] = random_number((uint64_t)(1000 * n + 20 * i + j));
-    }
-    std::memcpy(q, p, sizeof p);
-    wm::vectors::add_symmetric_outer(p, k, b, n, stride);
-    wm::scalar::add_symmetric_outer(q, k, b, n, stride);
-    TEST_ASSERT_EQUAL_MEMORY(q, p, sizeof p);
-    for (int i = 0; i < n; i++)
-      for (int j = 0; j < n; j++) TEST_ASSERT_EQUAL_MEMORY(&p[i * stride + j], &p[j * stride + i], sizeof(double));
-    wm::vectors::add_scaled(p, p + stride * (n - 1), 1.7, stride);
-    wm::scalar::add_scaled(q, q + stride * (n - 1), 1.7, stride);
-    wm::vectors::set_scaled(p + stride * (n - 1), p, -0.3, stride);
-    wm::scalar::set_scaled(q + stride * (n - 1), q, -0.3, stride);
-    TEST_ASSERT_EQUAL_MEMORY(q, p, sizeof p);
-  }
 }
 
 // The pose after a drive as a function of the start pose and the calibration.
@@ -129,14 +103,14 @@ void test_prediction_carries_the_right_derivatives(void) {
 
 // What the noise's adaption takes of a row: its derivatives by the pose, and by a position's lasting error where that
 // is a state.
-void test_a_projection_has_the_row_s_part_of_the_pose(void) {
+void test_a_row_s_part_of_the_pose(void) {
   make_busy_filter();
   wm::planar_row row;
   row.add(0, 0.3), row.add(2, -1.1), row.add(3, 0.7), row.add(4, 0.2);
-  wm::projection projected;
-  filter->project(row, &projected);
+  double by[wm::noise_adaption::kBlock];
+  filter->put_adapted(row, by);
   const double expected[wm::noise_adaption::kBlock] = {0.3, 0.0, -1.1, 0.0, 0.0};
-  for (int i = 0; i < wm::noise_adaption::kBlock; i++) TEST_ASSERT_EQUAL_DOUBLE(expected[i], projected.by[i]);
+  for (int i = 0; i < wm::noise_adaption::kBlock; i++) TEST_ASSERT_EQUAL_DOUBLE(expected[i], by[i]);
 }
 
 void test_josephs_form_is_the_plain_one_at_the_best_gain(void) {
@@ -150,14 +124,12 @@ void test_josephs_form_is_the_plain_one_at_the_best_gain(void) {
   row.add(5, 0.7);
   double h[kMax] = {};
   h[0] = 0.3, h[2] = -1.1, h[5] = 0.7;
-  wm::projection projected;
-  filter->project(row, &projected);
   double g[kMax] = {}, s = 0.05;
   for (int i = 0; i < n; i++)
     for (int j = 0; j < n; j++) g[i] += p[i][j] * h[j];
   for (int i = 0; i < n; i++) s += h[i] * g[i];
-  TEST_ASSERT_DOUBLE_WITHIN(1e-14, s - 0.05, projected.variance);
-  TEST_ASSERT_TRUE(filter->update(projected, 0.2, 0.05));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-14, s - 0.05, filter->variance_of(row));
+  TEST_ASSERT_TRUE(filter->update(row, 0.2, 0.05));
   for (int i = 0; i < n; i++) {
     for (int j = 0; j < n; j++) {
       // (I - KH) P (I - KH)' + K R K', written out in full.
@@ -172,27 +144,54 @@ void test_josephs_form_is_the_plain_one_at_the_best_gain(void) {
   }
 }
 
-// What an update leaves of a second innovation is by the states as they are then: considered ones have not moved.
-void test_the_second_innovation_by_the_corrected_states(void) {
-  for (const int kept_to : {3, 6}) {
+// What a state that is considered contributes to the innovation counts in its covariance; it stays, and so does its own
+// covariance with others that stay. By the whole matrices: Joseph's form for the best gain without the rows of such
+// states.
+void test_considered_states_stay(void) {
+  for (const int kept_to : {3, 6, 7}) {
     make_busy_filter();
+    const int n = filter->states();
+    double p[kMax][kMax], x[kMax], g[2][kMax] = {}, k[2][kMax] = {};
+    copy_covariance(p);
+    for (int i = 0; i < n; i++) x[i] = filter->value(i);
+    const double h[2][kMax] = {{1.0, 0, 0.4, 0, 0.7}, {0, -0.8, 0.9, 0, 0.5}}, z[2] = {0.03, -0.05},
+                 r[2] = {0.01, 0.02};
     wm::planar_row row[2];
-    row[0].add(0, 1.0), row[0].add(2, 0.4), row[0].add(4, 0.7);
-    row[1].add(1, -0.8), row[1].add(2, 0.9), row[1].add(4, 0.5);
-    wm::projection first;
-    filter->project(row[0], &first);
-    const double left = filter->innovation_left(row[1], -0.05, first, 0.3, 0.01, 3, kept_to);
-    double by_states = -0.05;
-    for (int k = 0; k < row[1].count; k++) by_states += row[1].by[k] * filter->value(row[1].index[k]);
-    TEST_ASSERT_TRUE(filter->update(first, 0.3, 0.01, 3, kept_to));
-    for (int k = 0; k < row[1].count; k++) by_states -= row[1].by[k] * filter->value(row[1].index[k]);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-12, by_states, left);
+    for (int m = 0; m < 2; m++)
+      for (int i = 0; i < n; i++) {
+        row[m].add(i, h[m][i]);
+        for (int j = 0; j < n; j++) g[m][i] += p[i][j] * h[m][j];
+      }
+    double s[2][2] = {{r[0], 0}, {0, r[1]}};
+    for (int m = 0; m < 2; m++)
+      for (int l = 0; l < 2; l++)
+        for (int i = 0; i < n; i++) s[m][l] += h[m][i] * g[l][i];
+    const double det = s[0][0] * s[1][1] - s[0][1] * s[1][0];
+    const double inverse[2][2] = {{s[1][1] / det, -s[0][1] / det}, {-s[1][0] / det, s[0][0] / det}};
+    for (int i = 0; i < n; i++)
+      for (int m = 0; m < 2 && (i < 3 || i >= kept_to); m++)
+        k[m][i] = g[0][i] * inverse[0][m] + g[1][i] * inverse[1][m];
+    wm::planar_filter::update_options options;
+    options.kept_from = 3;
+    options.kept_to = kept_to;
+    const wm::sparse_row rows[2] = {row[0], row[1]};
+    TEST_ASSERT_TRUE(filter->update(filter->prepare(rows, z, r, 2), rows, options));
+    for (int i = 0; i < n; i++) {
+      TEST_ASSERT_DOUBLE_WITHIN(1e-12, x[i] + k[0][i] * z[0] + k[1][i] * z[1], filter->value(i));
+      for (int j = 0; j < n; j++) {
+        double joseph = k[0][i] * r[0] * k[0][j] + k[1][i] * r[1] * k[1][j];
+        for (int a = 0; a < n; a++)
+          for (int b = 0; b < n; b++)
+            joseph += ((i == a) - k[0][i] * h[0][a] - k[1][i] * h[1][a]) * p[a][b] *
+                      ((j == b) - k[0][j] * h[0][b] - k[1][j] * h[1][b]);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-13, joseph, filter->covariance(i, j));
+      }
+    }
   }
 }
 
-// Theorem (e.g. Bar-Shalom, Estimation with Applications, 2001, 7.2): with uncorrelated noises, updating by one row
-// after the other is the same as by all at once. Premise, asserted: the prior couples the two rows.
-void test_one_number_after_the_other_is_all_at_once(void) {
+// Two rows at once, by the whole matrices. Premise, asserted: the prior couples the two rows.
+void test_two_numbers_at_once(void) {
   make_busy_filter();
   const int n = filter->states();
   double p[kMax][kMax], x[kMax];
@@ -215,12 +214,12 @@ void test_one_number_after_the_other_is_all_at_once(void) {
   wm::planar_row row[2];
   for (int k = 0; k < 2; k++)
     for (int i = 0; i < n; i++) row[k].add(i, h[k][i]);
-  wm::projection first, second;
-  filter->project(row[0], &first);
-  const double after_first = filter->innovation_left(row[1], z[1], first, z[0], r[0]);
-  TEST_ASSERT_TRUE(filter->update(first, z[0], r[0]));
-  filter->project(row[1], &second);
-  TEST_ASSERT_TRUE(filter->update(second, after_first, r[1]));
+  const wm::sparse_row rows[2] = {row[0], row[1]};
+  wm::innovation both = filter->prepare(rows, z, r, 2);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-13, s[1][0], both.s[1][0]);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, det, both.determinant);
+  const wm::planar_filter::update_options options;
+  TEST_ASSERT_TRUE(filter->update(std::move(both), rows, options));
 
   for (int i = 0; i < n; i++) {
     double want = x[i];
@@ -316,9 +315,7 @@ void test_an_update_of_a_vast_variance_leaves_some(void) {
     for (int axis = 0; axis < 2; axis++) {
       wm::planar_row row;
       row.add(axis, 1.0);
-      wm::projection projected;
-      filter->project(row, &projected);
-      TEST_ASSERT_TRUE(filter->update(projected, 0.0, 0.01));
+      TEST_ASSERT_TRUE(filter->update(row, 0.0, 0.01));
       TEST_ASSERT_GREATER_THAN_DOUBLE(0.0, filter->covariance(axis, axis));
     }
   TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.01, filter->covariance(0, 0));
@@ -334,12 +331,11 @@ void tearDown(void) { free(filter); }
 
 int main(void) {
   UNITY_BEGIN();
-  RUN_TEST(test_kernels_and_their_scalar_twins_give_the_same_bits);
   RUN_TEST(test_prediction_carries_the_right_derivatives);
-  RUN_TEST(test_a_projection_has_the_row_s_part_of_the_pose);
+  RUN_TEST(test_a_row_s_part_of_the_pose);
   RUN_TEST(test_josephs_form_is_the_plain_one_at_the_best_gain);
-  RUN_TEST(test_the_second_innovation_by_the_corrected_states);
-  RUN_TEST(test_one_number_after_the_other_is_all_at_once);
+  RUN_TEST(test_considered_states_stay);
+  RUN_TEST(test_two_numbers_at_once);
   RUN_TEST(test_standing_still_teaches_the_gyros_bias);
   RUN_TEST(test_the_estimate_of_a_drive_has_its_twist);
   RUN_TEST(test_a_copied_and_a_carried_state);

@@ -155,7 +155,7 @@ void test_inflated_mixed_and_scaled_covariances(void) {
     for (int j = 0; j < n; j++)
       TEST_ASSERT_DOUBLE_WITHIN(1e-15, a.p[i][j] + (i == j && i < 3 ? more[i] : 0.0), filter->covariance(i, j));
   const kept b;
-  double off[wm::kMaxStates] = {};
+  double off[kMost] = {};
   for (int i = 0; i < n; i++) off[i] = 0.3 * (i + 1);
   filter->add_chance(0.2, off);
   for (int i = 0; i < n; i++)
@@ -197,17 +197,13 @@ void test_updates_that_are_refused(void) {
   begin_busy();
   wm::planar_row nothing, row;
   row.add(0, 1.0);
-  wm::projection none, projected;
-  filter->project(nothing, &none);
-  TEST_ASSERT_EQUAL_DOUBLE(0.0, none.variance);
-  for (int i = 0; i < filter->states(); i++) TEST_ASSERT_EQUAL_DOUBLE(0.0, none.gain[i]);
-  filter->project(row, &projected);
+  TEST_ASSERT_EQUAL_DOUBLE(0.0, filter->variance_of(nothing));
   const kept before;
-  TEST_ASSERT_FALSE(filter->update(none, 0.1, 0.0));
-  TEST_ASSERT_FALSE(filter->update(projected, NAN, 0.1));
-  TEST_ASSERT_FALSE(filter->update(projected, 0.1, INFINITY));
+  TEST_ASSERT_FALSE(filter->update(nothing, 0.1, 0.0));
+  TEST_ASSERT_FALSE(filter->update(row, NAN, 0.1));
+  TEST_ASSERT_FALSE(filter->update(row, 0.1, INFINITY));
   for (int i = 0; i < filter->states(); i++) TEST_ASSERT_EQUAL_DOUBLE(before.x[i], filter->value(i));
-  TEST_ASSERT_TRUE(filter->update(none, 0.1, 0.1));  // of no effect
+  TEST_ASSERT_TRUE(filter->update(nothing, 0.1, 0.1));  // of no effect
   for (int i = 0; i < filter->states(); i++) TEST_ASSERT_EQUAL_DOUBLE(before.x[i], filter->value(i));
 }
 
@@ -217,30 +213,28 @@ void test_the_covariance_of_two_rows(void) {
   wm::planar_row a, b;
   a.add(0, 0.4), a.add(3, -1.2), a.add(5, 0.3);
   b.add(1, 2.0), b.add(2, 0.7), b.add(4, -0.9);
-  wm::projection of_b;
-  filter->project(b, &of_b);
   double expected = 0.0, own = 0.0;
   for (int i = 0; i < 3; i++)
     for (int j = 0; j < 3; j++) {
       expected += a.by[i] * b.by[j] * filter->covariance(a.index[i], b.index[j]);
       own += b.by[i] * b.by[j] * filter->covariance(b.index[i], b.index[j]);
     }
-  TEST_ASSERT_DOUBLE_WITHIN(1e-14, expected, filter->project_onto(a, of_b));
-  TEST_ASSERT_DOUBLE_WITHIN(1e-14, own, of_b.variance);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-14, expected, filter->covariance_of(a, b));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-14, own, filter->variance_of(b));
 }
 
 // What the noise's adaption takes of a row beside the pose: its derivatives by a position's lasting error, each axis.
-void test_a_projection_has_the_part_of_a_lasting_error(void) {
+void test_a_row_s_part_of_a_lasting_error(void) {
   begin_busy();
   const int error = filter->add_state(0.0, 0.3), other = filter->add_state(0.0, 0.3),
             behind = filter->add_state(0.0, 0.3);
   filter->set_correlated_position(error);
   wm::planar_row row;
   row.add(1, 0.4), row.add(3, 9.0), row.add(error, 0.7), row.add(other, -0.2), row.add(behind, 9.0);
-  wm::projection projected;
-  filter->project(row, &projected);
   const double expected[wm::noise_adaption::kBlock] = {0.0, 0.4, 0.0, 0.7, -0.2};
-  TEST_ASSERT_EQUAL_DOUBLE_ARRAY(expected, projected.by, wm::noise_adaption::kBlock);
+  double by[wm::noise_adaption::kBlock];
+  filter->put_adapted(row, by);
+  TEST_ASSERT_EQUAL_DOUBLE_ARRAY(expected, by, wm::noise_adaption::kBlock);
 }
 
 // GIVEN twists whose turn has the wrong sign WHEN headings are seen THEN the factor -1 explains them; of a right turn,
@@ -258,9 +252,7 @@ void test_the_turn_is_tested_by_what_is_seen(void) {
         filter->move(make::twist(0.1 * i, 0.5, w));
       wm::planar_row row;
       row.add(wm::kHeading, 1.0);
-      wm::projection projected;
-      filter->project(row, &projected);
-      TEST_ASSERT_TRUE(filter->update(projected, wm::wrap(heading - filter->value(wm::kHeading)), 1e-4));
+      TEST_ASSERT_TRUE(filter->update(row, wm::wrap(heading - filter->value(wm::kHeading)), 1e-4));
       wm_calibration_value value{};
       wm::calibration_list list(&value, 1);
       filter->turn_test().list(&list);
@@ -283,17 +275,15 @@ void test_a_state_beyond_its_limit_takes_the_others_along(void) {
   const int scale = filter->motion_state(wm::kSpeedScale);
   wm::planar_row row;
   row.add(scale, 1.0);
-  wm::projection projected;
-  filter->project(row, &projected);
-  const double s = projected.variance + 1e-4, innovation = 5.0;
-  TEST_ASSERT_TRUE(filter->update(projected, innovation, 1e-4));
-  const double beyond = before.x[scale] + projected.gain[scale] / s * innovation - 3.0;  // 3 is the most
+  const double s = before.p[scale][scale] + 1e-4, innovation = 5.0;
+  TEST_ASSERT_TRUE(filter->update(row, innovation, 1e-4));
+  const double beyond = before.x[scale] + before.p[scale][scale] / s * innovation - 3.0;  // 3 is the most
   TEST_ASSERT_GREATER_THAN_DOUBLE(0.5, beyond);
   TEST_ASSERT_EQUAL_DOUBLE(3.0, filter->value(scale));
   TEST_ASSERT_EQUAL_DOUBLE(3.0, filter->calibration().value[wm::kSpeedScale]);
   for (int i = 0; i < filter->states(); i++) {
     const double by = filter->covariance(scale, i) / filter->variance(scale);
-    const double expected = before.x[i] + projected.gain[i] / s * innovation - by * beyond;
+    const double expected = before.x[i] + before.p[i][scale] / s * innovation - by * beyond;
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, i == 2 ? wm::wrap(expected) : expected, filter->value(i));
   }
 }
@@ -310,9 +300,7 @@ void test_states_of_sensors_have_limits_and_walk(void) {
   for (const double sign : {-1.0, 1.0}) {
     wm::planar_row row;
     row.add(error, 1.0);
-    wm::projection projected;
-    filter->project(row, &projected);
-    TEST_ASSERT_TRUE(filter->update(projected, sign * 5.0, 1e-3));
+    TEST_ASSERT_TRUE(filter->update(row, sign * 5.0, 1e-3));
     TEST_ASSERT_EQUAL_DOUBLE(sign < 0.0 ? -0.3 : 0.4, filter->value(error));
   }
 }
@@ -357,9 +345,7 @@ void test_corrections_of_the_heading_tell_nothing_of_the_lag(void) {
     if (i % 25 != 0) continue;
     wm::planar_row row;
     row.add(wm::kHeading, 1.0);
-    wm::projection projected;
-    filter->project(row, &projected);
-    TEST_ASSERT_TRUE(filter->update(projected, 0.1, 1e-4));
+    TEST_ASSERT_TRUE(filter->update(row, 0.1, 1e-4));
   }
   filter->move(make::twist(10.04, 0.5, 0.0));
   TEST_ASSERT_GREATER_THAN_DOUBLE(0.7, filter->pose().heading_rad);
@@ -553,7 +539,7 @@ int main(void) {
   RUN_TEST(test_fading_and_forgetting_touch_one_row_and_column);
   RUN_TEST(test_updates_that_are_refused);
   RUN_TEST(test_the_covariance_of_two_rows);
-  RUN_TEST(test_a_projection_has_the_part_of_a_lasting_error);
+  RUN_TEST(test_a_row_s_part_of_a_lasting_error);
   RUN_TEST(test_the_turn_is_tested_by_what_is_seen);
   RUN_TEST(test_a_state_beyond_its_limit_takes_the_others_along);
   RUN_TEST(test_states_of_sensors_have_limits_and_walk);

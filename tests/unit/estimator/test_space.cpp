@@ -76,24 +76,6 @@ void test_the_mean_turn_is_the_mean(void) {
   }
 }
 
-void test_kernels_have_scalar_twins(void) {
-  for (const int n : {1, 2, 7, 24, 109}) {
-    const int stride = even(n) + 2;
-    const auto row = static_cast<size_t>(stride);
-    std::vector<double> room(row * (2 * row + 8) + 2);
-    auto *base =
-        reinterpret_cast<double *>((reinterpret_cast<uintptr_t>(room.data()) + 15) & ~static_cast<uintptr_t>(15));
-    double *p = base, *twin = p + stride * stride, *a = twin + stride * stride, *b = a + 4 * stride;
-    for (int i = 0; i < stride * stride; i++) p[i] = twin[i] = normal(i);
-    for (int i = 0; i < 8 * stride; i++) a[i] = i % stride < n ? normal(5000 + i) : 0.0;
-    vectors::subtract_gram(p, a, n, stride);
-    scalar::subtract_gram(twin, a, n, stride);
-    vectors::add_mixed(p, a, b, n, stride);
-    scalar::add_mixed(twin, a, b, n, stride);
-    TEST_ASSERT_EQUAL_MEMORY(twin, p, sizeof(double) * row * row);
-  }
-}
-
 // A small error in pose or sensor states, carried by the motion itself, against its covariance carried by the filter.
 void test_propagation_carries_errors_as_the_motion_does(void) {
   head_model models[kHeadStates] = {};
@@ -503,7 +485,6 @@ int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_turns_there_and_back);
   RUN_TEST(test_the_mean_turn_is_the_mean);
-  RUN_TEST(test_kernels_have_scalar_twins);
   RUN_TEST(test_propagation_carries_errors_as_the_motion_does);
   RUN_TEST(test_sensor_states_swing_the_way_as_they_should);
   RUN_TEST(test_motion_since_a_picture_and_considered_states);

@@ -29,11 +29,12 @@ ESTIMATOR_NEVER = re.compile(
 # Inside estimator/: folder -> folders whose headers it may include (its own always). A detector includes no other detector
 # and no filter, a filter no other filter.
 SENSING = ["", "math", "memory", "sensors", "image", "vision"]
-FILTER = ["", "math", "memory", "motion", "maps", "sensors", "filters", "filters/core", "filters/planar", "filters/relocalize"]
+FILTER = ["", "math", "memory", "state", "motion", "maps", "sensors", "filters", "filters/core", "filters/planar", "filters/relocalize"]
 FOLDER_MAY_USE = {
     "": [],
     "math": [],
     "memory": [],
+    "state": ["math", "memory"],
     "motion": ["", "math", "memory"],
     "maps": ["math", "memory"],
     "sensors": ["", "math", "memory"],
@@ -48,7 +49,7 @@ FOLDER_MAY_USE = {
     "vision/stereo": SENSING,
     "filters": [],
     "filters/core": ["", "math", "memory", "motion", "sensors"],
-    "filters/planar": ["math", "memory", "motion", "sensors", "filters/core"],
+    "filters/planar": ["math", "memory", "state", "motion", "sensors", "filters/core"],
     "filters/relocalize": ["math", "memory", "maps", "sensors", "filters/core"],
     "filters/edge_mcl": FILTER,
     "filters/landmark_ekf": FILTER,

@@ -1,13 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
-// A row of a measurement's Jacobian, of which few entries are not zero.
-#ifndef WAYMARK_ESTIMATOR_CORE_ROW_HPP
-#define WAYMARK_ESTIMATOR_CORE_ROW_HPP
+// A row of a Jacobian, of which few entries are not zero.
+#ifndef WAYMARK_ESTIMATOR_STATE_ROW_HPP
+#define WAYMARK_ESTIMATOR_STATE_ROW_HPP
 
 namespace wm {
 
+// A view of such a row. An entry of 0 counts nothing; a state may stand in a row twice, and the entries add up.
+struct sparse_row {
+  const int *index;  // states
+  const double *by;  // derivatives
+  int count;
+  int missing;  // entries that had no room: a row with missing entries must not be fused (WM_REJECTED_NUMERIC)
+};
+
 // `kCapacity` entries: the filter derives it from its table of states and asserts it. An entry beyond it is counted in
-// `missing` rather than written; a row with missing entries must not be fused (WM_REJECTED_NUMERIC). A state may stand
-// in a row twice; the entries add up.
+// `missing` rather than written.
 template <int kCapacity>
 struct jacobian_row {
   static constexpr int kMax = kCapacity;
@@ -31,6 +38,7 @@ struct jacobian_row {
     missing += other.missing;
     for (int i = 0; i < other.count; i++) add(other.index[i], factor * other.by[i]);
   }
+  operator sparse_row() const { return {index, by, count, missing}; }
 };
 
 }  // namespace wm
