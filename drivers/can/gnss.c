@@ -3,10 +3,8 @@
 #include <string.h>
 
 #include "waymark/can.h"
+#include "waymark/local_frame.h"
 
-// WGS84: semi-major axis and the square of the eccentricity.
-#define WGS84_A_M 6378137.0
-#define WGS84_E2 6.69437999014e-3
 #define SIGMA_M 5.0  // of a receiver without a stated accuracy: a common figure of data sheets
 #define DEGREE (M_PI / 180.0)
 
@@ -21,8 +19,8 @@ const char *wm_can_quantity_name(unsigned quantity) {
 }
 
 void wm_can_gnss_init(wm_can_gnss *self, const double origin[3]) {
-  *self = (wm_can_gnss){.origin = {origin[0] * DEGREE, origin[1] * DEGREE, origin[2]},
-                        .level_m = isnan(origin[2]) ? 0.0 : origin[2]};
+  *self = (wm_can_gnss){.level_m = isnan(origin[2]) ? 0.0 : origin[2]};
+  memcpy(self->origin, origin, sizeof self->origin);
   for (size_t i = 0; i < sizeof self->value / sizeof self->value[0]; i++) self->value[i] = (double)NAN;
 }
 
@@ -45,16 +43,17 @@ int wm_can_gnss_take(wm_can_gnss *self, const wm_quantities *values, wm_position
   self->fresh = 0;
   if (!is_fix(value)) return 0;
   double *origin = self->origin;
-  if (isnan(origin[LATITUDE])) memcpy(origin, value, 2 * sizeof *origin);
+  const double latitude = value[LATITUDE] / DEGREE, longitude = value[LONGITUDE] / DEGREE;
   const double altitude_m = value[ALTITUDE_VALID] == 0.0 ? (double)NAN : value[ALTITUDE];
+  if (isnan(origin[LATITUDE])) {
+    origin[LATITUDE] = latitude;
+    origin[LONGITUDE] = longitude;
+  }
   if (isnan(origin[ALTITUDE])) origin[ALTITUDE] = altitude_m;
-  const double sine = sin(origin[LATITUDE]), w = 1.0 - WGS84_E2 * sine * sine;
-  const double across_m = WGS84_A_M / sqrt(w) + self->level_m,
-               along_m = WGS84_A_M * (1.0 - WGS84_E2) / (w * sqrt(w)) + self->level_m;
-  const double turn = remainder(value[LONGITUDE] - origin[LONGITUDE], 2.0 * M_PI);
-  out->p_m[0] = across_m * cos(origin[LATITUDE]) * turn;
-  out->p_m[1] = along_m * (value[LATITUDE] - origin[LATITUDE]);
-  out->p_m[2] = altitude_m - origin[ALTITUDE];
+  const double above_m = isnan(altitude_m) ? 0.0 : altitude_m - origin[ALTITUDE];
+  local_frame((const double[3]){origin[LATITUDE], origin[LONGITUDE], self->level_m},
+              (const double[3]){latitude, longitude, self->level_m + above_m}, out->p_m);
+  if (isnan(altitude_m)) out->p_m[2] = (double)NAN;
   out->sigma_xy_m = value[XY] > 0.0 ? value[XY] : SIGMA_M;
   out->sigma_z_m = isnan(altitude_m) ? (double)NAN : value[Z] > 0.0 ? value[Z] : 2.0 * out->sigma_xy_m;
   return 1;

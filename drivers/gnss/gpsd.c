@@ -12,9 +12,9 @@
 #include <unistd.h>
 
 #include "gpsd_report.h"
-#include "local_frame.h"
 #include "waymark/devices.h"
 #include "waymark/foreign_clock.h"
+#include "waymark/local_frame.h"
 
 #define TRY_AGAIN_NS (500 * WM_NS_PER_MS)
 // Without a byte for so long the connection is made anew: a computer that was switched off closes none.
@@ -182,15 +182,17 @@ static int has_deviations(const gpsd *self, wm_time_ns now_ns) {
   return self->deviations_ns != WM_TIME_NONE && now_ns - self->deviations_ns < DEVIATIONS_NS;
 }
 
+// `accuracy_scale` is for gpsd's estimates: what the receiver states, and the usual figures, are sigmas already.
 static double sigma_of(const gpsd *self, const gpsd_report *report, wm_time_ns now_ns) {
+  const double scale = self->config.accuracy_scale;
   if (has_deviations(self, now_ns)) return self->deviation_m;
   // gpsd's estimates are without RTK: 19 m times the dilution of precision (H_UERE_NO_DGPS of gpsd 3.22).
   const double most_m = report->status == GPSD_FIX_RTK_FIXED   ? SIGMA_RTK_FIXED_M
                         : report->status == GPSD_FIX_RTK_FLOAT ? SIGMA_RTK_FLOAT_M
                                                                : HUGE_VAL;
   if (report->east_m > 0.0 && report->north_m > 0.0)
-    return fmin(hypot(report->east_m, report->north_m) / M_SQRT2, most_m);
-  if (report->across_m > 0.0) return fmin(report->across_m, most_m);
+    return fmin(scale * hypot(report->east_m, report->north_m) / M_SQRT2, most_m);
+  if (report->across_m > 0.0) return fmin(scale * report->across_m, most_m);
   if (most_m < HUGE_VAL) return most_m;
   return report->status == GPSD_FIX_DGPS ? SIGMA_DGPS_M : SIGMA_PLAIN_M;
 }
@@ -201,9 +203,10 @@ static void position(const gpsd *self, const gpsd_report *report, wm_stream_row 
   const double place[3] = {report->latitude_deg, report->longitude_deg,
                            has_altitude ? report->ellipsoid_m : self->origin[2]};
   local_frame(self->origin, place, out->number);
-  const double sigma_m = self->config.accuracy_scale * sigma_of(self, report, out->arrival_ns);
-  const double stated_m = has_deviations(self, out->arrival_ns) ? self->deviation_up_m : report->up_m;
-  const double up_m = stated_m > 0.0 ? self->config.accuracy_scale * stated_m : UP_SIGMAS * sigma_m;
+  const double sigma_m = sigma_of(self, report, out->arrival_ns);
+  const double stated_m =
+      has_deviations(self, out->arrival_ns) ? self->deviation_up_m : self->config.accuracy_scale * report->up_m;
+  const double up_m = stated_m > 0.0 ? stated_m : UP_SIGMAS * sigma_m;
   if (!has_altitude) out->number[2] = (double)NAN;
   out->number[3] = sigma_m;
   out->number[4] = has_altitude ? up_m : (double)NAN;
@@ -212,10 +215,9 @@ static void position(const gpsd *self, const gpsd_report *report, wm_stream_row 
 // A heading in the map, whose x axis points east.
 static int course(const gpsd *self, const gpsd_report *report, wm_stream_row *out) {
   if (!(report->speed_mps >= self->config.course_min_mps) || isnan(report->track_deg)) return 0;
-  const double sigma_rad =
-      report->track_error_deg > 0.0 ? report->track_error_deg * DEGREE : atan2(VELOCITY_SIGMA_MPS, report->speed_mps);
   out->number[0] = M_PI_2 - report->track_deg * DEGREE;
-  out->number[1] = self->config.accuracy_scale * sigma_rad;
+  out->number[1] = report->track_error_deg > 0.0 ? self->config.accuracy_scale * report->track_error_deg * DEGREE
+                                                 : atan2(VELOCITY_SIGMA_MPS, report->speed_mps);
   return 1;
 }
 

@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "gpsd_report.h"
-#include "local_frame.h"
+#include "waymark/local_frame.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 

@@ -97,10 +97,10 @@ const char *wm_can_quantity_name(unsigned quantity);
 // The bindings of one source: motion, or the GNSS receiver.
 typedef enum wm_can_part { WM_CAN_MOTION, WM_CAN_GNSS } wm_can_part;
 
-// Positions from the values of a GNSS receiver, in metres east and north of an origin (WGS84 by its radii of curvature
-// there: 0.02 m off at 300 m and 0.2 m at 1 km) and above it.
+// Positions from the values of a GNSS receiver, in metres east, north and up of an origin: in the plane that touches the
+// WGS84 ellipsoid there (waymark/local_frame.h).
 typedef struct wm_can_gnss {
-  double origin[3];  // rad, rad, m; NaN: the first position
+  double origin[3];  // degrees, degrees, m; NaN: the first position
   double level_m;    // the map's above the ellipsoid
   double value[WM_CAN_COUNT - WM_CAN_LATITUDE];
   uint32_t fresh;  // bit per value since the last position

@@ -5,8 +5,8 @@
 #include <math.h>
 #include <string.h>
 
-#include "local_frame.h"
 #include "unity.h"
+#include "waymark/local_frame.h"
 
 static gpsd_report report;
 

@@ -152,18 +152,20 @@ static void sigmas_follow_the_fix(void) {
                 {"\"mode\":3,\"status\":4,\"lat\":48,\"lon\":11,\"eph\":17.1", 0.5},
                 {"\"mode\":3,\"status\":3,\"lat\":48,\"lon\":11", 0.05},
                 {"\"mode\":3,\"status\":3,\"lat\":48,\"lon\":11,\"epx\":15,\"epy\":17", 0.05},
-                {"\"mode\":3,\"status\":3,\"lat\":48,\"lon\":11,\"eph\":0.02", 0.02}};
+                {"\"mode\":3,\"status\":3,\"lat\":48,\"lon\":11,\"eph\":0.02", 0.04},
+                {"\"mode\":3,\"status\":3,\"lat\":48,\"lon\":11,\"eph\":0.04", 0.05},
+                {"\"mode\":3,\"status\":1,\"lat\":48,\"lon\":11,\"epx\":3,\"epy\":3", 6}};
   config.accuracy_scale = 2;
   begin_connected();
   for (size_t i = 0; i < sizeof kFixes / sizeof kFixes[0]; i++) {
     report(utc_ns(), kFixes[i].members);
     expect(WM_OK);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 2 * kFixes[i].sigma_m, event.as.position.sigma_xy_m);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, kFixes[i].sigma_m, event.as.position.sigma_xy_m);
     TEST_ASSERT_DOUBLE_IS_NAN(event.as.position.p_m[2]);
     TEST_ASSERT_DOUBLE_IS_NAN(event.as.position.sigma_z_m);
   }
-  TEST_ASSERT_EQUAL_UINT32(4, source->counts.news);  // each type once
-  expect_state(WM_DEVICE_WORKS, "RTK fixed");
+  TEST_ASSERT_EQUAL_UINT32(5, source->counts.news);  // each change of the type
+  expect_state(WM_DEVICE_WORKS, "fix without corrections");
 }
 
 static void deviations(const char *lat_m) {
@@ -174,6 +176,7 @@ static void deviations(const char *lat_m) {
 
 // The receiver's own sigmas, and not beyond a change of the fix: the first position without corrections leaps.
 static void a_receivers_deviations_are_of_its_fix(void) {
+  config.accuracy_scale = 0.2;  // of gpsd's estimates alone
   begin_connected();
   report(utc_ns(), "\"mode\":3,\"status\":3," PLACE);
   expect(WM_OK);

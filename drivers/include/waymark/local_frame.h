@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Positions by latitude and longitude (WGS84) in metres east, north and up of an origin: the tangent plane there, exact
 // at any distance.
-#ifndef WM_GNSS_LOCAL_FRAME_H
-#define WM_GNSS_LOCAL_FRAME_H
+#ifndef WAYMARK_LOCAL_FRAME_H
+#define WAYMARK_LOCAL_FRAME_H
 
 // Degrees, degrees, metres above the ellipsoid.
 void local_frame(const double origin[3], const double place[3], double east_north_up_m[3]);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "local_frame.h"
+#include "waymark/local_frame.h"
 
 #include <math.h>
 
