@@ -47,6 +47,8 @@ typedef struct gpsd {
   int skips;           // the rest of a line that is too long
   foreign_clock receiver;
   int fix;                             // gpsd_fix; -1: none
+  int is_stored;                       // what a receiver for time reports is a stored place
+  wm_time_ns taken_ns;                 // UTC of the last row; WM_TIME_NONE: none
   wm_time_ns deviations_ns;            // when the receiver's own sigmas came; WM_TIME_NONE: none
   double deviation_m, deviation_up_m;  // of an axis, and of the altitude
   char gone[100];                      // why there is no fix
@@ -64,7 +66,8 @@ static void disconnect(gpsd *self) {
   self->is_connected = self->skips = 0;
   self->used = self->taken = 0;
   self->fix = -1;
-  self->deviations_ns = WM_TIME_NONE;
+  self->is_stored = 0;
+  self->deviations_ns = self->taken_ns = WM_TIME_NONE;
   self->gone[0] = '\0';
 }
 
@@ -264,6 +267,17 @@ static int take(gpsd *self, const gpsd_report *report, wm_stream_row *out, wm_so
     counts->ignored++;
     return 0;
   }
+  if (report->status > GPSD_FIX_UNKNOWN) self->is_stored = report->status == GPSD_FIX_TIME;
+  if (self->is_stored) {
+    set_fix(self, -1, "its receiver is one for time and reports a stored place", counts);
+    counts->ignored++;
+    return 0;
+  }
+  // Several sentences of a receiver make several reports of one epoch: the follower of its clock may move between them.
+  if (report->time_ns != WM_TIME_NONE && report->time_ns == self->taken_ns) {
+    counts->ignored++;
+    return 0;
+  }
   set_fix(self, report->status >= 0.0 && report->status < GPSD_FIX_COUNT ? (int)report->status : GPSD_FIX_UNKNOWN, "",
           counts);
   if (self->config.from == WM_GPSD_COURSE) return course(self, report, out);
@@ -286,6 +300,7 @@ static wm_status next_row(wm_row_device *base, wm_stream_row *out, wm_source_cou
     out->arrival_ns = self->read_ns;
     if (!why && take(self, &report, out, counts)) {
       why = stamp(self, report.time_ns, out, counts);
+      self->taken_ns = report.time_ns;
       if (!why) status = WM_OK;
     }
     if (why) wm_source_refuse(counts, base->where, why);
@@ -330,7 +345,7 @@ wm_status wm_gpsd_open(const wm_gpsd_device_config *config, const double origin[
   self->config = *config;
   memcpy(self->origin, origin, sizeof self->origin);
   self->fd = self->fix = -1;
-  self->deviations_ns = WM_TIME_NONE;
+  self->deviations_ns = self->taken_ns = WM_TIME_NONE;
   self->base.ops = &kGpsd;
   (void)snprintf(self->base.stream, sizeof self->base.stream, "%s", wm_gpsd_stream(config));
   (void)snprintf(self->base.where, sizeof self->base.where, "%.50s:%d", config->host, (int)config->port);

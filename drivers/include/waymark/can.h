@@ -97,8 +97,8 @@ const char *wm_can_quantity_name(unsigned quantity);
 // The bindings of one source: motion, or the GNSS receiver.
 typedef enum wm_can_part { WM_CAN_MOTION, WM_CAN_GNSS } wm_can_part;
 
-// Positions from the values of a GNSS receiver, in metres east, north and up of an origin: in the plane that touches the
-// WGS84 ellipsoid there (waymark/local_frame.h).
+// Positions from the values of a GNSS receiver, in metres east, north and up of an origin: in the plane that touches
+// the WGS84 ellipsoid there (waymark/local_frame.h).
 typedef struct wm_can_gnss {
   double origin[3];  // degrees, degrees, m; NaN: the first position
   double level_m;    // the map's above the ellipsoid

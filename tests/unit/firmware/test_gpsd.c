@@ -249,6 +249,30 @@ static void without_a_fix_nothing_is_fused(void) {
   TEST_ASSERT_EQUAL_UINT64(6, source->counts.ignored);
 }
 
+// A receiver for time sends its stored place with status 7, and again without a status.
+static void a_stored_place_is_no_fix(void) {
+  begin_connected();
+  report(utc_ns(), "\"mode\":3,\"status\":7," PLACE);
+  expect(WM_AGAIN);
+  expect_state(WM_DEVICE_DOWN, "a stored place");
+  report(utc_ns(), "\"mode\":3," PLACE);
+  expect(WM_AGAIN);
+  report(utc_ns(), FIX);
+  expect(WM_OK);
+}
+
+static void reports_of_one_epoch_are_one_row(void) {
+  begin_connected();
+  const wm_time_ns t_ns = utc_ns();
+  report(t_ns, FIX);
+  expect(WM_OK);
+  report(t_ns, FIX ",\"speed\":1");
+  expect(WM_AGAIN);
+  TEST_ASSERT_EQUAL_UINT64(1, source->counts.ignored);
+  report(utc_ns(), FIX);
+  expect(WM_OK);
+}
+
 static void rubbish_is_counted(void) {
   begin_connected();
   say("$GPGGA,1,2,3\r\n{\"class\":\"TPV\",\r\n");
@@ -380,6 +404,8 @@ int main(void) {
   RUN_TEST(a_course_is_a_heading);
   RUN_TEST(antennas_give_a_heading);
   RUN_TEST(without_a_fix_nothing_is_fused);
+  RUN_TEST(a_stored_place_is_no_fix);
+  RUN_TEST(reports_of_one_epoch_are_one_row);
   RUN_TEST(rubbish_is_counted);
   RUN_TEST(an_accuracy_that_cannot_be_is_refused);
   RUN_TEST(doubled_and_older_reports_are_counted);
