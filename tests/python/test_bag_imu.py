@@ -281,6 +281,16 @@ class Transforms(ImuTest):
         self.assertIn("'wheel' moves in 'base_link'", said)
         self.assertNotIn("'base_link' moves", said)
 
+    def test_a_late_message_of_tf_static_counts(self):
+        turned = matrix((0.1, 0, 0.2), (np.pi / 2, 0, 0))
+
+        def tf(bag):
+            for t in np.arange(0, 14, 0.005):
+                bag.tf("odom", "base_link", matrix((t, 0, 0)), "/tf", ns(t), ns(t))
+            bag.tf("base_link", "imu_link", turned, log=ns(14.5))
+
+        self.mounted(tf)
+
     def test_a_moving_joint_on_the_way_is_named(self):
         bag = self.with_imu()
         for t in times():

@@ -146,6 +146,12 @@ class SensorsWithALever(BagTest):
         self.assertIn("camera_pose_frame", said)
         self.assert_end(recording, said)
 
+    def test_a_lever_that_nobody_states_is_named(self):
+        for ahead in (1.0, -0.4):
+            recording, said = self.take(self.put(matrix((ahead, 0, 0.4)), lambda bag: None, child="base_link"))
+            self.assertIn(f"{abs(ahead):.2f} m {'ahead of' if ahead > 0 else 'behind'} the axle", said)
+            self.assertIn("motion6.csv", recording.streams())
+
     def test_other_names_of_the_robot_s_frame(self):
         for child in ("base_footprint", "/base_link", "robot1/base_link", "chassis", ""):
             with self.subTest(child):

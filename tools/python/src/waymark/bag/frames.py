@@ -50,8 +50,10 @@ class Frames:
             elif self._differs(old, matrix):
                 self.moving.add(key)
 
-    def is_known(self, raw: bytes | memoryview) -> bool:
+    def is_known(self, topic: str, raw: bytes | memoryview) -> bool:
         """Whether a serialized message of /tf brings nothing new: the same bytes but for the stamp, or one of very many."""
+        if topic.endswith("tf_static"):  # few, and each once
+            return False
         data = bytes(raw)
         key = data.replace(data[8:16], b"") if len(data) > 16 else data
         if key in self._seen:

@@ -33,6 +33,7 @@ _REPEATS = 0.5  # share of messages that repeat the one before, from which on it
 _LATE_MAX_NS = 100_000_000  # differences are known at their end: as twists only where that is soon enough to be fused
 _POSE_UNITS = {1000.0: "mm", 100.0: "cm", 39.37: "inches"}
 _FLAT = 1e-3  # m/s, rad/s: a part of the twist that stays below is none: the floats' own, or that of poses as text
+_LEVER_R, _LEVER_M = 0.95, 0.05  # skid steer and legs slide, too, and their sideways speed follows nothing so closely
 _NAMES = ("x", "y", "z")
 
 
@@ -253,6 +254,17 @@ def _poses_alone(into: Collection, topic: str, samples: Samples) -> Motion:
                   said=[(False, "the differences of its poses are the motion")])
 
 
+def _name_lever(motion: Motion) -> None:
+    """Says where the point whose motion is measured lies ahead of the one about which the robot turns: of two wheels' axle nothing moves sideways."""
+    borders = compare.grid(motion.t_ns)
+    windows = compare.held(motion.t_ns, motion.twist[:, [1, 5]], borders)
+    alike = compare.likeness(windows[:, 0], windows[:, 1])
+    if compare.turns(windows[:, 1]) and abs(alike.r) > _LEVER_R and abs(alike.factor) > _LEVER_M:
+        where = "ahead of" if alike.factor > 0 else "behind"
+        motion.said.append((False, f"its sideways speed is {alike.factor:.2f} m times its turn rate (r {alike.r:.2f}): it moves as a point "
+                                   f"{abs(alike.factor):.2f} m {where} the axle; where a sensor sits there, tf and child_frame_id have to say so"))
+
+
 def _rank(into: Collection, motion: Motion, base: str, span_s: float) -> tuple[float, ...]:
     """Smaller is better: measured before commanded, a sensor before a truth or a filter's answer, what moves before what doesn't,
     what lasts, what agrees with itself, the robot's own frame."""
@@ -285,6 +297,7 @@ def choose(into: Collection, given: argparse.Namespace, base: str) -> Motion | N
         if other is not best:
             kind = "commands, not measured motion; " if other.is_command and not best.is_command else ""
             into.refuse(other.topic, f"{kind}motion comes from {best.topic}; --motion {other.topic} takes this one")
+    _name_lever(best)
     for finding, text in best.said:
         (into.find if finding else into.note)(best.topic, text)
     if best.is_command:

@@ -57,7 +57,7 @@ def read(bag: Bag, into: Collection, progress: Progress | None) -> dict[str, lis
     for count, (topic, log_ns, raw) in enumerate(bag.messages(lambda topic: id(topic) in wanted)):
         if progress and count % _EVERY == 0:
             progress(bag.done)
-        if topic.name in into.refused or (topic.kind in TRANSFORMS and into.frames.is_known(raw)):
+        if topic.name in into.refused or (topic.kind in TRANSFORMS and into.frames.is_known(topic.name, raw)):
             continue
         counts[topic.name] = counts.get(topic.name, 0) + 1
         if is_ours(topic):
