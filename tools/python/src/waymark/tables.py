@@ -16,6 +16,7 @@ Table: TypeAlias = dict[str, Array]
 
 _WORDS = {"sensor", "source", "state", "verdict", "residual", "picture", "cause"}
 _COUNTS = {"id", "landmark", "frame", "polyline", "resets"}
+_BLOCK_ROWS = 4096  # written at once
 ABSENT = -1
 """An empty field of a column of integers."""
 
@@ -141,5 +142,7 @@ def write_table(path: str | Path, table: Mapping[str, Any]) -> None:
     columns = as_table(table, str(path))
     with Path(path).open("w", newline="", encoding="utf-8") as file:
         file.write(",".join(columns) + "\n")
-        for row in zip(*(column.tolist() for column in columns.values())):
-            file.write(",".join(map(field_text, row)) + "\n")
+        rows = max(map(len, columns.values()), default=0)
+        for begin in range(0, rows, _BLOCK_ROWS):  # as objects of Python a row is ten times as large
+            for row in zip(*(column[begin : begin + _BLOCK_ROWS].tolist() for column in columns.values())):
+                file.write(",".join(map(field_text, row)) + "\n")
