@@ -227,12 +227,17 @@ def _by_stamps(topic: _Topic, reference: list[_Topic], reference_ns: int, say: S
 
 def once(times: Array, values: Array) -> Array:
     """Which messages are the first with their stamp and content: a row that comes twice counts once."""
-    rows = np.column_stack([times[:, 0].astype(np.float64), times[:, 0] % 1_000_003, values])
-    stamped = times[:, 0] != 0
-    _, first = np.unique(rows[stamped].view([("", rows.dtype)] * rows.shape[1]), return_index=True)
-    keep = ~stamped
-    keep[np.flatnonzero(stamped)[first]] = True
-    return np.asarray(keep)
+    keep, stamp = np.ones(len(times), dtype=bool), times[:, 0]
+    order = np.argsort(stamp, kind="stable")
+    pairs = np.flatnonzero(np.diff(stamp[order]) == 0)
+    shared = np.unique(order[np.concatenate([pairs, pairs + 1])])  # few, as a rule none: rows are compared among these alone
+    shared = shared[stamp[shared] != 0]
+    if len(shared):
+        rows = np.column_stack([stamp[shared].astype(np.float64), stamp[shared] % 1_000_003, values[shared]])
+        _, first = np.unique(rows.view([("", rows.dtype)] * rows.shape[1]), return_index=True)
+        keep[shared] = False
+        keep[shared[first]] = True
+    return keep
 
 
 def settle(stamps: dict[str, Array], note: Say) -> dict[str, Clock]:
