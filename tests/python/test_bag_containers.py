@@ -161,7 +161,7 @@ class Cut(BagTest):
         return text, len(t)
 
     def test_a_file_that_is_cut_is_read_up_to_the_cut(self):
-        whole = {"zstd.mcap": self.events.mcap(self.folder / "a", CompressionType.ZSTD, 1 << 15), "lz4.mcap": self.events.mcap(
+        whole = {"one chunk.mcap": self.events.mcap(self.folder / "g", CompressionType.NONE, 1 << 24), "zstd.mcap": self.events.mcap(self.folder / "a", CompressionType.ZSTD, 1 << 15), "lz4.mcap": self.events.mcap(
             self.folder / "b", CompressionType.LZ4, 1 << 15), "plain.mcap": self.events.mcap(self.folder / "c", CompressionType.NONE),
             "loose.mcap": self.events.mcap(self.folder / "d", chunking=False), "ros1.bag": self.events.ros1(self.folder / "e"),
             "bz2.bag": self.events.ros1(self.folder / "f", Ros1Writer.CompressionFormat.BZ2)}

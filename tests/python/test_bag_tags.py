@@ -129,6 +129,13 @@ FAMILIES = {"tag16h5": 6, "tag25h9": 7, "tag36h10": 8, "tag36h11": 8, "tagStanda
 POSES = [pose(), pose(-20, -40, 160, (-0.06, 0.05, 0.7)), pose(10, 35, -70, (0.1, 0.04, 0.75))]
 
 
+def with_lens():
+    """The camera_info of the camera that sees."""
+    events = Events()
+    events.put("/cam/camera_info", "CameraInfo", START_NS, camera_info(START_NS, "cam_optical", SIZE, (F, F, *C)))
+    return events
+
+
 class Corners(BagTest):
     def detected(self, name, pictures, family, size_m=TAG_M):
         """What `waymark detect` finds: rows of its table."""
@@ -161,7 +168,7 @@ class Corners(BagTest):
                 modules = library.picture(family, 7)
                 pictures = [rendered(modules, edge, *p) for p in POSES]
                 own = self.detected(family, pictures, family)
-                events = Events()
+                events = with_lens()
                 for i, picture in enumerate(pictures):
                     (found,) = library.detect(family, picture)
                     t_ns, points = START_NS + i * STEP_NS, np.reshape(found[1], (4, 2))
@@ -188,7 +195,7 @@ class Corners(BagTest):
         pictures = [rendered(aruco_modules(), 6, *p) for p in POSES]
         own = self.detected("aruco", pictures, "aruco_4x4_50")
         self.assertEqual([int(row["id"]) for row in own], [0, 0, 0])
-        events = Events()
+        events = with_lens()
         for i, p in enumerate(POSES):
             t_ns, at = START_NS + i * STEP_NS, pixels(*p, OURS * TAG_M / 2)  # upper left first, clockwise; a pixel's middle is whole
             fields = {f"{axis}{k}": float(at[k]["xy".index(axis)]) for k in range(4) for axis in "xy"}
@@ -285,8 +292,14 @@ class Rectified(BagTest):
 
     def corners(self, info, *options, out="out"):
         text, folder = self.take(april_events(self.POINTS, info=info).mcap(self.folder / "a.mcap"), *options, out=out)
-        table = waymark.Recording(folder).table("marker-corners.csv")
+        table = waymark.Recording(folder).table("marker-corners.csv" if info else "marker-corners-cam.csv")
         return text, np.array([[table[f"{axis}{k}_px"][0] for axis in "uv"] for k in range(4)])
+
+    def test_corners_without_a_lens_are_kept_aside(self):
+        text, found = self.corners(None)
+        np.testing.assert_allclose(found, (self.POINTS - 0.5)[[1, 0, 3, 2]], atol=1e-9)
+        self.assertIn("marker-corners-cam.csv", text)
+        self.assertFalse((self.folder / "out/marker-corners.csv").exists())
 
     def test_corners_of_the_rectified_picture_become_the_raw_one_s(self):
         from waymark.bag.lens_fit import equidistant, radtan
@@ -303,7 +316,7 @@ class Rectified(BagTest):
 
     def test_where_both_pictures_are_the_same_nothing_is_done(self):
         as_read = (self.POINTS - 0.5)[[1, 0, 3, 2]]
-        for i, info in enumerate((None, {"k": (150, 150, 160, 120)}, {"k": (150, 150, 160, 120), "p": (150, 150, 160, 120)},
+        for i, info in enumerate(({"k": (150, 150, 160, 120)}, {"k": (150, 150, 160, 120), "p": (150, 150, 160, 120)},
                                   {"k": (150, 150, 160, 120), "d": (-0.3, 0.1, 0, 0, 0)})):  # the last: P of zeros, nothing is rectified
             text, found = self.corners(info, out=str(i))
             np.testing.assert_allclose(found, as_read, atol=1e-9)
