@@ -3,7 +3,7 @@
 """`waymark import` of bags that were changed at random: fields, types, stamps, counts, bytes. No crash, no text of a library, and a part that is
 bad doesn't cost the others. What is written, the reader takes.
 
-    test_bag_sweep.py BIN_DIR      WAYMARK_MUTANTS: how many (40), WAYMARK_MUTANT: that one alone, or FIRST-LAST, WAYMARK_SEED: of their numbers (1)"""
+    test_bag_sweep.py BIN_DIR      WAYMARK_MUTANTS: how many (12), WAYMARK_MUTANT: that one alone, or FIRST-LAST, WAYMARK_SEED: of their numbers (1)"""
 
 import copy
 import dataclasses
@@ -24,7 +24,7 @@ from rosbags.rosbag2 import StoragePlugin
 
 import waymark
 
-COUNT = int(os.environ.get("WAYMARK_MUTANTS", "40"))
+COUNT = int(os.environ.get("WAYMARK_MUTANTS", "12"))
 ALONE = os.environ.get("WAYMARK_MUTANT")
 SEED = int(os.environ.get("WAYMARK_SEED", "1"))
 # What a person must not read: names of libraries and their exceptions, types and addresses of Python.
@@ -89,7 +89,7 @@ def changed(value, chance):
     if isinstance(value, float):
         return chance.choice([float("nan"), float("inf"), -float("inf"), 0.0, -value, 1e300, 1e9, -1.0, value * 57.29578])
     if isinstance(value, int):
-        return chance.choice([0, 1, 2, 127, 255])  # fits the integers of all fields that are changed
+        return chance.choice([0, 1, 2, 100, 127])  # fits the integers of all fields that are changed
     if isinstance(value, str):
         return chance.choice(["", "/", "x" * 300, "mono16", "\N{SNOWMAN}", "16UC1", "base_link", "front_optical"])
     if isinstance(value, np.ndarray):

@@ -62,11 +62,11 @@ class CanLog:
         index = list(self._names).index(topic)
         self._spool.write(_RECORD.pack(frame.t_ns, log_ns, index, frame.id, flags, len(frame.data), frame.data))
 
-    def finish(self, clocks: Mapping[str, Callable[[Array, Array], tuple[Array, Array]]]) -> None:
-        """Writes can.log, with the times that the topics' clocks make of stamps and log."""
+    def finish(self, clocks: Mapping[str, Callable[[Array, Array], tuple[Array, Array]]]) -> int:
+        """Writes can.log, with the times that the topics' clocks make of stamps and log. How many are left out: candump has no times before 0."""
         topics = list(self._names)
         held: list[tuple[int, int, CanFrame]] = []
-        count = 0
+        count = before = 0
         self._spool.seek(0)
         while block := self._spool.read(_RECORD.size * _HELD):
             rows = np.frombuffer(block, dtype=_ROW)
@@ -78,6 +78,9 @@ class CanLog:
                 _, _, index, identity, flags, length, data = row
                 frame = CanFrame(t, self._names[topics[index]], identity, bool(flags & 1), data.ljust(length, b"\0"), 1 if flags & 8 else None,
                                  bool(flags & 2), bool(flags & 4))
+                if t < 0:
+                    before += 1
+                    continue
                 count += 1
                 heapq.heappush(held, (t, count, frame))
                 if len(held) > _HELD:
@@ -85,6 +88,7 @@ class CanLog:
         while held:
             self._writer.can(heapq.heappop(held)[2])
         self._spool.close()
+        return before
 
 
 def frame_of(t_ns: int, name: str, message: Any) -> CanFrame:

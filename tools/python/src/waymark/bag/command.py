@@ -70,7 +70,8 @@ def import_bag(path: Path, out: Path, given: argparse.Namespace, progress: Progr
             columns = [name for name in rows[0].__dataclass_fields__ if name not in ("header", "__msgtype__")]
             writer.table(topic.removeprefix("/recording/").replace("_", "-") + ".csv", streams.rows_to_table(rows, columns))
         into.settle()
-        into.can.finish(into.clocks)
+        if before := into.can.finish(into.clocks):
+            into.note("can.log", f"{before} frames have times before 1970, which candump can't write: left out")
         if ours:  # an export of ours: what isn't taken follows from the recording
             into.refused.clear()
             if "/truth/pose" in into.samples.get("poses", {}):
