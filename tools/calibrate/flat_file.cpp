@@ -56,7 +56,34 @@ FlatFile::Entry &FlatFile::at(const std::string &key, int line) {
   return place->second;
 }
 
-void FlatFile::read_yaml(const std::string &text) {
+namespace {
+
+// The end of the first document: a line "---" or "..." behind something that is neither blank nor a comment, as
+// `ros2 topic echo` writes it behind each message. `further`: documents behind it.
+size_t first_document(const std::string &text, size_t &further) {
+  size_t end = text.size();
+  bool has_content = false;
+  for (size_t at = 0; at < text.size();) {
+    const size_t next = std::min(text.find_first_of("\r\n", at), text.size());
+    const std::string line = text.substr(at, next - at);
+    const bool parts = line == "---" || line == "..." || line.starts_with("--- ");
+    if (parts && has_content) {
+      end = std::min(end, at);
+      has_content = false;
+    } else if (!parts && line.find_first_not_of(" \t\xEF\xBB\xBF") != std::string::npos && line[0] != '#' &&
+               line[0] != '%') {
+      further += end < text.size() && !has_content;
+      has_content = true;
+    }
+    at = next + 1;
+  }
+  return end;
+}
+
+}  // namespace
+
+void FlatFile::read_yaml(const std::string &whole) {
+  const std::string text = whole.substr(0, first_document(whole, further_documents_));
   wm_error error{};
   wm_yaml *parsed = nullptr;
   const wm_status status = wm_yaml_parse(text.data(), text.size(), path_.c_str(), &parsed, &error);
@@ -161,6 +188,18 @@ std::vector<double> FlatFile::numbers(const std::string &key) const {
     const auto [end, problem] = std::from_chars(from, to, value);
     if (problem != std::errc{} || end != to || !std::isfinite(value)) fail(key, "'" + word + "' is not a number");
     out.push_back(value);
+  }
+  return out;
+}
+
+FlatFile FlatFile::below(const std::string &key) const {
+  FlatFile out;
+  out.path_ = path_;
+  const std::string prefix = key + ".";
+  for (const std::string &name : order_) {
+    if (!name.starts_with(prefix)) continue;
+    out.order_.push_back(name.substr(prefix.size()));
+    out.entries_[out.order_.back()] = entries_.at(name);
   }
   return out;
 }

@@ -35,6 +35,10 @@ class FlatFile {
   // "FILE:LINE: KEY: text" as a Failure to throw.
   [[noreturn]] void fail(const std::string &key, const std::string &text) const;
   [[nodiscard]] const std::string &path() const { return path_; }
+  // What is below a key, as a file of its own.
+  [[nodiscard]] FlatFile below(const std::string &key) const;
+  // Documents of the YAML (parted by lines of ---) behind the first one, which alone is read.
+  [[nodiscard]] size_t further_documents() const { return further_documents_; }
 
  private:
   friend class Flattener;
@@ -43,6 +47,7 @@ class FlatFile {
   Entry &at(const std::string &key, int line);
 
   std::string path_;
+  size_t further_documents_ = 0;
   std::map<std::string, Entry> entries_;
   std::vector<std::string> order_;
 };

@@ -34,8 +34,9 @@ struct ImportHints {
   std::string lens;           // "plain" (radial and tangential) or "fisheye", for OpenCV's four coefficients
 };
 
-// Recognises OpenCV's FileStorage (YAML, XML), Kalibr's camchain, ROS camera_info and OCamCalib's text, and reads all
-// cameras in it. Throws tools::Failure with file, line and key, and with what to do.
+// Recognises OpenCV's FileStorage (YAML, XML), Kalibr's camchain, ROS camera_info (YAML, JSON, INI), PhotonVision's
+// JSON and OCamCalib's text, also packed by gzip, and reads all cameras in it. Throws tools::Failure with file, line
+// and key, and with what to do.
 std::vector<ForeignCamera> read_foreign(const std::filesystem::path &file, const ImportHints &hints);
 
 // As an entry named `name`, without a mounting: the same model where we have it (`model` "auto" or its name), else the
@@ -47,6 +48,7 @@ Entry import_camera(const ForeignCamera &camera, const std::string &name, const 
 std::vector<ForeignCamera> read_opencv(const FlatFile &file, const ImportHints &hints);
 std::vector<ForeignCamera> read_kalibr(const FlatFile &file, const ImportHints &hints);
 std::vector<ForeignCamera> read_ros(const FlatFile &file, const ImportHints &hints);
+std::vector<ForeignCamera> read_ros_ini(const std::string &text, const std::string &path, const ImportHints &hints);
 std::vector<ForeignCamera> read_ocamcalib(const std::string &text, const std::string &path, const ImportHints &hints);
 
 // ── the models ──

@@ -1,31 +1,60 @@
 // SPDX-License-Identifier: Apache-2.0
 // Which program wrote a file.
-#include <cstring>
-#include <fstream>
 #include <sstream>
 
 #include "calibrate/foreign.h"
 #include "common/failure.h"
+#include "common/unpacked.h"
 
 namespace wm::calibrate {
+
+namespace {
+
+// "[image]" alone on a line begins the INI of ROS' camera_calibration, behind comments.
+bool is_ros_ini(const std::string &text) {
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    if (line.starts_with('#') || line.find_first_not_of(" \t\r") == std::string::npos) continue;
+    return line.starts_with("[image]");
+  }
+  return false;
+}
+
+bool is_ros(const FlatFile &file) {
+  return file.has("distortion_model") && file.first({"image_width", "width"}) != nullptr &&
+         file.first({"camera_matrix.data", "K", "k"}) != nullptr;
+}
+
+// PhotonVision's settings of a camera have a list with a calibration for each size of picture.
+std::vector<ForeignCamera> read_photonvision_settings(const FlatFile &file, const ImportHints &hints) {
+  std::vector<ForeignCamera> out;
+  for (size_t i = 0; file.has("calibrations." + std::to_string(i) + ".cameraIntrinsics"); i++) {
+    const FlatFile part = file.below("calibrations." + std::to_string(i));
+    for (ForeignCamera &camera : read_opencv(part, hints)) {
+      camera.name = "camera" + std::to_string(camera.width) + "x" + std::to_string(camera.height);
+      out.push_back(camera);
+    }
+  }
+  return out;
+}
+
+}  // namespace
 
 std::vector<ForeignCamera> read_foreign(const std::filesystem::path &path, const ImportHints &hints) {
   if (std::filesystem::is_directory(path))
     throw tools::Failure(path.string() + ": is a folder; a calibration file is needed", tools::kUsage);
-  std::ifstream file(path, std::ios::binary);
-  if (!file) throw tools::Failure(path.string() + ": cannot be read: " + std::strerror(errno), tools::kUsage);
-  std::stringstream content;
-  content << file.rdbuf();
-  const std::string text = content.str();
+  const std::string text = tools::read_unpacked(path);
+  if (is_ros_ini(text)) return read_ros_ini(text, path.string(), hints);
   if (text.starts_with('#') && text.find("polynomial") != std::string::npos)
     return read_ocamcalib(text, path.string(), hints);
 
   const FlatFile flat = FlatFile::parse(text, path.string());
   for (const std::string &name : flat.children(""))
     if (flat.has(name + ".camera_model")) return read_kalibr(flat, hints);
-  const bool ros = flat.has("distortion_model") && flat.first({"image_width", "width"}) != nullptr &&
-                   flat.first({"camera_matrix.data", "K", "k"}) != nullptr;
-  if (ros) return read_ros(flat, hints);
+  if (is_ros(flat)) return read_ros(flat, hints);
+  for (const std::string &name : flat.children(""))
+    if (is_ros(flat.below(name))) return read_ros(flat.below(name), hints);  // {"camera_info": {...}}
+  if (flat.has("calibrations.0.cameraIntrinsics")) return read_photonvision_settings(flat, hints);
   if (flat.has("cameras"))
     throw tools::Failure(path.string() + ": is a calibration.yaml already; there is nothing to import");
   return read_opencv(flat, hints);

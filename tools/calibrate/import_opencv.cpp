@@ -6,8 +6,12 @@
 namespace wm::calibrate {
 namespace {
 
+// PhotonVision's JSON; the coefficients' name is wrong in its first versions.
+const char *const kPhotonMatrix = "cameraIntrinsics", *const kPhotonCoefficients = "cameraExtrinsics";
+
 const std::vector<std::string> kMatrix{
-    "camera_matrix", "Camera_Matrix", "cameraMatrix", "CameraMatrix", "intrinsic_matrix", "mtx", "K", "M1", "K1"};
+    "camera_matrix", "Camera_Matrix", "cameraMatrix", "CameraMatrix", "intrinsic_matrix", "mtx", "K", "M1", "K1",
+    kPhotonMatrix};
 const std::vector<std::string> kDistortion{"distortion_coefficients",
                                            "Distortion_Coefficients",
                                            "distCoeffs",
@@ -17,7 +21,8 @@ const std::vector<std::string> kDistortion{"distortion_coefficients",
                                            "DistCoeffs",
                                            "dist",
                                            "D",
-                                           "D1"};
+                                           "D1",
+                                           kPhotonCoefficients};
 
 // The key of a matrix that is there, as it stands or with its numbers under "data"; "" where none is.
 std::string key_of(const FlatFile &file, const std::vector<std::string> &names) {
@@ -33,7 +38,8 @@ void read_size(const FlatFile &file, const ImportHints &hints, int &width, int &
   height = hints.height;
   if (width > 0) return;
   for (const auto &[w, h] : {std::pair{"image_width", "image_height"}, std::pair{"width", "height"},
-                             std::pair{"image_Width", "image_Height"}, std::pair{"imageWidth", "imageHeight"}}) {
+                             std::pair{"image_Width", "image_Height"}, std::pair{"imageWidth", "imageHeight"},
+                             std::pair{"resolution.width", "resolution.height"}}) {
     const std::vector<double> a = file.numbers(w), b = file.numbers(h);
     if (a.size() == 1 && b.size() == 1) width = static_cast<int>(a[0]), height = static_cast<int>(b[0]);
   }
@@ -52,7 +58,7 @@ bool is_fisheye(const FlatFile &file, const ImportHints &hints, const std::strin
   const std::string model = file.text("distortion_model") + file.text("model") + file.text("camera_model");
   for (const char *name : {"fisheye", "equidistant", "kannala", "KANNALA"})
     if (model.find(name) != std::string::npos) return true;
-  if (coefficients == 4 && model.empty())
+  if (coefficients == 4 && model.empty() && !file.has(kPhotonMatrix))
     file.fail(key,
               "four coefficients are k1 k2 p1 p2 of a plain lens or k1 k2 k3 k4 of a fisheye, and the file doesn't "
               "state which; give --lens plain (cv2.calibrateCamera) or --lens fisheye (cv2.fisheye)");
@@ -64,9 +70,10 @@ bool is_fisheye(const FlatFile &file, const ImportHints &hints, const std::strin
 std::vector<ForeignCamera> read_opencv(const FlatFile &file, const ImportHints &hints) {
   const std::string matrix = key_of(file, kMatrix), bending = key_of(file, kDistortion);
   if (matrix.empty())
-    throw tools::Failure(file.path() +
-                         ": no camera matrix in it (camera_matrix, cameraMatrix, K ...); files of OpenCV, Kalibr "
-                         "(camchain), ROS (camera_info) and OCamCalib (calib_results.txt) are understood");
+    throw tools::Failure(
+        file.path() +
+        ": no camera matrix in it (camera_matrix, cameraMatrix, K ...); files of OpenCV, Kalibr "
+        "(camchain), ROS (camera_info, ost.ini), PhotonVision and OCamCalib (calib_results.txt) are understood");
   const std::vector<double> k = file.numbers(matrix);
   const std::vector<double> d = bending.empty() ? std::vector<double>{} : file.numbers(bending);
   if (k.size() != 9) file.fail(matrix, "has " + std::to_string(k.size()) + " numbers; 9 of a 3 x 3 matrix are needed");
@@ -95,7 +102,7 @@ std::vector<ForeignCamera> read_opencv(const FlatFile &file, const ImportHints &
   } else {
     out = plain_camera(m, {d.begin(), d.begin() + static_cast<std::ptrdiff_t>(std::min<size_t>(d.size(), 12))}, width,
                        height);
-    out.model = "OpenCV, " + std::to_string(d.size()) + " coefficients";
+    out.model = (file.has(kPhotonMatrix) ? "PhotonVision, " : "OpenCV, ") + std::to_string(d.size()) + " coefficients";
   }
   out.name = file.text("camera_name");
   if (file.has("M2") || file.has("K2")) out.notes.push_back("a stereo file: only its first camera was taken");

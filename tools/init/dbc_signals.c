@@ -43,8 +43,7 @@ static void fill(const wm_dbc *dbc, const dbc_message *m, const dbc_signal *s, i
   copy(s->name, out->name, sizeof out->name);
   copy(s->unit, out->unit, sizeof out->unit);
   out->line = s->line;
-  out->id = m->id;
-  out->is_extended = m->is_extended;
+  out->match = wm_dbc_match(dbc, m);
   out->bits = s->bits.length;
   out->is_signed = s->bits.kind != SIGNAL_UNSIGNED;
   out->is_float = s->bits.kind == SIGNAL_FLOAT || s->bits.kind == SIGNAL_DOUBLE;

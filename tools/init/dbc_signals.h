@@ -19,9 +19,8 @@ typedef enum init_dimension {
 
 typedef struct init_signal {
   char message[64], name[64], unit[32];
-  int line;  // of the DBC
-  uint32_t id;
-  int is_extended;
+  int line;            // of the DBC
+  wm_can_match match;  // of the frames that it is in
   unsigned bits;
   int is_signed, is_float;
   int is_usable;             // it fits into its message, and its multiplexer is known

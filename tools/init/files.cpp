@@ -201,7 +201,7 @@ std::vector<File> robot_files(const Robot &robot) {
                    can_signals_yaml(*robot.dbc, robot.candidates, robot.signals,
                                     w.can_log.empty() ? "" : std::filesystem::path(w.can_log).filename().string()),
                    "", std::to_string(robot.signals.size()) + " quantities from CAN"});
-    out.push_back({"vehicle.dbc", "", w.dbc, "a copy"});
+    out.push_back({"vehicle.dbc", robot.dbc_text, w.dbc, w.dbc.empty() ? "groups of NMEA 2000" : "a copy"});
   }
   if (robot.tags)
     out.push_back({"landmarks.csv", landmarks_csv(*robot.tags, kMapSigma_m), "",

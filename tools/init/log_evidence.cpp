@@ -5,12 +5,11 @@
 #include <cmath>
 #include <cstdio>
 #include <cstring>
-#include <fstream>
 #include <limits>
 #include <map>
 #include <optional>
 
-#include "common/failure.h"
+#include "init/can_log.h"
 
 namespace wm::init {
 namespace {
@@ -98,8 +97,12 @@ class Weigher {
  public:
   Weigher(const Dbc &dbc, std::vector<Candidate> &candidates) : dbc_(dbc), all_(candidates) {
     for (const Candidate &one : all_) {
-      const init_signal &s = dbc_.signals[one.signal];
-      auto &list = of_id_[{s.id, s.is_extended != 0}];
+      const wm_can_match &match = dbc_.signals[one.signal].match;
+      auto place = std::find_if(bound_.begin(), bound_.end(), [&](const Bound &b) {
+        return b.match.id == match.id && b.match.is_extended == match.is_extended;
+      });
+      if (place == bound_.end()) place = bound_.insert(place, Bound{match, "", {}});
+      std::vector<size_t> &list = place->signals;
       if (std::find(list.begin(), list.end(), one.signal) == list.end()) list.push_back(one.signal);
     }
   }
@@ -116,41 +119,35 @@ class Weigher {
   }
 
  private:
+  struct Bound {
+    wm_can_match match;
+    std::string sender;  // bus and J1939 source address of the first frame; others are passed over
+    std::vector<size_t> signals;
+  };
+
   void read(const std::filesystem::path &path) {
-    std::ifstream file(path, std::ios::binary);
-    if (!file || std::filesystem::is_directory(path)) throw tools::Failure(path.string() + ": cannot be read");
-    std::string line, problem;
-    uint64_t number = 0;
-    while (std::getline(file, line)) {
-      number++;
-      wm_can_frame frame;
-      wm_error error{};
-      const wm_status status = wm_candump_parse(line.data(), line.size(), &frame, &error);
-      if (status == WM_AGAIN) continue;
-      if (status != WM_OK) {
-        if (facts_.malformed++ == 0) problem = path.string() + ":" + std::to_string(number) + ": " + error.text;
-        continue;
-      }
+    survey_ = survey_log(path);
+    facts_.notes = each_frame(path, *survey_, facts_.malformed, [&](const wm_can_frame &frame) {
       if (facts_.frames++ == 0) start_ns_ = frame.t_ns;
       take(frame);
-    }
-    if (facts_.frames == 0)
-      throw tools::Failure(problem.empty() ? path.string() + ": has no frame; `candump -l any` records one" : problem);
-    if (facts_.malformed > 0)
-      facts_.notes.push_back(problem + " (" + std::to_string(facts_.malformed) + " lines are not frames)");
+    });
   }
 
   void take(const wm_can_frame &frame) {
-    const auto list = of_id_.find({frame.id, frame.is_extended != 0});
     const double t_s = static_cast<double>(frame.t_ns - start_ns_) * 1e-9;
     if (t_s < 0 || t_s / kBin_s >= static_cast<double>(kBinsMax)) return;
     facts_.seconds = std::max(facts_.seconds, t_s);
-    if (list == of_id_.end()) return;
-    for (const size_t signal : list->second) {
-      double value = 0;
-      uint64_t raw = 0;
-      if (init_signal_value(dbc_.file.get(), signal, &frame, &value, &raw) == 0) continue;
-      sample(samples_[signal], dbc_.signals[signal], signal, static_cast<size_t>(t_s / kBin_s), value, raw);
+    for (Bound &one : bound_) {
+      if (!wm_can_matches(&one.match, frame.id, frame.is_extended)) continue;
+      const std::string sender = frame.iface + (":" + std::to_string(frame.id & 0xFFU));
+      if (one.sender.empty()) one.sender = sender;
+      if (one.sender != sender) continue;
+      for (const size_t signal : one.signals) {
+        double value = 0;
+        uint64_t raw = 0;
+        if (init_signal_value(dbc_.file.get(), signal, &frame, &value, &raw) == 0) continue;
+        sample(samples_[signal], dbc_.signals[signal], signal, static_cast<size_t>(t_s / kBin_s), value, raw);
+      }
     }
   }
 
@@ -177,13 +174,21 @@ class Weigher {
     counts_[index][bin] = s.unwrapped;
   }
 
+  // What the log has in the place of a message: the id with its other width, or of the same PGN.
+  [[nodiscard]] std::string instead(const wm_can_match &match) const {
+    const wm_can_seen *near = wm_can_survey_nearest(survey_.get(), match.id, match.is_extended);
+    if (near == nullptr) return "";
+    return ", but " + std::to_string(near->frames) + " of " + id_text(near->id, near->is_extended != 0) +
+           (near->is_extended != 0 ? " (29 bits)" : " (11 bits)");
+  }
+
   // Absent and constant signals.
   void presence() {
     for (Candidate &one : all_) {
       if (one.refused.starts_with("it does not fit")) continue;
       const auto place = samples_.find(one.signal);
       if (place == samples_.end()) {
-        one.refused = "no frame of it is in the log";
+        one.refused = "no frame of it is in the log" + instead(dbc_.signals[one.signal].match);
         continue;
       }
       const Samples &s = place->second;
@@ -346,7 +351,8 @@ class Weigher {
 
   const Dbc &dbc_;
   std::vector<Candidate> &all_;
-  std::map<std::pair<uint32_t, bool>, std::vector<size_t>> of_id_;
+  std::vector<Bound> bound_;
+  std::unique_ptr<wm_can_survey> survey_;
   std::map<size_t, Samples> samples_;
   std::map<size_t, Series> counts_, series_;
   LogFacts facts_;

@@ -16,11 +16,12 @@ using wm::init::Robot;
 using wm::init::Wish;
 
 void parse_motion(wm::cli::App *app, Wish *w) {
-  app->add_option(
-         "--motion", w->motion,
-         "how motion is measured: can (the default with --dbc), twist, ticks, speeds, steering (over LCM), none")
+  app->add_option("--motion", w->motion,
+                  "how motion is measured: can (the default with --dbc or --can-log), twist, ticks, speeds, steering "
+                  "(over LCM), none")
       ->check(wm::cli::one_of({"can", "twist", "ticks", "speeds", "steering", "none"}));
-  app->add_option("--dbc", w->dbc, "DBC file of the CAN bus: signals are proposed by name, unit and range");
+  app->add_option("--dbc", w->dbc,
+                  "DBC file of the CAN bus: signals are proposed by name, unit and range; NMEA 2000 needs none");
   app->add_option("--can-log", w->can_log, "a drive by `candump -l`: signals are proposed by how they move, too");
   app->add_option("--can", w->can_interface, "the CAN interface; can0");
   app->add_flag("--imu", w->imu, "another program sends an IMU's gyro over LCM");
@@ -73,7 +74,7 @@ void parse(wm::cli::App *app, Wish *w) {
 
 void print_can(const Robot &robot) {
   if (!robot.dbc) return;
-  std::printf("%s: %zu signals", robot.wish.dbc.c_str(), robot.dbc->signals.size());
+  std::printf("%s: %zu signals", robot.dbc->path.c_str(), robot.dbc->signals.size());
   if (robot.log.frames > 0)
     std::printf("; %s: %" PRIu64 " frames in %.1f s", robot.wish.can_log.c_str(), robot.log.frames, robot.log.seconds);
   std::puts("");

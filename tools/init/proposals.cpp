@@ -161,8 +161,9 @@ class Finder {
   void vehicle_speed() {
     if (signal().dimension != INIT_SPEED && !has(name_, kSpeed)) return;
     if (signal().dimension != INIT_SPEED && signal().dimension != INIT_NO_UNIT) return;
-    if (has(both_, kWheel) || !has(name_, kSpeed) || has(name_, {"ANG*", "YAW*", "STEER*", "LAT*", "WIND", "Z", "Y"}))
-      return;
+    const bool of_wheel =
+        has(both_, kWheel) && !has(name_, {"BASED"});  // J1939's is a vehicle's: WheelBasedVehicleSpeed
+    if (of_wheel || !has(name_, kSpeed) || has(name_, {"ANG*", "YAW*", "STEER*", "LAT*", "WIND", "Z", "Y"})) return;
     const bool plain = has(both_, {"VEHICLE*", "VEH*", "CAR", "ROBOT", "ODOM*", "FORWARD*"}) || name_.size() == 1;
     add(WM_Q_VEHICLE_SPEED, plain ? 3 : 2, "a speed by its name", INIT_SPEED, 2, false);
   }
@@ -217,17 +218,32 @@ std::string joined(const std::vector<std::string> &texts) {
   return out;
 }
 
-Dbc read_dbc(const std::filesystem::path &path) {
+namespace {
+
+Dbc listed(wm_dbc *file, const std::filesystem::path &path) {
   Dbc out;
   out.path = path;
-  wm_dbc *file = nullptr;
-  wm_error error{};
-  if (wm_dbc_load(path.c_str(), &file, &error) != WM_OK) throw tools::Failure(error.text);
   out.file.reset(file);
   out.signals.resize(init_dbc_signals(file, nullptr, 0));
   (void)init_dbc_signals(file, out.signals.data(), out.signals.size());
   if (out.signals.empty()) throw tools::Failure(path.string() + ": has no signals (SG_ lines)");
   return out;
+}
+
+}  // namespace
+
+Dbc read_dbc(const std::filesystem::path &path) {
+  wm_dbc *file = nullptr;
+  wm_error error{};
+  if (wm_dbc_load(path.c_str(), &file, &error) != WM_OK) throw tools::Failure(error.text);
+  return listed(file, path);
+}
+
+Dbc parse_dbc(const std::string &text, const std::string &name) {
+  wm_dbc *file = nullptr;
+  wm_error error{};
+  if (wm_dbc_parse(text.data(), text.size(), name.c_str(), &file, &error) != WM_OK) throw tools::Failure(error.text);
+  return listed(file, name);
 }
 
 std::vector<std::string> words_of(const std::string &name) {

@@ -18,6 +18,7 @@ struct Dbc {
 };
 // Throws tools::Failure with file and line.
 Dbc read_dbc(const std::filesystem::path &path);
+Dbc parse_dbc(const std::string &text, const std::string &name);
 
 // A signal that may be a quantity. `score` orders those of one quantity.
 struct Candidate {

@@ -109,14 +109,14 @@ void ask_maps(Wish &wish) {
 
 void ask_robot(Wish &wish) {
   const bool may_ask = !wish.yes;
-  if (wish.motion.empty() && !wish.dbc.empty()) wish.motion = "can";
+  if (wish.motion.empty() && !(wish.dbc.empty() && wish.can_log.empty())) wish.motion = "can";
   if (wish.motion.empty() && !may_ask)
     throw Failure("--motion is missing: can (with --dbc FILE), twist, ticks, speeds, steering or none", tools::kUsage);
   if (wish.motion.empty()) wish.motion = choose_one("How is the robot's motion measured?", kMotions, "can", "--motion");
   if (wish.motion != "can" && (!wish.dbc.empty() || !wish.can_log.empty()))
     throw Failure("--dbc and --can-log go with --motion can", tools::kUsage);
   if (may_ask && wish.motion == "can") {
-    ask_file(wish.dbc, "The bus' DBC file", "--dbc", true);
+    if (wish.can_log.empty()) ask_file(wish.dbc, "The bus' DBC file", "--dbc", true);
     ask_file(wish.can_log, "A log of a drive by `candump -l`, which shows what moves with what", "--can-log", false);
     if (wish.can_interface.empty()) wish.can_interface = ask("The CAN interface", "can0", "--can");
   }

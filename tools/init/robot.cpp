@@ -9,7 +9,9 @@
 #include "calibrate/flat_file.h"
 #include "calibrate/foreign.h"
 #include "common/failure.h"
+#include "init/can_log.h"
 #include "init/kalibr.h"
+#include "init/nmea2000.h"
 #include "init/text_file.h"
 
 namespace wm::init {
@@ -140,6 +142,10 @@ class Mountings {
     }
     if (link.empty()) link = robot_.urdf->link_of(name);
     if (link.empty()) return std::nullopt;
+    const auto moving = robot_.urdf->moving.find(link);
+    if (moving != robot_.urdf->moving.end())
+      robot_.guesses.push_back("mounting of " + name + ": where " + link + " is while " + moving->second +
+                               ", which moves, is at its 0; poses are wrong while it isn't");
     by = "link " + link + " of " + std::filesystem::path(robot_.wish.urdf).filename().string();
     return shift_ * robot_.urdf->body(link);
   }
@@ -260,17 +266,33 @@ bool Robot::binds(unsigned quantity) const {
   return std::any_of(signals.begin(), signals.end(), [&](const Candidate &c) { return c.quantity == quantity; });
 }
 
+static void read_nmea2000(Robot &robot) {
+  const Wish &wish = robot.wish;
+  const Nmea2000 found = wish.can_log.empty() ? Nmea2000{} : nmea2000_of(*survey_log(wish.can_log));
+  if (found.dbc_text.empty())
+    throw Failure("motion over CAN needs the bus' DBC file: --dbc FILE" +
+                      (wish.can_log.empty() ? "" : "; " + wish.can_log + " has none of the groups of NMEA 2000"),
+                  tools::kUsage);
+  robot.dbc_text = found.dbc_text;
+  robot.dbc = parse_dbc(found.dbc_text, "NMEA 2000");
+  robot.candidates = found.candidates;
+  robot.unknown = found.notes;
+}
+
 void read_can(Robot &robot) {
   const Wish &wish = robot.wish;
   if (wish.motion != "can") return;
-  if (wish.dbc.empty()) throw Failure("motion over CAN needs the bus' DBC file: --dbc FILE", tools::kUsage);
-  robot.dbc = read_dbc(wish.dbc);
-  robot.candidates = name_candidates(*robot.dbc);
+  if (wish.dbc.empty()) {
+    read_nmea2000(robot);
+  } else {
+    robot.dbc = read_dbc(wish.dbc);
+    robot.candidates = name_candidates(*robot.dbc);
+  }
   if (!wish.can_log.empty()) robot.log = weigh_by_log(*robot.dbc, wish.can_log, robot.candidates);
   robot.signals = choose(robot.candidates);
   for (const std::string &note : robot.log.notes) robot.unknown.push_back(note);
   if (robot.signals.empty())
-    throw Failure(wish.dbc + ": none of its " + std::to_string(robot.dbc->signals.size()) +
+    throw Failure(robot.dbc->path.string() + ": none of its " + std::to_string(robot.dbc->signals.size()) +
                   " signals looks like a wheel's speed or count, a speed, a yaw rate or a steering angle" +
                   (wish.can_log.empty() ? "" : " that moves in " + wish.can_log) +
                   "; write can-signals.yaml by hand (docs/can.md)");
@@ -279,6 +301,7 @@ void read_can(Robot &robot) {
 void read_geometry(Robot &robot) {
   Wish &wish = robot.wish;
   if (!wish.urdf.empty()) robot.urdf = read_urdf(wish.urdf);
+  if (robot.urdf) robot.guesses.insert(robot.guesses.end(), robot.urdf->notes.begin(), robot.urdf->notes.end());
   if (robot.log.track_m > 0 && !wish.track_m) {
     wish.track_m = std::round(robot.log.track_m * 100) / 100;
     robot.wheels_by["track_m"] = std::filesystem::path(wish.can_log).filename().string();

@@ -71,6 +71,7 @@ struct RobotSensor {
 struct Robot {
   Wish wish;
   std::optional<Dbc> dbc;
+  std::string dbc_text;  // of NMEA 2000, where no file is given
   std::vector<Candidate> candidates, signals;
   LogFacts log;
   std::optional<Urdf> urdf;

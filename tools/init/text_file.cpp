@@ -1,28 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "init/text_file.h"
 
-#include <cerrno>
-#include <cstring>
-#include <fstream>
 #include <sstream>
 
-#include "common/failure.h"
+#include "common/unpacked.h"
 
 namespace wm::init {
 
-constexpr uintmax_t kLargest = 64U << 20U;
-
-std::string read_text(const std::filesystem::path &path) {
-  if (std::filesystem::is_directory(path)) throw tools::Failure(path.string() + ": is a folder; a file is needed");
-  std::ifstream file(path, std::ios::binary);
-  if (!file) throw tools::Failure(path.string() + ": cannot be read: " + std::strerror(errno));
-  std::error_code unknown;
-  if (std::filesystem::file_size(path, unknown) > kLargest && !unknown)
-    throw tools::Failure(path.string() + ": is larger than 64 MB; is it the right file?");
-  std::ostringstream text;
-  text << file.rdbuf();
-  return text.str();
-}
+std::string read_text(const std::filesystem::path &path) { return tools::read_unpacked(path); }
 
 std::string one_line(const std::string &text) {
   std::string out;

@@ -9,6 +9,7 @@
 #ifdef WM_HAS_TINYXML2
 #include <tinyxml2.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <set>
@@ -32,11 +33,13 @@ namespace {
 
 using tinyxml2::XMLElement;
 
+constexpr double kUsualPart_m = 20;       // a part farther from its parent is rather in mm
+constexpr double kWholeTurn_rad = 6.3;    // an angle beyond it is rather in degrees
 constexpr double kFarthestPart_m = 1000;  // of a part from its parent: beyond it the number is no length in m
 
 struct Joint {
   std::string name, parent, child;
-  bool is_wheel = false;
+  bool is_wheel = false, moves = false;
   images::Pose place;  // of the child in the parent
   int line = 0;
 };
@@ -55,6 +58,7 @@ class UrdfReader {
       fail(robot, "a URDF begins with <robot>; of a xacro file `xacro FILE > robot.urdf` makes one");
     for (const XMLElement *e = robot->FirstChildElement(); e != nullptr; e = e->NextSiblingElement()) {
       const std::string kind = e->Name();
+      if (kind == "link" || kind == "joint") refuse_xacro(e);
       if (kind == "link") add_link(e);
       if (kind == "joint") add_joint(e);
       if (kind.starts_with("xacro:")) fail(e, "<" + kind + "> is xacro: `xacro FILE > robot.urdf` makes a URDF of it");
@@ -66,6 +70,22 @@ class UrdfReader {
  private:
   [[noreturn]] void fail(const XMLElement *e, const std::string &text) const {
     throw tools::Failure(path_ + ":" + (e != nullptr ? std::to_string(e->GetLineNum()) : "1") + ": " + text);
+  }
+
+  void note(const XMLElement *e, const std::string &text) {
+    notes_.push_back(path_ + ":" + std::to_string(e->GetLineNum()) + ": " + text);
+  }
+
+  // "${...}" and "$(...)" in an attribute are left over from a xacro file.
+  void refuse_xacro(const XMLElement *e) const {
+    for (const tinyxml2::XMLAttribute *a = e->FirstAttribute(); a != nullptr; a = a->Next()) {
+      const std::string value = a->Value();
+      if (value.find("${") != std::string::npos || value.find("$(") != std::string::npos)
+        fail(e, std::string("<") + e->Name() + "> " + a->Name() + ": '" + value +
+                    "' is xacro: `xacro FILE > robot.urdf` makes a URDF of it");
+    }
+    for (const XMLElement *part = e->FirstChildElement(); part != nullptr; part = part->NextSiblingElement())
+      refuse_xacro(part);
   }
 
   std::string need(const XMLElement *e, const char *attribute) const {
@@ -80,7 +100,8 @@ class UrdfReader {
     const auto [end, problem] = std::from_chars(word.data(), word.data() + word.size(), value);
     if (problem != std::errc{} || end != word.data() + word.size() || !std::isfinite(value) ||
         std::abs(value) > kFarthestPart_m)
-      fail(e, std::string("<") + e->Name() + "> " + attribute + ": '" + word + "' is not a number from -1000 to 1000");
+      fail(e, std::string("<") + e->Name() + "> " + attribute + ": '" + word +
+                  "' is not a number from -1000 to 1000 (metres, radians)");
     return value;
   }
 
@@ -96,11 +117,21 @@ class UrdfReader {
     return out;
   }
 
-  images::Pose origin(const XMLElement *of) const {
+  images::Pose origin(const XMLElement *of) {
     const XMLElement *e = of->FirstChildElement("origin");
+    const XMLElement *pose = of->FirstChildElement("pose");
+    if (e == nullptr && pose != nullptr)
+      note(pose, "<pose> in a <joint> means nothing in a URDF, so " + need(of, "name") +
+                     " is taken to be at 0, 0, 0; write <origin xyz=\"...\" rpy=\"...\"/>");
     const images::Vec3 rpy = three(e, "rpy");
     images::Pose out = images::Pose::Identity();
     out.translation() = three(e, "xyz");
+    if (rpy.cwiseAbs().maxCoeff() > kWholeTurn_rad)
+      note(e, "<origin> rpy: '" + std::string(e->Attribute("rpy")) +
+                  "' is taken in radians, as a URDF has it; is it in degrees?");
+    if (out.translation().cwiseAbs().maxCoeff() > kUsualPart_m)
+      note(e, "<origin> xyz: '" + std::string(e->Attribute("xyz")) +
+                  "' is taken in metres, as a URDF has it; is it in millimetres?");
     out.linear() =
         (Eigen::AngleAxisd(rpy.z(), images::Vec3::UnitZ()) * Eigen::AngleAxisd(rpy.y(), images::Vec3::UnitY()) *
          Eigen::AngleAxisd(rpy.x(), images::Vec3::UnitX()))
@@ -121,6 +152,8 @@ class UrdfReader {
           if (const XMLElement *s = geometry->FirstChildElement(shape); s != nullptr)
             radius = number(s, need(s, "radius"), "radius");
       }
+    if (radius > kUsualPart_m)
+      note(e, "<link name=\"" + name + "\">: its radius is taken in metres; is it in millimetres?");
     radius_[name] = radius;
   }
 
@@ -135,6 +168,7 @@ class UrdfReader {
     out.parent = need(parent, "link");
     out.child = need(child, "link");
     out.place = origin(e);
+    out.moves = type != "fixed";
     const auto named = [](const std::string &name) { return name.find("wheel") != std::string::npos; };
     out.is_wheel =
         type == "continuous" && (named(out.child) || named(out.name)) && out.child.find("caster") == std::string::npos;
@@ -157,8 +191,30 @@ class UrdfReader {
     return out;
   }
 
+  // Links from one up to its root.
+  [[nodiscard]] std::vector<std::string> chain(std::string link) const {
+    std::vector<std::string> out{link};
+    for (auto j = of_child_.find(link); j != of_child_.end(); j = of_child_.find(link))
+      out.push_back(link = j->second.parent);
+    return out;
+  }
+
+  // The joint that moves between two links, by their chains to where these meet; "": none.
+  [[nodiscard]] std::string moving_joint(const std::string &from, const std::string &to) const {
+    const std::vector<std::string> chains[2] = {chain(from), chain(to)};
+    for (int side = 0; side < 2; side++)
+      for (const std::string &link : chains[side]) {
+        const std::vector<std::string> &other = chains[1 - side];
+        if (std::find(other.begin(), other.end(), link) != other.end()) break;
+        const auto joint = of_child_.find(link);
+        if (joint != of_child_.end() && joint->second.moves) return joint->second.name;
+      }
+    return "";
+  }
+
   [[nodiscard]] Urdf made() const {
     Urdf out;
+    out.notes = notes_;
     std::map<std::string, images::Pose> of_root;
     std::string first_root;
     for (const auto &[name, radius] : radius_) {
@@ -177,6 +233,8 @@ class UrdfReader {
       (void)in_root(name, root);
       if (root == base_root) out.links[name] = to_base * pose;
     }
+    for (const auto &[name, pose] : out.links)
+      if (const std::string joint = moving_joint(name, out.base); !joint.empty()) out.moving[name] = joint;
     for (const auto &[child, joint] : of_child_)
       if (joint.is_wheel && out.links.contains(child))
         out.wheels.push_back({child, out.links.at(child).translation(), radius_.at(child)});
@@ -186,6 +244,7 @@ class UrdfReader {
   std::string path_;
   std::map<std::string, double> radius_;  // of each link, 0: unknown
   std::map<std::string, Joint> of_child_;
+  std::vector<std::string> notes_;
 };
 
 }  // namespace

@@ -21,6 +21,8 @@ struct Urdf {
   std::string base;                           // base_footprint, base_link, or the root
   std::map<std::string, images::Pose> links;  // in `base`
   std::vector<UrdfWheel> wheels;              // continuous joints whose link or joint is named so
+  std::map<std::string, std::string> moving;  // link -> the joint between it and `base` that moves
+  std::vector<std::string> notes;             // what is unusual in the file, with its line
 
   // Link of a sensor: `name` itself, else NAME_optical_frame, NAME_optical, NAME_link, NAME_frame; "": none.
   [[nodiscard]] std::string link_of(const std::string &name) const;

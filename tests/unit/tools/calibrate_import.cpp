@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Calibrations of other programs: each format is read, its rays are those of the other program's own forward formula
 // (written down here anew), and mistakes are named with file, line and key.
+#include <zlib.h>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
@@ -161,6 +162,126 @@ void test_ros() {
                              .same->height);
 }
 
+void is_pinhole(const ForeignCamera &camera, const std::vector<double> &distortion) {
+  TEST_ASSERT_TRUE(camera.same.has_value());
+  TEST_ASSERT_EQUAL(Model::pinhole_radtan, camera.same->model);
+  TEST_ASSERT_EQUAL(640, camera.width);
+  TEST_ASSERT_EQUAL(480, camera.height);
+  const std::vector<double> intrinsics{500, 505, 322, 241};
+  TEST_ASSERT_TRUE(camera.same->intrinsics == intrinsics);
+  TEST_ASSERT_TRUE(camera.same->distortion == distortion);
+}
+
+const std::vector<double> kFive{-0.3, 0.11, 0.001, -0.0007, -0.02};
+const char *const kEcho2 =
+    "header:\n  stamp:\n    sec: 1700000000\n    nanosec: 123\n  frame_id: front\nheight: 480\nwidth: 640\n"
+    "distortion_model: plumb_bob\nd:\n- -0.3\n- 0.11\n- 0.001\n- -0.0007\n- -0.02\nk:\n- 500.0\n- 0.0\n- 322.0\n- 0.0\n"
+    "- 505.0\n- 241.0\n- 0.0\n- 0.0\n- 1.0\nbinning_x: 0\nroi:\n  x_offset: 0\n  height: 0\n  width: 0\n";
+const char *const kEcho1 =
+    "header: \n  seq: 12\n  stamp: \n    secs: 1565665931\n    nsecs: 268071349\n  frame_id: \"front\"\nheight: 480\n"
+    "width: 640\ndistortion_model: \"plumb_bob\"\nD: [-0.3, 0.11, 0.001, -0.0007, -0.02]\n"
+    "K: [500.0, 0.0, 322.0, 0.0, 505.0, 241.0, 0.0, 0.0, 1.0]\nbinning_x: 0\nroi: \n  width: 0\n  do_rectify: False\n";
+
+// What `topic echo` prints: a document for each message, closed by a line of ---. The first one is taken.
+void test_topic_echo() {
+  for (const std::string echo : {kEcho1, kEcho2}) {
+    std::string crlf;
+    for (const char c : echo) crlf += c == '\n' ? std::string("\r\n") : std::string(1, c);
+    std::string second = echo;
+    second.replace(second.find("500"), 3, "900");
+    for (const std::string &text : {echo, echo + "---\n", "---\n" + echo + "---\n", echo + "---", crlf + "---\r\n",
+                                    "\xEF\xBB\xBF" + echo + "---\n", "# printed\n" + echo + "...\n"}) {
+      const ForeignCamera camera = read(text);
+      is_pinhole(camera, kFive);
+      TEST_ASSERT_TRUE(camera.notes.empty());
+    }
+    const ForeignCamera camera = read(echo + "---\n" + second + "---\n" + second + "---\n");
+    is_pinhole(camera, kFive);
+    TEST_ASSERT_EQUAL_STRING("the first of 3 messages is taken", camera.notes.at(0).c_str());
+  }
+}
+
+void test_camera_info_as_json() {
+  const std::string json =
+      "{\"header\": {\"frame_id\": \"front\"}, \"height\": 480, \"width\": 640, \"distortion_model\": \"plumb_bob\",\n"
+      "\"D\": [-0.3, 0.11, 0.001, -0.0007, -0.02], \"K\": [500, 0, 322, 0, 505, 241, 0, 0, 1]}";
+  is_pinhole(read(json), kFive);
+  is_pinhole(read("{\"camera_info\": " + json + "}"), kFive);
+}
+
+std::string ini_of(const std::string &distortion) {
+  return "# oST version 5.0 parameters\n\n\n[image]\n\nwidth\n640\n\nheight\n480\n\n[front]\n\ncamera matrix\n"
+         "500.0 0.000000 322.0\n0.000000 505.0 241.0\n0.000000 0.000000 1.000000\n\ndistortion\n" +
+         distortion +
+         "\n\nrectification\n1.0 0.0 0.0\n0.0 1.0 0.0\n0.0 0.0 1.0\n\nprojection\n500.0 0.0 322.0 0.0\n0.0 505.0 241.0 "
+         "0.0\n"
+         "0.0 0.0 1.0 0.0\n\n";
+}
+
+// ost.ini and ost.txt of camera_calibration.
+void test_ros_ini() {
+  const ForeignCamera camera = read(ini_of("-0.3 0.11 0.001 -0.0007 -0.02"));
+  is_pinhole(camera, kFive);
+  TEST_ASSERT_EQUAL_STRING("front", camera.name.c_str());
+  TEST_ASSERT_FALSE(read(ini_of("-0.04 -0.036 -0.0016 -0.00066 0.1477 -0.0943 0.0575 0.1157")).same.has_value());
+  refused("four coefficients are k1 k2 p1 p2 of a plain lens", ini_of("0.1 0.01 0.001 0.002"));
+  ImportHints hints;
+  hints.lens = "fisheye";
+  TEST_ASSERT_EQUAL(Model::equidistant, read(ini_of("0.1 0.01 0.001 0.002"), hints).same->model);
+  refused("no section has a camera matrix", "[image]\nwidth\n640\nheight\n480\n");
+  refused("[left]: camera matrix: three lines", "[image]\nwidth\n640\nheight\n480\n[left]\ncamera matrix\n1 2 3\n");
+}
+
+std::string photon(const std::string &coefficients_name, const std::string &coefficients) {
+  return "{\"resolution\": {\"width\": 640.0, \"height\": 480.0}, \"cameraIntrinsics\": {\"rows\": 3, \"cols\": 3, "
+         "\"type\": 6, \"data\": [500.0, 0, 322.0, 0, 505.0, 241.0, 0, 0, 1.0]}, \"" +
+         coefficients_name + "\": {\"rows\": 1, \"cols\": 5, \"type\": 6, \"data\": [" + coefficients +
+         "]}, \"calobjectWarp\": [0.00062, 6e-05]}";
+}
+
+// PhotonVision's export of a calibration, in the spellings of its versions, and a camera's settings with all of them.
+void test_photonvision() {
+  const std::string five = "-0.3, 0.11, 0.001, -0.0007, -0.02";
+  for (const char *name : {"distCoeffs", "cameraExtrinsics"}) {
+    is_pinhole(read(photon(name, five)), kFive);
+    is_pinhole(read(photon(name, five + ", 0, 0, 0")), kFive);
+  }
+  const ForeignCamera eight =
+      read(photon("distCoeffs", "-0.04, -0.036, -0.0016, -0.00066, 0.1477, -0.0943, 0.0575, 0.1157"));
+  TEST_ASSERT_FALSE(eight.same.has_value());
+  TEST_ASSERT_EQUAL_STRING("PhotonVision, 8 coefficients", eight.model.c_str());
+  rays_agree(eight, 0.5, [](const Vec3 &d) {
+    const double x = d.x() / d.z(), y = d.y() / d.z(), r2 = x * x + y * y, r4 = r2 * r2, r6 = r4 * r2;
+    const double q = (1 - 0.04 * r2 - 0.036 * r4 + 0.1477 * r6) / (1 - 0.0943 * r2 + 0.0575 * r4 + 0.1157 * r6);
+    return Vec2(500 * (x * q - 0.0032 * x * y - 0.00066 * (r2 + 2 * x * x)) + 322,
+                505 * (y * q - 0.0016 * (r2 + 2 * y * y) - 0.00132 * x * y) + 241);
+  });
+  const made::Folder folder;
+  folder.write("config.json", "{\"nickname\": \"front\", \"calibrations\": [" + photon("distCoeffs", five) + ", " +
+                                  photon("distCoeffs", five) + "]}");
+  const std::vector<ForeignCamera> all = read_foreign(folder.path() / "config.json", {});
+  TEST_ASSERT_EQUAL(2, all.size());
+  is_pinhole(all[1], kFive);
+  TEST_ASSERT_EQUAL_STRING("camera640x480", all[0].name.c_str());
+}
+
+// Packed by gzip: the same file.
+void test_packed() {
+  const made::Folder folder;
+  const std::filesystem::path path = folder.path() / "ost.yaml.gz";
+  gzFile out = gzopen(path.c_str(), "wb");
+  gzputs(out, kEcho2);
+  gzclose(out);
+  is_pinhole(read_foreign(path, {}).at(0), kFive);
+  std::filesystem::resize_file(path, std::filesystem::file_size(path) / 2);
+  try {
+    (void)read_foreign(path, {});
+    TEST_FAIL_MESSAGE("half a file was taken");
+  } catch (const wm::tools::Failure &problem) {
+    TEST_ASSERT_NOT_NULL_MESSAGE(std::strstr(problem.what(), "packed by gzip, and damaged or cut off"), problem.what());
+  }
+}
+
 const char *const kOcam =
     "#polynomial coefficients for the DIRECT mapping function\n\n5 -5.517655e+002 0.000000e+000 8.372454e-004 "
     "-6.474789e-007 1.235631e-009\n\n#inverse\n\n1 0\n\n#center: \"row\" and \"column\"\n\n381.777786 505.480427\n\n"
@@ -237,6 +358,11 @@ int main() {
   RUN_TEST(test_skew_is_honoured);
   RUN_TEST(test_kalibr);
   RUN_TEST(test_ros);
+  RUN_TEST(test_topic_echo);
+  RUN_TEST(test_camera_info_as_json);
+  RUN_TEST(test_ros_ini);
+  RUN_TEST(test_photonvision);
+  RUN_TEST(test_packed);
   RUN_TEST(test_ocamcalib);
   RUN_TEST(test_what_is_no_calibration);
   RUN_TEST(test_a_fit_to_the_same_model_is_exact);

@@ -168,6 +168,10 @@ const BadInput kTable[] = {
      "robot.urdf:1: a URDF begins with <robot>; of a xacro file `xacro FILE > robot.urdf` makes one"},
     {"xacro", kUrdf, ROBOT "<xacro:include filename=\"a\"/></robot>",
      "robot.urdf:2: <xacro:include> is xacro: `xacro FILE > robot.urdf` makes a URDF of it"},
+    {"xacro in an attribute", kUrdf,
+     ROBOT LINK("a") LINK("b") "<joint name=\"j\" type=\"fixed\"><parent link=\"a\"/><child link=\"b\"/>\n"
+                               "<origin xyz=\"${x} 0 0\"/></joint></robot>",
+     "robot.urdf:5: <origin> xyz: '${x} 0 0' is xacro: `xacro FILE > robot.urdf` makes a URDF of it"},
     {"no link", kUrdf, ROBOT "</robot>", "robot.urdf:1: has no <link>"},
     {"link without a name", kUrdf, ROBOT "<link/></robot>", "robot.urdf:2: <link>: name=\"...\" is missing"},
     {"link defined twice", kUrdf, ROBOT LINK("a") LINK("a") "</robot>",
@@ -188,7 +192,7 @@ const BadInput kTable[] = {
     {"length in mm", kUrdf,
      ROBOT LINK("a") LINK("b") "<joint name=\"j\" type=\"fixed\"><parent link=\"a\"/><child link=\"b\"/>\n"
                                "<origin xyz=\"1500 0 0\"/></joint></robot>",
-     "robot.urdf:5: <origin> xyz: '1500' is not a number from -1000 to 1000"},
+     "robot.urdf:5: <origin> xyz: '1500' is not a number from -1000 to 1000 (metres, radians)"},
     {"no wheels", kUrdf, ROBOT LINK("base_link") "</robot>",
      "this motion needs numbers that no file had: --wheel-radius, --track"},
     {"sheared T_cam_imu", kCamchain,

@@ -1,0 +1,248 @@
+// SPDX-License-Identifier: Apache-2.0
+// What `waymark init` notes of URDFs that are valid and yet not meant so, and what it proposes of logs whose ids are
+// not those of the DBC, or that are of NMEA 2000 and have no DBC.
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+
+#include "common/failure.h"
+#include "init/files.h"
+#include "init/nmea2000.h"
+#include "init/robot.h"
+#include "made.h"
+#include "unity.h"
+#include "waymark/recording.h"
+
+using namespace wm::init;
+
+void setUp() {}
+void tearDown() {}
+
+namespace {
+
+// ── URDF ────────────────────────────────────────────────────────────────────────────────────────────────────────────
+
+// base_link, an arm on a joint of `type`, and a camera on the arm, its <origin> written as `place`.
+std::string urdf_of(const std::string &type, const std::string &place) {
+  return "<robot name=\"r\">\n<link name=\"base_link\"/>\n<link name=\"arm\"/>\n<link name=\"front\"/>\n"
+         "<joint name=\"pan\" type=\"" +
+         type +
+         "\"><parent link=\"base_link\"/><child link=\"arm\"/><axis xyz=\"0 0 1\"/></joint>\n"
+         "<joint name=\"fix\" type=\"fixed\"><parent link=\"arm\"/><child link=\"front\"/>\n" +
+         place + "</joint>\n</robot>\n";
+}
+
+bool names(const std::vector<std::string> &lines, const std::string &text) {
+  return std::any_of(lines.begin(), lines.end(),
+                     [&](const std::string &l) { return l.find(text) != std::string::npos; });
+}
+
+// What is noted of a robot with this URDF whose camera is named front.
+std::vector<std::string> noted(const std::string &urdf) {
+  const made::Folder folder;
+  folder.write("robot.urdf", urdf);
+  folder.write("front.yaml",
+               "image_width: 640\nimage_height: 480\ncamera_name: front\ndistortion_model: plumb_bob\n"
+               "camera_matrix: {rows: 3, cols: 3, data: [500, 0, 320, 0, 500, 240, 0, 0, 1]}\n"
+               "distortion_coefficients: {rows: 1, cols: 5, data: [0, 0, 0, 0, 0]}\n");
+  Robot robot;
+  robot.wish.motion = "twist";
+  robot.wish.sees = "tags";
+  robot.wish.urdf = (folder.path() / "robot.urdf").string();
+  robot.wish.calibrations = {(folder.path() / "front.yaml").string()};
+  read_geometry(robot);
+  return robot.guesses;
+}
+
+struct Noted {
+  const char *type, *place, *text;  // "": no such note
+};
+
+void test_urdfs_that_are_not_meant_so() {
+  if (!can_read_urdf()) TEST_IGNORE_MESSAGE("this build reads no URDF");
+  const char *const kPlain = "<origin xyz=\"0.3 0 0.5\" rpy=\"0 0.35 0\"/>";
+  const Noted kRows[] = {
+      {"revolute", kPlain, "mounting of front: where front is while pan, which moves, is at its 0"},
+      {"continuous", kPlain, "while pan, which moves"},
+      {"prismatic", kPlain, "while pan, which moves"},
+      {"floating", kPlain, "while pan, which moves"},
+      {"fixed", kPlain, ""},
+      {"fixed", "<pose xyz=\"0.3 0 0.5\" rpy=\"0 0.35 0\"/>",
+       "robot.urdf:7: <pose> in a <joint> means nothing in a URDF"},
+      {"fixed", "<pose>0.3 0 0.5 0 0.35 0</pose>", "robot.urdf:7: <pose> in a <joint>"},
+      {"fixed", "<origin xyz=\"0.3 0 0.5\" rpy=\"0 0 90\"/>",
+       "robot.urdf:7: <origin> rpy: '0 0 90' is taken in radians"},
+      {"fixed", "<origin xyz=\"0.3 0 0.5\" rpy=\"-20 0 0\"/>", "is it in degrees?"},
+      {"fixed", "<origin xyz=\"300 0 500\"/>", "robot.urdf:7: <origin> xyz: '300 0 500' is taken in metres"},
+      {"fixed", "<origin xyz=\"0.3 0 0.5\" rpy=\"3.14159265 0 -6.28318531\"/>", ""},
+  };
+  for (const Noted &row : kRows) {
+    const std::vector<std::string> lines = noted(urdf_of(row.type, row.place));
+    const std::string all = joined(lines);
+    if (*row.text != '\0') {
+      TEST_ASSERT_TRUE_MESSAGE(names(lines, row.text), all.c_str());
+    } else {
+      for (const char *none : {"moves", "<pose>", "degrees", "millimetres"})
+        TEST_ASSERT_FALSE_MESSAGE(names(lines, none), all.c_str());
+    }
+  }
+}
+
+void test_a_wheel_in_millimetres() {
+  if (!can_read_urdf()) TEST_IGNORE_MESSAGE("this build reads no URDF");
+  std::string urdf = urdf_of("fixed", "");
+  urdf.insert(
+      urdf.find("<joint"),
+      "<link name=\"wheel\"><collision><geometry><cylinder radius=\"100\" length=\"30\"/></geometry></collision>"
+      "</link>\n");
+  TEST_ASSERT_TRUE(names(noted(urdf), "<link name=\"wheel\">: its radius is taken in metres; is it in millimetres?"));
+}
+
+// ── logs ────────────────────────────────────────────────────────────────────────────────────────────────────────────
+
+const char *const kDbc =
+    "BO_ 2566844926 CCVS1: 8 X\n SG_ WHEEL_BASED_VEHICLE_SPEED : 8|16@1+ (0.00390625,0) [0|250.996] \"km/h\" X\n"
+    "BO_ 2565868030 VDC2: 8 X\n SG_ YAW_RATE : 24|16@1+ (0.000122070313,-3.92) [-3.92|3.92] \"rad/s\" X\n";
+
+// 20 s at 20 Hz: a speed and a turn rate that change. `speed` and `yaw` are ids as candump has them.
+std::string log_of(const char *speed, const char *yaw, bool differences) {
+  std::string out;
+  for (int i = 0; i < 400; i++) {
+    const auto v = static_cast<unsigned>(std::lround((1.5 + std::sin(i * 0.05)) * 3.6 * 256));
+    const auto w = static_cast<unsigned>(std::lround((0.4 * std::sin(i * 0.03) + 3.92) / 0.000122070313));
+    const double t = differences ? (i == 0 ? 0 : 0.04) : 100 + 0.05 * i;
+    out += made::format("(%010.6f) can0 %s#F3%02X%02XFFFFFFFFFF\n", t, speed, v & 0xFFU, v >> 8U);
+    out += made::format("(%010.6f) can0 %s#FFFFFF%02X%02XFFFFFF\n", differences ? 0.01 : t + 0.01, yaw, w & 0xFFU,
+                        w >> 8U);
+  }
+  return out;
+}
+
+Robot proposed(const std::string &dbc, const std::string &log, const made::Folder &folder) {
+  Robot robot;
+  robot.wish.motion = "can";
+  robot.wish.sees = "nothing";
+  robot.wish.can_interface = "can0";
+  if (!dbc.empty()) folder.write("car.dbc", dbc);
+  if (!dbc.empty()) robot.wish.dbc = (folder.path() / "car.dbc").string();
+  folder.write("drive.log", log);
+  robot.wish.can_log = (folder.path() / "drive.log").string();
+  read_can(robot);
+  return robot;
+}
+
+void test_j1939_is_bound_by_its_pgn() {
+  for (const char *speed : {"18FEF1FE", "18FEF100", "0CFEF117"}) {
+    const made::Folder folder;
+    const Robot robot = proposed(kDbc, log_of(speed, "18F0090B", false), folder);
+    TEST_ASSERT_TRUE_MESSAGE(robot.binds(WM_Q_VEHICLE_SPEED), speed);
+    TEST_ASSERT_TRUE_MESSAGE(robot.binds(WM_Q_YAW_RATE), speed);
+    TEST_ASSERT_DOUBLE_WITHIN(0.1, 20, robot.log.seconds);
+  }
+}
+
+void test_ids_that_differ_are_named() {
+  const made::Folder folder;
+  const Robot robot = proposed(
+      "BO_ 256 DRIVE: 8 X\n SG_ VEHICLE_SPEED : 8|16@1+ (0.00390625,0) [0|250.996] \"km/h\" X\n"
+      "BO_ 2565868030 VDC2: 8 X\n SG_ YAW_RATE : 24|16@1+ (0.000122070313,-3.92) [-3.92|3.92] "
+      "\"rad/s\" X\n",
+      log_of("00000100", "18F0090B", false), folder);
+  TEST_ASSERT_FALSE(robot.binds(WM_Q_VEHICLE_SPEED));
+  for (const Candidate &one : robot.candidates)
+    if (one.quantity == WM_Q_VEHICLE_SPEED)
+      TEST_ASSERT_EQUAL_STRING("no frame of it is in the log, but 400 of 00000100 (29 bits)", one.refused.c_str());
+}
+
+void test_differences_are_summed_up() {
+  const made::Folder folder;
+  const Robot robot = proposed(kDbc, log_of("18FEF100", "18F0090B", true), folder);
+  TEST_ASSERT_TRUE(robot.binds(WM_Q_YAW_RATE));
+  TEST_ASSERT_DOUBLE_WITHIN(0.1, 20, robot.log.seconds);
+  TEST_ASSERT_TRUE(names(robot.log.notes, "its times are differences"));
+}
+
+// A boat: heading, rate of turn to starboard, speed through the water, position, course and speed over ground; a fast
+// packet; and a group of J1939.
+std::string boat() {
+  std::string out;
+  const auto word = [](double value) {
+    const auto v = static_cast<unsigned>(std::lround(value)) & 0xFFFFU;
+    return made::format("%02X%02X", v & 0xFFU, v >> 8U);
+  };
+  const auto four = [&word](double value) {
+    const auto v = static_cast<uint32_t>(static_cast<int32_t>(std::lround(value)));
+    return word(v & 0xFFFFU) + word(v >> 16U);
+  };
+  for (int i = 0; i < 300; i++) {
+    const double t = 0.1 * i, v = 3 + std::sin(0.3 * t), starboard = 0.1 * std::sin(0.2 * t);
+    const std::string at = made::format("(%.6f) can0 ", 1000 + t);
+    out += at + "09F11203#00" + word(10000 + i) + "FF7FFF7FFD\n";
+    out += at + "0DF11303#00" + four(starboard / 3.125e-8) + "FFFFFF\n";
+    out += at + "09F50323#00" + word(100 * v) + "FFFF00FFFF\n";
+    out += at + "09F80105#" + four(525000000 + 20 * i) + four(133000000 + 5 * i) + "\n";
+    out += at + "09F80205#00FC" + word(15708) + word(100 * v + 3) + "FFFF\n";
+    out += at + "0DF80505#A02F00FFFFFFFFFF\n" + at + "0CFEF117#F39A03FFFFFFFFFF\n";
+  }
+  return out;
+}
+
+void test_nmea2000_needs_no_dbc() {
+  const made::Folder folder;
+  Robot robot = proposed("", boat(), folder);
+  for (const unsigned quantity : {static_cast<unsigned>(WM_Q_VEHICLE_SPEED), static_cast<unsigned>(WM_Q_YAW_RATE),
+                                  static_cast<unsigned>(WM_CAN_LATITUDE), static_cast<unsigned>(WM_CAN_LONGITUDE)})
+    TEST_ASSERT_TRUE_MESSAGE(robot.binds(quantity), wm_can_quantity_name(quantity));
+  TEST_ASSERT_TRUE(names(robot.unknown, "the heading of PGN 127250"));
+  TEST_ASSERT_TRUE(names(robot.unknown, "PGN 129029 (GNSS position with its accuracy): it goes over several frames"));
+  robot.wish.out = (folder.path() / "boat").string();
+  write_files(robot.wish.out, robot_files(robot), false);
+
+  // The runtime binds what was written, and decodes the boat's frames.
+  wm_error error{};
+  wm_can_decoder *decoder = nullptr;
+  const auto at = [&](const char *name) { return (folder.path() / "boat" / name).string(); };
+  TEST_ASSERT_EQUAL_MESSAGE(
+      WM_OK,
+      wm_can_decoder_load(at("vehicle.dbc").c_str(), at("can-signals.yaml").c_str(), WM_CAN_MOTION, &decoder, &error),
+      error.text);
+  const auto value = [&](const char *line) {
+    wm_can_frame frame;
+    wm_quantities out;
+    wm_source_counts counts{};
+    TEST_ASSERT_EQUAL(WM_OK, wm_candump_parse(line, std::strlen(line), &frame, &error));
+    TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_can_decode(decoder, &frame, &out, &counts, &error), line);
+    return out.value[0];
+  };
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 3.21, value("(1.0) can0 09F50323#004101FFFF00FFFF"));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, -0.1,
+                            value("(1.0) can0 0DF11303#0000D43000FFFFFF"));  // 3200000 * 3.125e-8 to starboard
+  wm_can_decoder_free(decoder);
+}
+
+void test_a_log_without_nmea2000_needs_its_dbc() {
+  const made::Folder folder;
+  try {
+    (void)proposed("", log_of("18FEF100", "18F0090B", false), folder);
+    TEST_FAIL_MESSAGE("taken without a DBC");
+  } catch (const wm::tools::Failure &problem) {
+    TEST_ASSERT_NOT_NULL_MESSAGE(std::strstr(problem.what(), "needs the bus' DBC file: --dbc FILE"), problem.what());
+    TEST_ASSERT_NOT_NULL_MESSAGE(std::strstr(problem.what(), "none of the groups of NMEA 2000"), problem.what());
+  }
+}
+
+}  // namespace
+
+int main() {
+  UNITY_BEGIN();
+  RUN_TEST(test_urdfs_that_are_not_meant_so);
+  RUN_TEST(test_a_wheel_in_millimetres);
+  RUN_TEST(test_j1939_is_bound_by_its_pgn);
+  RUN_TEST(test_ids_that_differ_are_named);
+  RUN_TEST(test_differences_are_summed_up);
+  RUN_TEST(test_nmea2000_needs_no_dbc);
+  RUN_TEST(test_a_log_without_nmea2000_needs_its_dbc);
+  return UNITY_END();
+}
