@@ -135,7 +135,7 @@ class Maps(Folder):
     def pictures(self):
         grey, clear = self.grey, np.where(self.grey == 205, 0, 255)
         hidden = np.where(self.grey == 205, 254, self.grey)
-        palette = Image.fromarray(np.select([grey == 254, grey == 0], [0, 1], 2).astype(np.uint8), "P")
+        palette = Image.frombytes("P", grey.shape[::-1], np.select([grey == 254, grey == 0], [0, 1], 2).astype(np.uint8).tobytes())
         palette.putpalette([254] * 3 + [0] * 3 + [205] * 3)
         return {"grey": png(grey), "grey16": png(grey, 16), "gamma": png(grey, gamma=1.0), "grey16-gamma": png(grey, 16, gamma=1.0),
                 "rgb": png(np.repeat(grey[:, :, None], 3, 2), kind=2),

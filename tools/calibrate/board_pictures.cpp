@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <filesystem>
 #include <iterator>
 #include <map>
 #include <set>
@@ -26,14 +27,18 @@ constexpr size_t kSamples = 8;
 
 class Search {
  public:
-  Search(Board &board, BoardPictures &out) : board_(board), out_(out) {}
+  Search(Board &board, BoardPictures &out, std::pair<int, int> size) : board_(board), out_(out), size_(size) {}
 
   void look(const std::string &name, const GreyPicture &picture) {
-    if (out_.pictures > 0 && (picture.width != out_.picture.width || picture.height != out_.picture.height))
-      throw tools::Failure(name + ": is " + std::to_string(picture.width) + " x " + std::to_string(picture.height) +
-                           ", the pictures before are " + std::to_string(out_.picture.width) + " x " +
-                           std::to_string(out_.picture.height));
-    if (out_.pictures == 0) out_.picture = picture;
+    if (std::pair(picture.width, picture.height) != size_) {
+      if (!picture.pixels.empty())
+        out_.notes.push_back(name + " is left out: it is " + size_text(picture.width, picture.height) + ", most are " +
+                             size_text(size_.first, size_.second));
+      if (board_.kind == BoardKind::charuco) markers_.emplace_back();
+      out_.pictures++;
+      return;
+    }
+    if (out_.picture.pixels.empty()) out_.picture = picture;
     if (board_.kind == BoardKind::charuco) {
       markers_.push_back(find_charuco_markers(picture, board_.dictionary));
     } else {
@@ -123,6 +128,7 @@ class Search {
 
   Board &board_;
   BoardPictures &out_;
+  std::pair<int, int> size_;                      // width and height of the pictures that count
   std::vector<std::pair<int, int>> sampled_;      // larger side first
   std::vector<std::vector<SeenMarker>> markers_;  // a list a picture
   bool begins_white_ = false;
@@ -130,14 +136,34 @@ class Search {
 
 }  // namespace
 
+namespace {
+
+// The size that most pictures of a folder have: a phone turns some of them. Those of a recording have one size.
+std::pair<int, int> usual_size(const std::string &from, const std::string &camera, int every) {
+  std::map<std::pair<int, int>, size_t> count;
+  const bool is_recording = std::filesystem::is_directory(std::filesystem::path(from) / "video");
+  tools::each_picture(from, camera, every, [&](const std::string & /*name*/, const GreyPicture &picture) {
+    if (!picture.pixels.empty()) count[{picture.width, picture.height}]++;
+    return !is_recording || count.empty();
+  });
+  const auto most =
+      std::max_element(count.begin(), count.end(), [](const auto &a, const auto &b) { return a.second < b.second; });
+  return most == count.end() ? std::pair(0, 0) : most->first;
+}
+
+}  // namespace
+
 BoardPictures look_for_boards(const std::string &from, const std::string &camera, int every, Board &board) {
   BoardPictures out;
-  Search search(board, out);
-  tools::each_picture(from, camera, every, [&](const std::string &name, const GreyPicture &picture) {
-    search.look(name, picture);
-    if (isatty(STDERR_FILENO)) std::fprintf(stderr, "\r%zu pictures, a board in %zu ", out.pictures, out.boards);
-    return true;
-  });
+  Search search(board, out, usual_size(from, camera, every));
+  tools::each_picture(
+      from, camera, every,
+      [&](const std::string &name, const GreyPicture &picture) {
+        search.look(name, picture);
+        if (isatty(STDERR_FILENO)) std::fprintf(stderr, "\r%zu pictures, a board in %zu ", out.pictures, out.boards);
+        return true;
+      },
+      [&](const std::string &reason) { out.notes.push_back(reason + "; it is left out"); });
   if (isatty(STDERR_FILENO)) std::fputc('\n', stderr);
   search.finish([&](const auto &look) { tools::each_picture(from, camera, every, look); });
   return out;

@@ -79,6 +79,7 @@ void each_frame(const fs::path &recording, const std::string &name, int every,
 
 GreyPicture load_picture(const fs::path &file) {
   const std::vector<uint8_t> bytes = read_bytes(file);
+  if (bytes.empty()) throw Failure(file.string() + ": is empty");
   if (bytes.size() > 2 && bytes[0] == 0xFF && bytes[1] == 0xD8) {
     images::Picture8 grey;
     std::string error;
@@ -112,13 +113,25 @@ std::vector<fs::path> picture_files(const fs::path &from) {
   return files;
 }
 
-void each_picture(const fs::path &from, const std::string &camera, int every,
-                  const std::function<bool(const std::string &, const GreyPicture &)> &look) {
+void each_picture(const fs::path &from, const std::string &camera, int every, const PictureTaker &look,
+                  const BrokenTaker &broken) {
   if (!fs::exists(from)) throw Failure(from.string() + ": there is no such file or folder", kUsage);
   if (fs::is_directory(from) && fs::is_directory(from / "video")) return each_frame(from, camera, every, look);
   const std::vector<fs::path> files = picture_files(from);
-  for (size_t i = 0; i < files.size(); i += static_cast<size_t>(every))
-    if (!look(files[i].filename().string(), load_picture(files[i]))) return;
+  bool any = false;
+  std::string reason;
+  for (size_t i = 0; i < files.size(); i += static_cast<size_t>(every)) {
+    GreyPicture picture;
+    try {
+      picture = load_picture(files[i]);
+      any = true;
+    } catch (const Failure &problem) {
+      reason = problem.what();
+      if (broken) broken(reason);
+    }
+    if (!look(files[i].filename().string(), picture)) return;
+  }
+  if (!any) throw Failure(reason);
 }
 
 }  // namespace wm::tools

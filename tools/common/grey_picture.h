@@ -28,8 +28,11 @@ std::vector<std::filesystem::path> picture_files(const std::filesystem::path &fr
 
 // Calls `look(name, picture)` for each picture of `from` until it returns false: a folder of pictures in the order of
 // their names, one picture, or a recording's folder (with `camera`, "" for the only one). `every` above 1 passes over
-// the others. Throws Failure: nothing there, or what is there can't be read.
-void each_picture(const std::filesystem::path &from, const std::string &camera, int every,
-                  const std::function<bool(const std::string &name, const GreyPicture &picture)> &look);
+// the others. A file of a folder that can't be read is handed on as a picture without pixels, and given to `broken`
+// with the reason. Throws Failure: nothing there, or nothing of what is there can be read.
+using PictureTaker = std::function<bool(const std::string &name, const GreyPicture &picture)>;
+using BrokenTaker = std::function<void(const std::string &reason)>;
+void each_picture(const std::filesystem::path &from, const std::string &camera, int every, const PictureTaker &look,
+                  const BrokenTaker &broken = nullptr);
 
 }  // namespace wm::tools

@@ -67,20 +67,36 @@ void fill(int32_t camera, uint64_t number, int width, int height, const uint8_t 
 
 class Files : public FrameStream {
  public:
-  Files(const std::vector<fs::path> &files, int32_t camera, int every)
-      : files_(files), camera_(camera), every_(static_cast<size_t>(every)) {}
+  Files(const std::vector<fs::path> &files, std::set<fs::path> &broken, int32_t camera, int every)
+      : files_(files), broken_(broken), camera_(camera), every_(static_cast<size_t>(every)) {}
   bool next(wm_frame *out) override {
-    if (at_ >= files_.size()) return false;
-    picture_ = load_picture(files_[at_]);
-    name_ = files_[at_].stem().string();
-    fill(camera_, at_, picture_.width, picture_.height, picture_.pixels.data(), out);
-    at_ += every_;
-    return true;
+    while (at_ < files_.size()) {
+      const size_t here = at_;
+      at_ += every_;
+      if (!load(files_[here])) continue;
+      fill(camera_, here, picture_.width, picture_.height, picture_.pixels.data(), out);
+      return true;
+    }
+    return false;
   }
   [[nodiscard]] std::string name() const override { return name_; }
 
  private:
+  // A picture that can't be read is named once; one alone ends the work.
+  bool load(const fs::path &file) {
+    try {
+      picture_ = load_picture(file);
+    } catch (const Failure &problem) {
+      if (files_.size() == 1) throw;
+      if (broken_.insert(file).second) std::fprintf(stderr, "note: %s; it is passed over\n", problem.what());
+      return false;
+    }
+    name_ = file.stem().string();
+    return true;
+  }
+
   const std::vector<fs::path> &files_;
+  std::set<fs::path> &broken_;
   GreyPicture picture_;
   std::string name_;
   int32_t camera_;
@@ -204,7 +220,7 @@ std::unique_ptr<FrameStream> Input::open(int32_t camera, int every) const {
 #ifdef WM_HAS_LIBAV
   if (kind_ == Kind::video) return std::make_unique<VideoFile>(from_, camera, every);
 #endif
-  return std::make_unique<Files>(files_, camera, every);
+  return std::make_unique<Files>(files_, broken_, camera, every);
 }
 
 void Input::add_landmarks(wm_view *view) const {

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -54,6 +55,7 @@ class Input {
   std::filesystem::path from_;
   Kind kind_ = Kind::files;
   std::vector<std::filesystem::path> files_;
+  mutable std::set<std::filesystem::path> broken_;  // that were named
   std::unique_ptr<wm_site, decltype(&wm_site_close)> site_{nullptr, wm_site_close};
   wm_rig rig_{};
   std::vector<int32_t> cameras_;

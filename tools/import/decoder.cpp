@@ -8,9 +8,13 @@ extern "C" {
 #include <libswscale/swscale.h>
 }
 
+#include <cstring>
+
 #include "common/failure.h"
 
 namespace wm::tools {
+
+constexpr int kErrnoMost = 200;  // Linux has 133; libav's own codes are far above
 
 struct Decoder::Libav {
   std::filesystem::path file;
@@ -68,14 +72,22 @@ void Decoder::Libav::to_grey() {
   sws_scale(scale, frame->data, frame->linesize, 0, frame->height, rows, strides);
 }
 
+// libav draws text files as pictures of letters ("tty", by the name's ending).
+static void refuse_text(const AVFormatContext &format, const std::filesystem::path &file) {
+  const std::string name = format.iformat->name;
+  for (const char *text : {"tty", "bin", "xbin", "adf", "idf"})
+    if (name == text) throw Failure(file.string() + ": is text, not a video", kUsage);
+}
+
 Decoder::Decoder(const std::filesystem::path &file) : av_(std::make_unique<Libav>()) {
   Libav &av = *av_;
   av.file = file;
   av_log_set_level(AV_LOG_FATAL);
   const auto why = [&file](int code) {
-    char text[AV_ERROR_MAX_STRING_SIZE] = "";
-    av_strerror(code, text, sizeof text);
-    return file.string() + ": " + text;
+    const int system = AVUNERROR(code);  // errno, or a number of libav's own
+    return file.string() + ": " +
+           (system > 0 && system < kErrnoMost ? std::strerror(system)
+                                              : "is not a video that can be read, or it is damaged");
   };
   // Every picture in the file has its row: an edit list, by which players leave some out, is not looked at.
   AVDictionary *options = nullptr;
@@ -83,6 +95,7 @@ Decoder::Decoder(const std::filesystem::path &file) : av_(std::make_unique<Libav
   const int opened = avformat_open_input(&av.format, file.c_str(), nullptr, &options);
   av_dict_free(&options);
   if (opened < 0) throw Failure(why(opened), kUsage);
+  refuse_text(*av.format, file);
   if (const int code = avformat_find_stream_info(av.format, nullptr); code < 0) throw Failure(why(code));
   const AVCodec *codec = nullptr;
   av.stream = av_find_best_stream(av.format, AVMEDIA_TYPE_VIDEO, -1, -1, &codec, 0);

@@ -163,6 +163,26 @@ void what_does_not_agree_is_said_and_leaves_nothing() {
   refused(wish_to("twice"), "is there already");
 }
 
+// libav draws these as pictures of letters; others it can't read at all.
+void text_is_no_video() {
+  struct Row {
+    const char *name, *says;
+  };
+  for (const Row &row :
+       {Row{"notes.txt", "notes.txt: is text, not a video"}, Row{"art.ans", "art.ans: is text, not a video"},
+        Row{"drive.nfo", "drive.nfo: is text, not a video"}, Row{"a.asc", "a.asc: is text, not a video"},
+        Row{"notes.md", "notes.md: "}, Row{"drive.mp4.txt", "drive.mp4.txt: is text, not a video"},
+        Row{"broken.mp4", "broken.mp4: is not a video that can be read, or it is damaged"}}) {
+    wm::tools::ImportWish wish = wish_to("text");
+    wish.video = folder / row.name;
+    std::ofstream text(wish.video);
+    for (int line = 0; line < 60; line++) text << "Line " << line << " of a text, which is not a video.\n";
+    text.close();
+    refused(wish, row.says);
+    TEST_ASSERT_TRUE(!fs::exists(folder / "text/video") || fs::is_empty(folder / "text/video"));
+  }
+}
+
 }  // namespace
 
 extern "C" void setUp() {}
@@ -177,6 +197,7 @@ int main() {
   RUN_TEST(the_containers_stamps_where_there_are_no_others);
   RUN_TEST(a_csv_of_stamps_is_kept_as_it_is);
   RUN_TEST(what_does_not_agree_is_said_and_leaves_nothing);
+  RUN_TEST(text_is_no_video);
   const int failed = UNITY_END();
   fs::remove_all(folder);
   return failed;
