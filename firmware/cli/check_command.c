@@ -189,9 +189,21 @@ static void ask_for_causes(checked *self) {
   json_causes = answer.json;
 }
 
+// Whether a finding from this place on is one that a mistake of the setup may explain: not of a clock, or of data that
+// are not used, which say themselves what is wrong.
+static int may_have_a_cause(const wm_findings *found, size_t from) {
+  for (size_t i = from; i < found->count; i++) {
+    const wm_finding_id id = found->at[i].id;
+    const int says_it = id == WM_FOUND_DATA_UNUSED || id == WM_FOUND_ROWS_UNUSED || id == WM_FOUND_CLOCK_JUMPED ||
+                        id == WM_FOUND_CLOCK_COARSE;
+    if (found->at[i].severity == WM_SEVERITY_BAD && !says_it) return 1;
+  }
+  return 0;
+}
+
 static void ended(void *context, const wm_assembly *assembly, const wm_run_report *report) {
   checked *self = context;
-  const size_t bad = wm_findings_of(self->found, WM_SEVERITY_BAD);
+  const size_t before = self->found->count;
   source_data_judge(&self->sources, wm_recording_quantities(self->recording), &report->health, self->found);
   const uint64_t due = report->messages_due;
   const drive_facts facts = {assembly, self->sources.facts, &self->evidence, report->recorded_s, due};
@@ -204,7 +216,7 @@ static void ended(void *context, const wm_assembly *assembly, const wm_run_repor
   wm_health_map_findings(&report->health, self->found);
   clock_data_judge_unused(&self->sources.clocks, &report->health, self->found);
   check_unused(&self->evidence, &self->sources, &report->health, wm_recording_quantities(self->recording), self->found);
-  if (wm_findings_of(self->found, WM_SEVERITY_BAD) > bad && !self->is_quick) ask_for_causes(self);
+  if (may_have_a_cause(self->found, before) && !self->is_quick) ask_for_causes(self);
 }
 
 static void check_recording(const wm_config *config, const causes_question *question, int is_quick,

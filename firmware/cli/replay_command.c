@@ -72,6 +72,18 @@ static int finished(const wm_run_report *report, const char *out_dir) {
   return EXIT_WORK_FAILED;
 }
 
+// What the recording has and the estimator doesn't take; one that takes no observation is chosen for dead reckoning.
+static void tell_unused(void *context, const wm_assembly *assembly, wm_status status) {
+  (void)context;
+  if (status != WM_OK || !(assembly->config->estimator->takes & ~(uint32_t)WM_MOTION_EVENTS)) return;
+  for (size_t i = 0; i < assembly->unused_count; i++) {
+    const wm_unused *one = &assembly->unused[i];
+    char line[sizeof *one + 32];
+    (void)snprintf(line, sizeof line, "%s is not used: %s", one->name, one->text);
+    if (one->why == WM_UNUSED_BY_ESTIMATOR) print_note(NULL, line);
+  }
+}
+
 static int replay_recording(const arguments *args) {
   wm_error err = {0};
   wm_config config;
@@ -94,7 +106,9 @@ static int replay_recording(const arguments *args) {
   if (status == WM_OK) {
     progress_line progress;
     progress_begin(&progress);
+    const wm_replay_watch watch = {.assembled = tell_unused};
     const wm_replay_options options = {.out_dir = args->out,
+                                       .watch = &watch,
                                        .seed = args->seed,
                                        .progress = progress_show,
                                        .progress_context = &progress,

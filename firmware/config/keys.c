@@ -335,12 +335,17 @@ static void warn(char *to, const wm_yaml_node *value, int line, const char *text
 
 static void warn_if_not_read(const reading *self, const config_filling *of, const wm_yaml_node *value, int line,
                              const wm_param *param) {
-  char key[KEY_MAX], text[100];
+  char key[KEY_MAX], text[200];
   const wm_estimator *reader = self->shared ? self->shared->reader : NULL;
   if (!reader || of < self->shared->of || of >= self->shared->of + CONFIG_SHARED) return;
   snprintf(key, sizeof key, "%s%s", of->prefix, param->key);
   if (wm_estimator_reads(reader, key)) return;
-  snprintf(text, sizeof text, "estimator %s does not take it", reader->name);
+  int used = snprintf(text, sizeof text, "estimator %s does not take it", reader->name);
+  size_t count, others = 0;
+  const wm_estimator *const *all = wm_estimators(&count);
+  for (size_t i = 0; i < count && used > 0 && (size_t)used < sizeof text; i++)
+    if (wm_estimator_reads(all[i], key))
+      used += snprintf(text + used, sizeof text - (size_t)used, "%s%s", others++ ? ", " : "; these do: ", all[i]->name);
   warn(self->warnings, value, line, text);
 }
 

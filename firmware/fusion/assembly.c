@@ -18,17 +18,17 @@ static wm_unused *leave_out(wm_assembly *self, const char *name, wm_unused_why w
 }
 
 // "the estimator 'slam' doesn't take its data; landmark_ekf, odometry do"
-static void leave_to_others(wm_assembly *self, const char *name, uint32_t kinds, int is_bound) {
+static wm_unused *leave_to_others(wm_assembly *self, const char *name, uint32_t kinds) {
   wm_unused *out = leave_out(self, name, WM_UNUSED_BY_ESTIMATOR);
   size_t count, others = 0;
   const wm_estimator *const *all = wm_estimators(&count);
-  out->is_bound = (uint8_t)is_bound;
   int used =
       snprintf(out->text, sizeof out->text, "the estimator '%s' doesn't take its data", self->config->estimator->name);
   for (size_t i = 0; i < count && used > 0 && (size_t)used < sizeof out->text; i++)
     if (all[i]->takes & kinds & ~(uint32_t)WM_MOTION_EVENTS)
       used += snprintf(out->text + used, sizeof out->text - (size_t)used, "%s%s",
                        others++ ? ", " : "; these do: ", all[i]->name);
+  return out;
 }
 
 // A source that the estimator can't use is not opened: it would only hold the watermark back.
@@ -36,7 +36,7 @@ static int is_left_out(wm_assembly *self, const wm_source *source, const wm_sour
   const uint32_t takes = self->config->estimator->takes | WM_MOTION_EVENTS;
   if (wanted->use && (source->kinds & takes)) return 0;
   if (wanted->use)
-    leave_to_others(self, source->name, source->kinds, source->is_live);
+    leave_to_others(self, source->name, source->kinds)->is_device = source->is_live;
   else
     (void)snprintf(leave_out(self, source->name, WM_UNUSED_WANTED)->text, sizeof self->unused[0].text, "%s",
                    "`use: false` in the configuration");
@@ -45,11 +45,17 @@ static int is_left_out(wm_assembly *self, const wm_source *source, const wm_sour
 
 // What the configuration binds to this run has a use: a device or a detector that is for nothing is a mistake.
 static wm_status check_bound(const wm_assembly *self, wm_error *err) {
-  for (size_t i = 0; i < self->unused_count; i++)
-    if (self->unused[i].is_bound)
+  for (size_t i = 0; i < self->unused_count; i++) {
+    const wm_unused *one = &self->unused[i];
+    if (one->is_detector)
+      return wm_fail(err, WM_BAD_CONFIG, "%s: vision: '%s' is for nothing: %s; leave it out, or take another estimator",
+                     self->config->path, one->name, one->text);
+    if (one->is_device)
       return wm_fail(err, WM_BAD_CONFIG,
-                     "%s: '%s' is bound, but %s; leave it out, or write `sources: [{name: %s, use: false}]`",
-                     self->config->path, self->unused[i].name, self->unused[i].text, self->unused[i].name);
+                     "%s: devices: '%s' is for nothing: %s; leave it out, take another estimator, or write "
+                     "`sources: [{name: %s, use: false}]`",
+                     self->config->path, one->name, one->text, one->name);
+  }
   return WM_OK;
 }
 
@@ -133,7 +139,7 @@ static wm_status add_vision(wm_assembly *self, wm_recording *recording, wm_error
   const wm_config *config = self->config;
   for (size_t i = 0; i < config->vision_count; i++)
     if (!(config->vision[i].detector->gives & config->estimator->takes))
-      leave_to_others(self, config->vision[i].detector->name, config->vision[i].detector->gives, 1);
+      leave_to_others(self, config->vision[i].detector->name, config->vision[i].detector->gives)->is_detector = 1;
   wm_status status = wm_vision_open(config, recording, NULL, NULL, &self->vision, err);
   for (size_t i = 0; status == WM_OK && i < wm_vision_count(self->vision); i++) {
     if (self->source_count == WM_SOURCES_MAX)

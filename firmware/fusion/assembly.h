@@ -34,7 +34,7 @@ typedef enum wm_unused_why {
 
 typedef struct wm_unused {
   wm_unused_why why;
-  uint8_t is_bound;  // the configuration names it: a device, or a detector
+  uint8_t is_device, is_detector;  // of the configuration
   char name[WM_SOURCE_NAME_MAX];
   char text[128];  // "the estimator 'slam' doesn't take it; landmark_ekf does"
 } wm_unused;

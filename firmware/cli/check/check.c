@@ -57,7 +57,7 @@ static void folder_of(const char *key, const char *path, const char *what, wm_fi
 }
 
 static void note_warning(void *context, const char *line) {
-  wm_find(context, WM_FOUND_FILE_NOTE, WM_SEVERITY_NOTE, "config", "", "%s", line);
+  wm_find(context, WM_FOUND_FILE_NOTE, WM_SEVERITY_NOTE, "config", NULL, "%s", line);
 }
 
 static int keeps_a_map(const wm_config *config) {

@@ -138,7 +138,7 @@ static void an_old_key_of_another_estimator_is_not_taken(void) {
   TEST_ASSERT_EQUAL_STRING(
       "dir/x.yaml:3: pole_filter.states.scale_sigma: is now 'motion.states.scale_sigma', and not read of an estimator "
       "that isn't chosen\n"
-      "dir/x.yaml:4: motion.states.scale_sigma: estimator cloud_filter does not take it\n",
+      "dir/x.yaml:4: motion.states.scale_sigma: estimator cloud_filter does not take it; these do: pole_filter\n",
       config.warnings);
 }
 
