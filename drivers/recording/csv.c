@@ -245,8 +245,18 @@ static wm_status read_number(const csv_reader *self, size_t column, csv_field fi
   return fail_range(self, err, column, field, c->min, c->max);
 }
 
+// What a field that was refused shows: a stamp of seconds, an angle or another number beyond its limits.
+static wm_row_problem problem_of(const csv_column *column, csv_field field, wm_status status) {
+  double value;
+  const size_t length = strlen(column->name);
+  if (wm_text_to_f64(field.text, field.length, &value) != WM_TEXT_OK) return WM_ROW_OTHER;
+  if (status == WM_BAD_DATA) return column->type == CSV_TIME ? WM_ROW_STAMP_OF_SECONDS : WM_ROW_OTHER;
+  return length > 4 && strcmp(column->name + length - 4, "_rad") == 0 ? WM_ROW_ANGLE : WM_ROW_VALUE;
+}
+
 wm_status csv_read(csv_reader *self, csv_row *row, wm_error *err) {
   char text[96];
+  self->problem = WM_ROW_OTHER;
   if (self->too_long) return csv_fail(self, err, WM_BAD_DATA, "the line is longer than 65536 bytes");
   if (self->fields_found != self->field_count) {
     snprintf(text, sizeof text, "%zu fields where the header has %zu", self->fields_found, self->field_count);
@@ -271,7 +281,9 @@ wm_status csv_read(csv_reader *self, csv_row *row, wm_error *err) {
       status = read_number(self, i, field, &row->number[i], err);
     else
       status = read_whole(self, i, field, &row->whole[i], err);
-    if (status != WM_OK) return status;
+    if (status == WM_OK) continue;
+    self->problem = problem_of(column, field, status);
+    return status;
   }
   return WM_OK;
 }

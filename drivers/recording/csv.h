@@ -5,6 +5,7 @@
 #define WM_RECORDING_CSV_H
 
 #include "lines.h"
+#include "waymark/source.h"
 
 #define CSV_COLUMNS_MAX 18  // of a format
 #define CSV_FIELDS_MAX 64   // of a file
@@ -56,6 +57,7 @@ typedef struct csv_reader {
   csv_field fields[CSV_FIELDS_MAX];
   size_t fields_found;  // in the current line
   int too_long;
+  wm_row_problem problem;  // of the line that csv_read refused last
 } csv_reader;
 
 // Opens the file and reads its header. A missing or doubled column is an error with its name. Unknown columns are

@@ -75,20 +75,21 @@ static int is_mine(const stream *self) {
   return self->takes_broken && !is_among(name, self->names);
 }
 
-static void count_bad(stream *self, wm_status status, const char *why) {
+static void count_bad(stream *self, wm_status status, wm_row_problem kind, const char *why) {
   wm_source_counts *counts = &self->base.counts;
   if (status == WM_NOT_FINITE)
     counts->not_finite++;
   else
     counts->malformed++;
-  if (!counts->first_problem[0])
-    snprintf(counts->first_problem, sizeof counts->first_problem, "%s; the row is skipped", why);
+  if (counts->first_problem[0]) return;
+  snprintf(counts->first_problem, sizeof counts->first_problem, "%s; the row is skipped", why);
+  counts->first_problem_kind = (uint8_t)kind;
 }
 
 static void count_bad_row(stream *self, wm_status status, const csv_row *row, const char *why) {
   char text[WM_PATH_MAX + 128];
   snprintf(text, sizeof text, "%s:%ld: %s", self->csv.lines.path, row->line, why);
-  count_bad(self, status, text);
+  count_bad(self, status, WM_ROW_OTHER, text);
 }
 
 // The next readable row of this source; others are counted.
@@ -102,7 +103,7 @@ static wm_status read_row(stream *self, csv_row *row, wm_error *err) {
     if (status == WM_OK && self->names && !is_name(csv_name(&self->csv), self->sensor))
       status = csv_fail(&self->csv, &why, WM_BAD_DATA, "the sensor's name is broken");
     if (status == WM_OK) return WM_OK;
-    count_bad(self, status, why.text);
+    count_bad(self, status, self->csv.problem, why.text);
   }
 }
 

@@ -72,10 +72,10 @@ static int finished(const wm_run_report *report, const char *out_dir) {
   return EXIT_WORK_FAILED;
 }
 
-// What the recording has and the estimator doesn't take; one that takes no observation is chosen for dead reckoning.
+// What the recording has and the estimator doesn't take.
 static void tell_unused(void *context, const wm_assembly *assembly, wm_status status) {
   (void)context;
-  if (status != WM_OK || !(assembly->config->estimator->takes & ~(uint32_t)WM_MOTION_EVENTS)) return;
+  if (status != WM_OK || !wm_assembly_observes(assembly)) return;
   for (size_t i = 0; i < assembly->unused_count; i++) {
     const wm_unused *one = &assembly->unused[i];
     char line[sizeof *one + 32];

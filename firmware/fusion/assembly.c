@@ -194,6 +194,13 @@ void wm_assembly_close(wm_assembly *self) {
   self->vision = NULL;
 }
 
+int wm_assembly_observes(const wm_assembly *self) {
+  const uint32_t observations = WM_EVENT_BIT(WM_EVENT_SIGHTING) | WM_EVENT_BIT(WM_EVENT_POSITION) |
+                                WM_EVENT_BIT(WM_EVENT_HEADING) | WM_EVENT_BIT(WM_EVENT_MARKER) |
+                                WM_EVENT_BIT(WM_EVENT_STEREO) | WM_EVENT_BIT(WM_EVENT_POINTS);
+  return (self->config->estimator->takes & observations) != 0;
+}
+
 uint64_t wm_assembly_observers(const wm_assembly *self) {
   const uint32_t observed = self->config->estimator->takes & ~(uint32_t)WM_MOTION_EVENTS;
   uint64_t bits = 0;

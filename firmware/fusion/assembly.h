@@ -67,6 +67,8 @@ wm_status wm_assembly_choose_motion(wm_assembly *self, wm_error *err);
 // Closes the pictures. Before the recording and the run's memory are closed.
 void wm_assembly_close(wm_assembly *self);
 
+// Whether the estimator takes any observation; one that takes none is chosen for dead reckoning.
+int wm_assembly_observes(const wm_assembly *self);
 // Bit for each source that gives observations for the estimator.
 uint64_t wm_assembly_observers(const wm_assembly *self);
 // "can", "sightings:laser" ... by index; "?" beyond.

@@ -54,13 +54,13 @@ def table(head, rows):
     return head + "\n" + "".join(",".join(str(c) for c in row) + "\n" for row in rows)
 
 
-def motion(rate_hz=50, v=1.0, w=1.0, sigma=0.01, stamp=ns, repeat=1, arrival=None, exact=False):
+def motion(rate_hz=50, v=1.0, w=1.0, sigma=0.01, stamp=ns, repeat=1, arrival=None, exact=False, steady=False):
     """motion.csv: speed and turn rate times a factor each; each value `repeat` times."""
     n, rows, held = noise(1), [], None
     for k, t in enumerate(times(rate_hz)):
         if k % repeat == 0:
             s = 0 if exact else sigma
-            held = (f"{v * speed(t) + n(s):.5f}", f"{w * turn(t) + n(s):.5f}") if not exact else (v, w * turn(t))
+            held = (f"{v * (1.5 if steady else speed(t)) + n(s):.5f}", f"{w * turn(t) + n(s):.5f}") if not exact else (v, w * turn(t))
         rows.append([stamp(t), *held, *([arrival(t)] if arrival else [])])
     return table("t_ns,v_mps,w_radps" + (",arrival_ns" if arrival else ""), rows)
 
@@ -93,14 +93,20 @@ def can(stamp=lambda t: f"{START_NS / 1e9 + t:.6f}", valtype=True, signed="-", v
     return {"can.log": "\n".join(lines) + "\n", "vehicle.dbc": DBC.format(signed, VALTYPES if valtype else ""), "can-signals.yaml": SIGNALS}
 
 
-def gnss(sigma=0.05, stated=0.05, rate_hz=5, scale=1.0):
+def headings():
+    n = noise(5)
+    return table("t_ns,heading_rad,sigma_rad", [[ns(t), f"{heading_at[round(100 * t)] + n(0.02):.5f}", 0.02] for t in times(5)])
+
+
+def gnss(sigma=0.05, stated=0.05, rate_hz=5, scale=1.0, steady=False):
     n, x, y, rows = noise(3), 0.0, 0.0, []
     for k in range(round(SECONDS * 100)):
         t = k / 100
         if k % round(100 / rate_hz) == 0:
             rows.append([ns(t), f"{scale * x + n(sigma):.4f}", f"{scale * y + n(sigma):.4f}", 0, stated, 0.1])
         h = heading_at[k]
-        x, y = x + 0.01 * speed(t) * math.cos(h), y + 0.01 * speed(t) * math.sin(h)
+        v = 1.5 if steady else speed(t)
+        x, y = x + 0.01 * v * math.cos(h), y + 0.01 * v * math.sin(h)
     return table("t_ns,x_m,y_m,z_m,sigma_xy_m,sigma_z_m", rows)
 
 
@@ -203,6 +209,7 @@ RIGHT = [
     ("a slow gyro with much noise", both(imu_csv=imu(20, sigma=0.05))),
     ("a base that turns a fifth less than its wheels", both(motion_csv=motion(w=1.2))),
     ("values in threes beside a gyro", {"motion.csv": motion(100, repeat=3), "imu.csv": imu()}),
+    ("positions at one speed, the antenna's place unknown", {"motion.csv": motion(steady=True), "gnss.csv": gnss(sigma=0.03, steady=True), "heading.csv": headings(), "recording.yaml": RECORDING.format("motion.csv, gnss.csv, heading.csv").split("vehicle:")[0], "config.yaml": "format: waymark-config/1\nestimator: landmark_ekf\n"}),
     ("a gyro that lags by 0.3 s", both(imu_csv=imu(lag_s=0.3))),
     ("a gyro on CAN", can()),
     ("CAN, unsigned turn to the left alone", can(w=0.5)),

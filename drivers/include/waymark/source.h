@@ -17,18 +17,27 @@ extern "C" {
 #define WM_SOURCE_NAME_MAX 48  // bytes, "sightings:" and a sensor's name
 #define WM_SOURCES_MAX 32      // of a run
 
+// What is wrong with a row that can't be read, where it is known.
+typedef enum wm_row_problem {
+  WM_ROW_OTHER = 0,
+  WM_ROW_STAMP_OF_SECONDS,  // a stamp with a fraction: nanoseconds are whole
+  WM_ROW_ANGLE,             // an angle outside of what can be: degrees
+  WM_ROW_VALUE              // another number outside of what can be
+} wm_row_problem;
+
 // Counts of a source: every datum that doesn't become an event is in one of these.
 typedef struct wm_source_counts {
-  uint64_t received;        // events handed out
-  uint64_t lost;            // missing by the sender's own count (message counters, frame numbers)
-  uint64_t malformed;       // rows, lines or frames that could not be read
-  uint64_t not_finite;      // values that were NaN, infinite or impossible
-  uint64_t out_of_order;    // older than the one before it where the format requires order
-  uint64_t ignored;         // well-formed, but without a binding (other CAN frames), or a repeated report
-  uint64_t frozen;          // of a sender whose counter or stamp stood still
-  uint64_t bus_errors;      // CAN error frames: faults of the bus, reported by the controller
-  uint64_t overflows;       // dropped by the kernel or the controller because they were not read in time
-  char first_problem[256];  // text of the first malformed one, with file and line; "" where none
+  uint64_t received;           // events handed out
+  uint64_t lost;               // missing by the sender's own count (message counters, frame numbers)
+  uint64_t malformed;          // rows, lines or frames that could not be read
+  uint64_t not_finite;         // values that were NaN, infinite or impossible
+  uint64_t out_of_order;       // older than the one before it where the format requires order
+  uint64_t ignored;            // well-formed, but without a binding (other CAN frames), or a repeated report
+  uint64_t frozen;             // of a sender whose counter or stamp stood still
+  uint64_t bus_errors;         // CAN error frames: faults of the bus, reported by the controller
+  uint64_t overflows;          // dropped by the kernel or the controller because they were not read in time
+  char first_problem[256];     // text of the first malformed one, with file and line; "" where none
+  uint8_t first_problem_kind;  // wm_row_problem
   // Devices: wm_device_state with a note for the user, and the uncertainty of stamps.
   uint8_t device;
   char device_note[160];

@@ -64,13 +64,21 @@ double landmark_ekf::position_row(int axis, const past_pose &past, const antenna
 }
 
 // Where the delay is uncertain, its derivatives are those of the chord over two sigmas: a robot that may have stood
-// then, or driven, has neither's derivative [Julier1997]. bend_m: by how much the chord's middle is off the way.
+// then, or driven, has neither's derivative [Julier1997]. bend_m: by how much the chord's middle is off the way. Before
+// the first motion datum the robot is taken to have moved as it does by that one: taken to have stood, its first
+// positions would be exact, and tell a delay that they cannot tell from the place of the antenna.
 void landmark_ekf::widen_delay(past_pose *past, double bend_m[2]) const {
   bend_m[0] = bend_m[1] = 0.0;
   if (gnss_time_state_ < 0) return;
   const double sigma_s = std::sqrt(filter_.variance(gnss_time_state_)), age_s = filter_.value(gnss_time_state_);
-  if (sigma_s < kLinearDelay_s || !filter_.is_path_known(filter_.now_ns() - wm_ns_from_seconds(age_s + sigma_s)))
+  const wm_time_ns now = filter_.now_ns();
+  if (sigma_s < kLinearDelay_s) return;
+  if (!filter_.is_path_known(now - wm_ns_from_seconds(age_s + sigma_s))) {
+    motion_twist ahead{};
+    (void)filter_.path(now, now + 1, &ahead);
+    put_age(filter_.steady(ahead), sincos(past->pose.heading_rad), past->age_by);
     return;
+  }
   const wm_pose2 earlier = pose_before(filter_, age_s + sigma_s).pose,
                  later = pose_before(filter_, age_s - sigma_s).pose;
   past->age_by[0] = (earlier.x_m - later.x_m) / (2.0 * sigma_s);
@@ -78,6 +86,25 @@ void landmark_ekf::widen_delay(past_pose *past, double bend_m[2]) const {
   past->age_by[2] = wrap(earlier.heading_rad - later.heading_rad) / (2.0 * sigma_s);
   bend_m[0] = 0.5 * (earlier.x_m + later.x_m) - past->pose.x_m;
   bend_m[1] = 0.5 * (earlier.y_m + later.y_m) - past->pose.y_m;
+}
+
+// A pose that was found by positions alone has the errors of their delay and of the antenna's place. (That of the
+// positions themselves is in its covariance.)
+void landmark_ekf::lean_on_positions(wm_time_ns since_ns) {
+  for (int i = observations_.kept() - observations_.count_since(since_ns); i < observations_.kept(); i++)
+    if (observations_.at(i).kind & (kObservedBearing | kObservedRange)) return;
+  if (!receiver_.is_used()) return;
+  past_pose past = pose_before(filter_, gnss_time_state_ < 0 ? 0.0 : filter_.value(gnss_time_state_));
+  double bend_m[2];
+  widen_delay(&past, bend_m);
+  const sin_cos h = view_antenna(past).h;
+  const double by_antenna[2][2] = {{h.cos, -h.sin}, {h.sin, h.cos}};
+  for (int axis = 0; axis < 2; axis++) {
+    planar_row row;
+    row.add(gnss_time_state_, -past.age_by[axis]);
+    for (int k = 0; k < 2 && antenna_state_ >= 0; k++) row.add(antenna_state_ + k, -by_antenna[axis][k]);
+    filter_.carry_state(axis, row, 0.0, 0.0);
+  }
 }
 
 wm_status landmark_ekf::fuse_position(const wm_event &event, record_list records) {

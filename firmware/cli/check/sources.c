@@ -43,12 +43,11 @@ static uint64_t of_hundred(uint64_t part, uint64_t whole) { return whole > 0 ? p
 // The fix for rows that can't be read, by the first of them.
 static const char *mend_rows(const wm_source *source) {
   const wm_source_counts *c = &source->counts;
-  const char *stamp = strstr(c->first_problem, "_ns: ");
-  if (stamp && strchr(stamp, '.') && strstr(stamp, "is not a whole number"))
+  if (c->first_problem_kind == WM_ROW_STAMP_OF_SECONDS)
     return "are the stamps in seconds? t_ns and arrival_ns are whole nanoseconds: multiply by 1e9";
-  if (strstr(c->first_problem, "_rad: ") && c->not_finite > c->malformed)
+  if (c->first_problem_kind == WM_ROW_ANGLE && c->not_finite > c->malformed)
     return "are the angles in degrees? The column is in radians: multiply by 0.0174533 (pi/180)";
-  if (strstr(c->first_problem, "is outside of what can be"))
+  if (c->first_problem_kind == WM_ROW_VALUE || c->first_problem_kind == WM_ROW_ANGLE)
     return "is it in the unit of the column's name? Leave a field empty where nothing was measured";
   return source->is_motion ? "the DBC and what is on the bus are not the same; or the file is damaged"
                            : "the file is damaged, or its columns differ from its first line";

@@ -51,8 +51,7 @@ static void gyro(const wm_assembly *assembly, uint32_t bound, wm_findings *out) 
 }
 
 static void sources(const wm_assembly *assembly, wm_findings *out) {
-  // One that takes none at all is chosen for dead reckoning.
-  const int takes_observations = (assembly->config->estimator->takes & ~(uint32_t)WM_MOTION_EVENTS) != 0;
+  const int takes_observations = wm_assembly_observes(assembly);
   for (size_t i = 0; i < assembly->unused_count; i++) {
     const wm_unused *one = &assembly->unused[i];
     char fix[WM_FINDING_FIX_MAX];

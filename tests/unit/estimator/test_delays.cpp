@@ -160,6 +160,28 @@ void test_a_receivers_delay_is_found_when_a_robot_drives_off() {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.11, worst);
 }
 
+// At one speed and straight on, from the first datum, a delay and the antenna's place along the way are the same:
+// neither is observed, whether the pose is given or found.
+void test_a_receivers_delay_is_not_observed_at_one_speed() {
+  for (const bool is_given : {true, false}) {
+    const double place = is_given ? 0.0 : static_cast<double>(NAN);
+    setup.start = {WM_TIME_NONE, {place, place, 0}, {0, 0, 0, 1}, place, 1.0, 0.1};
+    begin();
+    for (int k = 0; k < 500; k++) {
+      const double t = 0.02 * k;
+      const auto at = static_cast<uint64_t>(3 * k);
+      feed(make::twist(t, 1.5 + 0.01 * wm_random_normal(6, 1, at), 0.0));
+      if (k % 10) continue;
+      feed(make::position(t, 1.5 * t + 0.03 * wm_random_normal(6, 1, at + 1), 0.03 * wm_random_normal(6, 1, at + 2),
+                          0.05));
+      feed(make::heading(t, 0.02 * wm_random_normal(6, 2, at), 0.02));
+    }
+    const wm_calibration_value delay = found("gnss.time_offset_s");
+    TEST_ASSERT_GREATER_THAN_DOUBLE(0.2, delay.sigma);  // 0.3 m of antenna at 1.5 m/s
+    TEST_ASSERT_LESS_THAN_DOUBLE(3.0, std::fabs(delay.value) / delay.sigma);
+  }
+}
+
 }  // namespace
 
 void setUp() {
@@ -182,5 +204,6 @@ int main() {
   RUN_TEST(test_a_lag_at_its_limit_leaves_the_rest_to_the_offset);
   RUN_TEST(test_coarse_counts_behind_early_stamps_leave_the_track);
   RUN_TEST(test_a_receivers_delay_is_found_when_a_robot_drives_off);
+  RUN_TEST(test_a_receivers_delay_is_not_observed_at_one_speed);
   return UNITY_END();
 }
