@@ -123,7 +123,7 @@ def lag(rng):
 
 
 def bearings(rng):
-    return {"sightings.csv": each(bearing_rad=lambda b: -b)}, "bearings of sightings:front times -1", [1.0]
+    return {"sightings.csv": each(bearing_rad=lambda b: -b)}, "bearings of sightings:front times -1", [-1.0]
 
 
 def gyro(rng):

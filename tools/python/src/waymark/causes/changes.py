@@ -149,7 +149,7 @@ class Value(Edit):
             if below is None:
                 break
             node, walked = below, walked + 1
-        if walked == len(self.path):
+        if walked == len(self.path) and node is not None:
             return (text[:node.start_mark.index] + self.text + text[_end(text, node):]).encode()
         return _inserted(text, node, self.path[walked:], self.text, self.file).encode()
 

@@ -23,12 +23,12 @@ Size = tuple[float, ...]
 class Fault:
     """A mistake. `start`: sizes to begin with. With `step` its size is fitted, in logarithms where `is_log`, to `smallest`. `group`:
     rows of one group have one effect; where a drive cannot tell them apart, the likeliest is named with the others. `prior`: log
-    odds against the other rows. `is_slow`: it shows over a whole drive only. `is_blind`: it explains that nothing was seen."""
+    odds against the other rows."""
 
     name: str
     start: tuple[Size, ...]
-    edits: Callable[[Size], list[Edit]]
-    say: Callable[[Size], str]
+    edits: Callable[..., Sequence[Edit]]  # of a size
+    say: Callable[..., str]  # of a size
     step: tuple[float, ...] = ()
     smallest: tuple[float, ...] = ()
     is_log: bool = False
@@ -36,11 +36,13 @@ class Fault:
     group: str = ""
     named: Sequence[float] = ()
     prior: float = 0.0
-    is_slow: bool = False
-    is_blind: bool = False
+    is_clock: bool = False
+    """It changes stamps."""
+    scales: str = ""
+    """The residual whose observations are multiplied by the size."""
     settled: Callable[[Size, dict[str, float]], Size] = lambda size, states: size
     """The size with what the filter's own calibration states took of it, by their names."""
-    other_places: Callable[[Size], list[list[Edit]]] = lambda size: []
+    other_places: Callable[[Size], Sequence[Sequence[Edit]]] = lambda size: []
     """Other lines that would undo the same."""
 
     def by_states(self, states: dict[str, float]) -> Size:
@@ -63,10 +65,10 @@ class Fault:
         return size
 
 
-def discrete(name: str, edits: Callable[[Size], list[Edit]], say: Callable[[Size], str], *, group: str = "", size: float = 1.0,
-             prior: float = 0.0, is_blind: bool = False) -> Fault:
+def discrete(name: str, edits: Callable[..., Sequence[Edit]], say: Callable[..., str], *, group: str = "", size: float = 1.0,
+             prior: float = 0.0, scales: str = "") -> Fault:
     """A mistake that is there or not."""
-    return Fault(name, ((size,),), edits, say, group=group, prior=prior, is_blind=is_blind)
+    return Fault(name, ((size,),), edits, say, group=group, prior=prior, scales=scales)
 
 
 def factor_words(factor: float) -> str:

@@ -3,9 +3,11 @@
 
 import math
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 
+from ..tables import Array
 from .changes import Edit, Signal, Value, column, degrees, numbers, swapped
 from .fault import DEG, NEAR, Fault, Size, discrete, factor_words
 from .robot import Robot
@@ -20,7 +22,7 @@ UPRIGHT = 0.94  # cos of 20 degrees: a floor is no steeper
 
 def all_of(robot: Robot) -> Iterator[Fault]:
     """Every row of motion that this robot has something of."""
-    bound = {item.get("quantity"): number for number, item in enumerate(robot.bindings)} if robot.has("can.log") else {}
+    bound: dict[Any, int] = {item.get("quantity"): number for number, item in enumerate(robot.bindings)} if robot.has("can.log") else {}
     if bound:
         yield from _can(robot, bound)
     if robot.has("ticks.csv") or set(TICKS) <= set(bound):
@@ -63,8 +65,8 @@ def _wheels(robot: Robot, bound: dict[str, int]) -> Iterator[Fault]:
         return [Value("can-signals.yaml", (bound[TICKS[side]], "quantity"), TICKS[1 - side]) for side in (0, 1)]
 
     yield discrete("sides of the ticks", exchanged, lambda _: "the wheels' ticks, left and right, are swapped")
-    for sides, words in (((0,), "wheel_ticks_left counts"), ((1,), "wheel_ticks_right counts"), ((0, 1), "both wheels' ticks count")):
-        yield discrete(f"ticks {sides}", lambda _, s=sides: turned(s), lambda _, w=words: f"{w} backwards (scale: -1)")
+    for sides, counted in (((0,), "wheel_ticks_left counts"), ((1,), "wheel_ticks_right counts"), ((0, 1), "both wheels' ticks count")):
+        yield discrete(f"ticks {sides}", lambda _, s=sides: turned(s), lambda _, w=counted: f"{w} backwards (scale: -1)")
 
     # The way of a tick is radius over ticks: the drive shows it, not which of both is wrong.
     def places(size: Size) -> list[list[Edit]]:
@@ -103,7 +105,7 @@ def _rate_words(name: str, factor: float, is_angle: bool) -> str:
 
 
 def _can(robot: Robot, bound: dict[str, int]) -> Iterator[Fault]:
-    quantities = [(("yaw_rate",), TURNS, True), (("vehicle_speed",), SPEEDS, False), (("steering_wheel",), (-1.0, DEG, 1 / DEG), True),
+    quantities: list[tuple[tuple[str, ...], tuple[float, ...], bool]] = [(("yaw_rate",), TURNS, True), (("vehicle_speed",), SPEEDS, False), (("steering_wheel",), (-1.0, DEG, 1 / DEG), True),
                   (("road_wheel",), (-1.0, DEG, 1 / DEG), True)]
     quantities += [((f"wheel_speed_{axle}_left", f"wheel_speed_{axle}_right"), SPEEDS[:4], False) for axle in ("front", "rear")]
     for names, sizes, is_angle in quantities:
@@ -170,6 +172,6 @@ def _imu(robot: Robot) -> Iterator[Fault]:
                    lambda _: f"gravity is on another axis of the IMU than its mounting says (mean acceleration {up[0]:.1f}, {up[1]:.1f}, {up[2]:.1f} m/s2)")
 
 
-def _tilt(roll: float, pitch: float) -> np.ndarray:
+def _tilt(roll: float, pitch: float) -> Array:
     """base_link's z axis in the sensor's frame."""
     return np.array([-math.sin(pitch), math.sin(roll) * math.cos(pitch), math.cos(roll) * math.cos(pitch)])

@@ -141,8 +141,8 @@ class Robot:
         if not self.has("can.log"):
             return None
         lines = (self.files.recording / "can.log").read_bytes().split(b"\n")
-        stamps = [line[1:line.index(b")")] for line in (lines[0], *reversed(lines[-3:])) if line.startswith(b"(") and b")" in line]
-        return (round(float(stamps[0]) * 1e9), round(float(stamps[1]) * 1e9)) if len(stamps) > 1 else None
+        ends = [line[1:line.index(b")")] for line in (lines[0], *reversed(lines[-3:])) if line.startswith(b"(") and b")" in line]
+        return (round(float(ends[0]) * 1e9), round(float(ends[1]) * 1e9)) if len(ends) > 1 else None
 
     def setting(self, *path: str) -> float | None:
         """A number of the configuration: vision.apriltag.size_m."""

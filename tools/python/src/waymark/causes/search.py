@@ -13,9 +13,9 @@ from ..tables import Array
 from .faults import all_faults, exchanged
 from .fault import Fault, Size
 from .robot import Robot
-from .trial import Blocks, Change, Drive, Trials, likelihoods
+from .trial import Blocks, Change, Drive, Trials, outliers
 
-BUDGET_S = 50.0  # of processor time a processor; after it no further round is begun
+BUDGET_S = 14.0  # of processor time a processor; after it no further round is begun
 SCREEN_SHARE, SCREEN_MIN_S, SCREEN_MAX_S = 0.3, 10.0, 20.0
 FIT_MAX_S = 40.0  # of the drive, for sizes
 ROWS_KEPT, ROWS_FITTED, ROWS_JUDGED = 10, 4, 6
@@ -73,6 +73,7 @@ class Search:
         self.rows: list[Fault] = []
         self.cost = 0.0  # processor time of a second of the drive
         self.duration_s = 0.0
+        self.usual_seen = 0  # updates of the part that is driven
 
     def left_s(self) -> float:
         """Of the budget."""
@@ -101,13 +102,12 @@ class Search:
             if not found or not self._helps(found[0].drive, now):
                 break
             best, tied, probability = self._judge(found, now)
-            if tied:
-                if self._is_right(best.drive) and not fixed:
+            if self._is_right(best.drive):
+                if tied and not fixed:
                     verdict.undecided = [(c.fault, c.size) for c in (best, *tied)]
-                break
-            if probability < NAMED_FROM:
-                break
-            best = self._settled(best, fixed)
+                if tied or probability < NAMED_FROM:
+                    break
+                best = self._settled(best, fixed)
             fixed.append((best.fault, best.size))
             verdict.probability = min(probability, verdict.probability or 1.0)
             now = best.drive
@@ -115,10 +115,15 @@ class Search:
                 break
         if not self._is_right(now) and not verdict.undecided:
             fixed, now = self._pairs(firsts, before, verdict) or (fixed, now)
-        if fixed and self._is_right(now) and not verdict.undecided:
+        if fixed and self._is_right(now) and not verdict.undecided and self._are_needed(fixed, now):
             verdict.causes, verdict.after, verdict.gain = fixed, now, self._gain(now, before)
         verdict.drives = self.trials.drives
         return verdict
+
+    def _are_needed(self, fixed: list[Change], now: Drive) -> bool:
+        """Whether each of several mistakes has a part in it."""
+        without = self.trials.run([[c for c in fixed if c is not one] for one in fixed], has_states=True) if len(fixed) > 1 else []
+        return all(drive is None or self._beats(now, drive, APART_MIN)[0] for drive in without)
 
     def _begin(self) -> Drive | None:
         """The drive as it is."""
@@ -128,7 +133,7 @@ class Search:
             return None
         self.duration_s = float(stamps[-1] - stamps[0]) * 1e-9
         length = min(BLOCK_S, self.duration_s / BLOCKS_MIN)
-        self.trials.blocks = Blocks(int(stamps[0]), length, max(2, math.ceil(self.duration_s / length)))
+        self.trials.blocks = Blocks(int(stamps[0]), length, max(2, math.ceil(self.duration_s / length)), outliers(self.robot))
         self.cost = cpu_s / self.duration_s
         self.trials.spent_s += cpu_s
         return self.trials.run([[]], keeps=True, has_states=True)[0]
@@ -139,19 +144,20 @@ class Search:
         """The best rows beside those that are fixed, each with its fitted size, on the whole drive; the best first."""
         used = {fault.name for fault, _ in fixed}
         rows = [row for row in self.rows if row.name not in used]
-        starts = [(row, size) for row in rows if not row.is_slow for size in row.start if row.is_possible(size)]
+        starts = [(row, size) for row in rows for size in row.start if row.is_possible(size)]
         self.trials.settings = self._without_search()
         part_s = self.part_s(len(starts), SCREEN_SHARE, SCREEN_MAX_S)
-        base = self._drives([], fixed, part_s, plain=True)[0] or now
+        base = self._plain(fixed, part_s) or now
         kept = self._within_reach(self._best_sizes(self._tried(starts, fixed, part_s), part_s), base, part_s)[:ROWS_KEPT]
-        slow: list[Change] = []
-        if not any(self._is_right(c.drive) for c in kept):  # else what shows over a part of the drive is enough
-            slow = [(row, size) for row in rows if row.is_slow for size in row.start] + self._proposals(fixed, now)
-        fit_s = self.part_s(ROWS_KEPT + len(slow) + 9 * ROWS_FITTED, 0.5, FIT_MAX_S)
-        over_s = self._whole(fit_s) if slow else fit_s
-        base = self._drives([], fixed, over_s, plain=True)[0] or now
-        more = self._tried([*((c.fault, c.size) for c in kept), *slow], fixed, over_s)
+        # Where a row explains the part, no table of identities is looked for.
+        proposed = [] if any(self._is_right(c.drive) for c in kept) else self._proposals(fixed, now)
+        fit_s = self.part_s(ROWS_KEPT + len(proposed) + 9 * ROWS_FITTED, 0.5, FIT_MAX_S)
+        over_s = self._whole(fit_s) if proposed else fit_s
+        base = self._plain(fixed, over_s) or now
+        more = self._tried([*((c.fault, c.size) for c in kept), *proposed], fixed, over_s)
         ordered = self._within_reach(self._best_sizes(more, over_s), base, over_s)
+        if fit_s != over_s:
+            self._plain(fixed, fit_s)
         fitted = self._fitted(ordered[:ROWS_FITTED], fixed, fit_s)
         others = [(c.fault, c.size) for c in ordered[ROWS_FITTED:ROWS_JUDGED]]
         self.trials.settings = {}
@@ -171,9 +177,10 @@ class Search:
         """The rows that gain, and that a fitted size may make the best."""
         assert self.trials.blocks is not None
         part, least = self.trials.blocks.part(until_s), self._score(now, until_s)
-        most = max((self._score(c.drive, until_s) - least for c in ordered), default=0.0)
+        gains = {c.fault.name: self._score(c.drive, until_s, c.fault.is_clock) - least for c in ordered}
+        most = max(gains.values(), default=0.0)
         updates = max([1, int(now.seen[:part].sum()), *(int(c.drive.seen[:part].sum()) for c in ordered)]) / 2
-        return [c for c in ordered if most >= FIT_GAIN_MIN * updates and self._score(c.drive, until_s) - least >= REACH * most]
+        return [c for c in ordered if most >= FIT_GAIN_MIN * updates and gains[c.fault.name] >= REACH * most]
 
     def _whole(self, fit_s: float) -> float:
         return 0.0 if self.cost * self.duration_s * 30 < self.left_s() else fit_s
@@ -183,17 +190,19 @@ class Search:
         self.progress(min(0.99, self.trials.spent_s / (BUDGET_S * self.trials.at_once)))
         return [Candidate(fault, size, drive) for (fault, size), drive in zip(changes, drives) if drive is not None]
 
-    def _score(self, drive: Drive, until_s: float) -> float:
+    def _score(self, drive: Drive, until_s: float, is_clock: bool = False) -> float:
         """On the blocks of a part that are for fitting."""
         assert self.trials.blocks is not None
         part = self.trials.blocks.part(until_s)
-        return float(drive.gain[:part][_fit(part)].sum())
+        gain = float(drive.gain[:part][_fit(part)].sum())
+        # Other stamps bring more or less of the data into a part: more are no merit.
+        return gain * min(1.0, self.usual_seen / max(1, int(drive.seen[:part].sum()))) if is_clock and until_s > 0 and self.usual_seen else gain
 
     def _best_sizes(self, tried: list[Candidate], until_s: float) -> list[Candidate]:
         """Of each row its best size; the best rows first."""
         best: dict[str, tuple[float, Candidate]] = {}
         for candidate in tried:
-            score = self._score(candidate.drive, until_s) + candidate.fault.prior
+            score = self._score(candidate.drive, until_s, candidate.fault.is_clock) + candidate.fault.prior
             if candidate.fault.name not in best or score > best[candidate.fault.name][0]:
                 best[candidate.fault.name] = score, candidate
         return [candidate for _, candidate in sorted(best.values(), key=lambda pair: -pair[0])]
@@ -207,8 +216,8 @@ class Search:
             active = [s for s in state.values() if axis < len(s[2]) and s[2][axis] >= s[0].smallest[axis]]
             threes = [[(fault, fault.moved(size, axis, way)) for way in (-steps[axis], 0.0, steps[axis])] for fault, size, steps in active]
             jobs = {(fault.name, size): (fault, size) for three in threes for fault, size in three if (fault.name, size) not in known}
-            for (key, _), drive in zip(jobs.items(), self._drives(list(jobs.values()), fixed, until_s)):
-                known[key] = self._score(drive, until_s) if drive else -math.inf
+            for key, drive in zip(jobs, self._drives(list(jobs.values()), fixed, until_s)):
+                known[key] = self._score(drive, until_s, jobs[key][0].is_clock) if drive else -math.inf
             for entry, three in zip(active, threes):
                 entry[1], entry[2][axis] = _parabola(entry[0], entry[1], axis, entry[2][axis], [known[fault.name, size] for fault, size in three])
         return [(fault, self._neat(fault, size)) for fault, size, _ in state.values()]
@@ -224,6 +233,12 @@ class Search:
         if self.left_s() <= 0:
             return [None] * len(changes)
         return self.trials.run(changes, until_s, most_s=2 + LONGEST * self.cost * (until_s or self.duration_s), has_states=has_states)
+
+    def _plain(self, fixed: list[Change], until_s: float) -> Drive | None:
+        """The drive with what is fixed alone."""
+        drive = self._drives([], fixed, until_s, plain=True)[0]
+        self.usual_seen = int(drive.seen.sum()) if drive else 0
+        return drive
 
     def _without_search(self) -> dict[str, str]:
         """Settings with which a filter that starts at a known pose does not look for it elsewhere: a copy that is wrong need not be
@@ -337,7 +352,7 @@ class Search:
             is_same = other.fault.family() == best.fault.family() and "along the way" not in best.fault.family()
             if is_better:
                 probability = min(probability, better)
-            elif not is_same and (self._is_right(other.drive) or not self._is_right(best.drive)):
+            elif not is_same and self._is_right(other.drive):
                 tied.append(other)
         return best, tied, probability
 
@@ -397,4 +412,4 @@ def _student(t: float, freedom: int) -> float:
     return NormalDist().cdf(z)
 
 
-__all__ = ["Search", "Verdict", "likelihoods"]
+__all__ = ["Search", "Verdict"]

@@ -26,7 +26,8 @@ from .changes import CONFIG, NAMED, Edit, Impossible, Value
 from .fault import Fault, Size
 from .robot import Robot
 
-# Log density of an outlier, which has any value: over a turn, over 50 m, over a picture of 1000 px, over half a turn.
+# Log density of an outlier, which has any value: over a turn, over 50 m, over a picture of 1000 px, over half a turn. That of ranges and
+# bearings is over the values that the recording has, where they are further: of ranges in mm.
 _OUTLIER = {"bearing": -1.84, "heading": -1.84, "range": -3.91, "x": -3.91, "y": -3.91, "z": -3.91, "pixel": -6.91, "elevation": -1.14}
 _ANGLES = ("bearing", "heading")
 DOUBT = 0.3  # nats an update while the pose is lost or degraded: a filter that starts anew again and again fits, too
@@ -63,6 +64,7 @@ class Blocks:
     begin_ns: int
     length_s: float
     count: int
+    outliers: dict[str, float] = field(default_factory=lambda: dict(_OUTLIER))
 
     def of(self, stamps: Array) -> Array:
         """The block of each stamp."""
@@ -74,23 +76,35 @@ class Blocks:
         return self.count if until_s <= 0 else min(self.count, max(2, int(until_s / self.length_s)))
 
 
-def likelihoods(rows: dict[str, Array]) -> Array:
-    """Of each update, nats over an outlier's."""
+def outliers(robot: Robot) -> dict[str, float]:
+    """Log densities of outliers, in the units of the recording."""
+    values = robot.table("sightings.csv")
+    out = dict(_OUTLIER)
+    for kind, name in (("range", "range_m"), ("bearing", "bearing_rad")):
+        finite = np.abs(values.get(name, np.zeros(0)))
+        finite = finite[np.isfinite(finite)]
+        out[kind] = min(out[kind], -math.log(2 * float(finite.max()))) if len(finite) and finite.max() > 0 else out[kind]
+    return out
+
+
+def likelihoods(rows: dict[str, Array], densities: dict[str, float], scaled: dict[str, float]) -> Array:
+    """Of each update, nats over an outlier's. `scaled`: log factor by which a residual's observations were multiplied: the density is
+    that of the recording's own values."""
     kinds = rows["residual"]
     out = np.zeros(len(kinds))
-    for kind, outlier in _OUTLIER.items():
+    for kind, outlier in densities.items():
         mine = kinds == kind
         away, variance = (rows["observed"] - rows["expected"])[mine], rows["variance"][mine]
         if kind in _ANGLES:
             away = np.remainder(away + math.pi, 2 * math.pi) - math.pi
         with np.errstate(all="ignore"):
-            log = -0.5 * away**2 / variance - 0.5 * np.log(2 * math.pi * variance) - outlier
+            log = -0.5 * away**2 / variance - 0.5 * np.log(2 * math.pi * variance) + scaled.get(kind, 0.0) - outlier
             value = np.logaddexp(math.log(_OUTLIERS), math.log(1 - _OUTLIERS) + log) - math.log(_OUTLIERS)
         out[mine] = np.where((variance > 0) & np.isfinite(value), value, 0)
     return out
 
 
-def judged(estimate: Estimate, blocks: Blocks, cpu_s: float, keeps: bool) -> Drive:
+def judged(estimate: Estimate, blocks: Blocks, scaled: dict[str, float], cpu_s: float, keeps: bool) -> Drive:
     """A drive's blocks and shares."""
     rows = estimate.innovations
     counts = np.isin(rows["residual"], list(_OUTLIER))
@@ -105,7 +119,7 @@ def judged(estimate: Estimate, blocks: Blocks, cpu_s: float, keeps: bool) -> Dri
     when, doubted = blocks.of(estimate.published["t_ns"]), np.isin(states, ["lost", "degraded"])
     doubt = np.bincount(when, doubted, blocks.count) / np.maximum(1, np.bincount(when, minlength=blocks.count))
     seen = np.bincount(at, minlength=blocks.count)
-    return Drive(np.bincount(at, likelihoods(rows), blocks.count) - DOUBT * doubt * seen, seen, float(fused.mean()) if len(fused) else 0.0,
+    return Drive(np.bincount(at, likelihoods(rows, blocks.outliers, scaled), blocks.count) - DOUBT * doubt * seen, seen, float(fused.mean()) if len(fused) else 0.0,
                  float(np.mean(away[good] ** 2 / rows["variance"][good])) if good.any() else math.inf, share["lost"], share["degraded"], cpu_s,
                  estimate if keeps else None)
 
@@ -115,8 +129,9 @@ def edits_of(changes: Sequence[Change]) -> list[Edit]:
     return [edit for fault, size in changes for edit in fault.edits(size)]
 
 
-Job = tuple[dict[str, Any], Blocks, bool, float]
-"""What a worker drives: arguments of a replay, its blocks, whether its records are returned, and the most processor time, s."""
+Job = tuple[dict[str, Any], Blocks, dict[str, float], bool, float]
+"""What a worker drives: arguments of a replay, its blocks, how observations were scaled, whether its records are returned, and the most
+processor time, s."""
 
 
 def _work(jobs: int, results: int) -> None:
@@ -126,21 +141,21 @@ def _work(jobs: int, results: int) -> None:
     with os.fdopen(jobs, "rb") as given, os.fdopen(results, "wb") as taken:
         while True:
             try:
-                arguments, blocks, keeps, most_s = pickle.load(given)  # written by this program itself
+                arguments, blocks, scaled, keeps, most_s = pickle.load(given)  # written by this program itself
             except EOFError:
                 return
             signal.setitimer(signal.ITIMER_PROF, most_s)
-            pickle.dump(_driven(arguments, blocks, keeps), taken)
+            pickle.dump(_driven(arguments, blocks, scaled, keeps), taken)
             taken.flush()
 
 
-def _driven(arguments: dict[str, Any], blocks: Blocks, keeps: bool) -> Drive | None:
+def _driven(arguments: dict[str, Any], blocks: Blocks, scaled: dict[str, float], keeps: bool) -> Drive | None:
     begun = time.process_time()
     try:
         estimate = replay(**arguments)
     except WaymarkError:
         return None  # such a copy can't be driven: it explains nothing
-    drive = judged(estimate, blocks, time.process_time() - begun, keeps)
+    drive = judged(estimate, blocks, scaled, time.process_time() - begun, keeps)
     if not arguments.get("out"):
         return drive
     ended = _states(arguments["out"])
@@ -248,7 +263,8 @@ class Trials:
                     continue  # nothing to change: it explains nothing
                 worker = self.idle.pop()
                 arguments["out"] = self.folder / f"run-{number}" if has_states else None
-                worker.give((arguments, self.blocks, keeps, most_s))
+                scaled = {fault.scales: math.log(abs(size[0])) for fault, size in jobs[number] if fault.scales}
+                worker.give((arguments, self.blocks, scaled, keeps, most_s))
                 running[worker.results.fileno()] = worker, number
             for pipe in select.select(list(running), [], [])[0] if running else []:
                 worker, number = running.pop(pipe)
