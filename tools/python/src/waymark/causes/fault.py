@@ -32,7 +32,7 @@ class Fault:
     step: tuple[float, ...] = ()
     smallest: tuple[float, ...] = ()
     is_log: bool = False
-    is_possible: Callable[[Size], bool] = lambda size: True
+    is_possible: Callable[..., bool] = lambda size: True
     group: str = ""
     named: Sequence[float] = ()
     prior: float = 0.0

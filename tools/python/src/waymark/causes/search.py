@@ -10,9 +10,10 @@ from statistics import NormalDist
 import numpy as np
 
 from ..tables import Array
+from .changes import column
+from .fault import Fault, Size, discrete
 from .faults import all_faults, exchanged
-from .fault import Fault, Size
-from .robot import Robot
+from .robot import Robot, Source
 from .trial import Blocks, Change, Drive, Trials, outliers
 
 BUDGET_S = 14.0  # of processor time a processor; after it no further round is begun
@@ -61,8 +62,18 @@ class Verdict:
     drives: int = 0
 
 
+@dataclass
+class _Fit:
+    """A row whose size is being fitted."""
+
+    fault: Fault
+    size: Size
+    steps: list[float]
+
+
 def _fit(blocks: int) -> Array:
-    return np.arange(blocks) % 2 == 0
+    out: Array = np.arange(blocks) % 2 == 0
+    return out
 
 
 class Search:
@@ -209,22 +220,18 @@ class Search:
 
     def _fitted(self, candidates: Sequence[Candidate], fixed: list[Change], until_s: float) -> list[Change]:
         """Sizes of the largest likelihood, by a parabola through three sizes on each axis, with ever smaller steps."""
-        state = {c.fault.name: [c.fault, c.size, list(c.fault.step)] for c in candidates}
+        state = [_Fit(c.fault, c.size, list(c.fault.step)) for c in candidates]
         known: dict[tuple[str, Size], float] = {}
         axes = max((len(c.fault.step) for c in candidates), default=0)
         for axis in [k for _ in range(FIT_ROUNDS) for k in range(axes)]:
-            active = [s for s in state.values() if axis < len(s[2]) and s[2][axis] >= s[0].smallest[axis]]
-            threes = [[(fault, fault.moved(size, axis, way)) for way in (-steps[axis], 0.0, steps[axis])] for fault, size, steps in active]
-            jobs = {(fault.name, size): (fault, size) for three in threes for fault, size in three if (fault.name, size) not in known}
+            active = [f for f in state if axis < len(f.steps) and f.steps[axis] >= f.fault.smallest[axis]]
+            threes = [[f.fault.moved(f.size, axis, way) for way in (-f.steps[axis], 0.0, f.steps[axis])] for f in active]
+            jobs = {(f.fault.name, size): (f.fault, size) for f, three in zip(active, threes) for size in three if (f.fault.name, size) not in known}
             for key, drive in zip(jobs, self._drives(list(jobs.values()), fixed, until_s)):
                 known[key] = self._score(drive, until_s, jobs[key][0].is_clock) if drive else -math.inf
-            for entry, three in zip(active, threes):
-                entry[1], entry[2][axis] = _parabola(entry[0], entry[1], axis, entry[2][axis], [known[fault.name, size] for fault, size in three])
-        return [(fault, self._neat(fault, size)) for fault, size, _ in state.values()]
-
-    @staticmethod
-    def _neat(fault: Fault, size: Size) -> Size:
-        return fault.neat(size) if fault.step else size
+            for f, three in zip(active, threes):
+                f.size, f.steps[axis] = _parabola(f.fault, f.size, axis, f.steps[axis], [known[f.fault.name, size] for size in three])
+        return [(f.fault, f.fault.neat(f.size) if f.steps else f.size) for f in state]
 
     def _drives(self, jobs: Sequence[Change], fixed: list[Change], until_s: float, plain: bool = False,
                 has_states: bool = False) -> list[Drive | None]:
@@ -263,13 +270,8 @@ class Search:
         unique = {change[0].name: change for change in out if change[0].name not in {f.name for f, _ in fixed}}
         return list(unique.values())
 
-    def _table(self, source: object, fixed: list[Change]) -> dict[int, int]:
+    def _table(self, source: Source, fixed: list[Change]) -> dict[int, int]:
         """Which landmark the sightings of each number fit, where they are associated by their place."""
-        from .changes import column
-        from .fault import discrete
-        from .robot import Source
-
-        assert isinstance(source, Source)
         table = self.robot.rows(source)
         if (table["id"] < 0).all() or "bearing_rad" not in table:
             return {}
@@ -278,15 +280,17 @@ class Search:
         if drive is None or drive.estimate is None:
             return {}
         given = {(int(t), round(float(b), 5)): int(i) for t, b, i in zip(table["t_ns"], table["bearing_rad"], table["id"])}
-        rows, votes = drive.estimate.innovations, {}
+        rows = drive.estimate.innovations
+        votes: dict[int, dict[int, int]] = {}
         for t, observed, landmark, kind, verdict in zip(rows["t_ns"], rows["observed"], rows["landmark"], rows["residual"], rows["verdict"]):
             mine = given.get((int(t), round(float(observed), 5))) if kind == "bearing" and verdict == "fused" else None
             if mine is not None and mine >= 0 and landmark >= 0:
-                votes.setdefault(mine, {}).setdefault(int(landmark), []).append(1)
+                of = votes.setdefault(mine, {})
+                of[int(landmark)] = of.get(int(landmark), 0) + 1
         out = {}
         for mine, of in votes.items():
-            landmark, most = max(((k, len(v)) for k, v in of.items()), key=lambda pair: pair[1])
-            if most >= VOTES_MIN and most > VOTES_SHARE * sum(map(len, of.values())):
+            landmark, most = max(of.items(), key=lambda pair: pair[1])
+            if most >= VOTES_MIN and most > VOTES_SHARE * sum(of.values()):
                 out[mine] = landmark
         is_unique = len(set(out.values())) == len(out)
         changed = {a: b for a, b in out.items() if a != b}
