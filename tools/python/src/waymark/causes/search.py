@@ -134,7 +134,7 @@ class Search:
     def _are_needed(self, fixed: list[Change], now: Drive) -> bool:
         """Whether each of several mistakes has a part in it."""
         without = self.trials.run([[c for c in fixed if c is not one] for one in fixed], has_states=True) if len(fixed) > 1 else []
-        return all(drive is None or self._beats(now, drive, APART_MIN)[0] for drive in without)
+        return all(drive is None or self._beats(now, drive, GAIN_MIN)[0] for drive in without)
 
     def _begin(self) -> Drive | None:
         """The drive as it is."""

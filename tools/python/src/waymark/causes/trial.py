@@ -30,7 +30,9 @@ from .robot import Robot
 # bearings is over the values that the recording has, where they are further: of ranges in mm.
 _OUTLIER = {"bearing": -1.84, "heading": -1.84, "range": -3.91, "x": -3.91, "y": -3.91, "z": -3.91, "pixel": -6.91, "elevation": -1.14}
 _ANGLES = ("bearing", "heading")
-DOUBT = 0.3  # nats an update while the pose is lost or degraded: a filter that starts anew again and again fits, too
+# nats an update while the pose is lost or degraded: a filter that starts anew again and again fits, too. A degraded state alone names nothing:
+# it costs no more than the least gain of a cause.
+DOUBT = {"lost": 0.3, "degraded": 0.1}
 _OUTLIERS = 0.05  # share of outliers that is expected whatever the filter did: refusing more is not rewarded
 
 BEGIN_S = 0.02  # of a drive that states where the calibration begins: before its first observations are fused
@@ -116,10 +118,11 @@ def judged(estimate: Estimate, blocks: Blocks, scaled: dict[str, float], cpu_s: 
     good = fused & (rows["variance"] > 0)
     states = estimate.published["state"]
     share = {name: float(np.mean(states == name)) if len(states) else 1.0 for name in ("lost", "degraded")}
-    when, doubted = blocks.of(estimate.published["t_ns"]), np.isin(states, ["lost", "degraded"])
-    doubt = np.bincount(when, doubted, blocks.count) / np.maximum(1, np.bincount(when, minlength=blocks.count))
+    when = blocks.of(estimate.published["t_ns"])
+    costs = sum((states == name) * cost for name, cost in DOUBT.items())
+    doubt = np.bincount(when, costs, blocks.count) / np.maximum(1, np.bincount(when, minlength=blocks.count))
     seen = np.bincount(at, minlength=blocks.count)
-    return Drive(np.bincount(at, likelihoods(rows, blocks.outliers, scaled), blocks.count) - DOUBT * doubt * seen, seen, float(fused.mean()) if len(fused) else 0.0,
+    return Drive(np.bincount(at, likelihoods(rows, blocks.outliers, scaled), blocks.count) - doubt * seen, seen, float(fused.mean()) if len(fused) else 0.0,
                  float(np.mean(away[good] ** 2 / rows["variance"][good])) if good.any() else math.inf, share["lost"], share["degraded"], cpu_s,
                  estimate if keeps else None)
 
