@@ -18,6 +18,7 @@ from common import BIN, CONFIG, ROOT, Drive
 from PIL import Image
 
 import waymark
+from waymark.documents import read_yaml
 from waymark.maps import FREE, OCCUPIED, UNKNOWN, covariances
 
 
@@ -35,6 +36,23 @@ def plan():
     edges = np.zeros(cells.shape, dtype=bool)
     edges[1, 1:-1] = True
     return waymark.FloorPlan(0.05, (-1.0, 2.0, 0.5), cells, edges, cells == FREE)
+
+
+class Documents(unittest.TestCase):
+    def test_numbers_are_those_that_the_programs_read(self):
+        for text, value in (("1e-3", 0.001), ("1.5E+2", 150.0), (".5", 0.5), ("-3.", -3.0), ("010", 10), ("-7", -7), ("12:30:00", "12:30:00"), ("no", "no"),
+                            ("2026-01-01", "2026-01-01"), ("true", True), ("~", None), ("", None), ("1_000", "1_000"), ("tag36h11", "tag36h11"), ("'1'", "1")):
+            got = read_yaml(f"key: {text}")["key"]
+            self.assertEqual((got, type(got)), (value, type(value)), text)
+        self.assertTrue(np.isnan(read_yaml("key: .nan")["key"]))
+        self.assertEqual(read_yaml("a: &a {x: 1}\nb: {<<: *a, y: 2}")["b"], {"x": 1, "y": 2})
+
+    def test_a_calibration_s_small_numbers_are_numbers(self):
+        folder = Path(tempfile.mkdtemp(prefix="waymark-documents-"))
+        self.addCleanup(shutil.rmtree, folder)
+        (folder / "recording.yaml").write_text("format: waymark-recording/1\n")
+        (folder / "calibration.yaml").write_text("sensors: {eye: {bearing_sigma_rad: 1e-3}}\n")
+        self.assertEqual(waymark.Recording(folder).calibration["sensors"]["eye"]["bearing_sigma_rad"], 0.001)
 
 
 class FloorPlans(Folder):

@@ -14,6 +14,7 @@ import foxglove
 import yaml
 from foxglove.websocket import ServerListener
 
+from .documents import read_yaml
 from .lcm_types import load
 from .live import Live
 from .live_pictures import WebPictures, picture_items
@@ -114,7 +115,7 @@ class Site:
     """What is known of a robot and its place besides messages: the files of its configuration and its recording."""
 
     def __init__(self, config: str | None, recording: str | None, map_file: str | None):
-        about = yaml.safe_load(Path(config).read_text(encoding="utf-8")) if config else {}
+        about = read_yaml(Path(config).read_text(encoding="utf-8")) if config else {}
         about = about if isinstance(about, dict) else {}
         publish = about.get("publish") or {}
         self.url, self.prefix = str(publish.get("lcm_url", "")), str(publish.get("channel_prefix", "WAYMARK_"))
@@ -133,7 +134,7 @@ class Site:
     def topics(self, messages: Messages) -> dict[str, str]:
         """Topics, with their types, that follow from the files: pictures of the cameras, and what their sensors see."""
         out = {"/recording/sightings": streams.register(messages, "sightings.csv", SIGHTINGS)}
-        calibration = yaml.safe_load(self.files["calibration"].read_text(encoding="utf-8")) if "calibration" in self.files else None
+        calibration = read_yaml(self.files["calibration"].read_text(encoding="utf-8")) if "calibration" in self.files else None
         cameras = calibration.get("cameras") if isinstance(calibration, dict) and self.has_pictures else None
         for name in cameras or {}:
             topic = f"/camera/{topic_name(str(name))}"
@@ -144,7 +145,7 @@ class Site:
     def items(self, messages: Messages, t_ns: int) -> Iterator[Item]:
         """Mountings, map and landmarks."""
         if "calibration" in self.files:
-            calibration = yaml.safe_load(self.files["calibration"].read_text(encoding="utf-8")) or {}
+            calibration = read_yaml(self.files["calibration"].read_text(encoding="utf-8")) or {}
             yield from place.mountings(messages, calibration, t_ns)
         if "map" in self.files:
             yield from place.grid(messages, self.files["map"], t_ns)

@@ -15,6 +15,7 @@ import numpy as np
 import yaml
 from PIL import Image
 
+from .documents import read_yaml
 from .tables import Array, Table, read_table, write_table
 
 FREE, OCCUPIED, UNKNOWN = 0, 100, -1
@@ -123,7 +124,7 @@ def read_floor_plan(path: str | Path) -> FloorPlan:
     """
     file = Path(path) / "map/map.yaml" if Path(path).is_dir() else Path(path)
     try:
-        about = yaml.safe_load(file.read_text(encoding="utf-8"))
+        about = read_yaml(file.read_text(encoding="utf-8"))
         resolution_m, given = float(about["resolution"]), [float(value) for value in about["origin"]]
         layers = {str(name): str(picture) for name, picture in (about.get("layers") or {}).items()}
         shares = {key: float(about.get(key, default)) for key, default in _SHARES.items()}

@@ -16,6 +16,7 @@ import yaml
 from PIL import Image
 
 from .avi import AviWriter, read_jpegs
+from .documents import read_yaml
 from .maps import FloorPlan, read_floor_plan, read_landmarks, write_floor_plan, write_landmarks
 from .tables import Array, Table, as_table, read_table, write_table
 
@@ -96,7 +97,7 @@ def _known_columns(name: str, table: Table, where: str) -> None:
 
 def _read_yaml(path: Path) -> dict[str, Any]:
     try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+        content = read_yaml(path.read_text(encoding="utf-8"))
     except yaml.YAMLError as error:
         raise ValueError(f"{path}: {error}") from None
     if not isinstance(content, dict):

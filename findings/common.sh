@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: Apache-2.0
+# For the scripts of this folder: packages of stated versions in a temporary folder, and what they print against what was seen.
+# Exit status: 0 as seen, 1 it prints something else now, 2 the packages can't be had.
+set -euo pipefail
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+
+# Packages of PyPI, as NAME==VERSION, for $python. Wheels alone: nothing of a package runs when it is installed.
+pip_packages() {
+  python=$work/venv/bin/python
+  python3 -m venv --without-pip "$work/venv" || exit 2
+  if command -v uv >/dev/null; then # the same wheels, faster
+    uv -q pip install --python "$python" --only-binary :all: "$@" || exit 2
+  else
+    python3 -m pip -q --disable-pip-version-check --python "$python" install --only-binary :all: "$@" || exit 2
+  fi
+}
+
+# Packages of Debian 12, as NAME=VERSION, unpacked below $root and not installed.
+debian_packages() {
+  root=$work/root
+  mkdir -p "$root" "$work/deb"
+  (cd "$work/deb" && apt-get -qq -o APT::Sandbox::User=root download "$@") || exit 2
+  for package in "$work"/deb/*.deb; do dpkg -x "$package" "$root" || exit 2; done
+  export LD_LIBRARY_PATH=$root/usr/lib/$(uname -m)-linux-gnu:$root/lib/$(uname -m)-linux-gnu
+}
+
+# A package of npm and its version, in $work/npm.
+npm_packages() {
+  mkdir -p "$work/npm" && (cd "$work/npm" && npm install --silent --no-audit --no-fund --ignore-scripts "$@" >/dev/null) || exit 2
+}
+
+# Compares standard input with the text in $seen.
+as_seen() {
+  cat >"$work/out"
+  cat "$work/out"
+  printf '%s\n' "$seen" | diff - "$work/out" >"$work/diff" && { echo "$(basename "$0"): as seen"; return; }
+  echo "$(basename "$0"): the behaviour is another one now (< seen, > now):" >&2
+  cat "$work/diff" >&2
+  exit 1
+}
