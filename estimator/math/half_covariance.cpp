@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "math/half_covariance.hpp"
 
-#include <cstring>
-
 #include "math/wide.hpp"
 #include "waymark/vectors.h"
 
@@ -144,9 +142,8 @@ void apply(const half_covariance &p, const half_update &u, const filled_states &
   }
 }
 
-void project(const half_view &p, const int *state, const double *factor, int count, const filled_states &of, int n,
+void project(const half_view &p, const int *state, const double *factor, int count, const filled_states &of,
              double *out) {
-  std::memset(out, 0, static_cast<size_t>(even(n)) * sizeof *out);
 #if WM_HAS_WIDE
   if (wm_vectors_wide()) return project_wide(p, state, factor, count, of, out);
 #endif

@@ -8,6 +8,7 @@
 #define WAYMARK_ESTIMATOR_MATH_HALF_COVARIANCE_HPP
 
 #include <cstddef>
+#include <cstdint>
 
 namespace wm {
 
@@ -42,20 +43,20 @@ using half_view = half_matrix<const double>;  // to read
 
 // States of a matrix, in ascending order: those that are not empty, or those that an update moves.
 struct state_span {
-  int from, to;
+  int16_t from, to;
 };
 template <int kMost>
 struct span_list {
-  int count = 0;
+  int32_t count = 0;
   state_span span[kMost];
 
   // Behind those that are there. A list that is full, and one of even bounds where the gap is of one pair, takes the
   // gap along.
   void add(int from, int to, int gap) {
     if (count > 0 && (from - span[count - 1].to <= gap || count == kMost)) {
-      span[count - 1].to = to;
+      span[count - 1].to = static_cast<int16_t>(to);
     } else {
-      span[count++] = {from, to};
+      span[count++] = {static_cast<int16_t>(from), static_cast<int16_t>(to)};
     }
   }
 };
@@ -87,8 +88,8 @@ inline void set_scaled(double *out, const double *row, double factor, int count)
   for (int j = 0; j < count / 2; j++) o[j] = f * r[j];
 }
 
-// out = the sum of factor[k] * column state[k] of P, in those rows; 0 in others up to `n`, made even.
-void project(const half_view &p, const int *state, const double *factor, int count, const filled_states &of, int n,
+// out += the sum of factor[k] * column state[k] of P, in those rows.
+void project(const half_view &p, const int *state, const double *factor, int count, const filled_states &of,
              double *out);
 
 // The update of the rows and columns of those states. All others' elements of the vectors are 0, or their rows of P
@@ -110,10 +111,8 @@ inline void apply(const half_covariance &p, const half_update &u, int n) {
 }
 
 inline void project(const half_view &p, const int *state, const double *factor, int count, int n, double *out) {
-  for (int j = 0; j < n; j++) {
-    out[j] = 0.0;
+  for (int j = 0; j < n; j++)
     for (int k = 0; k < count; k++) out[j] += factor[k] * p.at(j, state[k]);
-  }
 }
 
 }  // namespace scalar

@@ -29,7 +29,8 @@ void error_state::init(const state_shape &shape, double *memory) {
   memory_.set(memory);
   generation_ = 1;
   solved_ = 0;
-  n_ = unused_ = 0;
+  n_ = 0;
+  filled_ = {};
   capacity_ = even(shape.capacity);
   rows_ = shape.rows;
   turns_ = shape.turns;
@@ -38,18 +39,13 @@ void error_state::init(const state_shape &shape, double *memory) {
 }
 
 // A covariance is positive semidefinite: where a variance is 0, so is its row.
-filled_states error_state::filled() const {
-  filled_states out;
-  const half_view cov = p();
+const filled_states &error_state::filled() {
+  if (filled_.count > 0) return filled_;
   const int sparse = dense_from_ < n_ ? dense_from_ : n_;
-  const double *row = cov.row(0);
-  for (int i = 0; i < sparse; i += 2) {  // row i + 1 lies behind row i, and row i + 2 behind that
-    const double a = row[i], b = row[capacity_ + 1];
-    if (a != 0.0 || b != 0.0) out.add(i, i + 2, 2);
-    row += 2 * (capacity_ - i - 1);
-  }
-  if (n_ > sparse) out.add(sparse, even(n_), 2);
-  return out;
+  for (int i = 0; i < sparse; i += 2)
+    if (variance(i) != 0.0 || (i + 1 < n_ && variance(i + 1) != 0.0)) filled_.add(i, i + 2, 2);
+  if (n_ > sparse) filled_.add(sparse, even(n_), 2);
+  return filled_;
 }
 
 // ---- read ----
@@ -71,14 +67,22 @@ double error_state::covariance_of(const sparse_row &a, const sparse_row &b) cons
   return sum;
 }
 
+double error_state::covariance_with(const sparse_row &row, int state) const {
+  double sum = 0.0;
+  for (int k = 0; k < row.count; k++) sum += row.by[k] * covariance(row.index[k], state);
+  return sum;
+}
+
 void error_state::project(const sparse_row &row, const filled_states &of, double *out) const {
-  vectors::project(p(), row.index, row.by, row.count, of, n_, out);
+  std::memset(out, 0, static_cast<size_t>(even(n_)) * sizeof *out);
+  vectors::project(p(), row.index, row.by, row.count, of, out);
 }
 
 // ---- change ----
 
 int error_state::append(int count) {
   touch();
+  filled_.count = 0;
   n_ += count;
   return n_ - count;
 }
@@ -104,6 +108,7 @@ void error_state::remove(int first, int count) {
 
 void error_state::forget(int first, int count, double variance) {
   touch();
+  filled_.count = 0;
   half_covariance cov = p();
   for (int i = first; i < first + count; i++) {
     for (int j = 0; j < half_covariance::first(i); j++) cov.row(j)[i] = 0.0;
@@ -114,25 +119,58 @@ void error_state::forget(int first, int count, double variance) {
   }
 }
 
+// In place, one row after the other: a row of the block takes from the rows behind it as they were. T = F P; its part
+// beyond the block is P'. Of states before the block the covariance is a column.
 void error_state::assign(int first, int count, const sparse_row *rows, const double *noise, int stride,
                          const double *values) {
   touch();
   half_covariance cov = p();
-  const filled_states of = filled();
-  for (int k = 0; k < count; k++) project(rows[k], of, vector(k));
+  const int begin = half_covariance::first(first), behind = even(first + count);
+  filled_states before, after;
+  const filled_states &all = filled();
+  for (int s = 0; s < all.count; s++) {
+    const state_span &of = all.span[s];
+    if (of.from < begin) before.add(of.from, of.to < begin ? of.to : begin, 0);
+    if (of.to > behind) after.add(of.from > behind ? of.from : behind, of.to, 0);
+  }
+  double block[kAssigned][kAssigned];  // of T
+  bool is_empty = false;
+  for (int k = 0; k < count; k++)
+    for (int l = k; l < count; l++) block[k][l] = covariance_with(rows[k], first + l);
   for (int k = 0; k < count; k++) {
-    const double *own = vector(k);
-    const int state = first + k, begin = half_covariance::first(first), behind = even(first + count);
-    for (int j = 0; j < begin; j++) cov.row(j)[state] = own[j];
-    if (behind < n_)
-      std::memcpy(cov.row(state) + behind, own + behind, static_cast<size_t>(even(n_) - behind) * sizeof *own);
-    if (begin < first) cov.set(state, begin, own[begin]);
-    if (behind > first + count && first + count < n_) cov.set(state, behind - 1, own[behind - 1]);
+    const int state = first + k;
+    is_empty = is_empty || cov.at(state, state) == 0.0;
+    if (begin < first) cov.set(state, begin, covariance_with(rows[k], begin));
+    if (behind > first + count && behind <= n_) cov.set(state, behind - 1, covariance_with(rows[k], behind - 1));
+    if (before.count > 0) {
+      double *column = vector(0);
+      std::memset(column, 0, static_cast<size_t>(begin) * sizeof *column);
+      vectors::project(cov_view(), rows[k].index, rows[k].by, rows[k].count, before, column);
+      for (int s = 0; s < before.count; s++)
+        for (int j = before.span[s].from; j < before.span[s].to; j++) cov.row(j)[state] = column[j];
+    }
+    const bool is_own = rows[k].count > 0 && rows[k].index[0] == state;
+    double *row = cov.row(state);
+    for (int s = 0; s < after.count && !(is_own && rows[k].by[0] == 1.0); s++)
+      vectors::set_scaled(row + after.span[s].from, row + after.span[s].from, is_own ? rows[k].by[0] : 0.0,
+                          after.span[s].to - after.span[s].from);
+    vectors::project(cov_view(), rows[k].index + is_own, rows[k].by + is_own, rows[k].count - is_own, after, row);
   }
   for (int k = 0; k < count; k++)
-    for (int l = k; l < count; l++)
-      cov.set(first + k, first + l, dot(rows[l], vector(k)) + (noise ? noise[k * stride + l] : 0.0));
-  for (int k = 0; k < count; k++) mean()[first + k] = values[k];
+    for (int l = k; l < count; l++) {
+      double sum = 0.0;
+      for (int m = 0; m < rows[l].count; m++) {
+        const int state = rows[l].index[m];
+        const bool is_inside = state >= first && state < first + count;
+        sum += rows[l].by[m] * (is_inside ? block[k][state - first] : cov.at(first + k, state));
+      }
+      cov.set(first + k, first + l, sum + (noise ? noise[k * stride + l] : 0.0));
+    }
+  for (int k = 0; k < count; k++) {
+    is_empty = is_empty || cov.at(first + k, first + k) == 0.0;
+    mean()[first + k] = values[k];
+  }
+  if (is_empty) filled_.count = 0;
 }
 
 void error_state::fade(int state, double factor, double added_variance) {
@@ -140,19 +178,12 @@ void error_state::fade(int state, double factor, double added_variance) {
 }
 
 void error_state::scale(int first, int count, double factor) {
-  sparse_row rows[kScaled];
-  double values[kScaled];
-  int state[kScaled];
-  for (int k = 0; k < count; k++) {
-    state[k] = first + k;
-    values[k] = value(state[k]);
-    rows[k] = {&state[k], &factor, 1, 0};
-  }
-  assign(first, count, rows, nullptr, 0, values);
+  for (int i = first; i < first + count; i++) assign(i, {&i, &factor, 1, 0}, 0.0, value(i));
 }
 
 void error_state::add_chance(double probability, const double *off) {
   touch();
+  filled_.count = 0;
   double *e = displacement(0), *r = step();
   for (int j = 0; j < even(n_); j++) {
     r[j] = j < n_ ? off[j] : 0.0;
@@ -257,6 +288,18 @@ const double *error_state::column_left(const innovation &i, int state) {
   return out;
 }
 
+// The states whose gains are not 0.
+filled_states error_state::reached(const filled_states &of, int rows) const {
+  filled_states out;
+  for (int s = 0; s < of.count; s++)
+    for (int i = of.span[s].from; i < of.span[s].to; i += 2) {
+      bool any = false;
+      for (int k = 0; k < rows; k++) any = any || gain(k)[i] != 0.0 || gain(k)[i + 1] != 0.0;
+      if (any) out.add(i, i + 2, 2);
+    }
+  return out;
+}
+
 // r = P h + sum of (h' P h) e / 2, of P as the correction leaves it: T P T' = P + sum of e r' + r e'.
 void error_state::pass(int rows, const filled_states &of, const sparse_row *turns, int turn_count) {
   touch();
@@ -275,7 +318,7 @@ void error_state::pass(int rows, const filled_states &of, const sparse_row *turn
     for (int l = 0; l < turn_count; l++) both[k][l] = dot(turns[l], u.r[k]);
   for (int k = 0; k < turn_count; k++)
     for (int l = 0; l < turn_count; l++) vectors::add_scaled(vector(rows_ + turns_ + k), u.e[l], 0.5 * both[k][l], n);
-  if (rows + turn_count > 0) vectors::apply(p(), u, of);
+  if (rows + turn_count > 0) vectors::apply(p(), u, turn_count > 0 ? of : reached(of, rows));
 }
 
 void error_state::correct(innovation &&i, const sparse_row *turns, int turn_count) {

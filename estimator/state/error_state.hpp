@@ -60,8 +60,16 @@ class error_state {
   // Between solve() and correct() the mean alone may change.
   double *mean() { return generation_++, memory_.get(); }
   void set_value(int state, double value) { mean()[state] = value; }
-  void set_covariance(int i, int j, double value) { touch(), p().set(i, j, value); }
-  void add_variance(int state, double added) { touch(), p().row(state)[state] += added; }
+  void set_covariance(int i, int j, double value) {
+    touch();
+    if (i == j) filled_.count = 0;
+    p().set(i, j, value);
+  }
+  void add_variance(int state, double added) {
+    touch();
+    if (variance(state) == 0.0) filled_.count = 0;
+    p().row(state)[state] += added;
+  }
   void add_covariance(int i, int j, double value) { set_covariance(i, j, covariance(i, j) + value); }
   // `count` states behind the others, with variance 0; returns the first. There must be room.
   int append(int count);
@@ -74,16 +82,23 @@ class error_state {
   void spread(int first, int states, int dense_from, To to);
   // The states from `first` on become independent of all others, with this variance.
   void forget(int first, int count, double variance);
-  // The states from `first` on become rows[k] of the state plus noise, upper triangle noise[k * stride + l], with those
-  // values. As many rows as there are vectors of scratch memory.
+  // The up to kAssigned states from `first` on become rows[k] of the state plus noise, upper triangle
+  // noise[k * stride + l], with those values. A row's entry of its own state comes first; of the others of the block it
+  // has those behind its own alone.
+  static constexpr int kAssigned = 12;
   void assign(int first, int count, const sparse_row *rows, const double *noise, int stride, const double *values);
+  template <class Row>
+  void assign_rows(int first, int count, const Row *rows, const double *noise, int stride, const double *values) {
+    sparse_row views[kAssigned];
+    for (int k = 0; k < count; k++) views[k] = rows[k];
+    assign(first, count, views, noise, stride, values);
+  }
   void assign(int state, const sparse_row &row, double variance, double value) {
     assign(state, 1, &row, &variance, 0, &value);
   }
   // x := factor x + noise, for a state that no other one's motion depends on.
   void fade(int state, double factor, double added_variance);
-  // Scales the sigmas of up to kScaled states; correlations remain.
-  static constexpr int kScaled = 3;
+  // Scales the sigmas of these states; correlations remain.
   void scale(int first, int count, double factor);
   // Covariance of a mixture: with this probability, the states differ by `off`, `states()` doubles.
   void add_chance(double probability, const double *off);
@@ -126,14 +141,18 @@ class error_state {
   void touch() { generation_++, solved_ = 0; }
   void correct_moving(const innovation &i, const moving_states &moving);
   bool is_solved(const innovation &i) const { return i.generation_ != 0 && i.generation_ == solved_; }
-  filled_states filled() const;
+  const filled_states &filled();
+  filled_states reached(const filled_states &of, int rows) const;
+  half_view cov_view() const { return p(); }
+  double covariance_with(const sparse_row &row, int state) const;
   void project(const sparse_row &row, const filled_states &of, double *out) const;
   void pass(int rows, const filled_states &of, const sparse_row *turns, int turn_count);
 
-  relative_array<double> memory_;  // the mean; gains, displacements e, vectors r; the covariance
-  uint64_t generation_;            // of the state, counted from 1
-  uint64_t solved_;                // of the innovation whose W the gains are; 0: none
-  int32_t n_, capacity_, dense_from_, rows_, turns_, unused_;  // no padding: the same events must give the same bytes
+  relative_array<double> memory_;                     // the mean; gains, displacements e, vectors r; the covariance
+  uint64_t generation_;                               // of the state, counted from 1
+  uint64_t solved_;                                   // of the innovation whose W the gains are; 0: none
+  int32_t n_, capacity_, dense_from_, rows_, turns_;  // no padding: the same events must give the same bytes
+  filled_states filled_;                              // none: to be found anew
 };
 
 // The last one goes first, so that no element is overwritten unread.
@@ -142,6 +161,7 @@ void error_state::spread(int first, int states, int dense_from, To to) {
   const int old = n_;
   touch();
   n_ = states;
+  filled_.count = 0;
   dense_from_ = even(dense_from);
   half_covariance cov = p();
   for (int i = old - 1; i >= 0; i--)

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <cstring>
+#include <type_traits>
 
 namespace wm {
 namespace {
@@ -24,44 +25,13 @@ constexpr int kNewtonSteps = 4;
 const char *const kNames[noise_adaption::kFactors] = {"noise.way_factor", "noise.turn_factor", "noise.bearing_factor",
                                                       "noise.range_factor", "noise.place_factor"};
 
-// Loops over the block of states, of a size that the compiler knows.
-constexpr int kStride = noise_adaption::kBlock;
-
-template <int kSize>
-void move_block(double d[][kStride], const double by[2]) {
-#pragma GCC unroll 2
-  for (int r = 0; r < 2; r++)
-#pragma GCC unroll 5
-    for (int j = 0; j < kSize; j++) d[r][j] += by[r] * d[2][j];
-#pragma GCC unroll 2
-  for (int r = 0; r < 2; r++)
-#pragma GCC unroll 5
-    for (int j = 0; j < kSize; j++) d[j][r] += by[r] * d[j][2];
-}
-
-template <int kSize>
-double derivatives_of_block(const double d[][kStride], const double mean_by[kStride], const noise_adaption::row &r,
-                            double dh[kStride], double *ds) {
-  double by = 0.0, sum = *ds;
-#pragma GCC unroll 5
-  for (int i = 0; i < kSize; i++) {
-    double of = 0.0;
-#pragma GCC unroll 5
-    for (int j = 0; j < kSize; j++) of += d[i][j] * r.by[j];
-    dh[i] = of;
-    sum += r.by[i] * of;
-    by += r.by[i] * mean_by[i];
-  }
-  *ds = sum;
-  return by;
-}
-
-template <int kSize>
-void follow_block(double d[][kStride], const noise_adaption::row &r, const double dh[kStride], double ds) {
-#pragma GCC unroll 5
-  for (int i = 0; i < kSize; i++)
-#pragma GCC unroll 5
-    for (int j = 0; j < kSize; j++) d[i][j] += r.gain[i] * r.gain[j] * ds - r.gain[i] * dh[j] - dh[i] * r.gain[j];
+// loop(size), of a block whose size the compiler knows: its loops are unrolled.
+template <class Loop>
+void over_block(int size, Loop loop) {
+  if (size == noise_adaption::kPose)
+    loop(std::integral_constant<int, noise_adaption::kPose>{});
+  else
+    loop(std::integral_constant<int, noise_adaption::kBlock>{});
 }
 
 }  // namespace
@@ -103,7 +73,15 @@ void noise_adaption::move(double x_m, double y_m, double along_m2, double across
   const double by[2] = {-y_m, x_m};
   for (int k = 0; k < kFactors; k++) {
     if (!is_used(k)) continue;
-    block_ == kPose ? move_block<kPose>(variance_by_[k], by) : move_block<kBlock>(variance_by_[k], by);
+    double(&d)[kBlock][kBlock] = variance_by_[k];
+    over_block(block_, [&](auto size) {
+      for (int r = 0; r < 2; r++)
+#pragma GCC unroll 5
+        for (int j = 0; j < decltype(size)::value; j++) d[r][j] += by[r] * d[2][j];
+      for (int r = 0; r < 2; r++)
+#pragma GCC unroll 5
+        for (int j = 0; j < decltype(size)::value; j++) d[j][r] += by[r] * d[j][2];
+    });
     for (int r = 0; r < 2; r++) mean_by_[k][r] += by[r] * mean_by_[k][2];
   }
   const double way2 = square(x_m) + square(y_m);
@@ -158,15 +136,30 @@ void noise_adaption::update(const row &r) {
 
 // D h, the derivative of the innovation's variance, and of the expectation, by a log factor.
 double noise_adaption::derivatives(const row &r, int k, double dh[kBlock], double *ds) const {
+  double by = 0.0;
   *ds = r.kind == k ? r.own : 0.0;
-  return block_ == kPose ? derivatives_of_block<kPose>(variance_by_[k], mean_by_[k], r, dh, ds)
-                         : derivatives_of_block<kBlock>(variance_by_[k], mean_by_[k], r, dh, ds);
+  for (int i = 0; i < block_; i++) {
+    double sum = 0.0;
+    over_block(block_, [&](auto size) {
+#pragma GCC unroll 5
+      for (int j = 0; j < decltype(size)::value; j++) sum += variance_by_[k][i][j] * r.by[j];
+    });
+    dh[i] = sum;
+    *ds += r.by[i] * dh[i];
+    by += r.by[i] * mean_by_[k][i];
+  }
+  return by;
 }
 
 void noise_adaption::follow(const row &r, int k, const double dh[kBlock], double ds, double by) {
-  for (int i = 0; i < block_; i++)
+  for (int i = 0; i < block_; i++) {
     mean_by_[k][i] += (dh[i] - r.gain[i] * ds) / r.variance * r.innovation - r.gain[i] * by;
-  block_ == kPose ? follow_block<kPose>(variance_by_[k], r, dh, ds) : follow_block<kBlock>(variance_by_[k], r, dh, ds);
+    over_block(block_, [&](auto size) {
+#pragma GCC unroll 5
+      for (int j = 0; j < decltype(size)::value; j++)
+        variance_by_[k][i][j] += r.gain[i] * r.gain[j] * ds - r.gain[i] * dh[j] - dh[i] * r.gain[j];
+    });
+  }
 }
 
 // The NIS has the expectation exp(u), u = share' (true - present log factors). Maximum a posteriori of u, whose prior

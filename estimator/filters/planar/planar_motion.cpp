@@ -194,10 +194,9 @@ void planar_motion::propagate(const motion_segment &piece, const motion_twist &t
     f[i].add(i, 1.0);
     for (int k = 0; k < step.columns; k++) f[i].add(step.column[k], step.by[k][i]);
   }
-  const sparse_row rows[kPoseStates] = {f[kX], f[kY], f[kHeading]};
   const double values[kPoseStates] = {value(kX) + step.x_m, value(kY) + step.y_m,
                                       wrap(value(kHeading) + step.turn_rad)};
-  state_.assign(kX, kPoseStates, rows, step.noise[0], kPoseStates, values);
+  state_.assign_rows(kX, kPoseStates, f, step.noise[0], kPoseStates, values);
   take_step(piece, twist, noise, step, value(kHeading));
 }
 
@@ -209,9 +208,8 @@ void planar_motion::begin_lag() {
     f[i].add(i, 1.0);
     f[i].add(motion_state_[kLag], behind[i]);
   }
-  const sparse_row rows[kPoseStates] = {f[kX], f[kY], f[kHeading]};
   const double values[kPoseStates] = {value(kX), value(kY), value(kHeading)};
-  state_.assign(kX, kPoseStates, rows, nullptr, 0, values);
+  state_.assign_rows(kX, kPoseStates, f, nullptr, 0, values);
 }
 
 void planar_motion::bound_heading() {

@@ -116,13 +116,6 @@ class planar_motion {
   // A state of a sensor's error: its random walk per sqrt(s), and the limits beyond which an update is cut.
   void set_sensor_state(int state, double walk, double low, double high);
 
-  // Takes a motion event that check_motion() accepts; move the state to its t_ns next. Returns the state to reset where
-  // the speed's source changed to a sensor with another scale; -1: none.
-  int feed(const wm_event &motion) {
-    front_.feed(motion);
-    if (front_.kind() != kind_) take_kind();
-    return front_.speed_source_changed() ? motion_state_[kSpeedScale] : -1;
-  }
   // By default a gyro's scale is no less certain than kGyroScaleSigma, also after a roll-back to its start.
   void limit_gyro_scale() {
     const int state = by_kind_[kYawRateScale] ? motion_state_[kYawRateScale] : -1;
@@ -145,8 +138,10 @@ class planar_motion {
   bool move_by(const wm_event &motion, Restart restart, Move move_to, Fuse fuse) {
     const int32_t kind = kind_;
     const int had_lag = motion_state_[kLag];
-    if (const int state = feed(motion); state >= 0) {
-      forget(state, 1.0, start_variance_[kSpeedScale]);
+    front_.feed(motion);
+    if (front_.kind() != kind_) take_kind();
+    if (front_.speed_source_changed() && motion_state_[kSpeedScale] >= 0) {
+      forget(motion_state_[kSpeedScale], 1.0, start_variance_[kSpeedScale]);
       restart();
     }
     if (kind_ != kind) take_calibration(state_.mean());  // values that a kept map brought along

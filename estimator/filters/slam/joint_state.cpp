@@ -142,8 +142,7 @@ void joint_state::shift_pose(const wm_pose2 &to, const double added[3][3]) {
 }
 
 void joint_state::assign(int first, int count, const joint_row *rows, const double (*noise)[3], const double *values) {
-  const sparse_row views[3] = {rows[0], rows[count > 1], rows[count > 2 ? 2 : 0]};
-  state_.assign(first, count, views, noise[0], 3, values);
+  state_.assign_rows(first, count, rows, noise[0], 3, values);
 }
 
 // ---- landmarks ----

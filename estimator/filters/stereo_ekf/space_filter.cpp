@@ -17,7 +17,7 @@ int head_size(const head_model models[kHeadStates]) {
 }  // namespace
 
 size_t space_filter::doubles(const head_model models[kHeadStates], int points_max) {
-  return error_state::doubles(head_size(models) + 3 * points_max, kScratch, kTurns) + (size_t)even(3 * points_max);
+  return error_state::doubles(head_size(models) + 3 * points_max, kRank, kTurns) + (size_t)even(3 * points_max);
 }
 
 void space_filter::init(double *memory, const head_model models[kHeadStates], int points_max) {
@@ -25,9 +25,9 @@ void space_filter::init(double *memory, const head_model models[kHeadStates], in
   points_max_ = points_max;
   first_point_ = head_size(models);
   const int capacity = first_point_ + 3 * points_max;
-  state_.init({capacity, kScratch, kTurns, first_point_}, memory);
+  state_.init({capacity, kRank, kTurns, first_point_}, memory);
   state_.append(first_point_);
-  points_.set(memory + error_state::doubles(capacity, kScratch, kTurns));
+  points_.set(memory + error_state::doubles(capacity, kRank, kTurns));
   int state = kPose6;
   for (int k = 0; k < kHeadStates; k++) {
     at_[k] = models[k].sigma > 0.0 ? state : -1;
@@ -220,9 +220,8 @@ void space_filter::add_point(const vec3 &place, const row_block &block, const ma
                 -(A.m[0][i] * block.by[0][c] + A.m[1][i] * block.by[1][c] + A.m[2][i] * block.by[2][c]));
     change[i] = error_state::dot(by[i], correction());
   }
-  const sparse_row rows[3] = {by[0], by[1], by[2]};
   const int state = state_.append(3);
-  state_.assign(state, 3, rows, own.m[0], 3, change);
+  state_.assign_rows(state, 3, by, own.m[0], 3, change);
   for (int i = 0; i < 3; i++) points()[state - first_point_ + i] = place[i];
 }
 

@@ -168,8 +168,7 @@ class space_filter {
   const double *correction() const { return state_.mean(); }
   double *points() { return points_.get(); }
   const double *points() const { return points_.get(); }
-  // Scratch vectors of the state beside those of three turns: assign() moves kMovers states.
-  static constexpr int kScratch = kMovers - 2 * kTurns;
+  static_assert(kMovers <= error_state::kAssigned);
 
   // States that motion moves: the pose, and the motion since the last picture where it is on.
   int movers() const { return at_[kMovedPlace] >= 0 ? kMovers : kPose6; }

@@ -144,14 +144,12 @@ void space_filter::move(const transition &f, const double noise[kMovers][kMovers
   constexpr int kMost = 1 + 3 * transition::kBlocks;
   const double nothing[kMovers] = {};  // is pending
   jacobian_row<kMost> by[kMovers];
-  sparse_row rows[kMovers];
   for (int i = 0; i < movers(); i++) {
     by[i].add(i, 1.0);
     for (int b = 0; b < f.count; b++)
       for (int k = 0; k < f.blocks[b].width; k++) by[i].add(f.blocks[b].state + k, f.blocks[b].by[i][k]);
-    rows[i] = by[i];
   }
-  state_.assign(kPlace, movers(), rows, noise[0], kMovers, nothing);
+  state_.assign_rows(kPlace, movers(), by, noise[0], kMovers, nothing);
 }
 
 // White noise along the step: a rotation error made evenly on the way displaces the end by half the way on average,
