@@ -93,7 +93,7 @@ static wm_status add(wm_vision *self, const wm_config *config, const wm_vision_c
   }
   if (!search_outcomes_open(&s->outcomes, s->view.appearance_count))
     return wm_fail(err, WM_IO, "no memory for detectors");
-  s->base = (wm_source){.ops = &kOps, .in_order = 1, .detector = wanted->detector};
+  s->base = (wm_source){.ops = &kOps, .in_order = 1};
   (void)snprintf(s->base.name, sizeof s->base.name, "%s:%s", s->detector->name, first->name);
   s->gives_looked = (config->estimator->takes & WM_EVENT_BIT(WM_EVENT_LOOKED)) != 0;
   s->base.kinds = s->detector->gives | (s->gives_looked ? WM_EVENT_BIT(WM_EVENT_LOOKED) : 0);

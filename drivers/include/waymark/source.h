@@ -73,7 +73,6 @@ struct wm_source {
   double lateness_max_ms;         // default where the configuration doesn't name the source; 0: merge.lateness_max_ms
   uint32_t kinds;                 // WM_EVENT_BIT of what it hands out
   uint32_t quantities;            // bit per wm_quantity that it may give
-  const struct wm_detector *detector;  // that finds its events in pictures; NULL: they are given
   wm_source_counts counts;
   wm_time_ns from_ns, until_ns;  // of the interval that a run takes: search outcomes outside of it aren't counted
   // NULL where nothing may be skipped. Pictures are large and slow to process: those that are no longer the newest at
