@@ -33,6 +33,7 @@ void test_every_derivative_of_every_model(void) {
     const wm::drive_terms drive = {{0.4, -0.7}, 0.05};
     const wm::motion_twist t = wm::twist_of(input, c, w, drive);
     TEST_ASSERT_GREATER_THAN(1, t.count);
+    TEST_ASSERT_EQUAL(0, t.missing);
     for (int state = 0; state < wm::kCalibrationCount; state++) {
       if (state == wm::kLag) continue;  // moves the ends of the interval, not the twist
       const double h = 1e-6;
@@ -50,6 +51,13 @@ void test_every_derivative_of_every_model(void) {
     }
   }
   TEST_ASSERT_EQUAL(4 + 5 + 3 + 8 + 5 + 12, checked);
+}
+
+void test_a_derivative_without_room_is_counted(void) {
+  wm::motion_twist t{};
+  for (int i = 0; i < wm::motion_twist::kMax + 2; i++) t.add(i % wm::kCalibrationCount, 1.0, 2.0);
+  TEST_ASSERT_EQUAL(wm::motion_twist::kMax, t.count);
+  TEST_ASSERT_EQUAL(2, t.missing);
 }
 
 void test_ticks_make_exact_arcs(void) {
@@ -559,6 +567,7 @@ void tearDown(void) {}
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_every_derivative_of_every_model);
+  RUN_TEST(test_a_derivative_without_room_is_counted);
   RUN_TEST(test_ticks_make_exact_arcs);
   RUN_TEST(test_counts_are_positions_whatever_comes_between);
   RUN_TEST(test_a_count_right_behind_another_event_is_no_doubt);
