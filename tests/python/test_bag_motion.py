@@ -243,6 +243,16 @@ class WhichTopic(BagTest):
                 self.assertIn(f"not taken: {topic}", said)
                 self.assert_end(recording, said)
 
+    def test_a_measured_twist_without_a_stamp_before_commands_with_one(self):
+        for topic in ("/cmd_vel", "/a/setpoint/velocity"):
+            with self.subTest(topic):
+                bag = self.bag()
+                self.command(bag, "/wheel_twist", "Twist", 20, factor=1.0)
+                self.command(bag, topic, "TwistStamped")
+                recording, said = self.take(bag)
+                self.assertIn(f"not taken: {topic}: commands", said)
+                self.assert_end(recording, said)
+
     def test_commands_alone_are_taken_and_said_to_be_commands(self):
         bag = self.bag()
         self.command(bag, "/cmd_vel", factor=1.0)
