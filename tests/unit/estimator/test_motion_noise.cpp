@@ -489,21 +489,23 @@ void test_commands_are_told_by_their_repetitions(void) {
     for (int i = 0; i < 100; i++) detector.note(1.0, 0.01 * run, true);
   TEST_ASSERT_EQUAL(wm::kKindCommands, detector.kind());  // 72 rows of which 64 repeat count
   // A measurement that is written several times: each value as often, or once more where the rates are no multiples.
-  const auto written = [](int rows, int times, int more) {
+  const auto written = [](int rows, int times, int more, bool both = true) {
     wm::command_detector repeats{};
-    double v = 1.0;
+    double v = 1.0, w = 0.1;
     for (int i = 0, left = 0, k = 0; i < rows; i++, left--) {
       if (left == 0) {
         v += 0.01;
+        if (both) w -= 0.001;
         left = times + (k++ % 2 ? more : 0);
       }
-      repeats.note(v, 0.1, true);
+      repeats.note(v, w, true);
     }
     return repeats.kind();
   };
   for (int times = 2; times <= 8; times++) TEST_ASSERT_EQUAL(wm::kKindMeasured, written(640, times, 0));
   TEST_ASSERT_EQUAL(wm::kKindMeasured, written(640, 2, 1));
   TEST_ASSERT_EQUAL(wm::kKindMeasured, written(640, 3, 1));
+  TEST_ASSERT_EQUAL(wm::kKindCommands, written(640, 3, 0, false));  // a controller that is slower than the rows
   TEST_ASSERT_EQUAL(wm::kKindCommands, written(640, 2, 4));
   TEST_ASSERT_EQUAL(wm::kKindCommands, written(640, 1, 2));
   wm::command_detector stands{};
