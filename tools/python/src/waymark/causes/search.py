@@ -337,9 +337,10 @@ class Search:
         return False, probability
 
     def _ordered(self, found: list[Candidate]) -> list[Candidate]:
-        """The best first: that which no other one beats."""
+        """The best first: that which no other one beats; of several, one with which the drive is right."""
         left = sorted(found, key=lambda c: -(float(c.drive.gain.sum()) - c.drive.unusual + c.fault.prior))
-        best = next((c for c in left if not any(self._beats(o.drive, c.drive, APART_MIN)[0] for o in left if o is not c)), left[0] if left else None)
+        unbeaten = [c for c in left if not any(self._beats(o.drive, c.drive, APART_MIN)[0] for o in left if o is not c)] or left
+        best = next((c for c in unbeaten if self._is_right(c.drive)), unbeaten[0] if unbeaten else None)
         return [c for c in left if c is best] + [c for c in left if c is not best]
 
     def _helps(self, drive: Drive, now: Drive) -> bool:

@@ -1,0 +1,111 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""The engine for causes without a drive: changes of files, the judgement between drives, sizes.
+
+    test_causes.py BIN_DIR       Skipped (77) where the build has no libwaymark.so (sanitizers)."""
+
+import math
+import os
+import sys
+import unittest
+
+import numpy as np
+from common import BIN
+
+LIBRARY = BIN.resolve().parent / "lib/libwaymark.so"
+if not LIBRARY.exists():
+    print("skipped: this build has no libwaymark.so")
+    sys.exit(77)
+os.environ["WAYMARK_LIBRARY"] = str(LIBRARY)
+
+from waymark.causes import changes, search  # noqa: E402
+from waymark.causes.fault import Fault, discrete, factor_words  # noqa: E402
+from waymark.causes.trial import Drive, likelihoods  # noqa: E402
+
+YAML = b"# a robot\nsensors:\n  front:   # screwed on by eye\n    mounting: {xyz_m: [0.1, 0, 0.2]}\nwheels: {radius_m: 0.05}\n"
+DBC = b"BO_ 256 ODOMETRY: 8 R\n SG_ TICKS : 0|32@1- (1,0) [0|1] \"\" W\n\nBO_ 257 OTHER: 8 R\n SG_ TICKS : 8|16@1+ (2,0) [0|1] \"\" W\n"
+
+
+class Changes(unittest.TestCase):
+    def value(self, path, text):
+        return changes.Value("f", path, text).apply(YAML).decode()
+
+    def test_a_value_is_replaced_and_all_else_stays(self):
+        self.assertEqual(self.value(("wheels", "radius_m"), "0.06"), YAML.decode().replace("0.05", "0.06"))
+        self.assertEqual(self.value(("sensors", "front", "mounting", "xyz_m"), "[0, 0, 1]"), YAML.decode().replace("[0.1, 0, 0.2]", "[0, 0, 1]"))
+
+    def test_a_missing_value_is_added_to_what_is_there(self):
+        self.assertIn("mounting: {rpy_deg: [0, 0, 90], xyz_m:", self.value(("sensors", "front", "mounting", "rpy_deg"), "[0, 0, 90]"))
+        self.assertIn("gnss: {mounting: {xyz_m: [1, 0, 0]}}\nsensors:", self.value(("gnss", "mounting", "xyz_m"), "[1, 0, 0]"))
+
+    def test_stamps_stay_whole_and_other_sensors_stay(self):
+        table = b"t_ns,sensor,range_m\n1700000000000000001,a,2.5\n1700000000000000002,b,\n"
+        self.assertEqual(changes.column("f", "t_ns", 1, -10**9).apply(table).splitlines()[1], b"1699999999000000001,a,2.5")
+        self.assertEqual(changes.column("f", "range_m", 2, only="b").apply(table), table)
+        self.assertEqual(changes.column("f", "range_m", 2, only="a").apply(table).splitlines()[1:], [b"1700000000000000001,a,5", b"1700000000000000002,b,"])
+
+    def test_a_signal_is_that_of_its_message(self):
+        self.assertIn(b"TICKS : 7|32@0- (1,0)", changes.Signal("f", "ODOMETRY", "TICKS", "order").apply(DBC))
+        self.assertIn(b"TICKS : 8|16@1- (2,0)", changes.Signal("f", "OTHER", "TICKS", "sign").apply(DBC))
+        with self.assertRaises(changes.Impossible):
+            changes.Signal("f", "OTHER", "NONE", "sign").apply(DBC)
+
+
+def drive(gain, unusual=0.0, lost=0.0):
+    """A drive of 40 blocks with 20 updates each, of `gain` nats an update."""
+    rng = np.random.default_rng(1)
+    return Drive(20 * gain + rng.normal(0, 0.5, 40), np.full(40, 20), 1.0, 0.9, lost, 0.0, 0.1, unusual=unusual)
+
+
+def row(name, group=""):
+    return discrete(name, lambda _: [], lambda _: name, group=group)
+
+
+class Judgement(unittest.TestCase):
+    def setUp(self):
+        self.search = search.Search(None, None)
+
+    def judged(self, *drives, groups=("", "", "")):
+        found = self.search._ordered([search.Candidate(row(f"row {i}", groups[i]), (1.0,), d) for i, d in enumerate(drives)])
+        best, tied, probability = self.search._judge(found, drive(1.0, unusual=20.0))
+        return best.fault.name, [c.fault.name for c in tied], probability
+
+    def test_the_better_one_is_named_with_its_probability(self):
+        name, tied, probability = self.judged(drive(1.5), drive(2.0), drive(1.1))
+        self.assertEqual((name, tied), ("row 1", []))
+        self.assertGreater(probability, 0.99)
+
+    def test_two_that_predict_alike_are_not_told_apart(self):
+        self.assertEqual(self.judged(drive(2.0), drive(2.001))[1], ["row 0"])
+        self.assertEqual(self.judged(drive(2.0), drive(2.001), groups=("same", "same"))[1], [])
+        self.assertEqual(self.judged(drive(2.0), drive(2.001, lost=0.5))[1], [])  # one that is no right drive is none to choose
+
+    def test_states_that_need_not_move_decide_between_two_that_predict_alike(self):
+        self.assertEqual(self.judged(drive(2.0, unusual=1.0), drive(2.001, unusual=15.0))[:2], ("row 0", []))
+
+    def test_a_small_gain_names_nothing(self):
+        self.assertFalse(self.search._helps(drive(1.05), drive(1.0)))
+        self.assertTrue(self.search._helps(drive(1.2), drive(1.0)))
+
+    def test_a_size_is_the_top_of_the_parabola(self):
+        fault = Fault("f", ((0.0,),), lambda _: [], lambda _: "", step=(1.0,))
+        size, step = search._parabola(fault, (3.0,), 0, 1.0, [-(2.0 - 3.4) ** 2, -(3.0 - 3.4) ** 2, -(4.0 - 3.4) ** 2])
+        self.assertAlmostEqual(size[0], 3.4)
+        self.assertLess(step, 1.0)
+
+    def test_ranges_that_are_scaled_down_gain_nothing_by_it(self):
+        def rows(scale):
+            return {"residual": np.array(["range"] * 3), "observed": scale * np.array([2.0, 3.0, 4.0]), "expected": scale * np.array([2.02, 3.01, 3.97]),
+                    "variance": scale**2 * np.array([0.01] * 3)}
+        np.testing.assert_allclose(likelihoods(rows(0.5), {"range": -3.91}, {"range": math.log(0.5)}), likelihoods(rows(1.0), {"range": -3.91}, {}))
+
+    def test_student_s_distribution(self):
+        self.assertAlmostEqual(search._student(2.086, 20), 0.975, places=3)
+        self.assertAlmostEqual(search._student(-2.086, 20), 0.025, places=3)
+
+    def test_words_of_a_factor(self):
+        self.assertEqual([factor_words(f) for f in (0.001, 1 / 1.05, 2.0)], ["in mm", "5 % too large", "0.5 times the true one"])
+
+
+if __name__ == "__main__":
+    unittest.main()
