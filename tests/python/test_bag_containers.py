@@ -7,6 +7,7 @@
 import bz2
 import gzip
 import lzma
+import re
 import shutil
 import sqlite3
 import subprocess
@@ -23,6 +24,7 @@ from rosbags.rosbag2 import StoragePlugin
 from rosbags.typesys import Stores, get_typestore
 
 import waymark
+from waymark.bag import command
 
 COUNT = 40
 
@@ -209,6 +211,18 @@ class Cut(BagTest):
         path.write_bytes(bytes(data))
         text, _ = self.take(path)
         self.assertIn("1 of its chunks differ from their checksums", text)
+
+
+class Shown(BagTest):
+    def test_a_long_import_shows_its_share_in_a_pipe(self):
+        path = Events().drive(2000).mcap(self.folder / "a.mcap")
+        every, command._LINE_EVERY_S = command._LINE_EVERY_S, 0.0
+        self.addCleanup(setattr, command, "_LINE_EVERY_S", every)
+        text, _ = self.take(path)
+        shares = [int(share) for share in re.findall(r"^waymark import: (\d+) %, \d+ s left$", text, re.M)]
+        self.assertGreater(len(shares), 4)
+        self.assertEqual(shares, sorted(shares))
+        self.assertGreater(shares[-1], 70)
 
 
 class Refused(BagTest):

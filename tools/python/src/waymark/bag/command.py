@@ -26,8 +26,8 @@ _EXAMPLES = """examples:
   waymark import rosbag2_2026_05_01/ --out recordings/drive --motion /odom --truth /vicon/pose
   waymark check config/robot.yaml recordings/drive
 
-A bag is an MCAP file, a folder of rosbag2, or a .bag of ROS 1. Taken: pictures and camera_info, odometry and twist, IMU, NavSatFix,
-AprilTag detections, CAN frames, tf (mountings), and what `waymark export` wrote. The rest is listed.
+A bag is an MCAP file, a folder or a .db3 of rosbag2, or a .bag of ROS 1; cut, compressed or renamed, too. Taken: pictures and camera_info, odometry and
+twist, IMU, NavSatFix, tags, CAN frames, tf (mountings), and what `waymark export` wrote. The rest is listed. docs/bags.md has the conventions.
 Exit code: 0 done, 1 the work failed, 2 usage."""
 
 
