@@ -7,8 +7,8 @@
 
 #include <cmath>
 
-#include "math/half_covariance.hpp"
 #include "math/elementary.hpp"
+#include "math/half_covariance.hpp"
 
 namespace wm {
 

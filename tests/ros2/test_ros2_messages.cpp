@@ -121,7 +121,7 @@ void test_fixes_are_metres_from_the_origin() {
   TEST_ASSERT_FALSE(position_of(message, &gnss, &row).has_value());
   TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0, row.number[0]);
   TEST_ASSERT_DOUBLE_WITHIN(0.05, 111.2035, row.number[1]);  // a thousandth of a degree of latitude there
-  TEST_ASSERT_DOUBLE_WITHIN(0.002, 3, row.number[2]);  // less what the earth falls away in 111 m
+  TEST_ASSERT_DOUBLE_WITHIN(0.002, 3, row.number[2]);        // less what the earth falls away in 111 m
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.5, row.number[3]);
   message.status.status = -1;
   TEST_ASSERT_EQUAL_STRING("", position_of(message, &gnss, &row)->c_str());

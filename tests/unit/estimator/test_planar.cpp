@@ -21,7 +21,6 @@ wm_motion_states states;
 wm_setup setup;
 wm::planar_filter_of<64> *filter;
 
-
 void make_setup(const wm_wheels &wheels) {
   make::exact_motion(&params);
   setup = {};
