@@ -49,7 +49,7 @@ class Comparison(ImuTest):
 
     def test_the_other_sign(self):
         kinds = {"upright": lambda t, w, a: (-w, a), "without accelerations": lambda t, w, a: (-w, np.zeros(3)), "with a bias": lambda t, w, a: (
-            -w + (0, 0, 0.005), a), "z alone (north-east-down)": lambda t, w, a: (w * (1, 1, -1), a), "accelerations without gravity": lambda t, w, a: (
+            -w + (0, 0, 0.0005), a), "z alone (north-east-down)": lambda t, w, a: (w * (1, 1, -1), a), "accelerations without gravity": lambda t, w, a: (
                 -w, (0.01, 0, 0.02))}
         for name, change in kinds.items():
             with self.subTest(name):
