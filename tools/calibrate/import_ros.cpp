@@ -94,7 +94,9 @@ std::vector<std::pair<std::string, IniValues>> sections_of(const std::string &te
 std::vector<ForeignCamera> read_ros_ini(const std::string &text, const std::string &path, const ImportHints &hints) {
   std::vector<ForeignCamera> out;
   int width = hints.width, height = hints.height;
-  for (const auto &[name, values] : sections_of(text)) {
+  for (const auto &section : sections_of(text)) {
+    const std::string &name = section.first;
+    const IniValues &values = section.second;
     const auto numbers = [&values](const char *key) {
       const auto place = values.find(key);
       return place == values.end() ? std::vector<double>{} : place->second;
