@@ -43,10 +43,10 @@ def rows():
         yield f"OpenCV: greys 0, 50, 100 of a PGM of {name} with the maximum 100", ", ".join(map(str, cv2.imread(str(folder / f"{kind}.pgm"), 0)[0])), CV, scaled
         yield f"Pillow: the same, {name}", ", ".join(map(str, np.asarray(Image.open(folder / f"{kind}.pgm"))[0])), PIL, scaled
     cv2.imwrite(str(folder / "16.png"), np.array([[0, 100 * 257, 205 * 257, 65535]], np.uint16))
-    yield "Pillow convert(\"L\") of a 16-bit PNG of 0, 100, 205, 255 times 257", ", ".join(map(str, np.asarray(Image.open(folder / "16.png").convert("L"))[0])), PIL, "the Python package divides by 257"
-    yield "OpenCV IMREAD_GRAYSCALE of it", ", ".join(map(str, cv2.imread(str(folder / "16.png"), 0)[0])), CV, "the Python package divides by 257"
+    yield "Pillow convert(\"L\") of a 16-bit PNG of 0, 100, 205, 255 times 257", ", ".join(map(str, np.asarray(Image.open(folder / "16.png").convert("L"))[0])), PIL, "the same 0, 100, 205, 255"
+    yield "OpenCV IMREAD_GRAYSCALE of it", ", ".join(map(str, cv2.imread(str(folder / "16.png"), 0)[0])), CV, "the same 0, 100, 205, 255"
     Image.fromarray(np.array([[[0, 0, 0, 0], [205, 205, 205, 255]]], np.uint8)).save(folder / "clear.png")
-    yield "OpenCV IMREAD_GRAYSCALE of a transparent pixel", f"{cv2.imread(str(folder / 'clear.png'), 0)[0, 0]}: black", CV, "transparent lies on white"
+    yield "OpenCV IMREAD_GRAYSCALE of a transparent pixel", f"{cv2.imread(str(folder / 'clear.png'), 0)[0, 0]}: black", CV, "a cell of a map is unknown"
     exif = Image.Exif()
     exif[0x0112] = 6
     Image.fromarray(np.zeros((48, 64), np.uint8)).save(folder / "turned.jpg", exif=exif)

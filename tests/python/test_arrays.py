@@ -75,10 +75,10 @@ class FloorPlans(Folder):
         (self.folder / "plan.png").write_bytes(b"P5\n4 1\n65535\n" + (grey * 257).astype(">u2").tobytes())  # a PGM by its content
         self.assertEqual(waymark.read_floor_plan(self.folder / "map.yaml").cells.tolist(), [[OCCUPIED, UNKNOWN, UNKNOWN, FREE]])
 
-    def test_what_is_transparent_lies_on_white(self):
+    def test_what_is_transparent_is_unknown(self):
         (self.folder / "map.yaml").write_text("image: plan.png\nresolution: 0.05\norigin: [0, 0, 0]\n")
         Image.fromarray(np.array([[[0, 0, 0, 0], [0, 0, 0, 255]]], dtype=np.uint8)).save(self.folder / "plan.png")
-        self.assertEqual(waymark.read_floor_plan(self.folder / "map.yaml").cells.tolist(), [[FREE, OCCUPIED]])
+        self.assertEqual(waymark.read_floor_plan(self.folder / "map.yaml").cells.tolist(), [[UNKNOWN, OCCUPIED]])
 
     def test_cells_and_places_invert(self):
         rows, columns = np.mgrid[0:40:7, 0:60:7]
