@@ -90,7 +90,7 @@ def pixels(rotation, place, plane):
 
 def rendered(modules, edge, rotation, place):
     """The picture of a print: `modules` with the print's upper row first, of which `edge` ones make TAG_M."""
-    fine = 3
+    fine = 2
     steps = (np.arange(fine) + 0.5) / fine - 0.5
     u, v = np.meshgrid((np.arange(SIZE[0])[:, None] + steps).ravel(), (np.arange(SIZE[1])[:, None] + steps).ravel())
     rays = np.stack([(u - C[0]) / F, (v - C[1]) / F, np.ones_like(u)])

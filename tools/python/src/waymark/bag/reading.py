@@ -26,7 +26,7 @@ def is_ours(topic: Topic) -> bool:
 
 def _look(bag: Bag) -> dict[str, str]:
     """Topics of pictures whose first message is of a kind that isn't taken, with the reason. They are looked at where a camera has several."""
-    waiting = {topic.name for topic in bag.topics if topic.kind in PICTURE_KINDS}
+    waiting = {topic.name for topic in bag.topics if topic.kind in PICTURE_KINDS and topic.count != 0}
     problems: dict[str, str] = {}
     if len(waiting) < 2:
         return problems
