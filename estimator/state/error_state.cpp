@@ -69,7 +69,12 @@ double error_state::covariance_of(const sparse_row &a, const sparse_row &b) cons
 
 double error_state::covariance_with(const sparse_row &row, int state) const {
   double sum = 0.0;
-  for (int k = 0; k < row.count; k++) sum += row.by[k] * covariance(row.index[k], state);
+  const half_view cov = p();
+  const double *own = cov.row(state);
+  for (int k = 0; k < row.count; k++) {
+    const int other = row.index[k];
+    sum += row.by[k] * (other >= state ? own[other] : cov.row(other)[state]);
+  }
   return sum;
 }
 
@@ -147,7 +152,11 @@ void error_state::assign(int first, int count, const sparse_row *rows, const dou
       std::memset(column, 0, static_cast<size_t>(begin) * sizeof *column);
       vectors::project(cov_view(), rows[k].index, rows[k].by, rows[k].count, before, column);
       for (int s = 0; s < before.count; s++)
-        for (int j = before.span[s].from; j < before.span[s].to; j++) cov.row(j)[state] = column[j];
+        for (int j = before.span[s].from; j < before.span[s].to; j += 2) {
+          double *pair_of_rows = cov.row(j) + state;
+          pair_of_rows[0] = column[j];
+          pair_of_rows[capacity_ - j] = column[j + 1];
+        }
     }
     const bool is_own = rows[k].count > 0 && rows[k].index[0] == state;
     double *row = cov.row(state);
@@ -156,16 +165,22 @@ void error_state::assign(int first, int count, const sparse_row *rows, const dou
                           after.span[s].to - after.span[s].from);
     vectors::project(cov_view(), rows[k].index + is_own, rows[k].by + is_own, rows[k].count - is_own, after, row);
   }
-  for (int k = 0; k < count; k++)
+  for (int k = 0; k < count; k++) {
+    const double *own = cov.row(first + k);
     for (int l = k; l < count; l++) {
       double sum = 0.0;
       for (int m = 0; m < rows[l].count; m++) {
         const int state = rows[l].index[m];
-        const bool is_inside = state >= first && state < first + count;
-        sum += rows[l].by[m] * (is_inside ? block[k][state - first] : cov.at(first + k, state));
+        const double of = state < first           ? cov.row(state)[first + k]
+                          : state < first + count ? block[k][state - first]
+                                                  : own[state];
+        sum += rows[l].by[m] * of;
       }
-      cov.set(first + k, first + l, sum + (noise ? noise[k * stride + l] : 0.0));
+      block[k][l] = sum + (noise ? noise[k * stride + l] : 0.0);
     }
+  }
+  for (int k = 0; k < count; k++)
+    for (int l = k; l < count; l++) cov.set(first + k, first + l, block[k][l]);
   for (int k = 0; k < count; k++) {
     is_empty = is_empty || cov.at(first + k, first + k) == 0.0;
     mean()[first + k] = values[k];
