@@ -38,7 +38,7 @@ static const char kHelp[] =
     "  --json              facts and findings, for programs\n"
     "  --quick             without the search for the mistake that explains them\n"
     "  --apply FOLDER      a corrected copy of the recording, and of the configuration where that has the mistake,\n"
-    "                      if the trials find a cause; the originals stay\n"
+    "                      if a cause is found; the originals stay\n"
     "\n"
     "example:\n"
     "  waymark check config/datasets/starry-night-plan.yaml RECORDING\n"
