@@ -35,7 +35,7 @@ static void read_can(reader *self) {
   int is_up;
   char line[256];
   can_received got;
-  const int fd = kSocketCan.open(NULL, kSocketCan.find(NULL, self->device, &is_up), NULL, NULL, 0);
+  const int fd = kSocketCan.open(NULL, kSocketCan.find(NULL, self->device, &is_up), NULL, 0);
   while (played_now_ns() < self->end_ns) {
     if (kSocketCan.receive(NULL, fd, 50, &got) != 1) continue;
     note(self, kSocketCan.realtime_ns(NULL) - got.software_ns);
