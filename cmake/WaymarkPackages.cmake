@@ -28,9 +28,10 @@ set(cameras "")
 if(WM_LIBCAMERA AND LIBCAMERA_FOUND)
   set(cameras ", libcamera0.0.3 (>= 0.0.3)")
 endif()
+set(packed "zlib1g (>= 1:1.1.4)") # of the desk's text files
 set(page "")
 if(TARGET waymark-web)
-  set(page ", libmicrohttpd12 (>= 0.9.75-2)")
+  set(page ", libmicrohttpd12 (>= 0.9.75-2), ${packed}")
 endif()
 set(videos "")
 if(TARGET waymark-import)
@@ -67,7 +68,7 @@ set(CPACK_DEBIAN_RUNTIME_PACKAGE_CONTROL_EXTRA ${CMAKE_BINARY_DIR}/debian/conffi
 
 set(CPACK_DEBIAN_TOOLS_PACKAGE_NAME waymark-tools)
 set(CPACK_DEBIAN_TOOLS_PACKAGE_SECTION misc)
-set(CPACK_DEBIAN_TOOLS_PACKAGE_DEPENDS "waymark (= ${PROJECT_VERSION}-1), ${base}, ${pictures}${videos}${urdf}${pages}")
+set(CPACK_DEBIAN_TOOLS_PACKAGE_DEPENDS "waymark (= ${PROJECT_VERSION}-1), ${base}, ${pictures}, ${packed}${videos}${urdf}${pages}")
 set(CPACK_DEBIAN_TOOLS_DESCRIPTION "desk tools for the localization of a robot
 Judges runs against truth, draws reports, makes maps, writes the
 configuration of a new robot: waymark eval, report, diff, map, init.")
@@ -91,7 +92,7 @@ if(TARGET wm_calibrate)
 endif()
 set(CPACK_DEBIAN_CALIBRATE_PACKAGE_NAME waymark-calibrate)
 set(CPACK_DEBIAN_CALIBRATE_PACKAGE_SECTION misc)
-set(CPACK_DEBIAN_CALIBRATE_PACKAGE_DEPENDS "waymark (= ${PROJECT_VERSION}-1), ${base}, ${pictures}${boards}")
+set(CPACK_DEBIAN_CALIBRATE_PACKAGE_DEPENDS "waymark (= ${PROJECT_VERSION}-1), ${base}, ${pictures}, ${packed}${boards}")
 set(CPACK_DEBIAN_CALIBRATE_DESCRIPTION "calibration of a robot's cameras
 Finds the model of a camera, of a pair, and their mountings on the robot, from
 pictures of boards or from drives; reads calibrations of OpenCV, Kalibr, ROS

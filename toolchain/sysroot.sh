@@ -14,7 +14,7 @@ esac
 cd "$(dirname "$(readlink -f "$0")")/.."
 
 # What a board's build includes and links. Embree is the desk's (pictures of the simulator).
-packages=(libc6-dev libstdc++-12-dev libeigen3-dev liblcm-dev libyaml-dev libturbojpeg0-dev libpng-dev libapriltag-dev
+packages=(libc6-dev libstdc++-12-dev libeigen3-dev liblcm-dev libyaml-dev libturbojpeg0-dev libpng-dev zlib1g-dev libapriltag-dev
   nlohmann-json3-dev libcli11-dev libmicrohttpd-dev libhpdf-dev)
 # For 64-bit boards on Debian 12 whose cameras are behind an image processor (presets arm64 and odroid-m1).
 [ "$arch" = armhf ] || packages+=(libcamera-dev)

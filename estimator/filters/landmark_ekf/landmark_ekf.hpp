@@ -101,7 +101,6 @@ class landmark_ekf {
   };
   antenna_view view_antenna(const past_pose &past) const;
   void widen_delay(past_pose *past, double bend_m[2]) const;
-  void lean_on_positions(wm_time_ns since_ns);
   double position_row(int axis, const past_pose &past, const antenna_view &antenna, planar_row *row) const;
   double lasting_error() const;  // of the receiver, over its sigma; 0 where it is no state
 

@@ -88,25 +88,6 @@ void landmark_ekf::widen_delay(past_pose *past, double bend_m[2]) const {
   bend_m[1] = 0.5 * (earlier.y_m + later.y_m) - past->pose.y_m;
 }
 
-// A pose that was found by positions alone has the errors of their delay and of the antenna's place. (That of the
-// positions themselves is in its covariance.)
-void landmark_ekf::lean_on_positions(wm_time_ns since_ns) {
-  for (int i = observations_.kept() - observations_.count_since(since_ns); i < observations_.kept(); i++)
-    if (observations_.at(i).kind & (kObservedBearing | kObservedRange)) return;
-  if (!receiver_.is_used()) return;
-  past_pose past = pose_before(filter_, gnss_time_state_ < 0 ? 0.0 : filter_.value(gnss_time_state_));
-  double bend_m[2];
-  widen_delay(&past, bend_m);
-  const sin_cos h = view_antenna(past).h;
-  const double by_antenna[2][2] = {{h.cos, -h.sin}, {h.sin, h.cos}};
-  for (int axis = 0; axis < 2; axis++) {
-    planar_row row;
-    row.add(gnss_time_state_, -past.age_by[axis]);
-    for (int k = 0; k < 2 && antenna_state_ >= 0; k++) row.add(antenna_state_ + k, -by_antenna[axis][k]);
-    filter_.carry_state(axis, row, 0.0, 0.0);
-  }
-}
-
 wm_status landmark_ekf::fuse_position(const wm_event &event, record_list records) {
   const wm_position &p = event.as.position;
   wm_innovation record = record_of(event, WM_RESIDUAL_X);

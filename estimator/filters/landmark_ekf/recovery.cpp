@@ -285,7 +285,6 @@ void landmark_ekf::search(wm_time_ns since_ns, const observation *prior, int pri
   for (int i = 0; i < static_cast<int>(setup_->sensor_count); i++)
     if (const int yaw = slots_.at(i, kYaw); yaw >= 0) result.covariance[2][2] += filter_.variance(yaw);
   filter_.set_pose(result.pose, result.covariance);
-  lean_on_positions(since_ns);
   start_.begin_found(result.pose, result.covariance, odometry(), since_ns);
   evidence_.begin(kFoundWrong);
   life_.relocalized(now);

@@ -174,12 +174,14 @@ static int drive(const given *of, int broken) {
   return said == WM_NOT_FINITE || counted->refused[WM_NOT_FINITE] > 0 || counted->rejected[WM_REJECTED_NOT_FINITE] > 0;
 }
 
-static void refused_or_absent(const char *estimator) {
+// `left_out`: a source that the estimator does not take, which a session refuses by name.
+static void refused_or_absent(const char *estimator, const char *left_out) {
   char text[100];
   (void)snprintf(text, sizeof text, "format: waymark-config/1\nestimator: %s\n", estimator);
   folder_write("robot.yaml", text);
   for (size_t k = 0; k < sizeof kGiven / sizeof kGiven[0]; k++) {
     const given *of = &kGiven[k];
+    if (strstr(left_out, of->source)) continue;
     for (int broken = -1; broken < (int)strlen(of->outcome); broken++) {
       char what[80];
       (void)snprintf(what, sizeof what, "%s, number %d", of->source, broken);
@@ -193,8 +195,8 @@ static void refused_or_absent(const char *estimator) {
   }
 }
 
-static void test_landmark_ekf(void) { refused_or_absent("landmark_ekf"); }
-static void test_slam(void) { refused_or_absent("slam"); }
+static void test_landmark_ekf(void) { refused_or_absent("landmark_ekf", ""); }
+static void test_slam(void) { refused_or_absent("slam", "heading gnss"); }
 
 int main(void) {
   UNITY_BEGIN();

@@ -106,7 +106,7 @@ expect 0 'in 1 areas' "$bin/waymark-map" make "$dir/plan.pgm" --resolution 0.05 
 expect 2 'not overwritten' "$bin/waymark-map" make "$dir/plan.pgm" --resolution 0.05 --out "$dir/map"
 expect 1 'no wall in the plan' "$bin/waymark-map" make "$dir/blank.pgm" --walls-below 1 --resolution 0.05 --out "$dir/map2"
 printf 'image: no.pgm\nresolution: 0.05\norigin: [0, 0, 0]\n' >"$dir/no.yaml"
-expect 1 "no.yaml: image: $dir/no.pgm: cannot be read" "$bin/waymark-map" make "$dir/no.yaml" --out "$dir/map2"
+expect 1 "no.yaml:1: image: 'no.pgm' can't be read (looked for $dir/no.pgm)" "$bin/waymark-map" make "$dir/no.yaml" --out "$dir/map2"
 expect 0 'good' "$bin/waymark-map" check "$dir/map/map.yaml" --draw "$dir/drawn.png"
 expect 0 'in 1 areas' "$bin/waymark-map" make "$dir/map/map.yaml" --out "$dir/map3"
 expect 2 'nowhere' "$bin/waymark-map" check "$dir/nowhere.yaml"
