@@ -27,6 +27,8 @@ static const char *count_key(const wm_source *source) {
   return NULL;
 }
 
+static uint64_t skipped_of(const wm_source *source) { return source->counts.malformed + source->counts.not_finite; }
+
 static void drain(wm_source *source, const char *name) {
   static wm_event event;
   wm_error err = {0};
@@ -44,7 +46,7 @@ static void drain(wm_source *source, const char *name) {
   TEST_ASSERT_EQUAL_MESSAGE(WM_END, status, err.text);
   TEST_ASSERT_EQUAL_UINT64(events, source->counts.received);
   // Some recordings hold rows as a sensor gave them without an echo (a range of 0): few, and counted.
-  const uint64_t skipped = source->counts.malformed + source->counts.not_finite;
+  const uint64_t skipped = skipped_of(source);
   if (skipped > 0) printf("  %s: %llu rows: %s\n", name, (unsigned long long)skipped, source->counts.first_problem);
   TEST_ASSERT_TRUE_MESSAGE(skipped * 100 < events, source->counts.first_problem);
 }
@@ -74,7 +76,7 @@ static void check_count(const wm_yaml_node *root, wm_source *const *sources, siz
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_yaml_i64(&node, 0, INT64_MAX, &expected, &err), err.text);
   for (size_t i = 0; i < count; i++)
     if (count_key(sources[i]) && strcmp(count_key(sources[i]), count_key(sources[of])) == 0)
-      received += sources[i]->counts.received + sources[i]->counts.malformed;
+      received += sources[i]->counts.received + skipped_of(sources[i]);
   TEST_ASSERT_EQUAL_UINT64_MESSAGE((uint64_t)expected, received, name);
 }
 
