@@ -47,28 +47,37 @@ WM_KERNEL void add_at(double *a, double *b, const half_update &u, const row_fact
   lanes::at(b + j) = y;
 }
 
+template <int kRows, int kTurns>
+WM_KERNEL void take_factors(const half_update &u, int i, row_factors<kRows, kTurns> *f) {
+#pragma GCC unroll 4
+  for (int k = 0; k < kRows; k++) f->wa[k] = u.w[k][i], f->wb[k] = u.w[k][i + 1];
+#pragma GCC unroll 4
+  for (int k = 0; k < kTurns; k++) {
+    f->ea[k] = u.e[k][i], f->eb[k] = u.e[k][i + 1];
+    f->ra[k] = u.r[k][i], f->rb[k] = u.r[k][i + 1];
+  }
+}
+
+// Rows i and i + 1, from the diagonal on; i lies in span s.
+template <class lanes, int kRows, int kTurns>
+WM_KERNEL void pass_rows(const half_covariance &p, const half_update &u, const filled_states &of, int s, int i) {
+  row_factors<kRows, kTurns> f;
+  take_factors(u, i, &f);
+  double *a = p.row(i), *b = p.row(i + 1);
+  for (int t = s; t < of.count; t++) {
+    const int to = of.span[t].to;
+    int j = t == s ? i : of.span[t].from;
+    for (; j + lanes::kWidth <= to; j += lanes::kWidth) add_at<lanes, kRows, kTurns>(a, b, u, f, j);
+    if constexpr (lanes::kWidth > 2)
+      if (j < to) add_at<two_lanes, kRows, kTurns>(a, b, u, f, j);
+  }
+}
+
 template <class lanes, int kRows, int kTurns>
 WM_KERNEL void pass(const half_covariance &p, const half_update &update, const filled_states &of) {
   const half_update u = update;
-  row_factors<kRows, kTurns> f;
   for (int s = 0; s < of.count; s++)
-    for (int i = of.span[s].from; i < of.span[s].to; i += 2) {
-      double *a = p.row(i), *b = p.row(i + 1);
-#pragma GCC unroll 4
-      for (int k = 0; k < kRows; k++) f.wa[k] = u.w[k][i], f.wb[k] = u.w[k][i + 1];
-#pragma GCC unroll 4
-      for (int k = 0; k < kTurns; k++) {
-        f.ea[k] = u.e[k][i], f.eb[k] = u.e[k][i + 1];
-        f.ra[k] = u.r[k][i], f.rb[k] = u.r[k][i + 1];
-      }
-      for (int t = s; t < of.count; t++) {
-        const int to = of.span[t].to;
-        int j = t == s ? i : of.span[t].from;
-        for (; j + lanes::kWidth <= to; j += lanes::kWidth) add_at<lanes, kRows, kTurns>(a, b, u, f, j);
-        if constexpr (lanes::kWidth > 2)
-          if (j < to) add_at<two_lanes, kRows, kTurns>(a, b, u, f, j);
-      }
-    }
+    for (int i = of.span[s].from; i < of.span[s].to; i += 2) pass_rows<lanes, kRows, kTurns>(p, u, of, s, i);
 }
 
 template <int kRows, int kTurns>

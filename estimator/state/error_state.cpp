@@ -124,20 +124,65 @@ void error_state::forget(int first, int count, double variance) {
   }
 }
 
+// The states that are not empty, before a block and behind it.
+struct error_state::around {
+  filled_states before, behind;
+  around(const filled_states &all, int begin, int end) {
+    for (int s = 0; s < all.count; s++) {
+      const state_span &of = all.span[s];
+      if (of.from < begin) before.add(of.from, of.to < begin ? of.to : begin, 0);
+      if (of.to > end) behind.add(of.from > end ? of.from : end, of.to, 0);
+    }
+  }
+};
+
+// The covariance of a new state with those before its block, a column, and with those behind it, its row.
+void error_state::assign_outside(const sparse_row &by, int state, int begin, const around &others) {
+  half_covariance cov = p();
+  if (others.before.count > 0) {
+    double *column = vector(0);
+    std::memset(column, 0, static_cast<size_t>(begin) * sizeof *column);
+    vectors::project(cov_view(), by.index, by.by, by.count, others.before, column);
+    for (int s = 0; s < others.before.count; s++)
+      for (int j = others.before.span[s].from; j < others.before.span[s].to; j += 2) {
+        double *pair_of_rows = cov.row(j) + state;
+        pair_of_rows[0] = column[j];
+        pair_of_rows[capacity_ - j] = column[j + 1];
+      }
+  }
+  const filled_states &behind = others.behind;
+  const bool is_own = by.count > 0 && by.index[0] == state;
+  double *row = cov.row(state);
+  for (int s = 0; s < behind.count && !(is_own && by.by[0] == 1.0); s++)
+    vectors::set_scaled(row + behind.span[s].from, row + behind.span[s].from, is_own ? by.by[0] : 0.0,
+                        behind.span[s].to - behind.span[s].from);
+  vectors::project(cov_view(), by.index + is_own, by.by + is_own, by.count - is_own, behind, row);
+}
+
+// T F' of one element of the block: `own` is the row of its first state, `block` the block of T.
+double error_state::assigned(const sparse_row &by, int first, int count, int k,
+                             const double block[kAssigned][kAssigned]) const {
+  const half_view cov = p();
+  const double *own = cov.row(first + k);
+  double sum = 0.0;
+  for (int m = 0; m < by.count; m++) {
+    const int state = by.index[m];
+    const double of = state < first           ? cov.row(state)[first + k]
+                      : state < first + count ? block[k][state - first]
+                                              : own[state];
+    sum += by.by[m] * of;
+  }
+  return sum;
+}
+
 // In place, one row after the other: a row of the block takes from the rows behind it as they were. T = F P; its part
 // beyond the block is P'. Of states before the block the covariance is a column.
 void error_state::assign(int first, int count, const sparse_row *rows, const double *noise, int stride,
                          const double *values) {
   touch();
   half_covariance cov = p();
-  const int begin = half_covariance::first(first), behind = even(first + count);
-  filled_states before, after;
-  const filled_states &all = filled();
-  for (int s = 0; s < all.count; s++) {
-    const state_span &of = all.span[s];
-    if (of.from < begin) before.add(of.from, of.to < begin ? of.to : begin, 0);
-    if (of.to > behind) after.add(of.from > behind ? of.from : behind, of.to, 0);
-  }
+  const int begin = half_covariance::first(first), end = even(first + count);
+  const around others(filled(), begin, end);
   double block[kAssigned][kAssigned];  // of T
   bool is_empty = false;
   for (int k = 0; k < count; k++)
@@ -146,44 +191,16 @@ void error_state::assign(int first, int count, const sparse_row *rows, const dou
     const int state = first + k;
     is_empty = is_empty || cov.at(state, state) == 0.0;
     if (begin < first) cov.set(state, begin, covariance_with(rows[k], begin));
-    if (behind > first + count && behind <= n_) cov.set(state, behind - 1, covariance_with(rows[k], behind - 1));
-    if (before.count > 0) {
-      double *column = vector(0);
-      std::memset(column, 0, static_cast<size_t>(begin) * sizeof *column);
-      vectors::project(cov_view(), rows[k].index, rows[k].by, rows[k].count, before, column);
-      for (int s = 0; s < before.count; s++)
-        for (int j = before.span[s].from; j < before.span[s].to; j += 2) {
-          double *pair_of_rows = cov.row(j) + state;
-          pair_of_rows[0] = column[j];
-          pair_of_rows[capacity_ - j] = column[j + 1];
-        }
-    }
-    const bool is_own = rows[k].count > 0 && rows[k].index[0] == state;
-    double *row = cov.row(state);
-    for (int s = 0; s < after.count && !(is_own && rows[k].by[0] == 1.0); s++)
-      vectors::set_scaled(row + after.span[s].from, row + after.span[s].from, is_own ? rows[k].by[0] : 0.0,
-                          after.span[s].to - after.span[s].from);
-    vectors::project(cov_view(), rows[k].index + is_own, rows[k].by + is_own, rows[k].count - is_own, after, row);
-  }
-  for (int k = 0; k < count; k++) {
-    const double *own = cov.row(first + k);
-    for (int l = k; l < count; l++) {
-      double sum = 0.0;
-      for (int m = 0; m < rows[l].count; m++) {
-        const int state = rows[l].index[m];
-        const double of = state < first           ? cov.row(state)[first + k]
-                          : state < first + count ? block[k][state - first]
-                                                  : own[state];
-        sum += rows[l].by[m] * of;
-      }
-      block[k][l] = sum + (noise ? noise[k * stride + l] : 0.0);
-    }
+    if (end > first + count && end <= n_) cov.set(state, end - 1, covariance_with(rows[k], end - 1));
+    assign_outside(rows[k], state, begin, others);
   }
   for (int k = 0; k < count; k++)
-    for (int l = k; l < count; l++) cov.set(first + k, first + l, block[k][l]);
+    for (int l = k; l < count; l++)
+      block[k][l] = assigned(rows[l], first, count, k, block) + (noise ? noise[k * stride + l] : 0.0);
   for (int k = 0; k < count; k++) {
-    is_empty = is_empty || cov.at(first + k, first + k) == 0.0;
+    for (int l = k; l < count; l++) cov.set(first + k, first + l, block[k][l]);
     mean()[first + k] = values[k];
+    is_empty = is_empty || block[k][k] == 0.0;
   }
   if (is_empty) filled_.count = 0;
 }

@@ -147,6 +147,9 @@ class error_state {
   double covariance_with(const sparse_row &row, int state) const;
   void project(const sparse_row &row, const filled_states &of, double *out) const;
   void pass(int rows, const filled_states &of, const sparse_row *turns, int turn_count);
+  struct around;
+  void assign_outside(const sparse_row &by, int state, int begin, const around &others);
+  double assigned(const sparse_row &by, int first, int count, int k, const double block[kAssigned][kAssigned]) const;
 
   relative_array<double> memory_;                     // the mean; gains, displacements e, vectors r; the covariance
   uint64_t generation_;                               // of the state, counted from 1

@@ -79,7 +79,8 @@ static void judge_wrap(const motion_data *self, int side, const char *about, wm_
 static void take_ticks(motion_data *self, const quantity_seen *seen, wm_time_ns t_ns) {
   if (seen[WM_Q_WHEEL_TICKS_LEFT].count == 0 || seen[WM_Q_WHEEL_TICKS_RIGHT].count == 0) return;
   const double now[2] = {seen[WM_Q_WHEEL_TICKS_LEFT].last, seen[WM_Q_WHEEL_TICKS_RIGHT].last};
-  const double dt_s = self->ticks_ns == WM_TIME_NONE ? -1 : (double)(t_ns / 2 - self->ticks_ns / 2) * 2e-9;
+  const wm_time_ns half_ns = self->ticks_ns == WM_TIME_NONE ? -1 : t_ns / 2 - self->ticks_ns / 2;
+  const double dt_s = (double)half_ns * 2e-9;
   if (dt_s >= 0 && dt_s < 0.05) return;  // single ticks give no speed
   const double m = 2 * M_PI * self->wheels->radius_m / self->wheels->ticks_per_turn;
   for (int side = 0; side < 2 && dt_s > 0 && dt_s < 1; side++)
