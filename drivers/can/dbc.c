@@ -153,7 +153,7 @@ static int is_j1939(const wm_dbc *dbc, const dbc_message *m) {
   return m->format == DBC_J1939 || dbc->default_format == DBC_J1939 || (m->id & ADDRESS_MASK) == NO_ADDRESS;
 }
 
-// A file that has the PGN several times tells its senders apart: their addresses count then.
+// Where a file has several messages of one PGN, they differ by their sender: the address counts then.
 wm_can_match wm_dbc_match(const wm_dbc *dbc, const dbc_message *message) {
   wm_can_match out = {message->id, message->is_extended ? 0x1FFFFFFFu : 0x7FFu, message->is_extended};
   if (!is_j1939(dbc, message)) return out;

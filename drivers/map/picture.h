@@ -8,7 +8,7 @@
 
 typedef enum picture_use {
   PICTURE_SEEN,  // as one sees it: brightness of colours (ITU-R BT.601), transparency over white
-  PICTURE_MAP    // as map_server reads it: the mean of the colours; transparency is told
+  PICTURE_MAP    // as map_server reads it: the mean of the colours; transparency is reported
 } picture_use;
 
 // *opaque (may be NULL): a byte a pixel, 1 where it is not transparent at all; NULL where all are. Both are the

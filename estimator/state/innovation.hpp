@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What one observation says of the state, before it is decided whether it is fused: the innovation of its rows, their
-// covariance and how well they fit.
+// One observation's information on the state, before it is decided whether it is fused: the innovation of its rows,
+// their covariance and how well they fit.
 #ifndef WAYMARK_ESTIMATOR_STATE_INNOVATION_HPP
 #define WAYMARK_ESTIMATOR_STATE_INNOVATION_HPP
 

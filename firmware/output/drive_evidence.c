@@ -130,7 +130,7 @@ double evidence_share(const drive_evidence *self, wm_state state, uint64_t total
 
 // ── findings ────────────────────────────────────────────────────────────────────────────────────────────────────────
 
-// All innovations of a source are far smaller than stated: what it says has hardly any weight.
+// All innovations of a source are far smaller than stated: it has hardly any weight.
 static void weightless(const drive_evidence *self, const wm_assembly *assembly, size_t i, wm_findings *out) {
   double squares = 0;
   uint64_t fused = 0;

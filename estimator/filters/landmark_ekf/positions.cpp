@@ -66,7 +66,7 @@ double landmark_ekf::position_row(int axis, const past_pose &past, const antenna
 // Where the delay is uncertain, its derivatives are those of the chord over two sigmas: a robot that may have stood
 // then, or driven, has neither's derivative [Julier1997]. bend_m: by how much the chord's middle is off the way. Before
 // the first motion datum the robot is taken to have moved as it does by that one: taken to have stood, its first
-// positions would be exact, and tell a delay that they cannot tell from the place of the antenna.
+// positions would be exact, and determine a delay that cannot be separated from the place of the antenna.
 void landmark_ekf::widen_delay(past_pose *past, double bend_m[2]) const {
   bend_m[0] = bend_m[1] = 0.0;
   if (gnss_time_state_ < 0) return;

@@ -206,7 +206,7 @@ static void judge_unused(const wm_source_health *s, int is_motion, wm_findings *
   for (size_t i = 0; i < out->count; i++)
     if (out->at[i].severity == WM_SEVERITY_BAD && strcmp(out->at[i].about, s->name) == 0 &&
         out->at[i].id != WM_FOUND_OBSERVATIONS_REFUSED)
-      return;  // said already
+      return;  // reported already
   wm_find(out, WM_FOUND_ROWS_UNUSED, WM_SEVERITY_BAD, s->name, NULL,
           "%" PRIu64 " of %" PRIu64 " rows are not used: %" PRIu64 " %s", unused, all, kReasons[most].count,
           kReasons[most].what)

@@ -34,7 +34,7 @@ void clock_data_init(clock_data *self, const wm_assembly *assembly);
 void clock_data_take(clock_data *self, const wm_event *event);
 // After the drive. Sources without data are left out.
 void clock_data_judge(const clock_data *self, const wm_health *health, wm_findings *out);
-// Sources of which more is dropped or ignored than a drive can be without, where no other finding says so.
+// Sources of which more is dropped or ignored than a drive can be without, where no other finding reports it.
 void clock_data_judge_unused(const clock_data *self, const wm_health *health, wm_findings *out);
 // Whether the stamps of a source jump: its rows in disorder and its lateness are consequences.
 int clock_data_jumps(const clock_data *self, size_t source);
