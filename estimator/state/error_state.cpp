@@ -214,16 +214,16 @@ void error_state::scale(int first, int count, double factor) {
 }
 
 void error_state::add_chance(double probability, const double *off) {
+  add_spread(probability, [off](int j) { return off[j]; });
+}
+
+// P + e r' + r e', e and r as add_spread() left them.
+void error_state::apply_spread() {
   touch();
   filled_.count = 0;
-  double *e = displacement(0), *r = step();
-  for (int j = 0; j < even(n_); j++) {
-    r[j] = j < n_ ? off[j] : 0.0;
-    e[j] = 0.5 * probability * r[j];
-  }
   filled_states all;
   all.add(0, even(n_), 0);
-  const half_update u = {0, 1, {}, {e}, {r}};
+  const half_update u = {0, 1, {}, {displacement(0)}, {step()}};
   vectors::apply(p(), u, all);
 }
 

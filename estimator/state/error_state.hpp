@@ -100,6 +100,9 @@ class error_state {
   void fade(int state, double factor, double added_variance);
   // Scales the sigmas of these states; correlations remain.
   void scale(int first, int count, double factor);
+  // P += share d d', d = of(state).
+  template <class Of>
+  void add_spread(double share, Of of);
   // Covariance of a mixture: with this probability, the states differ by `off`, `states()` doubles.
   void add_chance(double probability, const double *off);
 
@@ -147,6 +150,7 @@ class error_state {
   double covariance_with(const sparse_row &row, int state) const;
   void project(const sparse_row &row, const filled_states &of, double *out) const;
   void pass(int rows, const filled_states &of, const sparse_row *turns, int turn_count);
+  void apply_spread();
   struct around;
   void assign_outside(const sparse_row &by, int state, int begin, const around &others);
   double assigned(const sparse_row &by, int first, int count, int k, const double block[kAssigned][kAssigned]) const;
@@ -157,6 +161,16 @@ class error_state {
   int32_t n_, capacity_, dense_from_, rows_, turns_;  // no padding: the same events must give the same bytes
   filled_states filled_;                              // none: to be found anew
 };
+
+template <class Of>
+void error_state::add_spread(double share, Of of) {
+  double *e = displacement(0), *r = step();
+  for (int j = 0; j < even(n_); j++) {
+    r[j] = j < n_ ? of(j) : 0.0;
+    e[j] = 0.5 * share * r[j];
+  }
+  apply_spread();
+}
 
 // The last one goes first, so that no element is overwritten unread.
 template <class To>

@@ -3,6 +3,8 @@
 #ifndef WAYMARK_ESTIMATOR_CORE_POSITION_PARAMS_H
 #define WAYMARK_ESTIMATOR_CORE_POSITION_PARAMS_H
 
+#include <stdint.h>
+
 #include "param_rows.h"
 
 typedef struct wm_position_params {
@@ -10,6 +12,8 @@ typedef struct wm_position_params {
   double antenna_sigma_m;
   double sigma_factor, sigma_min_m;
   double correlated_m, correlated_tau_s;
+  double heading_bias_sigma_rad;      // PLANAR_POSITION_ROWS
+  int32_t use_position, use_heading;  // PLANAR_POSITION_ROWS
 } wm_position_params;
 
 // `member`: the field of that type.
@@ -31,5 +35,13 @@ typedef struct wm_position_params {
       F64("correlated.gnss_tau_s", member.correlated_tau_s, 20, 0.1, 1e6,                                           \
           "Time constant of that error, s. Among houses 10 to 20 s, under an open sky minutes. With 20 and 60 two " \
           "recordings have 9.6 and 20.1 m, 0.37 and 0.28 m.")
+
+// Of filters in the plane, besides.
+#define PLANAR_POSITION_ROWS(member)                                                                                \
+  F64("states.heading_bias_sigma_rad", member.heading_bias_sigma_rad, 0.05, 0, 1,                                   \
+      "Start sigma of the constant error of headings, rad: a compass' deviation, the mounting of two antennas. 0: " \
+      "off."),                                                                                                      \
+      BOOL("use.position", member.use_position, 1, "Fuse positions (GNSS)."),                                       \
+      BOOL("use.heading", member.use_heading, 1, "Fuse headings.")
 
 #endif

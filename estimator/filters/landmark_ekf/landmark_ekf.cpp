@@ -34,8 +34,7 @@ int error_slots(const wm_setup &setup) {
 int count_states(const wm_landmark_ekf_params &p, const wm_setup &setup) {
   const wm_sighting_params &s = *setup.sightings;
   return kPoseStates + planar_filter::count_motion_states(setup.motion->states, setup.motion->model) +
-         sensor_slots::count(setup) + (p.gnss.time_offset_sigma_s > 0.0) + 2 * (p.gnss.antenna_sigma_m != 0.0) +
-         (p.heading_bias_sigma_rad > 0.0) + 2 * (p.gnss.correlated_m != 0.0) +
+         sensor_slots::count(setup) + position_aid::count_states(p.gnss) +
          error_slots(setup) * correlated_slot_of(s).width + map_states(s) * map_slots(p, setup) +
          2 * (s.use_elevation && p.tilt_sigma_rad > 0.0);
 }
@@ -85,19 +84,8 @@ void landmark_ekf::init(const wm_landmark_ekf_params &params, const wm_setup &se
     return filter_.add_sensor_state(value, sigma, walk, low, high);
   });
   components_ = sightings().states.sigma[WM_SENSOR_ROW_kAngleScale] > 0.0 ? kAngleScaled : 0u;
-  gnss_time_state_ = add(0.0, params.gnss.time_offset_sigma_s);
-  gnss_error_state_ = add(0.0, std::fabs(params.gnss.correlated_m));  // below 0: the first position sets its variance
-  if (gnss_error_state_ >= 0) add(0.0, std::fabs(params.gnss.correlated_m));
-  if (gnss_error_state_ >= 0) {
-    filter_.set_correlated_position(gnss_error_state_);
-    filter_.noise().begin_correlated(square(params.gnss.correlated_m));
-  }
-  const antenna mounted = antenna_of(setup, params.gnss);
-  antenna_state_ = add(0.0, mounted.sigma_m);
-  if (antenna_state_ >= 0) add(0.0, mounted.sigma_m);
-  for (int i = 0; i < 2; i++) antenna_m_[i] = mounted.place_m[i];
-  heading_state_ = add(0.0, params.heading_bias_sigma_rad);
-  receiver_.begin();
+  positions_.init(params.gnss, setup, &filter_, add);
+  filter_.set_correlated_position(positions_.error_state());
   tilt_ns_ = WM_TIME_NONE;
   calibration_states_ = filter_.states();
   error_ = correlated_slot_of(sightings());
@@ -237,17 +225,10 @@ void landmark_ekf::add_start_mixture(wm_estimate *out) const {
 void landmark_ekf::list_calibration(calibration_list *list) const {
   filter_.list_motion_states(list);
   slots_.list(*setup_, filter_, list);
-  if (gnss_time_state_ >= 0)
-    list->add("gnss", "time_offset_s", filter_.value(gnss_time_state_), std::sqrt(filter_.variance(gnss_time_state_)));
-  static const char *const kAntenna[] = {"antenna_x_m", "antenna_y_m"};
-  for (int i = 0; i < 2 && antenna_state_ >= 0 && receiver_.is_used(); i++)
-    list->add("gnss", kAntenna[i], antenna_m_[i] + filter_.value(antenna_state_ + i),
-              std::sqrt(filter_.variance(antenna_state_ + i)));
-  if (heading_state_ >= 0 && has_heading_)
-    list->add("heading", "bias_rad", filter_.value(heading_state_), std::sqrt(filter_.variance(heading_state_)));
+  positions_.list(filter_, list);
   filter_.noise().list(list);
   filter_.turn_test().list(list);
-  list_lasting_error(lasting_error(), list);
+  list_lasting_error(positions_.lasting_error(filter_), list);
 }
 
 size_t landmark_ekf::list_counters(wm_counter *out, size_t capacity) const {

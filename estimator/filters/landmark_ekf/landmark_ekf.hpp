@@ -7,19 +7,17 @@
 
 #include <cmath>
 
+#include "aid/position.hpp"
 #include "filters/core/first_sightings.hpp"
 #include "filters/core/gate.hpp"
 #include "filters/core/landmark_evidence.hpp"
 #include "filters/core/lifecycle.hpp"
-#include "filters/core/receiver_error.hpp"
 #include "filters/core/rollback.hpp"
 #include "filters/core/sensor_slots.hpp"
 #include "filters/core/state_pool.hpp"
 #include "filters/landmark_ekf/params.h"
 #include "filters/landmark_ekf/start_hypotheses.hpp"
-#include "filters/planar/past_pose.hpp"
 #include "filters/planar/planar_filter.hpp"
-#include "filters/relocalize/pose_search.hpp"
 #include "maps/landmark_index.hpp"
 #include "sensors/sighting.hpp"
 #include "waymark/health.h"
@@ -42,9 +40,8 @@ class landmark_ekf {
 
  private:
   static constexpr int kErrorSlots = 24, kMapSlots = 24;  // most of correlated.slots and states.map_slots
-  static constexpr int kGnssStates = 3;                   // time offset, time-correlated error on each axis
   static constexpr int kMaxCalibration =
-      kCalibrationCount + 2 + kMaxSensors * kSensorStates + kGnssStates;  // 2: the wheels' heading
+      kCalibrationCount + 2 + kMaxSensors * kSensorStates + position_aid::kStates;  // 2: the wheels' heading
   static_assert(kMaxSensors * kSensorStates <= kMaxSensorStates);
   // In list_calibration() beside them: the antenna's place, the heading's bias, factors of noise, turn, lasting error.
   static_assert(kMaxCalibration + 3 + noise_adaption::kFactors + 2 <= 2 * WM_HEALTH_CALIBRATION_MAX);
@@ -58,13 +55,6 @@ class landmark_ekf {
     bool elevation;  // fused
     int landmark;    // index in the map
     past_pose past;
-  };
-  // One component of an observation.
-  struct residual {
-    planar_row row;
-    double innovation, noise;
-    wm_innovation record;
-    noise_adaption::source source;
   };
   // The slots of the time-correlated error of this sensor on this landmark, and of the landmark's error on the map;
   // -1: none.
@@ -93,16 +83,6 @@ class landmark_ekf {
   void restart_calibration(int sensor, const double prior[kSensorStates]);
   void test_calibration(const sighting_context &at, const residual *rows, int count);
   void decay_tilt(wm_time_ns t_ns);
-  void decay_gnss_error(wm_time_ns t_ns, double sigma_m);
-  // The antenna when the position was measured: its heading, its place in base_link, and against base_link in the map.
-  struct antenna_view {
-    sin_cos h;
-    double arm_m[2], off_m[2];
-  };
-  antenna_view view_antenna(const past_pose &past) const;
-  void widen_delay(past_pose *past, double bend_m[2]) const;
-  double position_row(int axis, const past_pose &past, const antenna_view &antenna, planar_row *row) const;
-  double lasting_error() const;  // of the receiver, over its sigma; 0 where it is no state
 
   // Gates one or two components jointly, weakens or rejects, updates, writes the records. Returns the log Bayes factor
   // of "anywhere in clutter_volume" against "as expected". `usable` false: the source is known to be wrong.
@@ -158,10 +138,7 @@ class landmark_ekf {
   mounted_sensor sensor_[kMaxSensors];
   sensor_slots slots_;
   unsigned components_;  // of expect(): whether the angle scale is a state
-  int gnss_time_state_, gnss_error_state_, antenna_state_, heading_state_;
-  double antenna_m_[2];  // in base_link, without the states of its error
-  int has_heading_;      // one has come
-  receiver_error receiver_;
+  position_aid positions_;
   state_pool<kErrorSlots> errors_;
   correlated_slot error_;  // a slot of these
   state_pool<kMapSlots> map_;

@@ -9,14 +9,10 @@ static const wm_param kParams[] = {
         "bends or is loaded on one side. States with sightings.use.elevation, else unused."),
     F64("states.tilt_tau_s", tilt_tau_s, 2, 0.01, 1e6, "Time after which such a tilt has fallen to 1/e, s."),
     POSITION_STATE_ROWS(gnss),
-    F64("states.heading_bias_sigma_rad", heading_bias_sigma_rad, 0.05, 0, 1,
-        "Start sigma of the constant error of headings, rad: a compass' deviation, the mounting of two antennas. 0: "
-        "off."),
     I32("states.map_slots", map_slots, 16, 0, 24,
         "Landmarks (the last seen ones) whose error on the map, by their sigma_m, is carried as states. That of a "
         "landmark beyond them counts as noise, the larger the more often it is seen."),
-    BOOL("use.position", use_position, 1, "Fuse positions (GNSS)."),
-    BOOL("use.heading", use_heading, 1, "Fuse headings."),
+    PLANAR_POSITION_ROWS(gnss),
     POSITION_NOISE_ROWS(gnss),
     F64("dead_reckoning_after_s", dead_reckoning_after_s, 2, 0, 3600,
         "Time without a fused observation after which the state is dead reckoning, s."),

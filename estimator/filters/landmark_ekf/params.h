@@ -15,8 +15,7 @@ extern "C" {
 typedef struct wm_landmark_ekf_params {
   double tilt_sigma_rad, tilt_tau_s;  // with elevations only
   wm_position_params gnss;
-  double heading_bias_sigma_rad;
-  int32_t map_slots, use_position, use_heading, recover;
+  int32_t map_slots, recover;
   double dead_reckoning_after_s;
   double recover_window_s, recover_sigma_xy_m, recover_sigma_heading_rad;
 } wm_landmark_ekf_params;

@@ -11,9 +11,6 @@
 
 namespace wm {
 
-// Entries of a measurement's Jacobian row (landmark_ekf asserts that they suffice).
-using planar_row = jacobian_row<24>;
-
 class planar_filter : public planar_motion {
  public:
   // How many states the motion's calibration takes with this motion.model.

@@ -19,6 +19,9 @@
 
 namespace wm {
 
+// Entries of a measurement's Jacobian row (landmark_ekf asserts that they suffice).
+using planar_row = jacobian_row<24>;
+
 // Errors of sensors that are states, of all sensors together (filters with sensors assert it).
 inline constexpr int kMaxSensorStates = 192;
 

@@ -145,6 +145,62 @@ void joint_state::assign(int first, int count, const joint_row *rows, const doub
   state_.assign_rows(first, count, rows, noise[0], 3, values);
 }
 
+// Which coordinate of a place a state is: 0 for x, 1 for y, 2 for a heading; -1: none of these.
+int joint_state::axis_of(int state) const {
+  if (state < kPoseStates) return state;
+  return state < layout_.robot_states ? -1 : (state - layout_.robot_states) % layout_.landmark_width;
+}
+
+// A rotation of x and y by three shears, each of which changes one state.
+void joint_state::turn_pair(int state, double half_tangent, double sine) {
+  const auto shear = [this](int to, int from, double by) {
+    joint_row row;
+    row.add(to, 1.0);
+    row.add(from, by);
+    state_.assign(to, row, 0.0, value(to) + by * value(from));
+  };
+  shear(state, state + 1, -half_tangent);
+  shear(state + 1, state, sine);
+  shear(state, state + 1, -half_tangent);
+}
+
+// In two halves: the tangent of a quarter of a turn is bounded.
+void joint_state::move_map(const wm_pose2 &by) {
+  const double half_tangent = tan(0.25 * by.heading_rad), sine = sincos(0.5 * by.heading_rad).sin;
+  const auto turn = [&](int state) {
+    for (int half = 0; half < 2 && by.heading_rad != 0.0; half++) turn_pair(state, half_tangent, sine);
+  };
+  if (has_velocity()) turn(motion_state_[kVelocityX]);
+  for (int j = 0; j < states(); j++)
+    if (const int axis = axis_of(j); axis == 0) {
+      turn(j);
+      set_value(j, value(j) + by.x_m);
+      set_value(j + 1, value(j + 1) + by.y_m);
+    } else if (axis == 2) {
+      set_value(j, wrap(value(j) + by.heading_rad));
+    }
+  twist_heading_rad_ = value(kHeading);
+  heading_rad_ = value(kHeading);
+  take_calibration(state_.mean());
+}
+
+void joint_state::add_frame_error(const double about_m[2], double turn_sigma_rad, double white_m, double lasting_m,
+                                  int error_state) {
+  state_.add_spread(square(turn_sigma_rad), [&](int j) {
+    const int axis = axis_of(j);
+    if (has_velocity() && j == motion_state_[kVelocityX]) return -value(j + 1);
+    if (has_velocity() && j == motion_state_[kVelocityX] + 1) return value(j - 1);
+    return axis == 0 ? about_m[1] - value(j + 1) : axis == 1 ? value(j - 1) - about_m[0] : axis == 2 ? 1.0 : 0.0;
+  });
+  for (int k = 0; k < 2; k++) {
+    state_.add_spread(square(white_m), [&](int j) { return axis_of(j) == k ? 1.0 : 0.0; });
+    if (error_state >= 0) forget(error_state + k, 0.0, 0.0);
+    state_.add_spread(square(lasting_m), [&](int j) {
+      return axis_of(j) == k ? 1.0 : error_state >= 0 && j == error_state + k ? -1.0 : 0.0;
+    });
+  }
+}
+
 // ---- landmarks ----
 
 int joint_state::add_landmark(const joint_row *rows, const double (*noise)[3], const double *values) {

@@ -98,6 +98,13 @@ class joint_state : public planar_motion {
   // The pose moves to `to`, whose covariance beyond the present one is `added`.
   void shift_pose(const wm_pose2 &to, const double added[3][3]);
 
+  // All of the map moves: x -> R x + shift, of the pose, the velocity and each landmark.
+  void move_map(const wm_pose2 &by);
+  // Errors of that motion: of the turn about a point, and of the shift on each axis. `lasting_m`: the part of the shift
+  // that is minus the error of `error_state` and the one behind it; -1: nobody's.
+  void add_frame_error(const double about_m[2], double turn_sigma_rad, double white_m, double lasting_m,
+                       int error_state);
+
   // ---- landmarks ----
   int landmarks() const { return landmarks_; }
   landmark_places places() const { return {values() + layout_.robot_states, landmarks_, layout_.landmark_width}; }
@@ -133,6 +140,8 @@ class joint_state : public planar_motion {
   void carry_scale(const double *before);
 
   void wander(double dt_s);
+  int axis_of(int state) const;
+  void turn_pair(int state, double half_tangent, double sine);
 
   joint_layout layout_;
   wheel_slip slip_;

@@ -23,6 +23,8 @@ constexpr int32_t kLargestId = INT32_MAX;
 // The next number of a landmark without an identity: as many are left as a drive can't have.
 constexpr int32_t kNextIdMost = INT32_MAX / 2;
 // Ages of a kept landmark at the first observation: far beyond the times that witnesses and returns are judged by.
+// Bits of by_bearings: the map began by bearings alone; it lies in the frame of positions, and of headings.
+constexpr uint32_t kByBearings = 1, kPlaced = 2, kTurned = 4;
 constexpr wm_time_ns kAge_ns = 600 * WM_NS_PER_S, kUnseen_ns = 60 * WM_NS_PER_S;
 
 struct kept_head {
@@ -158,7 +160,9 @@ size_t slam::keep(void *out, size_t capacity) const {
   head.next_id = next_id_;
   head.returned = returned_;
   head.rejoins = rejoins_;
-  head.by_bearings = by_bearings_;
+  head.by_bearings = by_bearings_ ? kByBearings : 0u;
+  if (is_placed_) head.by_bearings |= kPlaced;
+  if (is_turned_) head.by_bearings |= kTurned;
   std::memcpy(head.scale_origin_m, joint_.scale_origin_m(), sizeof head.scale_origin_m);
   const kept_layout layout(head);
   if (layout.bytes > capacity) return 0;
@@ -208,7 +212,9 @@ void slam::take_kept(const void *image) {
       if (!joint_.is_velocity(j)) joint_.set_covariance(i, j, kept.covariance(i, j));
   }
   rejoins_ = head.rejoins != 0;
-  by_bearings_ = head.by_bearings != 0;
+  by_bearings_ = (head.by_bearings & kByBearings) != 0;
+  is_placed_ |= (head.by_bearings & kPlaced) != 0;
+  is_turned_ |= (head.by_bearings & kTurned) != 0;
   returned_ = head.returned;
   next_id_ = head.next_id;
   for (int from = 0; from < kept.landmarks(); from++) take_kept_landmark(image, from);

@@ -19,6 +19,9 @@ static const wm_param kParams[] = {
     F64("states.sensor_stamp_sigma_s", sensor_stamp_sigma_s, 0, 0, 1,
         "Sigma of the error of each picture's stamp, s: the same for all that is seen in it, independent between "
         "pictures. 0: off."),
+    POSITION_STATE_ROWS(gnss),
+    POSITION_NOISE_ROWS(gnss),
+    PLANAR_POSITION_ROWS(gnss),
     F64("markers.sigma_m", marker_sigma_m, 0.002, 1e-5, 10,
         "Sigma of a marker's place, m; the sensor's sigmas, along and across, are added in squares."),
     F64("markers.sigma_rel", marker_sigma_rel, 0, 0, 1, "The same as a part of the distance."),

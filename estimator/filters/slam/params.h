@@ -5,6 +5,7 @@
 
 #include <stdint.h>
 
+#include "filters/core/position_params.h"
 #include "waymark/params.h"
 
 #ifdef __cplusplus
@@ -33,6 +34,7 @@ typedef struct wm_slam_params {
   int32_t line_clones, line_poses, line_method;
   int32_t line_rejoin;
   double line_near_m, line_patience_s, line_parallax_rad, line_step_m, line_sigma_rel;
+  wm_position_params gnss;
   int32_t consistency;
   int32_t recover;
   double dead_reckoning_after_s;

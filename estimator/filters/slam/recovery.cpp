@@ -81,7 +81,15 @@ bool slam::weigh(int landmark, bool passed, double log_bayes, double angle_rad, 
   const bool established =
       seen.seen >= kEstablished || (seen.seen >= static_cast<uint32_t>(params_.confirm_seen) && returned);
   if (!witness && (!established || log_bayes < 0.0)) return true;
-  evidence_.note(now, seen.id, log_bayes, angle_rad, normalised, &seen.record);
+  return weigh_source(seen.id, &seen.record, passed, witness, log_bayes, angle_rad, normalised);
+}
+
+// Of a landmark (`record`), or of positions or headings. `witness`: it proves a pose that it fits.
+bool slam::weigh_source(int key, landmark_record *record, bool passed, bool witness, double log_bayes, double angle_rad,
+                        double normalised) {
+  if (!params_.recover || rejoins_) return true;
+  const wm_time_ns now = joint_.now_ns();
+  evidence_.note(now, key, log_bayes, angle_rad, normalised, record);
   if (life_.tracking() && evidence_.contradicted()) {
     lose();
     return false;
@@ -148,16 +156,19 @@ bool slam::keep_observation(int landmark, const context &at, const planar_observ
   return fits;
 }
 
-// How many different landmarks of those observed since then a pose explains; *id: one of these.
+// How many different landmarks of those observed since then a pose explains; *id: one of these. Positions count as one
+// each, since a receiver that is wrong at one place is right at another.
 int slam::landmarks_fitting(const wm_pose2 &pose, wm_time_ns since_ns, int32_t *id) const {
   const wm_pose2 frame = compose(pose, between(joint_.odom(), wm_pose2{}));
   int32_t fitting[pose_search::kCapacity];
-  int count = 0;
+  int count = 0, positions = 0;
   for (int i = 0; i < observations_.kept(); i++) {
     const observation &o = observations_.at(i);
-    if (o.t_ns < since_ns || o.key < 0) continue;
+    if (o.t_ns < since_ns) continue;
     const wm_pose2 from = compose(frame, o.sensor);
     const double dx = o.place_m[0] - from.x_m, dy = o.place_m[1] - from.y_m, distance = std::sqrt(dx * dx + dy * dy);
+    positions += (o.kind & kObservedPosition) && distance < kFits_m + kSigmas * o.sigma_length_m;
+    if (o.key < 0) continue;
     const bool bearing_fits = !(o.kind & kObservedBearing) ||
                               std::fabs(wrap(atan2(dy, dx) - from.heading_rad - o.bearing_rad)) < kFits_rad ||
                               distance < kFits_m;
@@ -166,7 +177,7 @@ int slam::landmarks_fitting(const wm_pose2 &pose, wm_time_ns since_ns, int32_t *
     while (k < count && fitting[k] != o.key) k++;
     if (k == count) fitting[count++] = *id = o.key;
   }
-  return count;
+  return count + positions;
 }
 
 // Two landmarks must agree, since one may have moved. Whether one marker does for all that: its second pose is the

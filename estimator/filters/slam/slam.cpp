@@ -45,7 +45,7 @@ int states_that_last(const wm_slam_params &p, const wm_setup &setup) {
 int states_before_clones(const wm_slam_params &p, const wm_setup &setup) {
   const wm_sighting_params &s = *setup.sightings;
   return states_that_last(p, setup) + (p.sensor_stamp_sigma_s > 0.0) * (int)setup.sensor_count +
-         s.correlated_slots * error_slot_of(p, s).width;
+         s.correlated_slots * error_slot_of(p, s).width + position_aid::count_states(p.gnss);
 }
 
 // Azimuth and inverse distance of a ray, of which there are as many as clones.
@@ -157,6 +157,7 @@ void slam::init(const wm_slam_params &params, const wm_setup &setup) {
   }
   error_ = error_slot_of(params, sightings());
   for (int i = 0; i < sightings().correlated_slots && error_.width > 0; i++, next += error_.width) errors_.add(next);
+  positions_.init(params.gnss, setup, &joint_, [&next](double, double) { return next++; });
   follow_scale();
   life_ = {};
   start_again();
@@ -208,7 +209,8 @@ bool slam::has_standard() const {
 // transported from the first one on.
 void slam::follow_scale() {
   joint_.leave_scale();
-  const bool is_observed = !by_bearings_ && sightings().use_range && has_standard();
+  const bool by_positions = is_placed_ && positions_.has_position();
+  const bool is_observed = by_positions || (!by_bearings_ && sightings().use_range && has_standard());
   if (is_observed || params_.map != WM_SLAM_MAP_NONE || !joint_.find_scale(!has_headings())) return;
   for (int i = 0; i < static_cast<int>(setup_->sensor_count); i++) {
     const bool is_scaled = !slots_.is_by_default(kRangeScale) || (scaled_ >> i & 1u);
@@ -259,6 +261,7 @@ void slam::start_again() {
   while (joint_.landmarks() > 0) joint_.remove_landmark(joint_.landmarks() - 1);
   joint_.set_pose({place ? start.p_m[0] : 0.0, place ? start.p_m[1] : 0.0, heading ? start.heading_rad : 0.0},
                   covariance);
+  begin_frame();
   forget_lines();
   errors_.release_all();
   next_id_ = members_ = 0;
@@ -334,6 +337,8 @@ wm_status slam::correct(const wm_event &event, record_list records) {
   switch (event.kind) {
     case WM_EVENT_SIGHTING: return fuse_sighting(event, records);
     case WM_EVENT_MARKER: return fuse_marker(event, records);
+    case WM_EVENT_POSITION: return fuse_position(event, records);
+    case WM_EVENT_HEADING: return fuse_heading(event, records);
     case WM_EVENT_SET_POSE:
     case WM_EVENT_RESET: return take_pose(event);
     case WM_EVENT_LOOKED: {
@@ -372,7 +377,10 @@ void slam::estimate(wm_estimate *out) const {
   joint_.estimate(out);
   out->resets = life_.resets();
   out->state = life_.state(joint_.now_ns(), params_.dead_reckoning_after_s);
-  out->lost_probability = life_.searching() ? 1.0 : rejoins_ ? pattern_odds_.probability() : evidence_.probability();
+  if (is_frame_unknown() && life_.tracking()) out->state = WM_STATE_SEARCHING;
+  out->lost_probability = out->state == WM_STATE_SEARCHING ? 1.0
+                          : rejoins_                       ? pattern_odds_.probability()
+                                                           : evidence_.probability();
   if (!life_.tracking()) widen(out);
 }
 
@@ -382,6 +390,7 @@ void slam::list_calibration(calibration_list *list) const {
   static_assert(kMotionStates + 2 + kMaxSensors * (kSensorStates + 1) <= 2 * WM_HEALTH_CALIBRATION_MAX);
   joint_.list_motion_states(list);
   slots_.list(*setup_, joint_, list);
+  if (positions_.is_awake()) positions_.list(joint_, list);
   for (size_t i = 0; i < setup_->sensor_count; i++)
     if (finite(bloom_px_[i])) list->add(setup_->sensors[i].name, "bloom_px", bloom_px_[i], std::nan(""));
 }
@@ -511,7 +520,9 @@ int slam::note_landmark(int32_t id, int landmark, int sensor) {
 const wm_estimator wm_slam_estimator = wm::estimator_of<wm::slam, wm_slam_params>(
     "slam",
     "EKF-SLAM in the plane, right-invariant: the robot, its sensors' errors and landmarks at unknown places, "
-    "from coded markers, bearings and ranges, or bearings alone, with or without identities.",
-    WM_EVENT_BIT(WM_EVENT_SIGHTING) | WM_EVENT_BIT(WM_EVENT_MARKER) | WM_EVENT_BIT(WM_EVENT_LOOKED) |
-        WM_EVENT_BIT(WM_EVENT_SET_POSE) | WM_EVENT_BIT(WM_EVENT_RESET),
+    "from coded markers, bearings and ranges, or bearings alone, with or without identities; with positions and "
+    "headings.",
+    WM_EVENT_BIT(WM_EVENT_SIGHTING) | WM_EVENT_BIT(WM_EVENT_MARKER) | WM_EVENT_BIT(WM_EVENT_POSITION) |
+        WM_EVENT_BIT(WM_EVENT_HEADING) | WM_EVENT_BIT(WM_EVENT_LOOKED) | WM_EVENT_BIT(WM_EVENT_SET_POSE) |
+        WM_EVENT_BIT(WM_EVENT_RESET),
     wm_slam_params_table, wm::kReads);

@@ -5,6 +5,8 @@
 #ifndef WAYMARK_ESTIMATOR_SLAM_SLAM_HPP
 #define WAYMARK_ESTIMATOR_SLAM_SLAM_HPP
 
+#include "aid/frame_fit.hpp"
+#include "aid/position.hpp"
 #include "filters/core/gate.hpp"
 #include "filters/core/landmark_evidence.hpp"
 #include "filters/core/lifecycle.hpp"
@@ -13,9 +15,7 @@
 #include "filters/core/rollback.hpp"
 #include "filters/core/sensor_slots.hpp"
 #include "filters/core/state_pool.hpp"
-#include "filters/planar/past_pose.hpp"
 #include "filters/relocalize/line_search.hpp"
-#include "filters/relocalize/pose_search.hpp"
 #include "filters/slam/bearing_tracks.hpp"
 #include "filters/slam/joint_state.hpp"
 #include "filters/slam/params.h"
@@ -301,6 +301,16 @@ class slam {
   wm_verdict join_marker(const context &at, const marker_reading &r);
   void fuse_height(int landmark, int sensor, const marker_reading &r);
 
+  // positions.cpp
+  void begin_frame();
+  void place_map(const wm_pose2 &by, const double about_m[2], double turn_sigma_rad, double white_m, double lasting_m);
+  bool is_placing(const wm_position &p, const position_aid::view &at);
+  void fuse_given(const residual *rows, int count, int key, double clutter_volume, record_list records);
+  bool search_by(const observation &seen);
+  wm_status fuse_position(const wm_event &event, record_list records);
+  wm_status fuse_heading(const wm_event &event, record_list records);
+  bool is_frame_unknown() const { return !is_placed_ && positions_.has_position(); }
+
   // trust.cpp
   bool is_plausible(int landmark, const innovation &block, double noise);
   bool is_ambiguous(int32_t id, int landmark, int sensor);
@@ -331,6 +341,8 @@ class slam {
   joint_state::scope scope_now() const;
   bool is_witness(const landmark_note &note) const;
   bool weigh(int landmark, bool passed, double log_bayes, double angle_rad, double normalised);
+  bool weigh_source(int key, landmark_record *record, bool passed, bool witness, double log_bayes, double angle_rad,
+                    double normalised);
   void lose();
   observation observation_from(int landmark, const context &at, const planar_observation &seen) const;
   bool keep_observation(int landmark, const context &at, const planar_observation &seen);
@@ -370,6 +382,8 @@ class slam {
   wm_time_ns picture_ns_[kSlamSensors];  // that stamp
   state_pool<24> errors_;                // time-correlated errors of a sensor on a landmark
   correlated_slot error_;                // a slot of these
+  position_aid positions_;
+  frame_fit frame_;
   bearing_tracks tracks_;
   int first_ray_, first_clone_;
   int returned_;      // identities of bearings alone that came back
@@ -399,10 +413,11 @@ class slam {
   evidence pattern_odds_;
   double usual_share_;  // of a picture's bearings that the map explains
   wm_time_ns pattern_ns_;
-  bool by_slip_;      // LOST by a slip, which more sightings confirm
-  bool by_one_;       // the pose was found by one marker and is not proven yet
-  bool one_refuted_;  // by others; since then it takes two
-  bool is_kept_;      // the map is that of a run before, and nothing was observed yet
+  bool by_slip_;                // LOST by a slip, which more sightings confirm
+  bool by_one_;                 // the pose was found by one marker and is not proven yet
+  bool one_refuted_;            // by others; since then it takes two
+  bool is_kept_;                // the map is that of a run before, and nothing was observed yet
+  bool is_placed_, is_turned_;  // the map lies in the frame of positions, and of headings
 };
 
 }  // namespace wm

@@ -133,7 +133,7 @@ inline void exact_sensors(wm_motion_params *motion) {
 }
 inline void exact_map(wm_landmark_ekf_params *params) {
   wm_params_defaults(&wm_landmark_ekf_params_table, params);
-  params->gnss.time_offset_sigma_s = params->gnss.correlated_m = params->heading_bias_sigma_rad = 0.0;
+  params->gnss.time_offset_sigma_s = params->gnss.correlated_m = params->gnss.heading_bias_sigma_rad = 0.0;
   params->gnss.antenna_sigma_m = 0.0;
   params->gnss.sigma_factor = params->recover_sigma_xy_m = 1.0;
   params->gnss.correlated_tau_s = 60.0;

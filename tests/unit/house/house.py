@@ -29,7 +29,7 @@ ESTIMATOR_NEVER = re.compile(
 # Inside estimator/: folder -> folders whose headers it may include (its own always). A detector includes no other detector
 # and no filter, a filter no other filter.
 SENSING = ["", "math", "memory", "sensors", "image", "vision"]
-FILTER = ["", "math", "memory", "state", "motion", "maps", "sensors", "filters", "filters/core", "filters/planar", "filters/relocalize"]
+FILTER = ["", "aid", "math", "memory", "state", "motion", "maps", "sensors", "filters", "filters/core", "filters/planar", "filters/relocalize"]
 FOLDER_MAY_USE = {
     "": [],
     "math": [],
@@ -51,6 +51,7 @@ FOLDER_MAY_USE = {
     "filters/core": ["", "math", "memory", "motion", "sensors"],
     "filters/planar": ["math", "memory", "state", "motion", "sensors", "filters/core"],
     "filters/relocalize": ["math", "memory", "maps", "sensors", "filters/core"],
+    "aid": ["", "math", "memory", "state", "motion", "sensors", "filters/core", "filters/planar", "filters/relocalize"],
     "filters/edge_mcl": FILTER,
     "filters/landmark_ekf": FILTER,
     "filters/odometry": FILTER,
