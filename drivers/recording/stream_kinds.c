@@ -9,17 +9,17 @@
 #include "waymark/event_fields.h"
 #include "waymark/streams.h"
 
-// Limits of plausible values: wide enough for all vehicles, tight enough for corrupt data.
-#define SPEED -1000.0, 1000.0
-#define RATE -1000.0, 1000.0
+// Limits of plausible values, as of events (event_fields.h).
+#define SPEED WM_SPEED_LIMITS
+#define RATE WM_RATE_LIMITS
 #define ACCELERATION -10000.0, 10000.0
 #define TEMPERATURE -273.15, 1000.0
-#define ANGLE -6.2832, 6.2832
-#define PLACE -1e8, 1e8
-#define SIGMA DBL_MIN, 1e6
-#define PIXEL -1e5, 1e5
+#define ANGLE WM_ANGLE_LIMITS
+#define PLACE WM_PLACE_LIMITS
+#define SIGMA WM_SIGMA_LIMITS
+#define PIXEL WM_PIXEL_LIMITS
 #define VARIANCE 0.0, 1e12
-#define COVARIANCE -1e12, 1e12
+#define COVARIANCE WM_COVARIANCE_LIMITS
 #define ANY_ID 0.0, 2147483647.0
 #define ID_OR_UNKNOWN -1.0, 2147483647.0
 
@@ -429,8 +429,9 @@ wm_status wm_stream_event(const wm_stream *self, const wm_stream_row *row, const
     if (isnan(value) && column->need < CSV_NEEDED) continue;
     if (!isfinite(value)) return wm_fail(err, WM_NOT_FINITE, "%s is not a finite number", column->name);
     if (!(value >= column->min && value <= column->max))
-      return wm_fail(err, WM_NOT_FINITE, "%s: %.10g is outside of what can be (%s%.10g to %.10g)", column->name, value,
-                     column->min == DBL_MIN ? "above " : "", column->min == DBL_MIN ? 0.0 : column->min, column->max);
+      return wm_fail(err, WM_OUT_OF_RANGE, "%s: %.10g is outside of what can be (%s%.10g to %.10g)", column->name,
+                     value, column->min == DBL_MIN ? "above " : "", column->min == DBL_MIN ? 0.0 : column->min,
+                     column->max);
   }
   memset(out, 0, WM_EVENT_SMALL_BYTES);
   out->t_ns = row->t_ns;

@@ -66,12 +66,13 @@ size_t wm_pipeline_keep(const wm_pipeline *self, void *out, size_t capacity) {
   return keeper && !wm_monitor_doubts(&self->fuser.monitor) ? keeper->keep(self->fuser.state, out, capacity) : 0;
 }
 
-void wm_pipeline_arrive(wm_pipeline *self, const wm_event *event) {
+wm_merge_verdict wm_pipeline_arrive(wm_pipeline *self, const wm_event *event) {
   wm_time_ns begin_ns = wm_monotonic_ns();
   wm_merge_verdict verdict = wm_merge_push(self->merge, event);
   if (wm_event_is_motion(event) && verdict != WM_MERGE_DUPLICATE && verdict != WM_MERGE_FUTURE)
     wm_predictor_motion(&self->predictor, event);
   wm_histogram_add(&self->arrive_ns, wm_monotonic_ns() - begin_ns);
+  return verdict;
 }
 
 // Hands the newest fused pose and the calibration of the motion sensors to the predictor.

@@ -46,7 +46,7 @@ void wm_pipeline_take_kept(wm_pipeline *self, const void *image, size_t bytes);
 // The present map, into `out`: its bytes; 0 where the estimator keeps none or the pose is in doubt.
 WM_REALTIME size_t wm_pipeline_keep(const wm_pipeline *self, void *out, size_t capacity);
 
-WM_REALTIME void wm_pipeline_arrive(wm_pipeline *self, const wm_event *event);
+WM_REALTIME wm_merge_verdict wm_pipeline_arrive(wm_pipeline *self, const wm_event *event);
 WM_REALTIME void wm_pipeline_advance(wm_pipeline *self, wm_time_ns now_ns);
 // The pose of `now_ns` into *out, without sending it. 0 where there is none.
 WM_REALTIME int wm_pipeline_publish(wm_pipeline *self, wm_time_ns now_ns, wm_published *out);

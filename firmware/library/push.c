@@ -6,8 +6,14 @@
 #include "library/session.h"
 
 #define FARTHEST_NS (INT64_MAX / 4)  // stamps beyond it would overflow in differences
+// A time may be so far ahead of the newest one. Programs seldom stand still for longer; UTC, TAI and GPS differ by more
+// (18 s and above), as does a clock that was not set.
+#define AHEAD_MAX_NS (10 * WM_NS_PER_S)
+// A wrong stamp is alone among right ones. Behind a pause all are far ahead: they are taken once they went on for so
+// long, none of them within the bound.
+#define PAUSE_PROVEN_NS WM_NS_PER_S
 
-static wm_status check_started(const waymark_session *self, const char *function, wm_error *err) {
+wm_status session_check_started(const session *self, const char *function, wm_error *err) {
   if (self->has_started) return WM_OK;
   return wm_fail(err, WM_BAD_USAGE, "%s: waymark_start has to be called before", function);
 }
@@ -17,14 +23,54 @@ static wm_status check_time(const char *name, wm_time_ns t_ns, wm_error *err) {
   return wm_fail(err, WM_OUT_OF_RANGE, "%s: %lld ns is not a time", name, (long long)t_ns);
 }
 
+// A time that may become the session's newest.
+static wm_status check_ahead(session *self, const char *name, wm_time_ns t_ns, wm_error *err) {
+  const int goes_on =
+      self->ahead_to_ns != WM_TIME_NONE && t_ns >= self->ahead_from_ns && t_ns - self->ahead_to_ns <= AHEAD_MAX_NS;
+  if (self->now_ns == WM_TIME_NONE || t_ns - self->now_ns <= AHEAD_MAX_NS ||
+      (goes_on && t_ns - self->ahead_from_ns >= PAUSE_PROVEN_NS)) {
+    self->ahead_from_ns = self->ahead_to_ns = WM_TIME_NONE;
+    return WM_OK;
+  }
+  if (!goes_on) self->ahead_from_ns = t_ns;
+  self->ahead_to_ns = t_ns;
+  return wm_fail(err, WM_OUT_OF_RANGE,
+                 "%s: %.3f s ahead of the newest time of this session, at most %.0f s can be: is it of another clock? "
+                 "After a pause, times are taken again once they all went on for %.0f s",
+                 name, wm_seconds_between(self->now_ns, t_ns), wm_seconds_between(0, AHEAD_MAX_NS),
+                 wm_seconds_between(0, PAUSE_PROVEN_NS));
+}
+
+// What the merge said to a datum.
+static wm_status judge(const session *self, const wm_event *event, wm_merge_verdict verdict, wm_error *err) {
+  const char *name = self->assembly.sources[event->source].name;
+  const double late_s = wm_seconds_between(event->t_ns, event->arrival_ns);
+  switch (verdict) {
+    case WM_MERGE_TAKEN: break;
+    case WM_MERGE_LATE:
+      return wm_fail(err, WM_TIME_RAN_BACK,
+                     "%s: newer data were fused already: push in the order of the stamps, or raise lateness_max_ms; it "
+                     "came %.3f s after its stamp",
+                     name, late_s);
+    case WM_MERGE_FUTURE:
+      return wm_fail(
+          err, WM_OUT_OF_RANGE,
+          "%s: its stamp is %.3f s later than its arrival, more than merge.horizon_ms: are both on one clock?", name,
+          -late_s);
+    case WM_MERGE_DUPLICATE: return wm_fail(err, WM_BAD_DATA, "%s: the same datum was pushed before", name);
+    case WM_MERGE_DROPPED: return wm_fail(err, WM_FULL, "%s: the queue is full: raise merge.queue_events", name);
+  }
+  return WM_OK;
+}
+
 // A detector waits for pictures as a device's source for data: with is_live the readers do not read ahead.
-static void set_live(waymark_session *self, uint8_t is_live) {
+static void set_live(session *self, uint8_t is_live) {
   for (size_t i = 0; i < wm_vision_count(self->assembly.vision); i++)
     wm_vision_source(self->assembly.vision, i)->is_live = is_live;
 }
 
 // With the first datum: from_s and until_s of the configuration count from its stamp.
-static wm_status open_readers(waymark_session *self, wm_time_ns first_ns, wm_error *err) {
+static wm_status open_readers(session *self, wm_time_ns first_ns, wm_error *err) {
   if (self->has_data) return WM_OK;
   set_live(self, 1);
   wm_status status = wm_source_readers_open(&self->assembly, self->readers, first_ns, &first_ns, err);
@@ -33,27 +79,31 @@ static wm_status open_readers(waymark_session *self, wm_time_ns first_ns, wm_err
   return status;
 }
 
-static void advance(waymark_session *self, wm_time_ns now_ns) {
+static void advance(session *self, wm_time_ns now_ns) {
   if (self->now_ns == WM_TIME_NONE || now_ns > self->now_ns) self->now_ns = now_ns;
   wm_pipeline_advance(&self->pipeline, self->now_ns);
 }
 
 // Hands on all that the source has now.
-static wm_status read_source(waymark_session *self, const wm_source *source, wm_error *err) {
+static wm_status read_source(session *self, const wm_source *source, wm_error *err) {
+  wm_status first = WM_OK;
   for (size_t i = 0; i < self->assembly.source_count; i++) {
     wm_source_reader *reader = &self->readers[i];
     if (reader->source != source) continue;
     for (;;) {
       wm_status status = wm_source_reader_advance(reader, err);
-      if (status != WM_OK || !reader->has_next) return status;
+      if (status != WM_OK) return status;
+      if (!reader->has_next) return first;
       advance(self, reader->next.arrival_ns);
-      if (reader->next.kind != WM_EVENT_NONE) wm_pipeline_arrive(&self->pipeline, &reader->next);
+      if (reader->next.kind == WM_EVENT_NONE) continue;
+      const wm_merge_verdict verdict = wm_pipeline_arrive(&self->pipeline, &reader->next);
+      if (first == WM_OK) first = judge(self, &reader->next, verdict, err);
     }
   }
   return WM_OK;  // the estimator does not take it
 }
 
-static wm_time_ns arrival_of(const waymark_session *self, wm_time_ns t_ns, wm_time_ns arrival_ns) {
+static wm_time_ns arrival_of(const session *self, wm_time_ns t_ns, wm_time_ns arrival_ns) {
   if (arrival_ns != WM_TIME_NONE) return arrival_ns;
   return self->now_ns != WM_TIME_NONE && self->now_ns > t_ns ? self->now_ns : t_ns;
 }
@@ -63,20 +113,31 @@ static wm_status check_times(wm_time_ns t_ns, wm_time_ns arrival_ns, wm_error *e
   return status == WM_OK && arrival_ns != WM_TIME_NONE ? check_time("arrival_ns", arrival_ns, err) : status;
 }
 
+static void count_refused(pushed_source *source, wm_status status) {
+  wm_source_counts *counts = &source->base.counts;
+  *(status == WM_NOT_FINITE || status == WM_OUT_OF_RANGE ? &counts->not_finite : &counts->malformed) += 1;
+}
+
 // source->event is filled but for its arrival.
-static wm_status deliver(waymark_session *self, pushed_source *source, wm_time_ns arrival_ns, wm_error *err) {
-  wm_status status = open_readers(self, source->event.t_ns, err);
+static wm_status deliver(session *self, pushed_source *source, wm_time_ns arrival_ns, wm_error *err) {
+  const wm_time_ns t_ns = source->event.t_ns;
+  source->event.arrival_ns = arrival_of(self, t_ns, arrival_ns);
+  wm_status status =
+      check_ahead(self, arrival_ns == WM_TIME_NONE ? "t_ns" : "arrival_ns", source->event.arrival_ns, err);
+  if (status != WM_OK) {
+    count_refused(source, WM_BAD_DATA);
+    return wm_fail_in(err, "%s", source->base.name);
+  }
+  status = open_readers(self, t_ns, err);
   if (status != WM_OK) return status;
-  source->event.arrival_ns = arrival_of(self, source->event.t_ns, arrival_ns);
   source->has_event = 1;
   status = read_source(self, &source->base, err);
   source->has_event = 0;
   return status;
 }
 
-static wm_status find_source(waymark_session *self, const char *function, uint32_t source, pushed_source **out,
-                             wm_error *err) {
-  wm_status status = check_started(self, function, err);
+static wm_status find_source(session *self, const char *function, uint32_t source, pushed_source **out, wm_error *err) {
+  wm_status status = session_check_started(self, function, err);
   if (status != WM_OK) return status;
   if (source >= self->source_count)
     return wm_fail(err, WM_NOT_FOUND, "%s: %u is not a source of this session, which has %zu", function, source,
@@ -85,7 +146,7 @@ static wm_status find_source(waymark_session *self, const char *function, uint32
   return WM_OK;
 }
 
-wm_status waymark_push_row(waymark_session *self, uint32_t source, wm_time_ns t_ns, wm_time_ns arrival_ns,
+wm_status session_push_row(session *self, uint32_t source, wm_time_ns t_ns, wm_time_ns arrival_ns,
                            const double *numbers, size_t count, wm_error *err) {
   pushed_source *to;
   wm_status status = find_source(self, "waymark_push_row", source, &to, err);
@@ -102,11 +163,7 @@ wm_status waymark_push_row(waymark_session *self, uint32_t source, wm_time_ns t_
   for (size_t i = 0; i < WM_STREAM_NUMBERS_MAX; i++) row.number[i] = i < count ? numbers[i] : (double)NAN;
   status = wm_stream_event(to->stream, &row, wm_site_imu(wm_recording_site(self->robot)), &to->event, err);
   if (status == WM_OK) return deliver(self, to, arrival_ns, err);
-  wm_source_counts *counts = &to->base.counts;
-  if (status == WM_NOT_FINITE)
-    counts->not_finite++;
-  else
-    counts->malformed++;
+  count_refused(to, status);
   return wm_fail_in(err, "%s", to->base.name);
 }
 
@@ -117,43 +174,35 @@ static void set_sensor(wm_event *event, uint16_t sensor) {
   if (event->kind == WM_EVENT_LOOKED) event->as.looked.sensor = sensor;
 }
 
-wm_status waymark_push_event(waymark_session *self, uint32_t source, const wm_event *event, size_t bytes,
-                             wm_error *err) {
+wm_status session_push_event(session *self, uint32_t source, const wm_event *event, wm_error *err) {
   pushed_source *to;
   wm_status status = find_source(self, "waymark_push_event", source, &to, err);
-  if (status == WM_OK) status = library_check_size("waymark_push_event", event, bytes, sizeof *event, err);
   if (status == WM_OK) status = check_times(event->t_ns, event->arrival_ns, err);
   if (status != WM_OK) return status;
   memcpy(&to->event, event, wm_event_bytes(event));
   set_sensor(&to->event, to->sensor);
   status = pushed_source_check(to, &to->event, self->assembly.setup.sensor_count, err);
-  return status == WM_OK ? deliver(self, to, event->arrival_ns, err) : status;
+  if (status == WM_OK) return deliver(self, to, event->arrival_ns, err);
+  count_refused(to, status);
+  return status;
 }
 
-wm_status waymark_push_can(waymark_session *self, wm_time_ns t_ns, const char *interface, uint32_t id, int is_extended,
-                           const void *data, size_t length, wm_error *err) {
-  wm_status status = check_started(self, "waymark_push_can", err);
-  if (status == WM_OK) status = check_time("t_ns", t_ns, err);
+wm_status session_push_can(session *self, const char *interface, const wm_can_frame *frame, wm_error *err) {
+  wm_status status = session_check_started(self, "waymark_push_can", err);
+  if (status == WM_OK) status = check_time("t_ns", frame->t_ns, err);
   if (status != WM_OK) return status;
-  if (length > WM_CAN_DATA_MAX || id > (is_extended ? 0x1FFFFFFFu : 0x7FFu))
-    return wm_fail(err, WM_BAD_DATA, "%s: a frame of id %x and %zu bytes can't be", interface, id, length);
-  wm_can_frame frame = {
-      .t_ns = t_ns, .id = id, .is_extended = is_extended != 0, .is_fd = length > 8, .length = (uint8_t)length};
-  if (length > 0) memcpy(frame.data, data, length);
   for (size_t i = 0; i < self->source_count; i++) {
     pushed_source *to = self->sources[i];
     if (!to->decoder || (to->interface[0] && strcmp(to->interface, interface) != 0)) continue;
-    status = wm_can_event(to->decoder, to->part, &to->gnss, &frame, &to->event, &to->base.counts, err);
+    status = wm_can_event(to->decoder, to->part, &to->gnss, frame, &to->event, &to->base.counts, err);
     if (status == WM_OK) status = deliver(self, to, WM_TIME_NONE, err);
     if (status != WM_OK && status != WM_AGAIN && status != WM_BAD_DATA) return status;
   }
   return WM_OK;
 }
 
-wm_status waymark_push_picture(waymark_session *self, const char *camera, const wm_frame *frame, size_t bytes,
-                               wm_error *err) {
-  wm_status status = check_started(self, "waymark_push_picture", err);
-  if (status == WM_OK) status = library_check_size("waymark_push_picture", frame, bytes, sizeof *frame, err);
+wm_status session_push_picture(session *self, const char *camera, const wm_frame *frame, wm_error *err) {
+  wm_status status = session_check_started(self, "waymark_push_picture", err);
   if (status == WM_OK) status = check_times(frame->t_ns, frame->arrival_ns, err);
   if (status != WM_OK) return status;
   const wm_rig *rig = wm_site_rig(wm_recording_site(self->robot));
@@ -164,26 +213,27 @@ wm_status waymark_push_picture(waymark_session *self, const char *camera, const 
       frame->stride_bytes < frame->width_px)
     return wm_fail(err, WM_BAD_DATA, "%s: a picture of %u x %u, rows of %u bytes; calibration.yaml has %u x %u", camera,
                    frame->width_px, frame->height_px, frame->stride_bytes, is->width_px, is->height_px);
-  status = open_readers(self, frame->t_ns, err);
-  if (status != WM_OK) return status;
   wm_frame taken = *frame;
   taken.arrival_ns = arrival_of(self, frame->t_ns, frame->arrival_ns);
+  status = check_ahead(self, camera, taken.arrival_ns, err);
+  if (status == WM_OK) status = open_readers(self, frame->t_ns, err);
+  if (status != WM_OK) return status;
   pushed_pictures_put(self->pictures, index, &taken);
   for (size_t i = 0; status == WM_OK && i < wm_vision_count(self->assembly.vision); i++)
     status = read_source(self, wm_vision_source(self->assembly.vision, i), err);
   return status;
 }
 
-wm_status waymark_advance(waymark_session *self, wm_time_ns now_ns, wm_error *err) {
-  wm_status status = check_started(self, "waymark_advance", err);
+wm_status session_advance(session *self, const char *function, wm_time_ns now_ns, wm_error *err) {
+  wm_status status = session_check_started(self, function, err);
   if (status == WM_OK) status = check_time("now_ns", now_ns, err);
+  if (status == WM_OK) status = check_ahead(self, "now_ns", now_ns, err);
   if (status == WM_OK) advance(self, now_ns);
   return status;
 }
 
-wm_status waymark_pose(waymark_session *self, wm_time_ns now_ns, wm_published *out, size_t bytes, wm_error *err) {
-  wm_status status = library_check_size("waymark_pose", out, bytes, sizeof *out, err);
-  if (status == WM_OK) status = waymark_advance(self, now_ns, err);
+wm_status session_pose(session *self, wm_time_ns now_ns, wm_published *out, wm_error *err) {
+  wm_status status = session_advance(self, "waymark_pose", now_ns, err);
   if (status != WM_OK) return status;
   wm_estimate expected;
   const int there_is_one = wm_pipeline_publish(&self->pipeline, now_ns, out);
@@ -196,15 +246,11 @@ wm_status waymark_pose(waymark_session *self, wm_time_ns now_ns, wm_published *o
   return there_is_one ? WM_OK : WM_AGAIN;
 }
 
-wm_status waymark_health(waymark_session *self, wm_health *out, size_t bytes, wm_error *err) {
-  wm_status status = check_started(self, "waymark_health", err);
+wm_status session_health(session *self, wm_health *out, wm_error *err) {
+  wm_status status = session_check_started(self, "waymark_health", err);
   if (status != WM_OK) return status;
-  wm_health health = {0};
-  wm_pipeline_health(&self->pipeline, self->now_ns, &health);
-  if (self->has_data) wm_source_readers_health(self->readers, self->assembly.source_count, &health);
-  return library_put_health("waymark_health", &health, out, bytes, err);
-}
-
-const char *waymark_source_name(const waymark_session *self, uint32_t source) {
-  return source < self->assembly.source_count ? self->assembly.sources[source].name : "";
+  memset(out, 0, sizeof *out);
+  wm_pipeline_health(&self->pipeline, self->now_ns, out);
+  if (self->has_data) wm_source_readers_health(self->readers, self->assembly.source_count, out);
+  return WM_OK;
 }

@@ -5,6 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "waymark/event_fields.h"
+
 static wm_status next(wm_source *base, wm_event *out, wm_error *err) {
   pushed_source *self = (pushed_source *)base;
   (void)err;
@@ -103,24 +105,21 @@ wm_status pushed_can_open(const char *name, const char *interface, const char *d
   return WM_OK;
 }
 
-static int sensor_is_there(uint16_t sensor, size_t count) { return sensor < count; }
-
 wm_status pushed_source_check(const pushed_source *self, const wm_event *event, size_t sensor_count, wm_error *err) {
   const char *name = self->base.name;
   if (event->kind >= 32 || !(self->base.kinds >> event->kind & 1u))
     return wm_fail(err, WM_BAD_DATA, "%s: gives no events of the kind %s", name, wm_event_kind_name(event->kind));
-  int fits = 1;
-  switch ((wm_event_kind)event->kind) {
-    case WM_EVENT_QUANTITIES:
-      fits = event->as.quantities.count <= WM_QUANTITIES_MAX;
-      for (size_t i = 0; fits && i < event->as.quantities.count; i++) fits = event->as.quantities.id[i] < WM_Q_COUNT;
-      break;
-    case WM_EVENT_POINTS: fits = event->as.points.count <= WM_POINTS_MAX; break;
-    case WM_EVENT_SIGHTING: fits = sensor_is_there(event->as.sighting.sensor, sensor_count); break;
-    case WM_EVENT_MARKER: fits = sensor_is_there(event->as.marker.sensor, sensor_count); break;
-    case WM_EVENT_LOOKED: fits = sensor_is_there(event->as.looked.sensor, sensor_count); break;
-    default: break;
-  }
-  if (fits) return WM_OK;
-  return wm_fail(err, WM_BAD_DATA, "%s: a count, a quantity or a sensor of the event does not exist", name);
+  wm_status status = wm_event_check(event, err);
+  if (status != WM_OK) return wm_fail_in(err, "%s", name);
+  uint16_t sensor = 0;
+  if (event->kind == WM_EVENT_SIGHTING)
+    sensor = event->as.sighting.sensor;
+  else if (event->kind == WM_EVENT_MARKER)
+    sensor = event->as.marker.sensor;
+  else if (event->kind == WM_EVENT_LOOKED)
+    sensor = event->as.looked.sensor;
+  else
+    return WM_OK;
+  if (sensor < sensor_count) return WM_OK;
+  return wm_fail(err, WM_BAD_DATA, "%s: sensor %u; calibration.yaml has %zu", name, sensor, sensor_count);
 }

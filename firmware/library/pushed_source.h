@@ -31,7 +31,7 @@ wm_status pushed_source_open(const char *name, wm_site *site, pushed_source **ou
 // A part of a CAN bus; *out is NULL where the binding has nothing of that part.
 wm_status pushed_can_open(const char *name, const char *interface, const char *dbc, const char *signals,
                           wm_can_part part, const double gnss_origin[3], pushed_source **out, wm_error *err);
-// Checks an event of a program: kind, counts, indices.
+// Checks an event of a program: kind, numbers, sensor.
 wm_status pushed_source_check(const pushed_source *self, const wm_event *event, size_t sensor_count, wm_error *err);
 
 #endif

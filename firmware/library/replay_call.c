@@ -107,19 +107,17 @@ static wm_status replay_input(waymark_replay_options *options, wm_run_report *re
   return status;
 }
 
-wm_status waymark_replay(const waymark_replay_options *options, waymark_report *out, size_t bytes, wm_error *err) {
-  waymark_replay_options taken;
-  wm_status status =
-      library_take_options("waymark_replay", options, options ? options->bytes : 0, &taken, sizeof taken, err);
-  if (status == WM_OK) status = library_check_size("waymark_replay", out, bytes, sizeof *out, err);
-  if (status != WM_OK) return status;
-  if (!taken.input)
+wm_status session_replay(waymark_replay_options *taken, waymark_report *out, wm_error *err) {
+  if (!taken->input)
     return wm_fail(err, WM_BAD_USAGE, "waymark_replay: options.input: a recording or an event log is missing");
-  if (!(isfinite(taken.from_s) && isfinite(taken.until_s)))
+  if (!(isfinite(taken->from_s) && isfinite(taken->until_s)))
     return wm_fail(err, WM_NOT_FINITE, "waymark_replay: from_s and until_s are seconds");
+  if (taken->from_s < 0 || taken->until_s < 0 || (taken->until_s > 0 && taken->until_s <= taken->from_s))
+    return wm_fail(err, WM_OUT_OF_RANGE, "waymark_replay: from_s %.10g and until_s %.10g are no part of a recording",
+                   taken->from_s, taken->until_s);
   wm_run_report *report = calloc(1, sizeof *report);
   if (!report) return wm_fail(err, WM_IO, "no memory for a replay");
-  status = replay_input(&taken, report, err);
+  wm_status status = replay_input(taken, report, err);
   if (status == WM_OK)
     *out = (waymark_report){.poses = report->poses,
                             .events = report->events,

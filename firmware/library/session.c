@@ -6,6 +6,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <wm_version.h>
@@ -13,8 +14,6 @@
 #include "waymark/yaml.h"
 
 enum { OPTIONS_MAX_BYTES = 4096 };  // more than options ever have; less than what an unset `bytes` usually is
-
-const char *waymark_version(void) { return WM_VERSION; }
 
 // ── sizes ───────────────────────────────────────────────────────────────────────────────────────────────────────────
 
@@ -87,7 +86,7 @@ static wm_status read_start(const char *folder, wm_site *site, wm_error *err) {
   return status;
 }
 
-static wm_status open_robot(waymark_session *self, wm_error *err) {
+static wm_status open_robot(session *self, wm_error *err) {
   wm_site *site;
   const char *folder = self->site[0] ? self->site : NULL;
   wm_status status =
@@ -107,7 +106,7 @@ static wm_status open_robot(waymark_session *self, wm_error *err) {
 }
 
 // Without a start: nothing is fused, no file is written.
-static void free_session(waymark_session *self) {
+static void free_session(session *self) {
   wm_assembly_close(&self->assembly);
   wm_arena_close(&self->arena);
   if (self->robot) wm_recording_close(self->robot);
@@ -115,22 +114,22 @@ static void free_session(waymark_session *self) {
   free(self);
 }
 
-wm_status waymark_open(const waymark_options *options, waymark_session **out, wm_error *err) {
-  *out = NULL;
-  waymark_options taken;
-  wm_status status =
-      library_take_options("waymark_open", options, options ? options->bytes : 0, &taken, sizeof taken, err);
-  if (status != WM_OK) return status;
-  if (!taken.config)
-    return wm_fail(err, WM_BAD_USAGE, "waymark_open: options.config: the configuration's path is missing");
-  waymark_session *self = calloc(1, sizeof *self);
+static wm_status check_site(const char *site, wm_error *err) {
+  struct stat there;
+  if (!site[0] || (stat(site, &there) == 0 && S_ISDIR(there.st_mode))) return WM_OK;
+  return wm_fail(err, WM_NOT_FOUND, "%s: options.site: there is no such folder", site);
+}
+
+wm_status session_open(const waymark_options *taken, session **out, wm_error *err) {
+  session *self = calloc(1, sizeof *self);
   if (!self) return wm_fail(err, WM_IO, "no memory for a session");
-  self->options = taken;
-  self->now_ns = WM_TIME_NONE;
-  status = keep_path(taken.site, self->site, err);
-  if (status == WM_OK) status = keep_path(taken.out, self->out, err);
+  self->options = *taken;
+  self->now_ns = self->ahead_from_ns = self->ahead_to_ns = WM_TIME_NONE;
+  wm_status status = keep_path(taken->site, self->site, err);
+  if (status == WM_OK) status = keep_path(taken->out, self->out, err);
+  if (status == WM_OK) status = check_site(self->site, err);
   if (status == WM_OK)
-    status = changed_config_load(taken.config, taken.changes, taken.note, taken.context, &self->config, err);
+    status = changed_config_load(taken->config, taken->changes, taken->note, taken->context, &self->config, err);
   if (status == WM_OK) status = open_robot(self, err);
   self->options.config = self->options.changes = self->options.site = self->options.out = NULL;
   if (status != WM_OK) {
@@ -143,7 +142,7 @@ wm_status waymark_open(const waymark_options *options, waymark_session **out, wm
 
 // ── sources ─────────────────────────────────────────────────────────────────────────────────────────────────────────
 
-static wm_status add(waymark_session *self, pushed_source *source, wm_error *err) {
+static wm_status add(session *self, pushed_source *source, wm_error *err) {
   // The recording takes ownership, also where it fails.
   wm_status status = wm_recording_add_device(self->robot, &source->base, source->quantities, err);
   if (status == WM_OK) self->sources[self->source_count++] = source;
@@ -151,8 +150,8 @@ static wm_status add(waymark_session *self, pushed_source *source, wm_error *err
 }
 
 // Motion and GNSS of one bus. `out`: the first of them.
-static wm_status add_bus(waymark_session *self, const char *name, const char *interface, const char *dbc,
-                         const char *signals, uint32_t *out, wm_error *err) {
+static wm_status add_bus(session *self, const char *name, const char *interface, const char *dbc, const char *signals,
+                         uint32_t *out, wm_error *err) {
   const wm_can_part kParts[] = {WM_CAN_MOTION, WM_CAN_GNSS};
   char gnss_name[WM_SOURCE_NAME_MAX];
   (void)snprintf(gnss_name, sizeof gnss_name, "can-gnss%.*s", WM_SOURCE_NAME_MAX - 12, name + strlen("can"));
@@ -169,7 +168,7 @@ static wm_status add_bus(waymark_session *self, const char *name, const char *in
 }
 
 // "can": of `devices: can`, else of the site's files; "can:IFACE": of that device.
-static wm_status add_can(waymark_session *self, const char *name, uint32_t *out, wm_error *err) {
+static wm_status add_can(session *self, const char *name, uint32_t *out, wm_error *err) {
   const wm_devices_config *devices = &self->config.devices;
   const char *interface = name[3] == ':' ? name + 4 : NULL;
   for (size_t i = 0; i < devices->can_count; i++) {
@@ -188,7 +187,7 @@ static wm_status add_can(waymark_session *self, const char *name, uint32_t *out,
   return add_bus(self, name, "", dbc, signals, out, err);
 }
 
-wm_status waymark_add_source(waymark_session *self, const char *name, uint32_t *out, wm_error *err) {
+wm_status session_add_source(session *self, const char *name, uint32_t *out, wm_error *err) {
   if (self->has_started) return wm_fail(err, WM_BAD_USAGE, "%s: sources are added before waymark_start", name);
   if (strlen(name) >= WM_SOURCE_NAME_MAX)
     return wm_fail(err, WM_BAD_USAGE, "'%.40s...': the name of a source has %d bytes at most", name,
@@ -206,13 +205,13 @@ wm_status waymark_add_source(waymark_session *self, const char *name, uint32_t *
 // ── start ───────────────────────────────────────────────────────────────────────────────────────────────────────────
 
 static void put(void *context, wm_output_kind kind, const void *record, size_t bytes) {
-  waymark_session *self = context;
+  session *self = context;
   if (self->file.put) self->file.put(self->file.context, kind, record, bytes);
   const waymark_record known = library_record(kind);
   if (self->options.take && known) self->options.take(self->options.context, known, record, bytes);
 }
 
-static wm_status take_memory(waymark_session *self, wm_error *err) {
+static wm_status take_memory(session *self, wm_error *err) {
   wm_arena_need needs[WM_PIPELINE_NEEDS + 1 + WM_VISION_NEEDS];
   size_t count = WM_PIPELINE_NEEDS;
   wm_pipeline_needs(&self->pipeline, &self->assembly, needs);
@@ -222,8 +221,8 @@ static wm_status take_memory(waymark_session *self, wm_error *err) {
   return wm_arena_fill(&self->arena, needs, count, 0, err);
 }
 
-wm_status waymark_start(waymark_session *self, wm_error *err) {
-  if (self->has_started) return wm_fail(err, WM_BAD_USAGE, "waymark_start: this session has started");
+wm_status session_start(session *self, wm_error *err) {
+  if (self->has_started) return wm_fail(err, WM_BAD_USAGE, "waymark_start: this session has started already");
   wm_status status = wm_assemble(&self->config, self->robot, self->options.seed, &self->assembly, err);
   if (status == WM_OK) status = take_memory(self, err);
   if (status == WM_OK && self->out[0]) status = wm_run_folder_open(self->out, &self->assembly, &self->folder, err);
@@ -252,10 +251,10 @@ wm_status waymark_start(waymark_session *self, wm_error *err) {
 
 // ── close ───────────────────────────────────────────────────────────────────────────────────────────────────────────
 
-static wm_status write_summary(waymark_session *self, wm_error *err) {
+static wm_status write_summary(session *self, wm_error *err) {
   wm_findings *found = calloc(1, sizeof *found);
   wm_health *health = calloc(1, sizeof *health);
-  wm_status status = found && health ? waymark_health(self, health, sizeof *health, err)
+  wm_status status = found && health ? session_health(self, health, err)
                                      : wm_fail(err, WM_IO, "%s: no memory for health.json", self->out);
   if (status == WM_OK) status = wm_run_folder_health(self->folder, health, found, err);
   if (status == WM_OK)
@@ -265,8 +264,7 @@ static wm_status write_summary(waymark_session *self, wm_error *err) {
   return status;
 }
 
-wm_status waymark_close(waymark_session *self, wm_error *err) {
-  if (!self) return WM_OK;
+wm_status session_close(session *self, wm_error *err) {
   wm_status status = WM_OK;
   if (self->has_started) {
     wm_pipeline_finish(&self->pipeline);

@@ -47,7 +47,7 @@ static int take(row_source *self, wm_event *out) {
   const wm_status status = wm_stream_event(self->stream, &self->row, &self->imu, out, &err);
   if (status != WM_OK) {
     wm_source_refuse(counts, self->device->where, err.text);
-    if (status == WM_NOT_FINITE) counts->malformed--, counts->not_finite++;
+    if (status != WM_BAD_DATA) counts->malformed--, counts->not_finite++;
     return 0;
   }
   self->last_ns = self->row.t_ns;

@@ -2,9 +2,12 @@
 #include "output/run_folder.h"
 
 #include <errno.h>
+#include <fcntl.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/file.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include "output/csv_row.h"
 #include "output/drive_evidence.h"
@@ -27,6 +30,7 @@ static const char *const kTables[TABLE_COUNT] = {"trajectory.tum",  "trajectory.
 
 struct wm_run_folder {
   char dir[WM_PATH_MAX];
+  int lock;  // descriptor of the folder; -1: it can't be locked
   const wm_assembly *assembly;
   table tables[TABLE_COUNT];
   int trajectory_has_head, published_has_head;
@@ -284,6 +288,13 @@ static void write_heads(wm_run_folder *self) {
   }
 }
 
+// Two writers would destroy each other's files. Where the file system has no locks, nobody is kept out.
+static wm_status lock_dir(wm_run_folder *self, wm_error *err) {
+  self->lock = open(self->dir, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (self->lock < 0 || flock(self->lock, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK) return WM_OK;
+  return wm_fail(err, WM_BAD_USAGE, "%s: another run writes to this folder: choose another one", self->dir);
+}
+
 wm_status wm_run_folder_open(const char *dir, const wm_assembly *assembly, wm_run_folder **out, wm_error *err) {
   *out = NULL;
   wm_status status = make_dir(dir, err);
@@ -295,6 +306,7 @@ wm_status wm_run_folder_open(const char *dir, const wm_assembly *assembly, wm_ru
   self->newest.t_ns = WM_TIME_NONE;
   for (int i = 0; i < TABLE_COUNT; i++)
     (void)snprintf(self->tables[i].path, sizeof self->tables[i].path, "%s/%s", dir, kTables[i]);
+  status = lock_dir(self, err);
   for (int i = 0; i < TABLE_COUNT && status == WM_OK; i++) status = open_table(self, i, err);
   if (status == WM_OK) {
     char path[WM_PATH_MAX + 32];
@@ -409,6 +421,7 @@ wm_status wm_run_folder_close(wm_run_folder *self, wm_error *err) {
     if (t->failed && status == WM_OK)
       status = wm_fail(err, WM_IO, "%s: could not be written completely: %s", t->path, strerror(t->failed));
   }
+  if (self->lock >= 0) (void)close(self->lock);
   free(self);
   return status;
 }

@@ -1,40 +1,52 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/event_fields.h"
 
-#define FIELD_FROM(body, member, kind, n, since, zero_until) \
-  { #member, (uint16_t)offsetof(wm_event, as.body.member), WM_FIELD_##kind, n, since, zero_until }
-#define FIELD(body, member, kind) FIELD_FROM(body, member, kind, 1, 0, 0)
-#define FIELDS(body, member, kind, n) FIELD_FROM(body, member, kind, n, 0, 0)
+#define NO_LIMITS 0.0, 0.0
+// Identities and stamps.
+#define WHOLE(body, member, kind) \
+  { #member, (uint16_t)offsetof(wm_event, as.body.member), WM_FIELD_##kind, 1, 0, 0, 0, NO_LIMITS }
+// Numbers: n elements, of which `needed` are never absent.
+#define NUMBERS_FROM(body, member, n, needed, zero_until, ...) \
+  { #member, (uint16_t)offsetof(wm_event, as.body.member), WM_FIELD_F64, n, 0, zero_until, needed, __VA_ARGS__ }
+#define NUMBERS(body, member, n, needed, ...) NUMBERS_FROM(body, member, n, needed, 0, __VA_ARGS__)
 #define SIGHTING_NUMBER(member, need, least, most, limits, since, zero_until, message) \
-  FIELD_FROM(sighting, member, F64, 1, since, zero_until),
+  {#member, (uint16_t)offsetof(wm_event, as.sighting.member), WM_FIELD_F64, 1, since, zero_until, 0, least, most},
 
-static const wm_event_field kTwist2[] = {FIELD(twist2, v_mps, F64), FIELD(twist2, w_radps, F64)};
-static const wm_event_field kTwist6[] = {FIELDS(twist6, v_mps, F64, 3), FIELDS(twist6, w_radps, F64, 3)};
-static const wm_event_field kIncrement[] = {FIELD(increment, from_ns, I64), FIELD(increment, dx_m, F64),
-                                            FIELD(increment, dy_m, F64), FIELD(increment, dheading_rad, F64),
-                                            FIELDS(increment, covariance, F64, 6)};
-static const wm_event_field kSighting[] = {FIELD(sighting, sensor, U16), FIELD(sighting, landmark_id, I32),
+static const wm_event_field kTwist2[] = {NUMBERS(twist2, v_mps, 1, 1, WM_SPEED_LIMITS),
+                                         NUMBERS(twist2, w_radps, 1, 1, WM_RATE_LIMITS)};
+static const wm_event_field kTwist6[] = {NUMBERS(twist6, v_mps, 3, 3, WM_SPEED_LIMITS),
+                                         NUMBERS(twist6, w_radps, 3, 3, WM_RATE_LIMITS)};
+static const wm_event_field kIncrement[] = {
+    WHOLE(increment, from_ns, I64), NUMBERS(increment, dx_m, 1, 1, WM_PLACE_LIMITS),
+    NUMBERS(increment, dy_m, 1, 1, WM_PLACE_LIMITS), NUMBERS(increment, dheading_rad, 1, 1, WM_ANGLE_LIMITS),
+    NUMBERS(increment, covariance, 6, 0, WM_COVARIANCE_LIMITS)};
+static const wm_event_field kSighting[] = {WHOLE(sighting, sensor, U16), WHOLE(sighting, landmark_id, I32),
                                            WM_SIGHTING_NUMBERS(SIGHTING_NUMBER)};
-static const wm_event_field kPosition[] = {FIELDS(position, p_m, F64, 3), FIELD(position, sigma_xy_m, F64),
-                                           FIELD(position, sigma_z_m, F64)};
-static const wm_event_field kHeading[] = {FIELD(heading, heading_rad, F64), FIELD(heading, sigma_rad, F64)};
-static const wm_event_field kMarker[] = {FIELD(marker, sensor, U16),
-                                         FIELD(marker, poses, U16),
-                                         FIELD(marker, id, I32),
-                                         FIELDS(marker, p_m, F64, 3),
-                                         FIELD(marker, yaw_rad, F64),
-                                         FIELDS(marker, other_p_m, F64, 3),
-                                         FIELD(marker, other_yaw_rad, F64),
-                                         FIELD_FROM(marker, along_sigma_m, F64, 1, 0, 4),
-                                         FIELD_FROM(marker, yaw_sigma_rad, F64, 1, 0, 4),
-                                         FIELD_FROM(marker, bloom_px, F64, 1, 0, 4)};
-static const wm_event_field kStereo[] = {FIELD(stereo, id, I32), FIELDS(stereo, left_px, F64, 2),
-                                         FIELDS(stereo, right_px, F64, 2),
-                                         FIELD_FROM(stereo, appearance, U64, 4, 6, 0)};
-static const wm_event_field kLooked[] = {FIELD(looked, sensor, U16)};
-static const wm_event_field kSetPose[] = {FIELDS(set_pose, pose_map_base.p_m, F64, 3),
-                                          FIELDS(set_pose, pose_map_base.q_xyzw, F64, 4),
-                                          FIELD(set_pose, sigma_xy_m, F64), FIELD(set_pose, sigma_heading_rad, F64)};
+static const wm_event_field kPosition[] = {NUMBERS(position, p_m, 3, 0, WM_PLACE_LIMITS),
+                                           NUMBERS(position, sigma_xy_m, 1, 0, WM_SIGMA_LIMITS),
+                                           NUMBERS(position, sigma_z_m, 1, 0, WM_SIGMA_LIMITS)};
+static const wm_event_field kHeading[] = {NUMBERS(heading, heading_rad, 1, 1, WM_ANGLE_LIMITS),
+                                          NUMBERS(heading, sigma_rad, 1, 1, WM_SIGMA_LIMITS)};
+static const wm_event_field kMarker[] = {WHOLE(marker, sensor, U16),
+                                         WHOLE(marker, poses, U16),
+                                         WHOLE(marker, id, I32),
+                                         NUMBERS(marker, p_m, 3, 2, WM_PLACE_LIMITS),
+                                         NUMBERS(marker, yaw_rad, 1, 0, WM_ANGLE_LIMITS),
+                                         NUMBERS(marker, other_p_m, 3, 0, WM_PLACE_LIMITS),
+                                         NUMBERS(marker, other_yaw_rad, 1, 0, WM_ANGLE_LIMITS),
+                                         NUMBERS_FROM(marker, along_sigma_m, 1, 0, 4, WM_SIGMA_LIMITS),
+                                         NUMBERS_FROM(marker, yaw_sigma_rad, 1, 0, 4, WM_SIGMA_LIMITS),
+                                         NUMBERS_FROM(marker, bloom_px, 1, 0, 4, WM_PIXEL_LIMITS)};
+static const wm_event_field kStereo[] = {
+    WHOLE(stereo, id, I32),
+    NUMBERS(stereo, left_px, 2, 0, WM_PIXEL_LIMITS),
+    NUMBERS(stereo, right_px, 2, 0, WM_PIXEL_LIMITS),
+    {"appearance", (uint16_t)offsetof(wm_event, as.stereo.appearance), WM_FIELD_U64, 4, 6, 0, 0, NO_LIMITS}};
+static const wm_event_field kLooked[] = {WHOLE(looked, sensor, U16)};
+static const wm_event_field kSetPose[] = {NUMBERS(set_pose, pose_map_base.p_m, 3, 2, WM_PLACE_LIMITS),
+                                          NUMBERS(set_pose, pose_map_base.q_xyzw, 4, 4, -1.001, 1.001),
+                                          NUMBERS(set_pose, sigma_xy_m, 1, 0, WM_SIGMA_LIMITS),
+                                          NUMBERS(set_pose, sigma_heading_rad, 1, 0, WM_SIGMA_LIMITS)};
 
 #define HOLDS(rows) rows, sizeof(rows) / sizeof((rows)[0])
 #define HOLDS_NO_FIELDS NULL, 0

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""The example of docs/library.md, a robot's own program with its own loop: compiled against libwaymark.so, given the rows of a
-recording in the order of their arrival, its poses are those of `waymark replay`, digit by digit. The header compiles without a
-warning in each C and C++ that programs of users are in.
+"""The examples of docs/library.md, a robot's own program with its own loop in C and in C++: compiled against libwaymark.so, given
+the rows of a recording in the order of their arrival, their poses are those of `waymark replay`, digit by digit. The headers
+compile without a warning in each C and C++ that programs of users are in.
 
-    robot.py BUILD [CC]          Skipped (77) where there is no libwaymark.so (sanitizers)."""
+    robot.py BUILD [CC [CXX]]          Skipped (77) where there is no libwaymark.so (sanitizers)."""
 import csv
 import pathlib
 import shlex
@@ -19,7 +19,10 @@ import small_robot  # noqa: E402
 
 BUILD = pathlib.Path(sys.argv[1]).resolve()
 CC = shlex.split(sys.argv[2]) if len(sys.argv) > 2 else ["cc"]
-EXAMPLE = ROOT / "tests/package/downstream/robot.c"
+CXX = shlex.split(sys.argv[3]) if len(sys.argv) > 3 else ["c++"]
+EXAMPLES = {"C": (ROOT / "tests/package/downstream/robot.c", [*CC, "-std=c17"]),
+            "C++": (ROOT / "tests/package/downstream/robot.cpp", [*CXX, "-std=c++17"])}
+CLANG, CLANGXX = (next((path for name in (tool, f"{tool}-14") if (path := shutil.which(name))), tool) for tool in ("clang", "clang++"))
 
 
 def rows(path):
@@ -50,14 +53,34 @@ def in_order(folder):
     return "\n".join(line for *_, line in sorted(data, key=lambda row: row[:2])) + "\n"
 
 
-def header_compiles():
-    """The header alone, by gcc and by clang where it is there, with all warnings."""
+def headers_compile():
+    """Each header alone, by gcc and by clang where it is there, with all warnings."""
     includes = [f"-I{ROOT / room}" for room in ("msgs/include", "firmware/library/include")]
-    for compiler, language, standards in (("gcc", "c", ("c99", "c11", "c17", "gnu17", "c2x")), ("g++", "c++", ("c++11", "c++17", "c++20")),
-                                          ("clang", "c", ("c99", "c17")), ("clang++", "c++", ("c++11", "c++20"))):
+    for compiler, language, header, standards in (
+            ("gcc", "c", "waymark.h", ("c99", "c11", "c17", "gnu17", "c2x")),
+            ("g++", "c++", "waymark.h", ("c++11", "c++17", "c++20", "c++23")), ("g++", "c++", "waymark.hpp", ("c++17", "c++20", "c++23")),
+            (CLANG, "c", "waymark.h", ("c99", "c11", "c17")), (CLANGXX, "c++", "waymark.h", ("c++11", "c++20")),
+            (CLANGXX, "c++", "waymark.hpp", ("c++17", "c++20", "c++2b")), ("g++", "c++", "waymark.hpp", ("c++17 -fno-exceptions",))):
         for standard in standards if shutil.which(compiler) else ():
-            subprocess.run([compiler, "-x", language, f"-std={standard}", "-Wall", "-Wextra", "-Wpedantic", "-Werror", *includes, "-fsyntax-only",
-                            "-"], input="#include <waymark/waymark.h>\n", text=True, check=True)
+            subprocess.run([compiler, "-x", language, *f"-std={standard}".split(), "-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Werror",
+                            *includes, "-fsyntax-only", "-"], input=f"#include <waymark/{header}>\n", text=True, check=True)
+
+
+def poses_of(name, library, work):
+    """What the example prints, given the recording's rows."""
+    source, compiler = EXAMPLES[name]
+    program = work / source.name.replace(".", "-")
+    includes = [f"-I{ROOT / room}" for room in ("msgs/include", "firmware/library/include")]
+    subprocess.run([*compiler, "-Wall", "-Wextra", "-Werror", *includes, source, library, f"-Wl,-rpath,{library.parent}", "-o", program],
+                   check=True)
+    usage = subprocess.run([program], capture_output=True, text=True, check=False)
+    assert usage.returncode == 2 and "usage" in usage.stderr, usage
+    wrong = subprocess.run([program, work / "none.yaml", work], input="", capture_output=True, text=True, check=False)
+    assert wrong.returncode in (1, 2) and "none.yaml" in wrong.stderr, wrong
+    done = subprocess.run([program, work / "robot.yaml", work / "recording"], input=in_order(work / "recording"), capture_output=True,
+                          text=True, check=True)
+    assert not done.stderr, done.stderr
+    return [line.split() for line in done.stdout.splitlines()]
 
 
 def main():
@@ -65,31 +88,25 @@ def main():
     if not library.exists():
         print("skipped: this build has no libwaymark.so")
         return 77
-    header_compiles()
+    headers_compile()
     text = (ROOT / "docs/library.md").read_text()
-    assert EXAMPLE.read_text() in text, "docs/library.md does not have tests/package/downstream/robot.c word by word"
+    for source, _ in EXAMPLES.values():
+        assert source.read_text() in text, f"docs/library.md does not have {source.name} word by word"
     with tempfile.TemporaryDirectory(prefix="waymark-library-") as name:
         work = pathlib.Path(name)
-        includes = [f"-I{ROOT / room}" for room in ("msgs/include", "firmware/library/include")]
-        subprocess.run([*CC, "-std=c17", "-Wall", "-Wextra", "-Werror", *includes, EXAMPLE, library, f"-Wl,-rpath,{library.parent}", "-o",
-                        work / "robot"], check=True)
         with_twists(work / "recording")
         config = work / "robot.yaml"
         config.write_text("format: waymark-config/1\nestimator: landmark_ekf\n")
         subprocess.run([BUILD / "bin/waymark", "replay", work / "recording", "--config", config, "--out", work / "run"], check=True,
                        stdout=subprocess.DEVNULL)
-        done = subprocess.run([work / "robot", config, work / "recording"], input=in_order(work / "recording"), capture_output=True,
-                              text=True, check=True)
-        usage = subprocess.run([work / "robot"], capture_output=True, text=True, check=False)
         wanted = rows(work / "run/trajectory.csv")
-    assert usage.returncode == 2 and "usage" in usage.stderr, usage
-    assert not done.stderr, done.stderr
-    got = [line.split() for line in done.stdout.splitlines()]
-    assert len(got) == len(wanted) > 5000, (len(got), len(wanted))
-    for mine, row in zip(got, wanted):
-        theirs = [float(row[name]) for name in ("x_m", "y_m", "cov_xx")]
-        assert mine[0] == row["t_ns"] and [float(value) for value in mine[1:]] == theirs, (mine, row)
-    print(f"{len(got)} poses of the program are those of the replay, bit by bit")
+        for language in EXAMPLES:
+            got = poses_of(language, library, work)
+            assert len(got) == len(wanted) > 5000, (language, len(got), len(wanted))
+            for mine, row in zip(got, wanted):
+                theirs = [float(row[name]) for name in ("x_m", "y_m", "cov_xx")]
+                assert mine[0] == row["t_ns"] and [float(value) for value in mine[1:]] == theirs, (language, mine, row)
+            print(f"{len(got)} poses of the program in {language} are those of the replay, bit by bit")
     return 0
 
 

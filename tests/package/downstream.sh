@@ -35,14 +35,31 @@ c++ -Wall -Wextra -Werror -o "$dir/filters" "$here/downstream/filters.cpp" $(pkg
 "$dir/filters" | grep -q '^slam: '
 # shellcheck disable=SC2046
 cc -Wall -Wextra -Werror -o "$dir/robot" "$here/downstream/robot.c" $(pkg-config --cflags --libs waymark-session)
-for robot in "$dir/robot" "$dir/cmake/robot"; do
+# shellcheck disable=SC2046
+c++ -std=c++17 -Wall -Wextra -Werror -o "$dir/robot_cpp" "$here/downstream/robot.cpp" $(pkg-config --cflags --libs waymark-session)
+for robot in "$dir"/robot "$dir"/cmake/robot "$dir"/robot_cpp "$dir"/cmake/robot_cpp; do
   { LD_LIBRARY_PATH=$PKG_CONFIG_PATH/.. "$robot" 2>&1 || true; } | grep -q '^usage: robot'
 done
+
+echo "a part alone, and one that is not"
+find_part() { # COMPONENT [CMAKE_OPTION...]
+  printf 'cmake_minimum_required(VERSION 3.13)\nproject(part C)\nfind_package(waymark REQUIRED COMPONENTS %s)\n' "$1" >"$dir/part.txt"
+  mkdir -p "$dir/part" && cp "$dir/part.txt" "$dir/part/CMakeLists.txt" && rm -rf "$dir/part-build"
+  cmake -G Ninja -S "$dir/part" -B "$dir/part-build" -DCMAKE_PREFIX_PATH="$usr" "${@:2}" 2>&1
+}
+no_lcm=(-DCMAKE_FIND_USE_CMAKE_SYSTEM_PATH=OFF -DCMAKE_FIND_USE_SYSTEM_ENVIRONMENT_PATH=OFF)
+find_part session "${no_lcm[@]}" >"$dir/part.log" || { cat "$dir/part.log"; exit 1; }
+! find_part messages "${no_lcm[@]}" >"$dir/part.log" && tr -s '\n ' ' ' <"$dir/part.log" | grep -q 'messages: LCM is missing: install liblcm-dev'
+! find_part sessions >"$dir/part.log" && tr -s '\n ' ' ' <"$dir/part.log" | grep -q "'sessions' is not a component; messages, estimator and session are"
 
 # Headers stand on their own, in C and in C++.
 for header in "$usr"/include/waymark/*.h; do
   printf '#include <waymark/%s>\n' "$(basename "$header")"
 done >"$dir/all.c"
+for standard in c++17 c++20 c++23; do
+  # shellcheck disable=SC2046
+  echo '#include <waymark/waymark.hpp>' | c++ -std=$standard -x c++ -fsyntax-only -Wall -Wextra -Wpedantic -Werror - $(pkg-config --cflags waymark-session)
+done
 # shellcheck disable=SC2046
 cc -std=c17 -fsyntax-only -Wall -Wextra -Werror "$dir/all.c" $(pkg-config --cflags waymark)
 # shellcheck disable=SC2046

@@ -29,7 +29,8 @@ uint32_t wm_stream_kinds(const wm_stream *self);       // WM_EVENT_BIT of its ev
 uint32_t wm_stream_quantities(const wm_stream *self);  // bit per wm_quantity that they may have
 // Name of a column behind the stamps; NULL behind the last one.
 const char *wm_stream_number(const wm_stream *self, size_t index);
-// WM_NOT_FINITE: a number that can't be; WM_BAD_DATA: numbers that contradict each other. `source` and `seq` are 0.
+// WM_NOT_FINITE, WM_OUT_OF_RANGE: a number that can't be; WM_BAD_DATA: numbers that contradict each other. `source` and
+// `seq` are 0.
 wm_status wm_stream_event(const wm_stream *self, const wm_stream_row *row, const wm_mounting *imu, wm_event *out,
                           wm_error *err);
 

@@ -11,10 +11,20 @@
 #include <stdint.h>
 
 #include "waymark/event.h"
+#include "waymark/status.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
+
+// Limits of plausible values: wide enough for all vehicles, tight enough for corrupt data.
+#define WM_SPEED_LIMITS -1000.0, 1000.0  // m/s
+#define WM_RATE_LIMITS -1000.0, 1000.0   // rad/s
+#define WM_ANGLE_LIMITS -6.2832, 6.2832  // rad
+#define WM_PLACE_LIMITS -1e8, 1e8        // m
+#define WM_SIGMA_LIMITS DBL_MIN, 1e6     // above 0; of any unit
+#define WM_PIXEL_LIMITS -1e5, 1e5
+#define WM_COVARIANCE_LIMITS -1e12, 1e12  // of any unit
 
 #define WM_EVENT_VERSION 6         // of the codec; the next one where a field comes
 #define WM_EVENT_VERSION_OLDEST 3  // that is read
@@ -40,11 +50,17 @@ typedef struct wm_event_field {
   uint8_t count;       // elements
   uint8_t since;       // codec version it came with; of older logs NaN, or 0 bits, is read. 0: always there
   uint8_t zero_until;  // last codec version in which 0 stands for absent; 0: none
+  uint8_t needed;      // the first so many elements are never absent; F64 alone
+  double least, most;  // what can be; F64 alone
 } wm_event_field;
 
 // Fields of a kind, in the order of the event log. None: the kind holds nothing, or as many entries as it counts. Any
 // thread.
 const wm_event_field *wm_event_fields(unsigned kind, size_t *count);
+
+// Checks an event of another program before it goes on: kind, counts and numbers. WM_BAD_DATA, WM_NOT_FINITE or
+// WM_OUT_OF_RANGE, with the member's name and what it may be. Not its times and indices of sensors.
+wm_status wm_event_check(const wm_event *event, wm_error *err);
 
 #ifdef __cplusplus
 }

@@ -432,7 +432,7 @@ static void test_data_that_cannot_be_are_refused_and_change_nothing(void) {
   TEST_ASSERT_EQUAL(WM_BAD_USAGE, waymark_add_source(session, "gnss", &motion, &err));
 
   const double fast[3] = {1e9, (double)NAN, 0.0}, row[4] = {0.5, (double)NAN, 0.0, 0.0};
-  TEST_ASSERT_EQUAL(WM_NOT_FINITE, waymark_push_row(session, motion, 0, WM_TIME_NONE, fast, 3, &err));
+  TEST_ASSERT_EQUAL(WM_OUT_OF_RANGE, waymark_push_row(session, motion, 0, WM_TIME_NONE, fast, 3, &err));
   TEST_ASSERT_EQUAL(WM_NOT_FINITE, waymark_push_row(session, motion, 0, WM_TIME_NONE, row, 1, &err));
   TEST_ASSERT_EQUAL(WM_BAD_USAGE, waymark_push_row(session, motion, 0, WM_TIME_NONE, row, 4, &err));
   TEST_ASSERT_EQUAL(WM_BAD_USAGE, waymark_push_row(session, eye, 0, WM_TIME_NONE, row, 3, &err));

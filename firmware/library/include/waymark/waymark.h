@@ -6,10 +6,14 @@
 // pushes data. A replay localizes from a recording or from the event log of a run, in one call.
 //
 // Threads: a handle is for one thread at a time; different handles may be in different threads. Callbacks are called on
-// the thread that called the library, before that call returns, and may not call functions of the same handle.
+// the thread that called the library, before that call returns, and may ask for names; other functions of the same
+// handle answer WM_BAD_USAGE there, as they do in a second thread.
 //
 // Errors: a function returns a wm_status; where it is neither WM_OK, WM_END nor WM_AGAIN, *err (may be NULL) has a
-// text. A refused call changes nothing. The library ends no program and prints nothing.
+// text. A refused call changes nothing but counts. The library ends no program and prints nothing.
+//
+// Handles: WM_BAD_USAGE for NULL, for one that was closed, and for any other value; a function that gives a name
+// answers "". WM_BAD_USAGE for other pointers that are NULL and needed. WM_FULL: 1024 handles are open.
 //
 // Sizes: a struct is passed with its size (`bytes`, sizeof of the caller's struct). Options may be shorter than the
 // library's, of a program compiled with an older header, or longer, of a newer header, where the part beyond is zero.
@@ -86,8 +90,8 @@ wm_status waymark_open(const waymark_options *options, waymark_session **out, wm
 // Adds a source before the start; *out is its number for pushing. Its name is as in `sources:` of a configuration:
 // "motion", "motion6", "ticks", "speeds", "steering", "imu", "heading", "depth", "gnss", "increments", "stereo",
 // "points", "sightings:SENSOR", "markers:SENSOR", "commands", or "can" (the DBC of `devices: can` or of the site;
-// "can:can1" where there are several). WM_NOT_FOUND: no such name. A source that the estimator does not take is
-// accepted, with a note.
+// "can:can1" where there are several). WM_NOT_FOUND: no such name. waymark_start refuses one that the estimator has no
+// use for.
 wm_status waymark_add_source(waymark_session *session, const char *name, uint32_t *out, wm_error *err);
 
 // After the sources: allocates, prepares the estimator, opens the files. From here on data are taken.
@@ -95,8 +99,16 @@ wm_status waymark_start(waymark_session *session, wm_error *err);
 
 // Data. `t_ns` is when a datum was true, `arrival_ns` when it came, both on one monotonic clock of the program's choice
 // (WM_TIME_NONE: it comes at its stamp). Sources of motion and CAN are pushed in the order of their stamps; any order
-// between sources, and within the others, is right up to lateness_max_ms. WM_BAD_DATA, WM_NOT_FINITE and
-// WM_OUT_OF_RANGE refuse one datum; the session goes on.
+// between sources, and within the others, is right up to lateness_max_ms. One datum is refused, counted in the health,
+// and the session goes on:
+//   WM_BAD_DATA       it contradicts itself, or was pushed before
+//   WM_NOT_FINITE     NaN or infinity where a number is needed
+//   WM_OUT_OF_RANGE   a number or a time that can't be
+//   WM_TIME_RAN_BACK  newer data were fused already
+//   WM_FULL           the queue is full
+// A time may be 10 s ahead of the newest one that the session was given, and a stamp merge.horizon_ms ahead of its
+// arrival. After a pause of the whole program all times are farther ahead: they are taken again once they went on for
+// 1 s without one that is nearer.
 //
 // A row of "motion", "motion6", "ticks", "speeds", "steering", "imu", "heading", "depth" or "gnss": the numbers of the
 // table's columns behind the stamps (docs/recording-format.md), NaN where absent; missing ones at the end are absent.
