@@ -205,12 +205,35 @@ void error_state::assign(int first, int count, const sparse_row *rows, const dou
   if (is_empty) filled_.count = 0;
 }
 
+// Row and column of one state. Of the block on the diagonal both elements are kept.
+void error_state::scale_one(int state, double factor, double added_variance) {
+  const filled_states &of = filled();
+  touch();
+  half_covariance cov = p();
+  const int begin = half_covariance::first(state);
+  double *row = cov.row(state), *other = cov.row(state ^ 1);
+  const double before = row[state];
+  for (int s = 0; s < of.count; s++) {
+    int j = of.span[s].from;
+    for (; j < of.span[s].to && j < begin; j += 2) {
+      double *pair_of_rows = cov.row(j) + state;
+      pair_of_rows[0] *= factor;
+      pair_of_rows[capacity_ - j] *= factor;
+    }
+    if (j < of.span[s].to) vectors::set_scaled(row + j, row + j, factor, of.span[s].to - j);
+  }
+  other[state] = row[state ^ 1];
+  row[state] = factor * (factor * before) + added_variance;
+  if (before == 0.0 || row[state] == 0.0) filled_.count = 0;
+}
+
 void error_state::fade(int state, double factor, double added_variance) {
-  assign(state, {&state, &factor, 1, 0}, added_variance, factor * value(state));
+  scale_one(state, factor, added_variance);
+  set_value(state, factor * value(state));
 }
 
 void error_state::scale(int first, int count, double factor) {
-  for (int i = first; i < first + count; i++) assign(i, {&i, &factor, 1, 0}, 0.0, value(i));
+  for (int i = first; i < first + count; i++) scale_one(i, factor, 0.0);
 }
 
 void error_state::add_chance(double probability, const double *off) {

@@ -151,6 +151,7 @@ class error_state {
   void project(const sparse_row &row, const filled_states &of, double *out) const;
   void pass(int rows, const filled_states &of, const sparse_row *turns, int turn_count);
   void apply_spread();
+  void scale_one(int state, double factor, double added_variance);
   struct around;
   void assign_outside(const sparse_row &by, int state, int begin, const around &others);
   double assigned(const sparse_row &by, int first, int count, int k, const double block[kAssigned][kAssigned]) const;
