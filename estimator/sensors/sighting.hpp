@@ -40,6 +40,19 @@ inline sighting_reading read_sighting(const wm_sighting &s, const mounted_sensor
   return r;
 }
 
+// A false range lies anywhere within this; a factor of 10 is 2.3 nats.
+inline constexpr double kClutterRange_m = 30.0;
+// Where a false detection may lie.
+inline double clutter_volume(const sighting_reading &r) {
+  return (r.bearing ? kTwoPi : 1.0) * (r.range ? kClutterRange_m : 1.0);
+}
+
+inline constexpr double kOnSensor_m = 0.05;  // nearer to the sensor, a landmark has no direction
+// Of an expectation that is not possible.
+inline wm_verdict why_impossible(const expected_sighting &e) {
+  return e.distance_m < kOnSensor_m ? WM_REJECTED_SINGULAR : WM_REJECTED_OUT_OF_RANGE;
+}
+
 // Sigma of a sighting's time-correlated error: of the bearing, without and with that across the line of sight, and of
 // the range, without and with the part that is relative to it. 0 without slots.
 inline double correlated_bearing(const wm_sighting_params &p, double sigma_rad) {

@@ -19,24 +19,9 @@ constexpr double kAround_m = 5.0;  // sigma of a lost robot's distance from the 
 
 const char *const kReads[] = {"motion.", "sightings.", nullptr};
 
-int map_states(const wm_sighting_params &p) { return p.use_elevation ? 3 : 2; }
-
-// No more slots than the map has landmarks, and pairs of a sensor and a landmark.
-int map_slots(const wm_landmark_ekf_params &p, const wm_setup &setup) {
-  return p.map_slots < static_cast<int>(setup.landmark_count) ? p.map_slots : static_cast<int>(setup.landmark_count);
-}
-int error_slots(const wm_setup &setup) {
-  const size_t pairs = setup.landmark_count * setup.sensor_count;
-  const int wanted = setup.sightings->correlated_slots;
-  return static_cast<size_t>(wanted) < pairs ? wanted : static_cast<int>(pairs);
-}
-
 int count_states(const wm_landmark_ekf_params &p, const wm_setup &setup) {
-  const wm_sighting_params &s = *setup.sightings;
   return kPoseStates + planar_filter::count_motion_states(setup.motion->states, setup.motion->model) +
-         sensor_slots::count(setup) + position_aid::count_states(p.gnss) +
-         error_slots(setup) * correlated_slot_of(s).width + map_states(s) * map_slots(p, setup) +
-         2 * (s.use_elevation && p.tilt_sigma_rad > 0.0);
+         sighting_aid::count_states(p.landmarks, setup) + position_aid::count_states(p.gnss);
 }
 
 // Variance of a place anywhere among the landmarks, each axis, m2.
@@ -56,8 +41,7 @@ double spread_of(const wm_setup &setup) {
 landmark_ekf::arrays landmark_ekf::place(memory_layout *layout, const wm_landmark_ekf_params &params,
                                          const wm_setup &setup) {
   return {layout->take<double>(planar_filter::doubles(count_states(params, setup))),
-          layout->take<int>(setup.landmark_count), layout->take<landmark_record>(setup.landmark_count),
-          layout->take<wm_time_ns>(setup.landmark_count)};
+          layout->take<landmark_record>(setup.landmark_count), sighting_aid::place(layout, setup)};
 }
 
 size_t landmark_ekf::bytes(const wm_landmark_ekf_params &params, const wm_setup &setup, const char **why) {
@@ -79,30 +63,13 @@ void landmark_ekf::init(const wm_landmark_ekf_params &params, const wm_setup &se
   filter_.init(setup, setup.motion->states, count_states(params, setup), behind.filter);
   if (setup.motion->model != WM_MOTION_CONSTANT_VELOCITY) filter_.noise().init(setup.motion->noise_adapt_log_sigma);
   const auto add = [this](double value, double sigma) { return sigma > 0.0 ? filter_.add_state(value, sigma) : -1; };
-  for (size_t i = 0; i < setup.sensor_count; i++) sensor_[i].init(setup.sensors[i]);
-  slots_.init(setup, true, [this](double value, double sigma, double walk, double low, double high) {
-    return filter_.add_sensor_state(value, sigma, walk, low, high);
-  });
-  components_ = sightings().states.sigma[WM_SENSOR_ROW_kAngleScale] > 0.0 ? kAngleScaled : 0u;
+  aid_.init(params.landmarks, setup, behind.aid);
+  aid_.add_calibration(&filter_);
   positions_.init(params.gnss, setup, &filter_, add);
   filter_.set_correlated_position(positions_.error_state());
-  tilt_ns_ = WM_TIME_NONE;
   calibration_states_ = filter_.states();
-  error_ = correlated_slot_of(sightings());
-  for (int i = 0; i < error_slots(setup) && error_.width > 0; i++) {
-    errors_.add(filter_.states());
-    for (int k = 0; k < error_.width; k++) filter_.add_state(0.0, 0.0);
-  }
-  for (int i = 0; i < map_slots(params, setup); i++) {
-    map_.add(filter_.states());
-    for (int k = 0; k < map_states(sightings()); k++) filter_.add_state(0.0, 0.0);
-  }
-  tilt_state_ = sightings().use_elevation ? add(0.0, params.tilt_sigma_rad) : -1;
-  if (tilt_state_ >= 0) add(0.0, params.tilt_sigma_rad);
-  index_.init(setup.landmarks, setup.landmark_count, behind.order);
+  aid_.add_lent(&filter_);
   records_.set(behind.records);
-  seen_ns_.set(behind.seen_ns);
-  for (size_t i = 0; i < setup.landmark_count; i++) behind.seen_ns[i] = WM_TIME_NONE;
   std::memset(behind.records, 0, setup.landmark_count * sizeof(landmark_record));
   map_variance_m2_ = spread_of(setup);
   moved_id_ = -1;
@@ -156,7 +123,7 @@ void landmark_ekf::start_again() {
 wm_status landmark_ekf::predict(const wm_event &motion) {
   const wm_status status = filter_.check_motion(motion);
   if (status != WM_OK) return status;
-  if (filter_.move(motion)) slots_.begin_lag(*setup_, &filter_);
+  if (filter_.move(motion)) aid_.slots().begin_lag(*setup_, &filter_);
   return status;
 }
 
@@ -224,7 +191,7 @@ void landmark_ekf::add_start_mixture(wm_estimate *out) const {
 
 void landmark_ekf::list_calibration(calibration_list *list) const {
   filter_.list_motion_states(list);
-  slots_.list(*setup_, filter_, list);
+  aid_.slots().list(*setup_, filter_, list);
   positions_.list(filter_, list);
   filter_.noise().list(list);
   filter_.turn_test().list(list);

@@ -4,14 +4,9 @@
 typedef struct wm_landmark_ekf_params params;
 
 static const wm_param kParams[] = {
-    F64("states.tilt_sigma_rad", tilt_sigma_rad, 0.007, 0, 1,
-        "Sigma of the robot's roll and pitch on its springs and on the ground, rad: 0.4 degrees for a car that brakes, "
-        "bends or is loaded on one side. States with sightings.use.elevation, else unused."),
-    F64("states.tilt_tau_s", tilt_tau_s, 2, 0.01, 1e6, "Time after which such a tilt has fallen to 1/e, s."),
+    LANDMARK_TILT_ROWS(landmarks),
     POSITION_STATE_ROWS(gnss),
-    I32("states.map_slots", map_slots, 16, 0, 24,
-        "Landmarks (the last seen ones) whose error on the map, by their sigma_m, is carried as states. That of a "
-        "landmark beyond them counts as noise, the larger the more often it is seen."),
+    LANDMARK_SLOTS_ROW(landmarks),
     PLANAR_POSITION_ROWS(gnss),
     POSITION_NOISE_ROWS(gnss),
     F64("dead_reckoning_after_s", dead_reckoning_after_s, 2, 0, 3600,

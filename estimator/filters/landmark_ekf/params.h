@@ -5,6 +5,7 @@
 
 #include <stdint.h>
 
+#include "filters/core/landmark_params.h"
 #include "filters/core/position_params.h"
 #include "waymark/params.h"
 
@@ -13,9 +14,9 @@ extern "C" {
 #endif
 
 typedef struct wm_landmark_ekf_params {
-  double tilt_sigma_rad, tilt_tau_s;  // with elevations only
+  wm_landmark_params landmarks;
   wm_position_params gnss;
-  int32_t map_slots, recover;
+  int32_t recover, unused;
   double dead_reckoning_after_s;
   double recover_window_s, recover_sigma_xy_m, recover_sigma_heading_rad;
 } wm_landmark_ekf_params;

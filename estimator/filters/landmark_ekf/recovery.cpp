@@ -24,15 +24,13 @@ constexpr double kVague_rad = 0.5, kVaguePlace = 0.5, kVagueFor_s = 5.0;
 // Largest sigma of a found place: where only bearings find it, and the least limit by accurate ranges. Not swept; 0.3 m
 // with bearings loses crossing-laps.
 constexpr double kFoundByBearings_m = 1.0, kFoundLeast_m = 0.3;
-constexpr double kLeastDepth = 0.1;      // floor of the cosine between a depth's axis and the bearing
-constexpr double kLeastOnFloor_m = 0.1;  // floor of a horizontal range; bearings of nearer landmarks are not usable
 
 }  // namespace
 
 // From before a fault: a wrong pose falsifies the calibration.
 sensor_errors landmark_ekf::remembered_errors_of(int sensor) const {
   const auto generation = trusted_generation();
-  return slots_.errors(sensor, [&](int slot) { return rollback_.value(generation, slot); });
+  return aid_.slots().errors(sensor, [&](int slot) { return rollback_.value(generation, slot); });
 }
 
 observation landmark_ekf::observation_at(wm_time_ns t_ns, int key, const wm_pose2 &sensor_in_odom) const {
@@ -40,55 +38,6 @@ observation landmark_ekf::observation_at(wm_time_ns t_ns, int key, const wm_pose
   seen.t_ns = t_ns;
   seen.key = key;
   seen.sensor = sensor_in_odom;
-  return seen;
-}
-
-// A sighting for the search: with the remembered calibration, and with all errors as sigmas.
-observation landmark_ekf::observation_of(const sighting_context &at, wm_time_ns t_ns) const {
-  const wm_sighting &s = *at.s;
-  const mounted_sensor &sensor = sensor_[s.sensor];
-  const wm_landmark &target = setup_->landmarks[at.landmark];
-  const sensor_errors errors = remembered_errors_of(s.sensor);
-  const double *sigma = sightings().states.sigma;
-  const double tilt_sigma = sigma[WM_SENSOR_ROW_kRoll], scale_sigma = sigma[WM_SENSOR_ROW_kAngleScale];
-  const wm_pose2 mounting = {sensor.x_m + errors[kMountX], sensor.y_m + errors[kMountY], sensor.yaw_rad + errors[kYaw]};
-  observation seen = observation_at(t_ns, at.landmark * kMaxSensors + s.sensor,
-                                    compose(compose(filter_.odom(), at.past.step), mounting));
-  seen.kind = (at.reading.bearing ? kObservedBearing : 0u) | (at.reading.range ? kObservedRange : 0u);
-  seen.place_m[0] = target.p_m[0];
-  seen.place_m[1] = target.p_m[1];
-  seen.bearing_rad = s.bearing_rad;
-  if (at.elevation) {
-    const level_ray ray = levelled(sensor, errors, s.bearing_rad, s.elevation_rad);
-    seen.kind |= kObservedElevation;
-    seen.bearing_rad = ray.azimuth_rad;
-    seen.tangent = ray.tangent;
-    seen.height_m = target.p_m[2] - sensor.z_m;
-    seen.sigma_tangent =
-        (1.0 + square(ray.tangent)) * std::sqrt(square(s.elevation_sigma_rad) + square(params_.tilt_sigma_rad) +
-                                                square(tilt_sigma) + square(scale_sigma));
-    seen.sigma_height_m = map_sigma(at.landmark);
-  }
-  const double along =
-      at.reading.range && sensor.range_is_depth && !std::isnan(s.bearing_rad) ? cos(s.bearing_rad) : 1.0;
-  const double slant_m =
-      (s.range_m - errors[kRangeBias]) / errors[kRangeScale] / (along > kLeastDepth ? along : kLeastDepth);
-  // The search is planar: the range on the floor, by the landmark's height over the sensor.
-  const double height_m = finite(target.p_m[2]) ? target.p_m[2] - sensor.z_m : 0.0;
-  const double left_m2 = square(slant_m) - square(height_m), least_m2 = square(kLeastOnFloor_m);
-  const double floor_m = std::sqrt(left_m2 > least_m2 ? left_m2 : least_m2);
-  seen.range_m = height_m == 0.0 ? slant_m : floor_m;
-  seen.sigma_angle_rad =
-      std::sqrt(square(at.reading.bearing_sigma_rad) +
-                square(correlated_bearing(sightings(), at.reading.bearing_sigma_rad)) + square(scale_sigma * kHalfPi));
-  seen.sigma_place_m = std::sqrt(square(map_sigma(at.landmark)) + square(sigma[WM_SENSOR_ROW_kMountX]) +
-                                 square(tilt_sigma * (target.p_m[2] - sensor.z_m)));
-  const double by_slant = height_m == 0.0 ? 1.0 : slant_m / floor_m;  // derivative of the range on the floor
-  seen.sigma_length_m = std::sqrt(
-      square(by_slant) *
-          (square(at.reading.range_sigma_m) + square(correlated_range(sightings(), at.reading.range_sigma_m)) +
-           square((sightings().range_sigma_rel + sightings().correlated_range_rel) * slant_m)) +
-      square(map_sigma(at.landmark)));
   return seen;
 }
 
@@ -136,7 +85,7 @@ bool landmark_ekf::is_elsewhere(wm_time_ns since_ns, wm_time_ns t_ns) {
   const wm_pose2 pose = filter_.pose();
   wm_pose2 mounting[kMaxSensors] = {};
   for (int i = 0; i < static_cast<int>(setup_->sensor_count); i++) {
-    const sensor_errors buffered = remembered_errors_of(i), now = errors_of(i);
+    const sensor_errors buffered = remembered_errors_of(i), now = aid_.errors_of(filter_, i);
     mounting[i] =
         between({buffered[kMountX], buffered[kMountY], buffered[kYaw]}, {now[kMountX], now[kMountY], now[kYaw]});
   }
@@ -218,9 +167,7 @@ rollback<landmark_ekf::kMaxCalibration>::generation landmark_ekf::trusted_genera
 void landmark_ekf::restore_calibration() {
   rollback_.restore(&filter_);
   filter_.noise().restart(true);
-  errors_.release_all();
-  map_.release_all();
-  for (int k = 0; k < 2 && tilt_state_ >= 0; k++) filter_.forget(tilt_state_ + k, 0.0, square(params_.tilt_sigma_rad));
+  aid_.release(&filter_);
 }
 
 // Is the pose unknown, or so vague (after seconds of blind turning) that observations should find it rather than
@@ -283,7 +230,7 @@ void landmark_ekf::search(wm_time_ns since_ns, const observation *prior, int pri
   restore_calibration();
   // The found heading has the error of the mounting's yaw.
   for (int i = 0; i < static_cast<int>(setup_->sensor_count); i++)
-    if (const int yaw = slots_.at(i, kYaw); yaw >= 0) result.covariance[2][2] += filter_.variance(yaw);
+    if (const int yaw = aid_.slots().at(i, kYaw); yaw >= 0) result.covariance[2][2] += filter_.variance(yaw);
   filter_.set_pose(result.pose, result.covariance);
   start_.begin_found(result.pose, result.covariance, odometry(), since_ns);
   evidence_.begin(kFoundWrong);

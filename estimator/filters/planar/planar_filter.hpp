@@ -16,7 +16,7 @@ class planar_filter : public planar_motion {
   // How many states the motion's calibration takes with this motion.model.
   static int count_motion_states(const wm_motion_states &states, int model = WM_MOTION_AUTO);
 
-  static constexpr int kRows = 2;  // of one observation: bearing and range
+  static constexpr int kRows = 3;  // of one observation: a tag's place and heading
   // Doubles of the memory behind a filter of so many states.
   static constexpr size_t doubles(int states) { return error_state::doubles(states, kRows, 1); }
   // `arrays` is 16-byte aligned and lies in the same block of memory as *this, at a distance that copies keep. There is
@@ -41,7 +41,7 @@ class planar_filter : public planar_motion {
   }
   // How an update by prepared rows goes on.
   struct update_options {
-    double added_noise[kRows] = {0, 0};  // of each row, on top of what was prepared
+    double added_noise[kRows] = {};  // of each row, on top of what was prepared
     // The states from `kept_from` up to `kept_to` keep their values: they are considered, not corrected [Schmidt1966].
     int kept_from = 0, kept_to = 0;
     noise_adaption::source source[kRows] = {};  // what the noise adapts to

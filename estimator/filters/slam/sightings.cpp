@@ -10,13 +10,8 @@ constexpr double kLeastLever_m = 0.1;       // floor of the distance by which a 
 constexpr double kLeastDepth = 0.1;         // floor of the cosine between a depth's axis and the bearing
 constexpr double kAmbiguous = 2.0;          // the second best association must be worse by this factor; not swept
 constexpr int kNameless = 20;               // sightings without an identity, none with one; not swept
-constexpr double kClutterRange_m = 30.0;    // a false detection lies anywhere up to this distance, as in landmark_ekf
 constexpr double kLeastDeterminant = 1e-9;  // of H_l; in a regular geometry it is 1 / distance, 1e-6 at the least
 constexpr int kNewtonSteps = 3;             // to the place that a sensor that is not level sees; each squares the error
-
-double clutter_volume(const sighting_reading &r) {
-  return (r.bearing ? kTwoPi : 1.0) * (r.range ? kClutterRange_m : 1.0);
-}
 
 }  // namespace
 
@@ -170,7 +165,7 @@ wm_verdict slam::expect_sighting(const wm_sighting &s, const reading &r, const p
   const double at[3] = {place.x_m, place.y_m, std::nan("")};
   const unsigned components = (r.bearing ? kBearing : 0u) | (r.range ? kRange : 0u) | components_;
   const expected_sighting e = expect(sensor_[s.sensor], errors_of(s.sensor), past.pose, at, components);
-  if (!e.possible) return e.distance_m < kOnSensor_m ? WM_REJECTED_SINGULAR : WM_REJECTED_OUT_OF_RANGE;
+  if (!e.possible) return why_impossible(e);
   const auto add = [&](wm_residual kind, double observed, double expected, const double by[kCauses], double variance,
                        int error_offset, double error_size) {
     const int i = out->count++;

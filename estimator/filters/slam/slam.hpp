@@ -26,7 +26,6 @@
 namespace wm {
 
 inline constexpr int kSlamSensors = 8;       // capacity
-inline constexpr double kOnSensor_m = 0.05;  // nearer, a landmark has no direction
 // Observations of each of two lines that may be one (lines.rejoin): a false line rarely lasts a second. Not swept.
 inline constexpr uint32_t kMergeSeen = 10;
 // An identity that was unseen for so long and comes back is the landmark's own: a tracker bridges a few pictures. Two

@@ -138,7 +138,7 @@ inline void exact_map(wm_landmark_ekf_params *params) {
   params->gnss.sigma_factor = params->recover_sigma_xy_m = 1.0;
   params->gnss.correlated_tau_s = 60.0;
   params->recover_sigma_heading_rad = 0.25;
-  params->map_slots = 0;
+  params->landmarks.map_slots = 0;
 }
 
 // A robot of which only its motion and one sensor are known; both must outlive what is started with it.

@@ -389,7 +389,7 @@ void test_nameless_sightings_are_of_the_one_that_fits(void) {
 // than the map.
 void test_a_maps_error_is_not_averaged_away(void) {
   landmarks[0].sigma_m = landmarks[3].sigma_m = landmarks[6].sigma_m = 0.2;
-  params.map_slots = 4;
+  params.landmarks.map_slots = 4;
   setup.landmark_count = 1;
   begin();
   for (int i = 0; i < 200; i++) {
@@ -524,7 +524,7 @@ void test_sixteen_fully_calibrated_sensors(void) {
   for (wm_sensor &s : sensors) s = sensor;
   make::sightings.correlated_slots = 24;
   make::sightings.correlated_bearing_rad = make::sightings.correlated_range_m = 0.1;
-  params.map_slots = 16;
+  params.landmarks.map_slots = 16;
   make::sightings.map_sigma_min_m = 0.01;
   make::sightings.use_elevation = 1;
   for (double &sigma : make::sightings.states.sigma) sigma = 0.01;

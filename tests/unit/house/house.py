@@ -51,7 +51,7 @@ FOLDER_MAY_USE = {
     "filters/core": ["", "math", "memory", "motion", "sensors"],
     "filters/planar": ["math", "memory", "state", "motion", "sensors", "filters/core"],
     "filters/relocalize": ["math", "memory", "maps", "sensors", "filters/core"],
-    "aid": ["", "math", "memory", "state", "motion", "sensors", "filters/core", "filters/planar", "filters/relocalize"],
+    "aid": ["", "math", "memory", "state", "motion", "maps", "sensors", "filters/core", "filters/planar", "filters/relocalize"],
     "filters/edge_mcl": FILTER,
     "filters/landmark_ekf": FILTER,
     "filters/odometry": FILTER,

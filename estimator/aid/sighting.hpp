@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+// Sightings (bearing, range, elevation) of a given map's landmarks as observations of a planar filter, with their
+// states: the sensors' errors, the time-correlated error of a sensor on a landmark, a landmark's error on the map, the
+// body's tilt.
+#ifndef WAYMARK_ESTIMATOR_AID_SIGHTING_HPP
+#define WAYMARK_ESTIMATOR_AID_SIGHTING_HPP
+
+#include "aid/residual.hpp"
+#include "filters/core/landmark_params.h"
+#include "filters/core/sensor_slots.hpp"
+#include "filters/core/state_pool.hpp"
+#include "filters/planar/past_pose.hpp"
+#include "filters/planar/planar_filter.hpp"
+#include "filters/relocalize/pose_search.hpp"
+#include "maps/landmark_index.hpp"
+#include "sensors/sighting.hpp"
+
+namespace wm {
+
+class sighting_aid {
+ public:
+  static constexpr int kErrorSlots = 24, kMapSlots = 24;  // most of correlated.slots and states.map_slots
+  // Pose, sensor, time-correlated error, landmark, tilt.
+  static_assert(kPoseStates + kSensorStates + 2 + 3 + 2 <= planar_row::kMax);
+
+  // Behind the filter's memory.
+  struct arrays {
+    int *order;
+    wm_time_ns *seen_ns;
+  };
+  static arrays place(memory_layout *layout, const wm_setup &setup);
+  // The states of add_calibration() and of add_lent().
+  static int count_states(const wm_landmark_params &params, const wm_setup &setup);
+  void init(const wm_landmark_params &params, const wm_setup &setup, const arrays &behind);
+  void add_calibration(planar_filter *filter);  // the sensors' errors
+  void add_lent(planar_filter *filter);         // the other states
+  // The lent states are nobody's again.
+  void release(planar_filter *filter);
+
+  // A sighting of a landmark of the map, and the robot when it was taken.
+  struct view {
+    const wm_sighting *s;
+    sighting_reading reading;
+    bool elevation;  // fused
+    int landmark;    // index in the map
+    past_pose past;
+  };
+  // Whether a sighting is to be fused (WM_FUSED), and with which landmark. `nameless`: one without identity may be.
+  wm_verdict look(const planar_filter &filter, const wm_sighting &s, bool nameless, view *out) const;
+  expected_sighting expect(const planar_filter &filter, const view &at) const;
+  // Bearing, then range or elevation. Returns how many.
+  int put_rows(const view &at, const expected_sighting &e, const wm_innovation &record, planar_filter *filter,
+               residual rows[2]);
+  // For the search of a pose, with all errors as sigmas. `errors`: the sensor's.
+  observation observe(const view &at, const sensor_errors &errors, const planar_filter &filter) const;
+
+  const sensor_slots &slots() const { return slots_; }
+  const mounted_sensor &sensor(int i) const { return sensor_[i]; }
+  sensor_errors errors_of(const planar_filter &filter, int sensor) const {
+    return slots_.errors(sensor, [&filter](int slot) { return filter.value(slot); });
+  }
+  int find(int32_t id) const { return index_.find(setup_->landmarks, id); }  // -1: not on the map
+  double map_sigma(int landmark) const;
+
+ private:
+  // The slots of the time-correlated error of this sensor on this landmark, and of the landmark's error on the map;
+  // -1: none.
+  struct lent_slots {
+    int error, map;
+    double repeated_error, repeated_map;  // variances of those without a slot, as noise, over their own
+  };
+  struct row_of {
+    wm_residual kind;
+    double observed, expected;
+    const double *by;
+    int error_offset;  // in the slot of the time-correlated error; -1: none
+    double error_size;
+  };
+  const wm_sighting_params &params() const { return *setup_->sightings; }
+  bool has_tilt() const { return params().use_elevation && landmarks_.tilt_sigma_rad > 0.0; }
+  double time_offset(const planar_filter &filter, int sensor) const {
+    const int slot = slots_.at(sensor, kTimeOffset);
+    return slot < 0 ? 0.0 : filter.value(slot);
+  }
+  int find_nearest(const planar_filter &filter, const view &at) const;
+  lent_slots lend_states(int sensor, int landmark, planar_filter *filter);
+  void decay_tilt(planar_filter *filter);
+  void put_row(const view &at, const lent_slots &lent, const row_of &of, const wm_innovation &record,
+               const planar_filter &filter, residual *r) const;
+  void add_errors(const view &at, const lent_slots &lent, const row_of &of, const planar_filter &filter,
+                  residual *r) const;
+
+  const wm_setup *setup_;
+  wm_landmark_params landmarks_;
+  mounted_sensor sensor_[kMaxSensors];
+  sensor_slots slots_;
+  landmark_index index_;
+  relative_array<wm_time_ns> seen_ns_;  // of each landmark's last sighting; WM_TIME_NONE: none
+  state_pool<kErrorSlots> errors_;
+  correlated_slot error_;  // a slot of these
+  state_pool<kMapSlots> map_;
+  unsigned components_;  // of expect(): whether the angle scale is a state
+  int tilt_state_;       // the body's roll and pitch; -1: not carried
+  wm_time_ns tilt_ns_;
+};
+
+}  // namespace wm
+
+#endif
