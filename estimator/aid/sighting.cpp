@@ -40,7 +40,17 @@ curvature curvature_of(const expected_sighting &e, double xx, double xy, double 
           0.5 * (square(by_along) + square(by_across))};
 }
 
-int map_states(const wm_sighting_params &p) { return p.use_elevation ? 3 : 2; }
+constexpr double kSurveyed_rad = 0.01;  // a landmark's direction that comes without a sigma
+
+bool has_yaw(const wm_setup &setup) {
+  for (size_t i = 0; i < setup.landmark_count; i++)
+    if (finite(setup.landmarks[i].yaw_rad)) return true;
+  return false;
+}
+
+// Place, height and direction of a landmark.
+int place_states(const wm_sighting_params &p) { return p.use_elevation ? 3 : 2; }
+int map_states(const wm_setup &setup) { return place_states(*setup.sightings) + has_yaw(setup); }
 
 // No more slots than the map has landmarks, and pairs of a sensor and a landmark.
 int map_slots(const wm_landmark_params &p, const wm_setup &setup) {
@@ -52,6 +62,18 @@ int error_slots(const wm_setup &setup) {
   return static_cast<size_t>(wanted) < pairs ? wanted : static_cast<int>(pairs);
 }
 
+constexpr int kTagHeadingKey = -16;  // of an observed heading, less the landmark's index
+
+observation observation_now(const planar_filter &filter, int key) {
+  observation out{};
+  out.t_ns = filter.now_ns();
+  out.key = key;
+  out.sensor = filter.odom();
+  out.travelled_m = filter.travelled_m();
+  out.turned_rad = filter.turned_rad();
+  return out;
+}
+
 }  // namespace
 
 sighting_aid::arrays sighting_aid::place(memory_layout *layout, const wm_setup &setup) {
@@ -61,12 +83,15 @@ sighting_aid::arrays sighting_aid::place(memory_layout *layout, const wm_setup &
 int sighting_aid::count_states(const wm_landmark_params &p, const wm_setup &setup) {
   const wm_sighting_params &s = *setup.sightings;
   return sensor_slots::count(setup) + error_slots(setup) * correlated_slot_of(s).width +
-         map_states(s) * map_slots(p, setup) + 2 * (s.use_elevation && p.tilt_sigma_rad > 0.0);
+         map_states(setup) * map_slots(p, setup) + 2 * (s.use_elevation && p.tilt_sigma_rad > 0.0);
 }
 
-void sighting_aid::init(const wm_landmark_params &landmarks, const wm_setup &setup, const arrays &behind) {
+void sighting_aid::init(const wm_landmark_params &landmarks, const wm_marker_params &markers, const wm_setup &setup,
+                        const arrays &behind) {
   setup_ = &setup;
   landmarks_ = landmarks;
+  markers_ = markers;
+  yaw_offset_ = has_yaw(setup) ? place_states(params()) : -1;
   for (size_t i = 0; i < setup.sensor_count; i++) sensor_[i].init(setup.sensors[i]);
   components_ = params().states.sigma[WM_SENSOR_ROW_kAngleScale] > 0.0 ? kAngleScaled : 0u;
   index_.init(setup.landmarks, setup.landmark_count, behind.order);
@@ -92,7 +117,7 @@ void sighting_aid::add_lent(planar_filter *filter) {
   }
   for (int i = 0; i < map_slots(landmarks_, *setup_); i++) {
     map_.add(filter->states());
-    for (int k = 0; k < map_states(params()); k++) filter->add_state(0.0, 0.0);
+    for (int k = 0; k < map_states(*setup_); k++) filter->add_state(0.0, 0.0);
   }
   if (!has_tilt()) return;
   tilt_state_ = filter->add_state(0.0, landmarks_.tilt_sigma_rad);
@@ -110,9 +135,15 @@ double sighting_aid::map_sigma(int landmark) const {
   return larger(setup_->landmarks[landmark].sigma_m, params().map_sigma_min_m);
 }
 
-wm_verdict sighting_aid::look(const planar_filter &filter, const wm_sighting &s, bool nameless, view *out) const {
+double sighting_aid::yaw_sigma(int landmark) const {
+  const double stated = setup_->landmarks[landmark].yaw_sigma_rad;
+  return stated > 0.0 && stated < kPi ? stated : kSurveyed_rad;
+}
+
+wm_verdict sighting_aid::look(const planar_filter &filter, const wm_sighting &s, bool tracking, view *out) const {
   const mounted_sensor &seen_by = sensor_[s.sensor];
   out->s = &s;
+  out->yaw_rad = out->yaw_variance = std::nan("");
   out->reading = read_sighting(s, seen_by, params());
   if (!out->reading.bearing && !out->reading.range) return WM_REJECTED_BY_CONFIG;
   if (!std::isnan(s.range_m) && s.range_m > seen_by.max_range_m) return WM_REJECTED_OUT_OF_RANGE;
@@ -121,12 +152,43 @@ wm_verdict sighting_aid::look(const planar_filter &filter, const wm_sighting &s,
     out->landmark = find(s.landmark_id);
     if (out->landmark < 0) return WM_REJECTED_UNKNOWN_ID;
   } else {
-    out->landmark = params().use_unidentified && nameless ? find_nearest(filter, *out) : -1;
+    out->landmark = params().use_unidentified && tracking ? find_nearest(filter, *out) : -1;
     if (out->landmark < 0) return WM_REJECTED_NO_ASSOCIATION;
   }
   out->elevation = wm_sighting_has_elevation(&s) && params().use_elevation && out->reading.bearing &&
                    !out->reading.range && finite(setup_->landmarks[out->landmark].p_m[2]) && finite(seen_by.z_m);
   return WM_FUSED;
+}
+
+// Its place in the sensor's frame gives bearing and range, of a steep sensor about the vertical. The range is along the
+// line of sight where the map has the marker's height, else on the floor, as expect() has it.
+wm_verdict sighting_aid::look(const planar_filter &filter, const wm_marker &m, bool tracking, wm_sighting *s,
+                              view *out) const {
+  const mounted_sensor &seen_by = sensor_[m.sensor];
+  const auto read = [&](bool second) {
+    return read_tag(m, second, seen_by, errors_of(filter, m.sensor), params(), markers_);
+  };
+  tag_reading tag = read(false);
+  const double *v = seen_by.is_steep ? tag.nominal : m.p_m;
+  const int landmark = find(m.id);
+  const bool has_height = landmark >= 0 && finite(setup_->landmarks[landmark].p_m[2]);
+  *s = wm_sighting_without_numbers();
+  s->sensor = m.sensor;
+  s->landmark_id = m.id;
+  s->bearing_rad = atan2(v[1], v[0]);
+  s->range_m = std::sqrt(square(v[0]) + square(v[1]) + (has_height ? square(v[2]) : 0.0));
+  const wm_verdict verdict = look(filter, *s, false, out);
+  if (verdict != WM_FUSED) return verdict;
+  out->reading.bearing_sigma_rad = std::sqrt(tag.noise[1]) / larger(tag.floor_m, kNear_m);
+  out->reading.range_sigma_m = std::sqrt(tag.noise[0]);
+  if (!finite(setup_->landmarks[landmark].yaw_rad)) return verdict;
+  if (m.poses == 2 && tracking)
+    tag = choose_pose(m, tag, read(true), markers_,
+                      [&](const tag_reading &one) { return heading_nis(filter, *out, one); });
+  if (!tag.has_heading) return verdict;
+  out->yaw_rad = tag.yaw_rad;
+  out->yaw_variance = tag.noise[2];
+  return verdict;
 }
 
 // The one landmark that a sighting without identity fits: within half the gate, and no other within the gate.
@@ -190,7 +252,8 @@ sighting_aid::lent_slots sighting_aid::lend_states(int sensor, int landmark, pla
   if (!slot) return out;
   out.map = slot->state;
   slot->used_ns = t_ns;
-  for (int k = 0; fresh && k < map_states(params()); k++) filter->forget(slot->state + k, 0.0, square(sigma));
+  for (int k = 0; fresh && k < place_states(params()); k++) filter->forget(slot->state + k, 0.0, square(sigma));
+  if (fresh && yaw_offset_ >= 0) filter->forget(slot->state + yaw_offset_, 0.0, 0.0);
   return out;
 }
 
@@ -253,8 +316,53 @@ void sighting_aid::put_row(const view &at, const lent_slots &lent, const row_of 
   r->innovation = of.kind == WM_RESIDUAL_BEARING ? wrap(difference) : difference;
 }
 
+// A marker's direction as it is expected in levelled axes along the sensor's yaw.
+double sighting_aid::expected_yaw(const planar_filter &filter, const view &at) const {
+  const int sensor = at.s->sensor;
+  const double from_rad = at.past.pose.heading_rad + sensor_[sensor].yaw_rad + errors_of(filter, sensor)[kYaw];
+  return wrap(setup_->landmarks[at.landmark].yaw_rad - from_rad);
+}
+
+void sighting_aid::put_heading(const view &at, planar_row *row) const {
+  const double by[3] = {0.0, 0.0, -1.0};
+  add_past_pose(row, by, at.past, slots_.at(at.s->sensor, kTimeOffset));
+  row->add(slots_.at(at.s->sensor, kYaw), -1.0);
+}
+
+// Of its heading alone: its two poses stand at the same place.
+double sighting_aid::heading_nis(const planar_filter &filter, const view &at, const tag_reading &tag) const {
+  planar_row row;
+  put_heading(at, &row);
+  return square(wrap(tag.yaw_rad - expected_yaw(filter, at))) /
+         (filter.variance_of(row) + tag.noise[2] + square(yaw_sigma(at.landmark)));
+}
+
+// The landmark's own error is a state of its slot, open from its first heading on, or noise that all views share.
+void sighting_aid::put_heading_row(const view &at, const lent_slots &lent, const wm_innovation &record,
+                                   planar_filter *filter, residual *r) const {
+  r->row.count = r->row.missing = 0;
+  r->source = {};
+  r->noise = at.yaw_variance;
+  put_heading(at, &r->row);
+  double expected_rad = expected_yaw(*filter, at);
+  const double own = square(yaw_sigma(at.landmark));
+  if (lent.map >= 0) {
+    const int state = lent.map + yaw_offset_;
+    if (!(filter->variance(state) > 0.0)) filter->forget(state, 0.0, own);
+    r->row.add(state, 1.0);
+    expected_rad = wrap(expected_rad + filter->value(state));
+  } else {
+    r->noise += lent.repeated_map * own;
+  }
+  r->record = record;
+  r->record.residual = WM_RESIDUAL_HEADING;
+  r->record.observed = wrap(at.yaw_rad);
+  r->record.expected = expected_rad;
+  r->innovation = wrap(at.yaw_rad - expected_rad);
+}
+
 int sighting_aid::put_rows(const view &at, const expected_sighting &e, const wm_innovation &record,
-                           planar_filter *filter, residual rows[2]) {
+                           planar_filter *filter, residual rows[3]) {
   const wm_sighting &s = *at.s;
   const noise_adaption &noise = filter->noise();
   const lent_slots lent = lend_states(s.sensor, at.landmark, filter);
@@ -283,7 +391,19 @@ int sighting_aid::put_rows(const view &at, const expected_sighting &e, const wm_
   if (at.elevation)
     add({}, square(s.elevation_sigma_rad) + second.elevation_variance,
         {WM_RESIDUAL_ELEVATION, s.elevation_rad, e.elevation_rad + second.elevation_rad, e.elevation_by, -1, 0.0});
+  if (finite(at.yaw_rad)) put_heading_row(at, lent, record, filter, &rows[count++]);
   return count;
+}
+
+observation sighting_aid::observe_heading(const view &at, const sensor_errors &errors,
+                                          const planar_filter &filter) const {
+  const int sensor = at.s->sensor;
+  observation seen = observation_now(filter, kTagHeadingKey - at.landmark);
+  seen.kind = kObservedHeading;
+  seen.sensor = compose(seen.sensor, at.past.step);
+  seen.bearing_rad = wrap(setup_->landmarks[at.landmark].yaw_rad - at.yaw_rad - sensor_[sensor].yaw_rad - errors[kYaw]);
+  seen.sigma_angle_rad = std::sqrt(at.yaw_variance + square(yaw_sigma(at.landmark)));
+  return seen;
 }
 
 observation sighting_aid::observe(const view &at, const sensor_errors &errors, const planar_filter &filter) const {
@@ -294,12 +414,8 @@ observation sighting_aid::observe(const view &at, const sensor_errors &errors, c
   const double tilt_sigma = sigma[WM_SENSOR_ROW_kRoll], scale_sigma = sigma[WM_SENSOR_ROW_kAngleScale];
   const wm_pose2 mounting = {seen_by.x_m + errors[kMountX], seen_by.y_m + errors[kMountY],
                              seen_by.yaw_rad + errors[kYaw]};
-  observation seen{};
-  seen.t_ns = filter.now_ns();
-  seen.key = at.landmark * kMaxSensors + s.sensor;
-  seen.sensor = compose(compose(filter.odom(), at.past.step), mounting);
-  seen.travelled_m = filter.travelled_m();
-  seen.turned_rad = filter.turned_rad();
+  observation seen = observation_now(filter, at.landmark * kMaxSensors + s.sensor);
+  seen.sensor = compose(compose(seen.sensor, at.past.step), mounting);
   seen.kind = (at.reading.bearing ? kObservedBearing : 0u) | (at.reading.range ? kObservedRange : 0u);
   seen.place_m[0] = target.p_m[0];
   seen.place_m[1] = target.p_m[1];

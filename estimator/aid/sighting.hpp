@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sightings (bearing, range, elevation) of a given map's landmarks as observations of a planar filter, with their
-// states: the sensors' errors, the time-correlated error of a sensor on a landmark, a landmark's error on the map, the
-// body's tilt.
+// Sightings (bearing, range, elevation) and coded markers (bearing, range, heading) of a given map's landmarks as
+// observations of a planar filter, with their states: the sensors' errors, the time-correlated error of a sensor on a
+// landmark, a landmark's error on the map, the body's tilt.
 #ifndef WAYMARK_ESTIMATOR_AID_SIGHTING_HPP
 #define WAYMARK_ESTIMATOR_AID_SIGHTING_HPP
 
 #include "aid/residual.hpp"
+#include "aid/tag.hpp"
 #include "filters/core/landmark_params.h"
 #include "filters/core/sensor_slots.hpp"
 #include "filters/core/state_pool.hpp"
@@ -31,7 +32,8 @@ class sighting_aid {
   static arrays place(memory_layout *layout, const wm_setup &setup);
   // The states of add_calibration() and of add_lent().
   static int count_states(const wm_landmark_params &params, const wm_setup &setup);
-  void init(const wm_landmark_params &params, const wm_setup &setup, const arrays &behind);
+  void init(const wm_landmark_params &params, const wm_marker_params &markers, const wm_setup &setup,
+            const arrays &behind);
   void add_calibration(planar_filter *filter);  // the sensors' errors
   void add_lent(planar_filter *filter);         // the other states
   // The lent states are nobody's again.
@@ -44,15 +46,22 @@ class sighting_aid {
     bool elevation;  // fused
     int landmark;    // index in the map
     past_pose past;
+    // A marker's direction in levelled axes along the sensor's yaw, where it is fused; NaN: it is not.
+    double yaw_rad, yaw_variance;
   };
-  // Whether a sighting is to be fused (WM_FUSED), and with which landmark. `nameless`: one without identity may be.
-  wm_verdict look(const planar_filter &filter, const wm_sighting &s, bool nameless, view *out) const;
+  // Whether a sighting is to be fused (WM_FUSED), and with which landmark. `tracking`: by the pose a sighting without
+  // identity may be associated, and one of a marker's two poses chosen.
+  wm_verdict look(const planar_filter &filter, const wm_sighting &s, bool tracking, view *out) const;
+  // The same of a marker that check_tag() lets pass. *s: what it is as a sighting.
+  wm_verdict look(const planar_filter &filter, const wm_marker &m, bool tracking, wm_sighting *s, view *out) const;
   expected_sighting expect(const planar_filter &filter, const view &at) const;
-  // Bearing, then range or elevation. Returns how many.
+  // Bearing, then range or elevation, then a marker's heading. Returns how many.
   int put_rows(const view &at, const expected_sighting &e, const wm_innovation &record, planar_filter *filter,
-               residual rows[2]);
+               residual rows[3]);
   // For the search of a pose, with all errors as sigmas. `errors`: the sensor's.
   observation observe(const view &at, const sensor_errors &errors, const planar_filter &filter) const;
+  // The robot's heading by a marker's: at.yaw_rad is a number.
+  observation observe_heading(const view &at, const sensor_errors &errors, const planar_filter &filter) const;
 
   const sensor_slots &slots() const { return slots_; }
   const mounted_sensor &sensor(int i) const { return sensor_[i]; }
@@ -61,6 +70,7 @@ class sighting_aid {
   }
   int find(int32_t id) const { return index_.find(setup_->landmarks, id); }  // -1: not on the map
   double map_sigma(int landmark) const;
+  double yaw_sigma(int landmark) const;
 
  private:
   // The slots of the time-correlated error of this sensor on this landmark, and of the landmark's error on the map;
@@ -82,6 +92,11 @@ class sighting_aid {
     const int slot = slots_.at(sensor, kTimeOffset);
     return slot < 0 ? 0.0 : filter.value(slot);
   }
+  double expected_yaw(const planar_filter &filter, const view &at) const;
+  void put_heading(const view &at, planar_row *row) const;
+  double heading_nis(const planar_filter &filter, const view &at, const tag_reading &tag) const;
+  void put_heading_row(const view &at, const lent_slots &lent, const wm_innovation &record, planar_filter *filter,
+                       residual *r) const;
   int find_nearest(const planar_filter &filter, const view &at) const;
   lent_slots lend_states(int sensor, int landmark, planar_filter *filter);
   void decay_tilt(planar_filter *filter);
@@ -92,6 +107,7 @@ class sighting_aid {
 
   const wm_setup *setup_;
   wm_landmark_params landmarks_;
+  wm_marker_params markers_;
   mounted_sensor sensor_[kMaxSensors];
   sensor_slots slots_;
   landmark_index index_;
@@ -100,7 +116,9 @@ class sighting_aid {
   correlated_slot error_;  // a slot of these
   state_pool<kMapSlots> map_;
   unsigned components_;  // of expect(): whether the angle scale is a state
+  int yaw_offset_;       // of a landmark's direction in a slot of map_; -1: the map states none
   int tilt_state_;       // the body's roll and pitch; -1: not carried
+  int unused_;           // no padding
   wm_time_ns tilt_ns_;
 };
 

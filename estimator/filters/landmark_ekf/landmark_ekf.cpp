@@ -63,7 +63,7 @@ void landmark_ekf::init(const wm_landmark_ekf_params &params, const wm_setup &se
   filter_.init(setup, setup.motion->states, count_states(params, setup), behind.filter);
   if (setup.motion->model != WM_MOTION_CONSTANT_VELOCITY) filter_.noise().init(setup.motion->noise_adapt_log_sigma);
   const auto add = [this](double value, double sigma) { return sigma > 0.0 ? filter_.add_state(value, sigma) : -1; };
-  aid_.init(params.landmarks, setup, behind.aid);
+  aid_.init(params.landmarks, params.markers, setup, behind.aid);
   aid_.add_calibration(&filter_);
   positions_.init(params.gnss, setup, &filter_, add);
   filter_.set_correlated_position(positions_.error_state());
@@ -129,8 +129,8 @@ wm_status landmark_ekf::predict(const wm_event &motion) {
 
 wm_status landmark_ekf::correct(const wm_event &event, record_list records) {
   switch (event.kind) {
-    case WM_EVENT_SIGHTING: return fuse_sighting(event, event.as.sighting, records);
-    case WM_EVENT_MARKER: return fuse_marker(event, records);
+    case WM_EVENT_SIGHTING:
+    case WM_EVENT_MARKER: return fuse_landmark(event, records);
     case WM_EVENT_POSITION: return fuse_position(event, records);
     case WM_EVENT_HEADING: return fuse_heading(event, records);
     case WM_EVENT_SET_POSE:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The landmark filter of system 1 [Stepanov2017] with self-calibration, time-correlated errors and relocalization.
-// docs/estimators/landmark_ekf.md has the model. One observation's way: correct() -> fuse_sighting() -> sighting_aid
+// docs/estimators/landmark_ekf.md has the model. One observation's way: correct() -> fuse_landmark() -> sighting_aid
 // -> fuse() -> planar_filter::update() -> note().
 #ifndef WAYMARK_ESTIMATOR_LANDMARK_EKF_HPP
 #define WAYMARK_ESTIMATOR_LANDMARK_EKF_HPP
@@ -43,12 +43,12 @@ class landmark_ekf {
   // In list_calibration() beside them: the antenna's place, the heading's bias, factors of noise, turn, lasting error.
   static_assert(kMaxCalibration + 3 + noise_adaption::kFactors + 2 <= 2 * WM_HEALTH_CALIBRATION_MAX);
 
-  wm_status fuse_sighting(const wm_event &event, const wm_sighting &s, record_list records);
-  wm_status fuse_marker(const wm_event &event, record_list records);
+  wm_status fuse_landmark(const wm_event &event, record_list records);
   wm_status fuse_position(const wm_event &event, record_list records);
   wm_status fuse_heading(const wm_event &event, record_list records);
   wm_status take_pose(const wm_event &event);
 
+  void buffer(const sighting_aid::view &at, bool has_heading);
   first_sightings::row row_at_prior(const residual &r, int sensor) const;
   void restart_calibration(int sensor, const double prior[kSensorStates]);
   void test_calibration(const sighting_aid::view &at, const residual *rows, int count);

@@ -9,6 +9,7 @@ static const wm_param kParams[] = {
     LANDMARK_SLOTS_ROW(landmarks),
     PLANAR_POSITION_ROWS(gnss),
     POSITION_NOISE_ROWS(gnss),
+    MARKER_ROWS(markers),
     F64("dead_reckoning_after_s", dead_reckoning_after_s, 2, 0, 3600,
         "Time without a fused observation after which the state is dead reckoning, s."),
     BOOL("recover.on", recover, 1, "Relocalize when the observations show that the pose is wrong."),

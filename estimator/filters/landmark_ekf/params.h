@@ -6,6 +6,7 @@
 #include <stdint.h>
 
 #include "filters/core/landmark_params.h"
+#include "filters/core/marker_params.h"
 #include "filters/core/position_params.h"
 #include "waymark/params.h"
 
@@ -15,6 +16,7 @@ extern "C" {
 
 typedef struct wm_landmark_ekf_params {
   wm_landmark_params landmarks;
+  wm_marker_params markers;
   wm_position_params gnss;
   int32_t recover, unused;
   double dead_reckoning_after_s;

@@ -9,50 +9,33 @@ namespace {
 
 constexpr double kWidenEvery_s = 1.0;  // the pose's covariance in doubt; not swept
 
-// From a sensor's axes to levelled axes along its yaw.
-void to_level(const mounted_sensor &sensor, const double p_m[3], double level_m[3]) {
-  for (int i = 0; i < 3; i++)
-    level_m[i] = sensor.axis[0][i] * p_m[0] + sensor.axis[1][i] * p_m[1] + sensor.axis[2][i] * p_m[2];
-}
-
 }  // namespace
 
-// A marker whose place is known is a landmark: its place in the sensor's frame gives bearing and range, of a steep
-// sensor about the vertical. The range is along the line of sight where the map has the marker's height, else on the
-// floor, as expect() has it. A second pose that the corners fit is turned about the same place.
-wm_status landmark_ekf::fuse_marker(const wm_event &event, record_list records) {
-  const wm_marker &m = event.as.marker;
-  double v[3] = {m.p_m[0], m.p_m[1], m.p_m[2]};
-  if (m.sensor < setup_->sensor_count && aid_.sensor(m.sensor).is_steep) to_level(aid_.sensor(m.sensor), m.p_m, v);
-  const int landmark = aid_.find(m.id);
-  const bool has_height = landmark >= 0 && finite(setup_->landmarks[landmark].p_m[2]);
-  const double range_m = std::sqrt(square(v[0]) + square(v[1]) + (has_height ? square(v[2]) : 0.0));
-  wm_sighting s = wm_sighting_without_numbers();
-  s.sensor = m.sensor;
-  s.landmark_id = m.id;
-  s.bearing_rad = atan2(v[1], v[0]);
-  s.range_m = range_m;
-  s.range_sigma_m = m.along_sigma_m;
-  return fuse_sighting(event, s, records);
-}
-
-wm_status landmark_ekf::fuse_sighting(const wm_event &event, const wm_sighting &s, record_list records) {
-  const bool has_bearing = !std::isnan(s.bearing_rad);
+// A sighting, or a marker whose place is known.
+wm_status landmark_ekf::fuse_landmark(const wm_event &event, record_list records) {
+  const bool is_marker = event.kind == WM_EVENT_MARKER;
+  wm_sighting s = is_marker ? wm_sighting_without_numbers() : event.as.sighting;
+  const bool has_bearing = is_marker || !std::isnan(s.bearing_rad);
   wm_innovation record = record_of(event, has_bearing ? WM_RESIDUAL_BEARING : WM_RESIDUAL_RANGE);
-  record.sensor = s.sensor;
-  record.landmark_id = s.landmark_id;
+  record.sensor = is_marker ? event.as.marker.sensor : s.sensor;
+  record.landmark_id = is_marker ? event.as.marker.id : s.landmark_id;
   record.observed = has_bearing ? s.bearing_rad : s.range_m;
-  wm_status status = check_sighting(s, setup_->sensor_count);
+  wm_status status =
+      is_marker ? check_tag(event.as.marker, setup_->sensor_count) : check_sighting(s, setup_->sensor_count);
   if (status != WM_OK) return refuse(records, record, status);
   status = filter_.check_time(event.t_ns);
   if (status != WM_OK) return status;
   filter_.move_to(event.t_ns);
 
   sighting_aid::view at;
-  const wm_verdict verdict = aid_.look(filter_, s, life_.tracking(), &at);
+  const bool tracking = life_.tracking();
+  const wm_verdict verdict =
+      is_marker ? aid_.look(filter_, event.as.marker, tracking, &s, &at) : aid_.look(filter_, s, tracking, &at);
+  record.observed = has_bearing ? s.bearing_rad : s.range_m;
   if (verdict != WM_FUSED) return reject(records, record, verdict);
   record.landmark_id = setup_->landmarks[at.landmark].id;
-  if (params_.recover) observations_.add(aid_.observe(at, remembered_errors_of(s.sensor), filter_));
+  const bool has_heading = finite(at.yaw_rad);
+  buffer(at, has_heading && !tracking);
   if (needs_search(event.t_ns, at.reading.bearing)) {
     search_now(event.t_ns);
     return reject(records, record, WM_REJECTED_SEARCHING);
@@ -67,17 +50,26 @@ wm_status landmark_ekf::fuse_sighting(const wm_event &event, const wm_sighting &
   residual rows[3];
   const int count = aid_.put_rows(at, e, record, &filter_, rows) - at.elevation;
   const bool usable = !records_[static_cast<size_t>(at.landmark)].moved && !evidence_.biased(at.landmark, event.t_ns);
+  const double volume = clutter_volume(at.reading) * (has_heading ? kTwoPi : 1.0);
   // A larger tilt than stated must not make the robot lost.
-  later_row elevation(filter_, &rows[count]);
-  const double log_bayes = fuse(rows, count, clutter_volume(at.reading), usable, records);
+  later_row elevation(filter_, &rows[at.elevation ? count : 0]);
+  const double log_bayes = fuse(rows, count, volume, usable, records);
   if (at.elevation) (void)elevation.fuse(&filter_, policy(true), rows[0].record.verdict == WM_FUSED, records);
-  if (usable) test_calibration(at, rows, count);
+  if (usable) test_calibration(at, rows, count - has_heading);
   if (at.reading.bearing)
     note(event.t_ns, at.landmark, log_bayes, rows[0].innovation,
          rows[0].innovation / std::sqrt(rows[0].record.variance));
   else
     note(event.t_ns, at.landmark, log_bayes);
   return WM_OK;
+}
+
+// For the search. A tracked pose is not doubted by one marker's heading: that one may have moved.
+void landmark_ekf::buffer(const sighting_aid::view &at, bool has_heading) {
+  if (!params_.recover) return;
+  const sensor_errors errors = remembered_errors_of(at.s->sensor);
+  observations_.add(aid_.observe(at, errors, filter_));
+  if (has_heading) observations_.add(aid_.observe_heading(at, errors, filter_));
 }
 
 // A row that the gate refused, with the sensor's states at their prior's mean.

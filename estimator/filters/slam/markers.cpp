@@ -9,88 +9,21 @@
 namespace wm {
 namespace {
 
-constexpr double kFarthest_m = 1e4;         // beyond, a number is an error of the sender
-constexpr double kClutter_m = 10.0;         // a misread code lies anywhere on a square of this side, as in landmark_ekf
-constexpr double kNoDirection_m = 0.05;     // a marker nearer to the camera's axis than this has no direction
-constexpr double kLeastLength_m = 1e-6;     // below, a marker is in the camera itself
-constexpr double kClearlyBetter_nis = 9.0;  // of two poses: one is 90 times as likely
+constexpr double kClutter_m = 10.0;      // a misread code lies anywhere on a square of this side, as in landmark_ekf
+constexpr double kNoDirection_m = 0.05;  // a marker nearer to the camera's axis than this has no direction
 // A marker's height (fuse_height):
 constexpr double kAlike = 10.0;             // observations a tenth of a second apart with one error; not swept
 constexpr double kLeastInformation = 0.01;  // share of the tilt's variance that a row must be worth its O(n^2)
 constexpr double kHeightGate_nis = 9.0;     // three sigmas
 
-double number_or(double a, double b) { return finite(a) ? a : b; }
-double zero_if_absent(double a) { return std::isnan(a) ? 0.0 : a; }
-
-wm_status check_marker(const wm_marker &m, size_t sensors) {
-  const bool two = m.poses == 2;
-  const double lengths[] = {m.p_m[0],
-                            m.p_m[1],
-                            m.p_m[2],
-                            two ? m.other_p_m[0] : 0.0,
-                            two ? m.other_p_m[1] : 0.0,
-                            two ? m.other_p_m[2] : 0.0,
-                            zero_if_absent(m.along_sigma_m)};
-  const double angles[] = {m.yaw_rad, two ? m.other_yaw_rad : 0.0, zero_if_absent(m.yaw_sigma_rad),
-                           zero_if_absent(m.bloom_px)};
-  bool all_finite = true, in_range = m.sensor < sensors && !(m.along_sigma_m <= 0.0) && !(m.yaw_sigma_rad <= 0.0);
-  for (double n : lengths) {
-    all_finite &= finite(n);
-    in_range &= std::fabs(n) <= kFarthest_m;
-  }
-  for (double a : angles) {
-    all_finite &= finite(a);
-    in_range &= std::fabs(a) <= kMaxAngle_rad;
-  }
-  return !all_finite ? WM_NOT_FINITE : in_range ? WM_OK : WM_OUT_OF_RANGE;
-}
-
 }  // namespace
-
-// In levelled axes along the sensor's yaw. axis is (Ry(pitch) Rx(roll))', its columns are the sensor's axes.
-slam::marker_reading slam::read_marker(const wm_marker &m, const double p_m[3], double yaw_rad) const {
-  const mounted_sensor &sensor = sensor_[m.sensor];
-  marker_reading r;
-  double *level = r.level, *nominal = r.nominal;
-  for (int i = 0; i < 3; i++)
-    nominal[i] = sensor.axis[0][i] * p_m[0] + sensor.axis[1][i] * p_m[1] + sensor.axis[2][i] * p_m[2];
-  // The states of roll and pitch are small rotations about the levelled axes ahead and to the left.
-  const sensor_errors errors = errors_of(m.sensor);
-  const double roll = errors[kRoll], pitch = errors[kPitch];
-  level[0] = nominal[0] + pitch * nominal[2];
-  level[1] = nominal[1] - roll * nominal[2];
-  level[2] = nominal[2] + roll * nominal[1] - pitch * nominal[0];
-  const double floor_m = std::sqrt(level[0] * level[0] + level[1] * level[1]);
-  r.length_m = std::sqrt(level[0] * level[0] + level[1] * level[1] + level[2] * level[2]);
-  r.along[0] = floor_m > kLeastLength_m ? level[0] / floor_m : 1.0;
-  r.along[1] = floor_m > kLeastLength_m ? level[1] / floor_m : 0.0;
-  r.yaw_rad = yaw_rad;
-  const double across = sightings().bearing_sigma_factor *
-                        number_or(sensor.bearing_sigma_rad, params_.marker_bearing_sigma_rad) * floor_m;
-  // A detector that gives the error along the line of sight leaves none to assume.
-  const double assumed_m = finite(m.along_sigma_m) ? 0.0 : sightings().range_sigma_default_m;
-  const double range = sightings().range_sigma_factor * number_or(sensor.range_sigma_m, assumed_m);
-  const double least = square(params_.marker_sigma_m) + square(params_.marker_sigma_rel * r.length_m);
-  // The error along the line of sight: its parts on the floor and upwards.
-  const double along_sigma_m = zero_if_absent(m.along_sigma_m);
-  const bool apart = r.length_m > kLeastLength_m;
-  const double along = apart ? sightings().range_sigma_factor * along_sigma_m * floor_m / r.length_m : 0.0;
-  const double up = apart ? sightings().range_sigma_factor * along_sigma_m * level[2] / r.length_m : 0.0;
-  r.noise[0] = least + square(range) + square(along);
-  r.noise[1] = least + square(across);
-  r.noise[2] = square(number_or(m.yaw_sigma_rad, params_.marker_heading_sigma_rad));
-  r.z_noise = least + square(across) + square(up);
-  r.z_m = sensor.z_m + level[2];
-  r.has_heading = m.poses != 2 && !(m.yaw_sigma_rad > params_.marker_heading_most_rad);
-  return r;
-}
 
 wm_status slam::fuse_marker(const wm_event &event, record_list records) {
   const wm_marker &m = event.as.marker;
   context at{m.sensor, m.id, {}, record_of(event, WM_RESIDUAL_X), records};
   at.record.sensor = m.sensor;
   at.record.landmark_id = m.id;
-  wm_status status = check_marker(m, setup_->sensor_count);
+  wm_status status = check_tag(m, setup_->sensor_count);
   if (status != WM_OK) return refuse(records, at.record, status);
   status = begin_observation(event.t_ns);
   if (status != WM_OK) return status;
@@ -99,7 +32,7 @@ wm_status slam::fuse_marker(const wm_event &event, record_list records) {
   take_headings();
   note_range(m.sensor, true);
 
-  marker_reading r = read_marker(m, m.p_m, m.yaw_rad);
+  tag_reading r = read_marker(m, false);
   if (r.length_m > sensor_[m.sensor].max_range_m) return reject(records, at.record, WM_REJECTED_OUT_OF_RANGE);
   const int landmark = find_landmark(m.id);
   if (is_ambiguous(m.id, landmark, m.sensor)) return reject(records, at.record, WM_REJECTED_NO_ASSOCIATION);
@@ -112,7 +45,9 @@ wm_status slam::fuse_marker(const wm_event &event, record_list records) {
     if (!fits && life_.tracking()) return reject(records, at.record, WM_REJECTED_GATE);
   }
   if (life_.searching()) return reject(records, at.record, WM_REJECTED_SEARCHING);
-  if (m.poses == 2) r = choose_pose(at, m, r, landmark);
+  if (m.poses == 2)
+    r = choose_pose(m, r, read_marker(m, true), params_.markers,
+                    [&](const tag_reading &one) { return landmark < 0 ? 0.0 : marker_nis(at, landmark, one); });
   if (landmark >= 0) {
     fuse_known_marker(at, m, r, landmark);
     return WM_OK;
@@ -124,26 +59,12 @@ wm_status slam::fuse_marker(const wm_event &event, record_list records) {
   return reject(records, at.record, verdict);
 }
 
-// A marker seen nearly face on has two poses, which differ in its heading [Schweighofer2006]. The one that fits the map
-// clearly better is taken; else the place alone, since the wrong one would fit a picture after the other.
-slam::marker_reading slam::choose_pose(const context &at, const wm_marker &m, const marker_reading &first,
-                                       int landmark) {
-  const marker_reading other = read_marker(m, m.other_p_m, m.other_yaw_rad);
-  const double nis = landmark < 0 ? 0.0 : marker_nis(at, landmark, first);
-  const double other_nis = landmark < 0 ? 0.0 : marker_nis(at, landmark, other);
-  marker_reading r = other_nis < nis ? other : first;
-  r.has_heading =
-      !(m.yaw_sigma_rad > params_.marker_heading_most_rad) && std::fabs(other_nis - nis) > kClearlyBetter_nis;
-  return r;
-}
-
 // The rows of a marker of the map. Where the pose is vague, the second derivatives count as noise [Athans1968]. With
 // the heading's error h, and the errors r along and t across the line of sight at distance d, which are linear in the
 // state, a marker is seen h w beside its expected place along the sight, w = t + h d / 2, and -h r across. Their mean
 // squares are P_hh P_ww + 2 P_hw^2 and P_hh P_rr + 2 P_hr^2. A place alone that is vague bends nothing. Below the
 // marker's own noise they change no pose and are left out.
-void slam::expect_known_marker(const context &at, const marker_reading &r, int landmark, int count,
-                               landmark_rows *out) {
+void slam::expect_known_marker(const context &at, const tag_reading &r, int landmark, int count, landmark_rows *out) {
   expect_marker(at, r, pose_of(landmark), lend(at), out);
   out->count = count;
   const relative_place place = relative_place_of(at, landmark);
@@ -157,7 +78,7 @@ void slam::expect_known_marker(const context &at, const marker_reading &r, int l
 }
 
 // NIS of all three numbers of a known marker.
-double slam::marker_nis(const context &at, int landmark, const marker_reading &r) {
+double slam::marker_nis(const context &at, int landmark, const tag_reading &r) {
   landmark_rows v;
   expect_known_marker(at, r, landmark, 3, &v);
   innovation block = prepare(landmark, &v);
@@ -165,12 +86,11 @@ double slam::marker_nis(const context &at, int landmark, const marker_reading &r
 }
 
 // For the search of the pose.
-slam::planar_observation slam::observation_of(const wm_marker &m, const marker_reading &r) const {
-  const double floor_m = std::sqrt(square(r.level[0]) + square(r.level[1]));
-  return {.bearing_rad = floor_m > kNoDirection_m ? atan2(r.along[1], r.along[0]) : std::nan(""),
-          .range_m = floor_m / errors_of(m.sensor)[kRangeScale],
+slam::planar_observation slam::observation_of(const wm_marker &m, const tag_reading &r) const {
+  return {.bearing_rad = r.floor_m > kNoDirection_m ? atan2(r.along[1], r.along[0]) : std::nan(""),
+          .range_m = r.floor_m / errors_of(m.sensor)[kRangeScale],
           .heading_rad = r.has_heading ? wrap(sensor_[m.sensor].yaw_rad + r.yaw_rad) : std::nan(""),
-          .bearing_sigma_rad = std::sqrt(r.noise[1]) / larger(floor_m, kNoDirection_m),
+          .bearing_sigma_rad = std::sqrt(r.noise[1]) / larger(r.floor_m, kNoDirection_m),
           .range_sigma_m = std::sqrt(r.noise[0]),
           .heading_sigma_rad = std::sqrt(r.noise[2])};
 }
@@ -178,7 +98,7 @@ slam::planar_observation slam::observation_of(const wm_marker &m, const marker_r
 // The rows along and across the line of sight and of the heading. The line of sight is the measured one: u is the
 // landmark in the sensor's frame, a' u its component along a, with a the unit vector along or across.
 // `error_state`: of the time-correlated errors along and of the heading; -1: they count as noise.
-void slam::expect_marker(const context &at, const marker_reading &r, const wm_pose2 &place, int error_state,
+void slam::expect_marker(const context &at, const tag_reading &r, const wm_pose2 &place, int error_state,
                          landmark_rows *out) const {
   static constexpr wm_residual kKinds[3] = {WM_RESIDUAL_X, WM_RESIDUAL_Y, WM_RESIDUAL_HEADING};
   const sensor_errors errors = errors_of(at.sensor);
@@ -231,7 +151,7 @@ void slam::expect_marker(const context &at, const marker_reading &r, const wm_po
 }
 
 // The time-correlated share of the errors along and of the heading is a state of this sensor and marker.
-void slam::carry_marker_errors(const marker_reading &r, int error_state, landmark_rows *out) const {
+void slam::carry_marker_errors(const tag_reading &r, int error_state, landmark_rows *out) const {
   for (int k = 0; k < 3; k += 2) {
     const int state = error_state + k / 2;
     const double size = params_.marker_correlated * std::sqrt(r.noise[k]), error = size * joint_.value(state);
@@ -242,7 +162,7 @@ void slam::carry_marker_errors(const marker_reading &r, int error_state, landmar
   }
 }
 
-void slam::fuse_known_marker(const context &at, const wm_marker &m, const marker_reading &r, int landmark) {
+void slam::fuse_known_marker(const context &at, const wm_marker &m, const tag_reading &r, int landmark) {
   landmark_rows v;
   expect_known_marker(at, r, landmark, r.has_heading ? 3 : 2, &v);
   innovation block = prepare(landmark, &v);
@@ -264,7 +184,7 @@ void slam::fuse_known_marker(const context &at, const wm_marker &m, const marker
   if (may_change) fuse_height(landmark, at.sensor, r);
 }
 
-wm_verdict slam::join_marker(const context &at, const marker_reading &r) {
+wm_verdict slam::join_marker(const context &at, const tag_reading &r) {
   if (!make_room()) return WM_REJECTED_NO_ASSOCIATION;
   const double scale = errors_of(at.sensor)[kRangeScale];
   const wm_pose2 there = compose(sensor_pose(at.sensor, at.past), {r.level[0] / scale, r.level[1] / scale, r.yaw_rad});
@@ -287,7 +207,7 @@ wm_verdict slam::join_marker(const context &at, const marker_reading &r) {
 // unknown and the same each time, so each observation is compared with the mean of those before, z - mean z = pitch (x
 // - mean x) - roll (y - mean y). Its noise (1 + 1/n) sigma^2 is independent of theirs (Helmert's transform of a
 // regression with a constant). One row more, O(n^2); none once it carries little information.
-void slam::fuse_height(int landmark, int sensor, const marker_reading &r) {
+void slam::fuse_height(int landmark, int sensor, const tag_reading &r) {
   const int roll = slots_.at(sensor, kRoll), pitch = slots_.at(sensor, kPitch);
   landmark_note &marker = note(landmark);
   if (roll < 0) return;

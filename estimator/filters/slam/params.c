@@ -22,13 +22,7 @@ static const wm_param kParams[] = {
     POSITION_STATE_ROWS(gnss),
     POSITION_NOISE_ROWS(gnss),
     PLANAR_POSITION_ROWS(gnss),
-    F64("markers.sigma_m", marker_sigma_m, 0.002, 1e-5, 10,
-        "Sigma of a marker's place, m; the sensor's sigmas, along and across, are added in squares."),
-    F64("markers.sigma_rel", marker_sigma_rel, 0, 0, 1, "The same as a part of the distance."),
-    F64("markers.bearing_sigma_rad", marker_bearing_sigma_rad, 0.001, 1e-5, 3,
-        "Sigma of a marker's direction where the sensor gives none, rad: half a pixel of a camera with a focal length "
-        "of 500 pixels."),
-    F64("markers.heading_sigma_rad", marker_heading_sigma_rad, 0.02, 1e-5, 3, "Sigma of a marker's heading, rad."),
+    MARKER_ROWS(markers),
     F64("markers.stamp_sigma_s", marker_stamp_sigma_s, 0, 0, 1,
         "Sigma of a picture's stamp as noise of each marker, s; at 1 rad/s it is so many rad across."),
     F64("markers.correlated", marker_correlated, 0, 0, 0.99,
@@ -36,9 +30,6 @@ static const wm_param kParams[] = {
         "corners, "
         "light, its bend), with the time constant sightings.correlated.tau_s; needs sightings.correlated.slots. 0: all "
         "of it is independent."),
-    F64("markers.heading_most_rad", marker_heading_most_rad, 10, 1e-5, 10,
-        "Largest sigma of a marker's heading that is fused, rad. Seen small and nearly face on, a marker's heading is "
-        "biased by several degrees for as long as it is seen so."),
     ENUM("landmarks.map", map, WM_SLAM_MAP_NONE, WM_SLAM_MAP_FROZEN, kMaps,
          "Use of landmarks.csv. none: not used; extend: its landmarks are in the state from the start, with their "
          "covariance, and new ones join; frozen: they are considered, not corrected, and only the robot is located."),

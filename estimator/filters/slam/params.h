@@ -5,6 +5,7 @@
 
 #include <stdint.h>
 
+#include "filters/core/marker_params.h"
 #include "filters/core/position_params.h"
 #include "waymark/params.h"
 
@@ -21,8 +22,8 @@ typedef struct wm_slam_params {
   double wheel_slip_sigma, wheel_slip_tau_s;  // the wheels' scales wander about their means
   double sensor_stamp_sigma_s;                // of each picture's stamp
   // coded markers
-  double marker_sigma_m, marker_sigma_rel, marker_bearing_sigma_rad, marker_heading_sigma_rad, marker_stamp_sigma_s,
-      marker_correlated, marker_heading_most_rad;
+  wm_marker_params markers;
+  double marker_stamp_sigma_s, marker_correlated;
   // landmarks
   int32_t map, landmark_capacity;
   int32_t confirm_seen;

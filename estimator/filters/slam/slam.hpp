@@ -7,6 +7,7 @@
 
 #include "aid/frame_fit.hpp"
 #include "aid/position.hpp"
+#include "aid/tag.hpp"
 #include "filters/core/gate.hpp"
 #include "filters/core/landmark_evidence.hpp"
 #include "filters/core/lifecycle.hpp"
@@ -25,7 +26,7 @@
 
 namespace wm {
 
-inline constexpr int kSlamSensors = 8;       // capacity
+inline constexpr int kSlamSensors = 8;  // capacity
 // Observations of each of two lines that may be one (lines.rejoin): a false line rarely lasts a second. Not swept.
 inline constexpr uint32_t kMergeSeen = 10;
 // An identity that was unseen for so long and comes back is the landmark's own: a tracker bridges a few pictures. Two
@@ -160,16 +161,6 @@ class slam {
     double bearing_rad, given_sigma_rad, sigma_rad, correlated_rad;
     unsigned exact;  // states of the sensor, as sensor_slots::at()
   };
-  // A marker in levelled axes along the sensor's yaw.
-  struct marker_reading {
-    double level[3], along[2];  // place; unit vector towards it on the floor
-    double nominal[3];          // the place by the camera's roll and pitch of calibration.yaml
-    double yaw_rad, z_m;
-    double noise[3];  // variances along, across, of the heading
-    double z_noise;   // of its height
-    double length_m;
-    bool has_heading;  // false: ambiguous, or not accurate enough
-  };
   // A landmark as seen from the sensor: its distance, and the variances along and across the line of sight.
   struct relative_place {
     double distance_m, along_m2, across_m2, along_across_m2;
@@ -288,17 +279,18 @@ class slam {
 
   // markers.cpp
   wm_status fuse_marker(const wm_event &event, record_list records);
-  marker_reading read_marker(const wm_marker &m, const double p_m[3], double yaw_rad) const;
-  marker_reading choose_pose(const context &at, const wm_marker &m, const marker_reading &first, int landmark);
-  planar_observation observation_of(const wm_marker &m, const marker_reading &r) const;
-  void expect_known_marker(const context &at, const marker_reading &r, int landmark, int count, landmark_rows *out);
-  double marker_nis(const context &at, int landmark, const marker_reading &r);
-  void expect_marker(const context &at, const marker_reading &r, const wm_pose2 &place, int error_state,
+  tag_reading read_marker(const wm_marker &m, bool second) const {
+    return read_tag(m, second, sensor_[m.sensor], errors_of(m.sensor), sightings(), params_.markers);
+  }
+  planar_observation observation_of(const wm_marker &m, const tag_reading &r) const;
+  void expect_known_marker(const context &at, const tag_reading &r, int landmark, int count, landmark_rows *out);
+  double marker_nis(const context &at, int landmark, const tag_reading &r);
+  void expect_marker(const context &at, const tag_reading &r, const wm_pose2 &place, int error_state,
                      landmark_rows *out) const;
-  void carry_marker_errors(const marker_reading &r, int error_state, landmark_rows *out) const;
-  void fuse_known_marker(const context &at, const wm_marker &m, const marker_reading &r, int landmark);
-  wm_verdict join_marker(const context &at, const marker_reading &r);
-  void fuse_height(int landmark, int sensor, const marker_reading &r);
+  void carry_marker_errors(const tag_reading &r, int error_state, landmark_rows *out) const;
+  void fuse_known_marker(const context &at, const wm_marker &m, const tag_reading &r, int landmark);
+  wm_verdict join_marker(const context &at, const tag_reading &r);
+  void fuse_height(int landmark, int sensor, const tag_reading &r);
 
   // positions.cpp
   void begin_frame();

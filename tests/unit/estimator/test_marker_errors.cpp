@@ -99,7 +99,7 @@ void setUp(void) {
   slam = wm_estimator_find("slam");
   make::exact_sensors(&motion);
   wm_params_defaults(&slam->params, &params);
-  params.marker_sigma_m = kPlace_m;
+  params.markers.sigma_m = kPlace_m;
   motion.noise_yaw_rate_radps = kGyro_radps * std::sqrt(0.02);
   motion.noise_yaw_rate_rel = 0;
   sensor = make::sensor("camera", NAN, NAN);

@@ -74,7 +74,7 @@ void test_a_measured_twist_at_standstill_gives_the_bias(void) {
 
 void test_coded_markers_give_place_and_heading_at_once(void) {
   coded = true;
-  params.marker_heading_sigma_rad = 0.01;
+  params.markers.heading_sigma_rad = 0.01;
   begin();
   drive(40);
   size_t found;
@@ -112,7 +112,7 @@ void test_absurd_markers_are_refused_and_change_nothing(void) {
 
 void test_of_two_poses_the_one_is_taken_that_fits_the_map(void) {
   coded = true;
-  params.marker_heading_sigma_rad = 0.01;
+  params.markers.heading_sigma_rad = 0.01;
   begin();
   drive(20);
   two_poses = true;
@@ -270,7 +270,7 @@ void test_a_robot_that_was_turned_does_not_turn_its_map(void) {
     leave_room();
     make_room();
     coded = true;
-    params.marker_heading_sigma_rad = 0.01;
+    params.markers.heading_sigma_rad = 0.01;
     begin();
     drive(30.0);
     truth.heading_rad = wm::wrap(truth.heading_rad + turn_rad);
@@ -293,7 +293,7 @@ void test_bearings_beside_markers_do_not_hide_that_the_robot_was_turned(void) {
     leave_room();
     make_room();
     coded = true;
-    params.marker_heading_sigma_rad = 0.01;
+    params.markers.heading_sigma_rad = 0.01;
     begin();
     drive(30.0);
     truth.heading_rad = wm::wrap(truth.heading_rad + 0.3);
@@ -322,7 +322,7 @@ void test_bearings_beside_markers_do_not_hide_that_the_robot_was_turned(void) {
 // Two markers of five or six in view are turned by somebody, alike: the others say that it wasn't the robot.
 void test_markers_that_were_turned_do_not_turn_the_robot(void) {
   coded = true;
-  params.marker_heading_sigma_rad = 0.01;
+  params.markers.heading_sigma_rad = 0.01;
   begin();
   drive(30.0);
   turned[4] = turned[5] = 0.3;
