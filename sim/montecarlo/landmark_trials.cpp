@@ -15,16 +15,9 @@
 namespace wm::montecarlo {
 namespace {
 
-constexpr double kDegree = sim::kPi / 180, kLook_s = 0.1;
+constexpr double kDegree = sim::kPi / 180;
 constexpr double kDriving_mps = 0.3, kWayAhead_s = 7, kCarried_m = 5;
 constexpr uint64_t kPlaces = 0x1a7d;  // stream of random numbers
-
-void check(wm_status status, const wm_error &error, const char *what) {
-  if (status != WM_OK)
-    throw tools::Failure(std::string(what) + ": " + (error.text[0] ? error.text : wm_status_text(status)));
-}
-
-double seconds(const sim::Recording &r, wm_time_ns t_ns) { return 1e-9 * static_cast<double>(t_ns - r.clock_start_ns); }
 
 // Identities by how often they are seen rightly, most often first.
 std::vector<int32_t> seen_most(const sim::Recording &r) {
@@ -57,33 +50,17 @@ struct Judge {
 
   Sample look(const wm_estimate &e) const {
     const double t_s = seconds(recording, e.t_ns);
-    const sim::State truth = recording.drive.at(t_s);
-    const Eigen::Vector3d error(truth.x_m - e.pose_map_base.p_m[0], truth.y_m - e.pose_map_base.p_m[1],
-                                sim::wrap(truth.heading_rad - e.heading_rad));
-    const int axes[3] = {0, 1, 5};
-    Eigen::Matrix3d covariance;
-    for (int i = 0; i < 3; i++)
-      for (int j = 0; j < 3; j++) covariance(i, j) = e.covariance[wm_cov_index(axes[i], axes[j])];
+    const PlanarError error = error_of(e, recording.drive.at(t_s));
     Sample s{};
     s.t_s = t_s - from_s;
-    s.error_m = error.head<2>().norm();
-    s.error_rad = std::fabs(error[2]);
-    s.nees = error.dot(covariance.ldlt().solve(error));
+    s.error_m = error.position_m();
+    s.error_rad = error.heading_rad();
+    s.nees = error.nees();
     s.tracking = e.state == WM_STATE_TRACKING || e.state == WM_STATE_DEAD_RECKONING;
     s.lost_probability = e.lost_probability;
     return s;
   }
 };
-
-double longest(const std::vector<Sample> &samples, bool (*is)(const Sample &)) {
-  double since = NAN, most = 0;
-  for (const Sample &s : samples) {
-    if (!is(s)) since = NAN;
-    if (is(s) && std::isnan(since)) since = s.t_s - kLook_s;
-    if (is(s)) most = std::max(most, s.t_s - since);
-  }
-  return most;
-}
 
 bool right(const Sample &s) { return s.tracking && s.error_m < 0.3 && s.error_rad < 5 * kDegree; }
 bool confidently_wrong(const Sample &s) {
@@ -198,14 +175,14 @@ LandmarkOutcome run_landmark_trial(LandmarkWorld &world, const wm_config &config
   if (trial.start) {
     begin_s = moving_at(recording, 2, 0, recording.duration_s - kWayAhead_s).value_or(0);
     from_s = begin_s;
-    wm_start &start = filter.start();
+    wm_start &start = filter.setup().start;
     start.p_m[0] = start.p_m[1] = start.heading_rad = NAN;
   }
   if (trial.start_off_m > 0) {
     const double direction = 2 * sim::kPi * wm_random_uniform(recording.seed, kPlaces + 3, 0);
-    filter.start().p_m[0] += trial.start_off_m * std::cos(direction);
-    filter.start().p_m[1] += trial.start_off_m * std::sin(direction);
-    filter.start().sigma_xy_m = 0.05;
+    filter.setup().start.p_m[0] += trial.start_off_m * std::cos(direction);
+    filter.setup().start.p_m[1] += trial.start_off_m * std::sin(direction);
+    filter.setup().start.sigma_xy_m = 0.05;
   }
   check(filter.init(&error), error, "init");
 
@@ -224,8 +201,7 @@ LandmarkOutcome run_landmark_trial(LandmarkWorld &world, const wm_config &config
       out.moved_seen += e.kind == WM_EVENT_SIGHTING && std::find(recording.moved.begin(), recording.moved.end(),
                                                                  e.as.sighting.landmark_id) != recording.moved.end();
     }
-    wm_estimate estimate{};
-    filter.ops().estimate(filter.state(), &estimate);
+    const wm_estimate estimate = filter.estimate();
     const bool astray = estimate.state == WM_STATE_LOST || estimate.state == WM_STATE_SEARCHING;
     if (trial.kidnap && astray && !out.detected_after_s && t_s >= first_view_s)
       out.detected_after_s = t_s - first_view_s;
@@ -242,9 +218,11 @@ LandmarkOutcome run_landmark_trial(LandmarkWorld &world, const wm_config &config
   std::vector<Sample> judged = out.outcome.samples;
   if (trial.kidnap && out.detected_after_s)
     std::erase_if(judged, [&](const Sample &s) { return from_s + s.t_s < first_view_s + *out.detected_after_s; });
+  // From the look before the first one on.
   out.wrong_s = longest(judged, confidently_wrong);
+  if (std::any_of(judged.begin(), judged.end(), confidently_wrong)) out.wrong_s += kLook_s;
   if (trial.start || trial.kidnap) out.right_after_s = driven_until_right(recording, from_s, out.outcome.samples);
-  const wm_counter moved = filter.counter(WM_COUNTER_LANDMARKS_MOVED);
+  const wm_counter moved = filter.counter(WM_COUNTER_LANDMARKS_MOVED).value_or(wm_counter{0, -1, 0});
   out.reported_moved = static_cast<double>(moved.count);
   const int32_t last = moved.landmark_id;
   out.rightly_named =

@@ -31,7 +31,7 @@ const std::vector<LandmarkTrial> &landmark_trials();
 // One seed's world: drawn once, then driven with one trial or another.
 class LandmarkWorld {
  public:
-  // Throws tools::Failure where the scenario doesn't fit.
+  // Throws where the scenario doesn't fit.
   LandmarkWorld(const sim::Scenario &scenario, uint64_t seed);
   [[nodiscard]] const sim::Recording &as_driven() const { return driven_; }
   // With the trial's faults; `at_s`: when it was carried off.
@@ -63,7 +63,7 @@ struct LandmarkOutcome {
   double rms_m = 0, rms_deg = 0;
 };
 
-// Throws tools::Failure where the estimator can't work with the drive.
+// Throws where the estimator can't work with the drive.
 LandmarkOutcome run_landmark_trial(LandmarkWorld &world, const wm_config &config, const LandmarkTrial &trial);
 
 }  // namespace wm::montecarlo

@@ -61,7 +61,7 @@ def pose_of(a, run, drive):
 
 
 def bound_of(a, scenario, run, drive):
-    return json.loads(call(a.bin / "waymark-montecarlo-bound", scenario, run, drive))
+    return json.loads(call(a.bin / "waymark-montecarlo", scenario, "--run", run, "--recording", drive))
 
 
 def seen_most(run):

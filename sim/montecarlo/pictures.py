@@ -9,7 +9,7 @@ all: as driven, set down elsewhere, started anywhere, set down where it looks th
 example: sim/montecarlo/pictures.py config/worlds/corridor-hard.yaml --config config/datasets/corridor.yaml --cache out/drives --drives 100
 A drive of 120 s takes about 20 s of processor to render at 640x360 and 5 Hz, one ray a pixel, and 4.5 MB to keep. Drives
 that are in the cache are reused: stop it and go on at will; another detector wants another cache. Options behind --
-go to waymark-montecarlo-edges (--trials kidnap, --diagram lost.svg, --scans scans.csv, --quiet ...)."""
+go to waymark-montecarlo (--trials kidnap, --diagram lost.svg, --csv looks.csv, --each ...)."""
 import argparse
 import pathlib
 import re
@@ -75,7 +75,7 @@ def main():
         left = f", {(time.monotonic() - begun) / done * (len(missing) - done) / 60:.0f} min left" if done else ""
         print(f"rendering seed {seed}, {done + 1} of {len(missing)}{left}", file=sys.stderr, flush=True)
         make_drive(a, scenario, seed, a.cache / str(seed))
-    command = [a.bin / "waymark-montecarlo-edges", a.cache, "--config", a.config, *rest]
+    command = [a.bin / "waymark-montecarlo", a.cache, "--config", a.config, *rest]
     sys.exit(subprocess.run([str(c) for c in command]).returncode)
 
 

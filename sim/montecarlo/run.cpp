@@ -15,20 +15,15 @@ namespace {
 
 // Adds the error of a pose to its step, and to the sums of its drive.
 void judge(const wm_estimate &estimate, const sim::State &truth, Step &step, Run &run) {
-  Eigen::Vector3d error(truth.x_m - estimate.pose_map_base.p_m[0], truth.y_m - estimate.pose_map_base.p_m[1],
-                        sim::wrap(truth.heading_rad - estimate.heading_rad));
-  const int axes[3] = {0, 1, 5};
-  Eigen::Matrix3d cov;
-  for (int i = 0; i < 3; i++)
-    for (int j = 0; j < 3; j++) cov(i, j) = estimate.covariance[wm_cov_index(axes[i], axes[j])];
-  const double position_sq_m2 = error.head<2>().squaredNorm(), nees = error.dot(cov.ldlt().solve(error));
+  const PlanarError error = error_of(estimate, truth);
+  const double position_sq_m2 = error.off.head<2>().squaredNorm(), nees = error.nees(), turned = error.off[2];
   step.runs++;
   step.position_sq_m2 += position_sq_m2;
-  step.heading_sq_rad2 += error[2] * error[2];
+  step.heading_sq_rad2 += turned * turned;
   step.nees += nees;
   run.position_rms_m += position_sq_m2;
   run.position_max_m = std::fmax(run.position_max_m, std::sqrt(position_sq_m2));
-  run.rotation_rms_rad += error[2] * error[2];
+  run.rotation_rms_rad += turned * turned;
   run.nees_mean += nees;
 }
 

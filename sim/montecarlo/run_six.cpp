@@ -7,6 +7,7 @@
 #include <map>
 #include <memory>
 
+#include "montecarlo/look.h"
 #include "montecarlo/six.h"
 #include "simulate/simulate.h"
 
@@ -120,10 +121,6 @@ namespace {
 
 constexpr size_t kPoints = 1024;
 
-struct alignas(64) Block {
-  char bytes[64];
-};
-
 // A point of the state, as it was last.
 struct Point {
   Eigen::Vector3d p;
@@ -145,29 +142,21 @@ void judge_points(const std::map<int32_t, Point> &points, const std::vector<wm_l
   }
 }
 
-// The estimator of the configuration for a drive, as it begins.
-struct Begun {
-  wm_rig rig;
-  wm_setup setup{};
-  std::unique_ptr<Block[]> memory;
-
-  wm_status begin(const sim::Scenario &scenario, const wm_config &config, const sim::Recording &recording,
-                  wm_error *err) {
-    rig = rig_of(scenario);
-    setup = setup_of(scenario, config, recording, &rig);
-    setup.sensors = recording.sensors.data();
-    setup.sensor_count = recording.sensors.size();
-    setup.landmarks = recording.map.data();
-    setup.landmark_count = recording.map.size();
-    const wm_estimator &ops = *config.estimator;
-    const char *why = "";
-    const size_t bytes = ops.state_bytes(config.estimator_params, &setup, &why);
-    if (bytes == 0) return wm_fail(err, WM_BAD_CONFIG, "%s: %s", ops.name, why);
-    memory = std::make_unique<Block[]>(bytes / sizeof(Block) + 1);
-    if (const wm_status s = ops.init(memory.get(), config.estimator_params, &setup); s != WM_OK)
-      return wm_fail(err, s, "%s: init: %s", ops.name, wm_status_text(s));
-    return WM_OK;
+// The estimator of the configuration for a drive in space.
+class SpaceFilter : public Filter {
+ public:
+  SpaceFilter(const sim::Scenario &scenario, const wm_config &config, const sim::Recording &recording)
+      : Filter(config), rig_(rig_of(scenario)) {
+    wm_setup &s = setup();
+    s = setup_of(scenario, config, recording, &rig_);
+    s.sensors = recording.sensors.data();
+    s.sensor_count = recording.sensors.size();
+    s.landmarks = recording.map.data();
+    s.landmark_count = recording.map.size();
   }
+
+ private:
+  wm_rig rig_;
 };
 
 // Variances of a pose by component (Step6).
@@ -195,9 +184,9 @@ wm_status add_bound(const sim::Scenario &scenario, const wm_config &config, uint
   recording.start.sigma_xy_m = real.start.sigma_xy_m;
   recording.start.sigma_heading_rad = real.start.sigma_heading_rad;
   recording.sensors = real.sensors;  // without errors, but with the noise that is stated
-  Begun begun;
-  if (const wm_status s = begun.begin(scenario, config, recording, err); s != WM_OK) return s;
-  const wm_estimator &ops = *config.estimator;
+  SpaceFilter begun(scenario, config, recording);
+  if (const wm_status s = begun.init(err); s != WM_OK) return s;
+  const wm_estimator &ops = begun.ops();
   size_t next = 0;
   for (const wm_event &e : events_of(recording)) {
     const double event_s = static_cast<double>(e.t_ns - recording.clock_start_ns) * 1e-9;
@@ -205,12 +194,11 @@ wm_status add_bound(const sim::Scenario &scenario, const wm_config &config, uint
     if (!wm_event_is_motion(&e)) {
       wm_innovation innovations[WM_INNOVATIONS_PER_EVENT_MAX];
       size_t count = 0;
-      (void)ops.correct(begun.memory.get(), &e, innovations, WM_INNOVATIONS_PER_EVENT_MAX, &count);
+      (void)ops.correct(begun.state(), &e, innovations, WM_INNOVATIONS_PER_EVENT_MAX, &count);
       continue;
     }
     if (next < out.steps.size() && event_s > out.steps[next].t_s + 1e-6) {
-      wm_estimate estimate{};
-      ops.estimate(begun.memory.get(), &estimate);
+      const wm_estimate estimate = begun.estimate();
       Step6 &step = out.steps[next++];
       for (int i = 0; i < 3; i++) {
         step.bound_position_sq_m2 += estimate.covariance[wm_cov_index(i, i)];
@@ -218,7 +206,7 @@ wm_status add_bound(const sim::Scenario &scenario, const wm_config &config, uint
       }
       add_variances(estimate, step.bound);
     }
-    (void)ops.predict(begun.memory.get(), &e);
+    (void)ops.predict(begun.state(), &e);
   }
   out.bounds++;
   return WM_OK;
@@ -226,10 +214,10 @@ wm_status add_bound(const sim::Scenario &scenario, const wm_config &config, uint
 
 wm_status run_one(const sim::Scenario &scenario, const wm_config &config, const sim::Recording &recording,
                   const Options6 &options, Statistics6 &out, wm_error *err) {
-  Begun begun;
-  if (const wm_status s = begun.begin(scenario, config, recording, err); s != WM_OK) return s;
-  const wm_estimator &ops = *config.estimator;
-  void *state = begun.memory.get();
+  SpaceFilter begun(scenario, config, recording);
+  if (const wm_status s = begun.init(err); s != WM_OK) return s;
+  const wm_estimator &ops = begun.ops();
+  void *state = begun.state();
 
   for (const sim::StereoSeen &s : recording.stereo) out.outliers += s.outlier;
   std::map<int32_t, Point> points;
@@ -259,8 +247,7 @@ wm_status run_one(const sim::Scenario &scenario, const wm_config &config, const 
     }
     // Before the motion that takes it on: with everything of the stamp before.
     if (next < out.steps.size() && event_s > out.steps[next].t_s + 1e-6) {
-      wm_estimate estimate{};
-      ops.estimate(state, &estimate);
+      const wm_estimate estimate = begun.estimate();
       Step6 &step = out.steps[next++];
       if (ops.landmarks) {
         const size_t n = ops.landmarks(state, listed.data(), reinterpret_cast<double(*)[4]>(covs.data()), kPoints);

@@ -109,44 +109,29 @@ wm_status make_events(const sim::Recording &recording, std::vector<SmallEvent> &
 }
 
 SimulatedFilter::SimulatedFilter(const wm_config &config, const sim::Recording &recording, const wm_wheels &wheels)
-    : estimator_(config.estimator), config_(config) {
-  setup_.motion = config.motion;
-  setup_.sightings = config.sightings;
-  setup_.wheels = wheels;
-  setup_.sensors = recording.sensors.data();
-  setup_.sensor_count = recording.sensors.size();
-  setup_.landmarks = recording.map.data();
-  setup_.landmark_count = recording.map.size();
-  setup_.start = recording.start;
-  setup_.seed = recording.seed;
-}
-
-wm_status SimulatedFilter::init(wm_error *err) {
-  const char *why = "";
-  const size_t bytes = estimator_->state_bytes(config_.estimator_params, &setup_, &why);
-  if (bytes == 0) return wm_fail(err, WM_BAD_CONFIG, "%s: %s", estimator_->name, why);
-  memory_ = std::make_unique<Block[]>((bytes + sizeof(Block) - 1) / sizeof(Block));
-  const wm_status status = estimator_->init(state(), config_.estimator_params, &setup_);
-  return status == WM_OK ? status : wm_fail(err, status, "%s: init: %s", estimator_->name, wm_status_text(status));
+    : Filter(config) {
+  wm_setup &s = setup();
+  s.wheels = wheels;
+  s.sensors = recording.sensors.data();
+  s.sensor_count = recording.sensors.size();
+  s.landmarks = recording.map.data();
+  s.landmark_count = recording.map.size();
+  s.start = recording.start;
+  s.seed = recording.seed;
 }
 
 std::span<const wm_innovation> SimulatedFilter::take(const wm_event &event) {
   size_t count = 0;
   const wm_status status = wm_event_is_motion(&event)
-                               ? estimator_->predict(state(), &event)
-                               : estimator_->correct(state(), &event, innovations_.data(), innovations_.size(), &count);
-  if (status != WM_OK) throw std::runtime_error(std::string(estimator_->name) + ": " + wm_status_text(status));
+                               ? ops().predict(state(), &event)
+                               : ops().correct(state(), &event, innovations_.data(), innovations_.size(), &count);
+  if (status != WM_OK) throw std::runtime_error(std::string(ops().name) + ": " + wm_status_text(status));
   return {innovations_.data(), count};
 }
 
-wm_counter SimulatedFilter::counter(wm_counter_kind kind) const {
-  wm_counter all[WM_HEALTH_COUNTERS_MAX];
-  const size_t count = estimator_->counters
-                           ? std::min<size_t>(std::size(all), estimator_->counters(memory_.get(), all, std::size(all)))
-                           : 0;
-  for (size_t i = 0; i < count; i++)
-    if (all[i].kind == static_cast<uint32_t>(kind)) return all[i];
-  return {static_cast<uint32_t>(kind), -1, 0};
+void check(wm_status status, const wm_error &error, const char *what) {
+  if (status != WM_OK)
+    throw std::runtime_error(std::string(what) + ": " + (error.text[0] ? error.text : wm_status_text(status)));
 }
 
 }  // namespace wm::montecarlo

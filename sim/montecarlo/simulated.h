@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "config/config.h"
+#include "montecarlo/look.h"
 #include "simulate/simulate.h"
 #include "waymark/estimator.h"
 #include "waymark/event.h"
@@ -32,29 +33,24 @@ class SmallEvent {
 // The recording's data as events, in the order in which the merge would hand them on: by stamp, motion first.
 wm_status make_events(const sim::Recording &recording, std::vector<SmallEvent> &out, wm_error *err);
 
-// One estimator with its memory. Keeps references to all that it is made of.
-class SimulatedFilter {
+// The estimator for a simulated drive on the plane.
+class SimulatedFilter : public Filter {
  public:
   SimulatedFilter(const wm_config &config, const sim::Recording &recording, const wm_wheels &wheels);
-  wm_status init(wm_error *err);
-  void *state() { return memory_.get(); }
-  const wm_estimator &ops() const { return *estimator_; }
   // Takes one event. Motion gives no innovations; the others give at most WM_INNOVATIONS_PER_EVENT_MAX, valid until the
   // next call. Throws std::runtime_error where the estimator refuses the event: a simulated drive has no invalid data.
   std::span<const wm_innovation> take(const wm_event &event);
-  wm_start &start() { return setup_.start; }  // before init()
-  // The counter of this kind; of count 0 where the estimator has none.
-  wm_counter counter(wm_counter_kind kind) const;
 
  private:
-  struct alignas(64) Block {
-    char bytes[64];
-  };
-  const wm_estimator *estimator_;
-  const wm_config &config_;
-  wm_setup setup_ = {};
-  std::unique_ptr<Block[]> memory_;
   std::array<wm_innovation, WM_INNOVATIONS_PER_EVENT_MAX> innovations_;
 };
+
+// Time of the drive.
+inline double seconds(const sim::Recording &r, wm_time_ns t_ns) {
+  return 1e-9 * static_cast<double>(t_ns - r.clock_start_ns);
+}
+
+// Throws std::runtime_error where it failed; `what` was to be done.
+void check(wm_status status, const wm_error &error, const char *what);
 
 }  // namespace wm::montecarlo

@@ -18,20 +18,13 @@
 namespace wm::montecarlo {
 namespace {
 
-constexpr double kDegree = sim::kPi / 180, kLook_s = 0.1;
+constexpr double kDegree = sim::kPi / 180;
 constexpr double kAhead_s = 25;         // of the drive behind the cut
 constexpr double kForgotten_s = 1;      // a tracker gives a new number after this time
 constexpr double kMapSigma_m = 0.02;    // of a finished map
 constexpr double kMapTurn_rad = 0.005;  // and of its markers' headings
 constexpr uint64_t kDraws = 0x51a3;     // stream of random numbers
 constexpr double kNear_m = 0.5;         // renumbered: a landmark is the nearest true one's, up to this
-
-void check(wm_status status, const wm_error &error, const char *what) {
-  if (status != WM_OK)
-    throw tools::Failure(std::string(what) + ": " + (error.text[0] ? error.text : wm_status_text(status)));
-}
-
-double seconds(const sim::Recording &r, wm_time_ns t_ns) { return 1e-9 * static_cast<double>(t_ns - r.clock_start_ns); }
 
 bool is_jump(Disturbance d, double away_m, double turned_rad) {
   if (d == Disturbance::kKidnap) return away_m > 2;
@@ -131,17 +124,12 @@ struct Look {
 Look look_at(const sim::Recording &r, const wm_estimate &e) {
   Look out{};
   out.t_s = seconds(r, e.t_ns);
-  const sim::State truth = r.drive.at(out.t_s);
-  const Eigen::Vector3d error(truth.x_m - e.pose_map_base.p_m[0], truth.y_m - e.pose_map_base.p_m[1],
-                              sim::wrap(truth.heading_rad - e.heading_rad));
-  const int axes[3] = {0, 1, 5};
-  Eigen::Matrix3d covariance;
-  for (int i = 0; i < 3; i++)
-    for (int j = 0; j < 3; j++) covariance(i, j) = e.covariance[wm_cov_index(axes[i], axes[j])];
-  out.error_m = error.head<2>().norm();
-  out.error_rad = std::fabs(error[2]);
-  out.place_nees = error.head<2>().dot(covariance.topLeftCorner<2, 2>().ldlt().solve(error.head<2>()));
-  out.nees = error.dot(covariance.ldlt().solve(error));
+  const PlanarError error = error_of(e, r.drive.at(out.t_s));
+  const auto place = error.off.head<2>();
+  out.error_m = error.position_m();
+  out.error_rad = error.heading_rad();
+  out.place_nees = place.dot(error.covariance.topLeftCorner<2, 2>().ldlt().solve(place));
+  out.nees = error.nees();
   out.state = static_cast<wm_state>(e.state);
   return out;
 }
@@ -159,27 +147,6 @@ double map_error(const sim::Recording &r, SimulatedFilter &filter, bool by_ident
     if (least < 1e8) sum += least * least, count++;
   }
   return count > 0 ? std::sqrt(sum / static_cast<double>(count)) : tools::kNan;
-}
-
-double longest_wrong(const std::vector<Look> &looks) {
-  double since = NAN, most = 0;
-  for (const Look &l : looks) {
-    if (!l.wrong()) since = NAN;
-    if (l.wrong() && std::isnan(since)) since = l.t_s;
-    if (l.wrong()) most = std::max(most, l.t_s - since);
-  }
-  return most;
-}
-
-std::optional<double> right_after(const std::vector<Look> &looks, double cut_s) {
-  double since = NAN;
-  for (const Look &l : looks) {
-    if (l.t_s < cut_s) continue;
-    if (!l.right()) since = NAN;
-    if (l.right() && std::isnan(since)) since = l.t_s;
-    if (l.t_s - since >= 2) return since - cut_s;
-  }
-  return std::nullopt;
 }
 
 // When enough was seen since the cut to notice it.
@@ -231,8 +198,9 @@ void judge(const std::vector<Look> &looks, double enough_s, SlamOutcome &out) {
       out.detected_after_s = l.t_s - enough_s;
       break;
     }
-  out.right_after_s = right_after(looks, out.cut_s);
-  out.wrong_s = longest_wrong(looks);
+  const auto right = [&out](const Look &l) { return l.t_s >= out.cut_s && l.right(); };
+  if (const Look *since = first_lasting(looks, 2, right)) out.right_after_s = since->t_s - out.cut_s;
+  out.wrong_s = longest(looks, [](const Look &l) { return l.wrong(); });
   out.end_m = looks.empty() ? tools::kNan : looks.back().error_m;
 }
 
@@ -266,7 +234,7 @@ SlamOutcome run_slam_trial(const sim::Scenario &scenario, const wm_config &confi
   std::vector<SmallEvent> events;
   check(make_events(recording, events, &error), error, "events");
   SimulatedFilter filter(changed, recording, scenario.robot.wheels);
-  wm_start &start = filter.start();
+  wm_start &start = filter.setup().start;
   if (!begun) start.p_m[0] = start.p_m[1] = start.heading_rad = NAN;
   check(filter.init(&error), error, "init");
 
@@ -292,8 +260,7 @@ SlamOutcome run_slam_trial(const sim::Scenario &scenario, const wm_config &confi
       if (options.renumber) *id = numbers.number(*id, t_s);
     }
     filter.take(e);
-    wm_estimate estimate{};
-    filter.ops().estimate(filter.state(), &estimate);
+    const wm_estimate estimate = filter.estimate();
     if (t_s < look_s || estimate.t_ns == WM_TIME_NONE) continue;
     look_s = t_s + kLook_s;
     looks.push_back(look_at(recording, estimate));

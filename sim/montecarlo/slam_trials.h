@@ -47,7 +47,7 @@ struct SlamOutcome {
   size_t looks = 0, inside = 0;              // looks while tracking, those within 95 % of the covariance
 };
 
-// Throws tools::Failure where the estimator refuses the drive, or no disturbance of this kind fits into it.
+// Throws where the estimator refuses the drive, or no disturbance of this kind fits into it.
 SlamOutcome run_slam_trial(const sim::Scenario &scenario, const wm_config &config, const SlamTrial &trial,
                            const SlamOptions &options, uint64_t seed);
 

@@ -10,6 +10,7 @@
 
 #include "common/failure.h"
 #include "common/statistics.h"
+#include "montecarlo/look.h"
 #include "montecarlo/views.h"
 #include "waymark/estimator.h"
 #include "waymark/health.h"
@@ -19,66 +20,52 @@ namespace wm::montecarlo {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
-constexpr double kLook_s = 0.1;
 constexpr double kWayAhead_m = 22, kDriving_mps = 0.25;
 
 constexpr int64_t ns(double s) { return static_cast<int64_t>(s * 1e9); }
 
-// An estimator with its memory.
-class Filter {
+// The estimator of a drive, and what it had last to look at.
+class EdgeFilter : public Filter {
  public:
-  Filter(const EdgeDrive &drive, const wm_config &config, bool start_known, uint64_t seed)
-      : ops_(*config.estimator), head_(drive.head()) {
-    setup_.motion = config.motion;
-    setup_.sightings = config.sightings;
-    setup_.wheels = head_.wheels;
-    setup_.sensors = head_.sensors;
-    setup_.sensor_count = head_.sensor_count;
-    setup_.landmarks = head_.landmarks;
-    setup_.landmark_count = head_.landmark_count;
-    setup_.rig = &head_.rig;
-    setup_.map = &drive.map();
-    setup_.start = head_.start;
-    setup_.seed = seed;
-    if (!start_known) setup_.start.p_m[0] = setup_.start.p_m[1] = setup_.start.heading_rad = NAN;
-    if (!start_known) setup_.start.t_ns = WM_TIME_NONE;
-    const char *why = "";
-    const size_t bytes = ops_.state_bytes(config.estimator_params, &setup_, &why);
-    if (bytes == 0) throw tools::Failure(drive.name() + ": " + why, tools::kUsage);
-    memory_ = std::make_unique<Block[]>((bytes + sizeof(Block) - 1) / sizeof(Block));
-    if (const wm_status s = ops_.init(memory_.get(), config.estimator_params, &setup_); s != WM_OK)
-      throw tools::Failure(drive.name() + ": " + wm_status_text(s), tools::kUsage);
+  EdgeFilter(const EdgeDrive &drive, const wm_config &config, bool start_known, uint64_t seed) : Filter(config) {
+    const wm_log_head &head = drive.head();
+    wm_setup &s = setup();
+    s.wheels = head.wheels;
+    s.sensors = head.sensors;
+    s.sensor_count = head.sensor_count;
+    s.landmarks = head.landmarks;
+    s.landmark_count = head.landmark_count;
+    s.rig = &head.rig;
+    s.map = &drive.map();
+    s.start = head.start;
+    s.seed = seed;
+    if (!start_known) s.start.p_m[0] = s.start.p_m[1] = s.start.heading_rad = NAN;
+    if (!start_known) s.start.t_ns = WM_TIME_NONE;
+    wm_error error{};
+    if (init(&error) != WM_OK) throw tools::Failure(drive.name() + ": " + error.text, tools::kUsage);
   }
   void take(const wm_event &event) {
     if (wm_event_is_motion(&event)) {
-      (void)ops_.predict(memory_.get(), &event);
+      (void)ops().predict(state(), &event);
       return;
     }
     wm_innovation out[WM_INNOVATIONS_PER_EVENT_MAX];
     size_t count = 0;
-    (void)ops_.correct(memory_.get(), &event, out, WM_INNOVATIONS_PER_EVENT_MAX, &count);
+    (void)ops().correct(state(), &event, out, WM_INNOVATIONS_PER_EVENT_MAX, &count);
     if (event.kind == WM_EVENT_POINTS && count > 0) points_ = event.as.points.count;
-  }
-  [[nodiscard]] wm_estimate estimate() const {
-    wm_estimate e{};
-    ops_.estimate(memory_.get(), &e);
-    return e;
   }
   [[nodiscard]] Sample look(const wm_pose2 &truth, const wm_estimate &e) const;
 
  private:
   // Share of the edge points that lie on edges of the map, smoothed.
   [[nodiscard]] double explained() const {
-    wm_counter all[WM_HEALTH_COUNTERS_MAX];
-    const size_t count = ops_.counters ? ops_.counters(memory_.get(), all, std::size(all)) : 0;
-    for (size_t i = 0; i < std::min(count, std::size(all)); i++)
-      if (all[i].kind == WM_COUNTER_EXPLAINED_PERMILLE) return 1e-3 * static_cast<double>(all[i].count);
-    return tools::kNan;
+    const std::optional<wm_counter> found = counter(WM_COUNTER_EXPLAINED_PERMILLE);
+    return found ? 1e-3 * static_cast<double>(found->count) : tools::kNan;
   }
   [[nodiscard]] double weight_about(const wm_pose2 &truth) const {
-    if (ops_.particles == nullptr) return 0;
-    std::vector<wm_particle> all(ops_.particles(memory_.get(), nullptr, 0));
-    ops_.particles(memory_.get(), all.data(), all.size());
+    if (ops().particles == nullptr) return 0;
+    std::vector<wm_particle> all(ops().particles(state(), nullptr, 0));
+    ops().particles(state(), all.data(), all.size());
     double sum = 0;
     for (const wm_particle &p : all)
       if (std::hypot(p.x_m - truth.x_m, p.y_m - truth.y_m) < 0.5 &&
@@ -89,9 +76,9 @@ class Filter {
 
   // Whether a place that is listed beside the estimate holds the truth within its own covariance's 95 %.
   [[nodiscard]] bool listed(const wm_pose2 &truth) const {
-    if (ops_.hypotheses == nullptr) return false;
-    std::vector<wm_hypothesis> all(ops_.hypotheses(memory_.get(), nullptr, 0));
-    ops_.hypotheses(memory_.get(), all.data(), all.size());
+    if (ops().hypotheses == nullptr) return false;
+    std::vector<wm_hypothesis> all(ops().hypotheses(state(), nullptr, 0));
+    ops().hypotheses(state(), all.data(), all.size());
     return std::any_of(all.begin(), all.end(), [&truth](const wm_hypothesis &h) {
       const Eigen::Vector3d off(truth.x_m - h.x_m, truth.y_m - h.y_m, tools::wrap(truth.heading_rad - h.heading_rad));
       const double *c = h.covariance;
@@ -101,27 +88,15 @@ class Filter {
     });
   }
 
-  struct alignas(64) Block {
-    char bytes[64];
-  };
-  const wm_estimator &ops_;
-  const wm_log_head &head_;
-  wm_setup setup_{};
   uint32_t points_ = 0;
-  std::unique_ptr<Block[]> memory_;
 };
 
-Sample Filter::look(const wm_pose2 &truth, const wm_estimate &e) const {
+Sample EdgeFilter::look(const wm_pose2 &truth, const wm_estimate &e) const {
   Sample s{};
-  const Eigen::Vector3d error(truth.x_m - e.pose_map_base.p_m[0], truth.y_m - e.pose_map_base.p_m[1],
-                              tools::wrap(truth.heading_rad - e.heading_rad));
-  const int axes[3] = {0, 1, 5};
-  Eigen::Matrix3d covariance;
-  for (int i = 0; i < 3; i++)
-    for (int j = 0; j < 3; j++) covariance(i, j) = e.covariance[wm_cov_index(axes[i], axes[j])];
-  s.error_m = error.head<2>().norm();
-  s.error_rad = std::fabs(error[2]);
-  s.nees = error.dot(covariance.ldlt().solve(error));
+  const PlanarError error = error_of(e, truth);
+  s.error_m = error.position_m();
+  s.error_rad = error.heading_rad();
+  s.nees = error.nees();
   s.tracking = e.state == WM_STATE_TRACKING || e.state == WM_STATE_DEAD_RECKONING;
   s.lost_probability = e.lost_probability;
   s.explained = explained();
@@ -137,7 +112,7 @@ bool off(const Sample &s) { return s.error_m > 0.5 || s.error_rad > 15 * kDegree
 }  // namespace
 
 Outcome run_trial(const EdgeDrive &drive, const wm_config &config, const Trial &trial, uint64_t seed) {
-  Filter filter(drive, config, trial.kind != TrialKind::kStart, seed);
+  EdgeFilter filter(drive, config, trial.kind != TrialKind::kStart, seed);
   const bool begun = trial.kind == TrialKind::kNormal;
   const int64_t shift = trial.kind == TrialKind::kStart ? 0 : trial.cut_ns - trial.on_ns;
   Outcome out;
@@ -238,12 +213,7 @@ double Outcome::nees_inside() const {
 }
 
 bool Outcome::lost() const {
-  double since = NAN;
-  for (const Sample &s : samples) {
-    if (!off(s)) since = NAN;
-    if (off(s) && std::isnan(since)) since = s.t_s;
-    if (off(s) && s.t_s - since > 2) return true;
-  }
+  if (longest(samples, off) > 2) return true;
   return samples.empty() || off(samples.back());
 }
 
@@ -261,26 +231,12 @@ std::optional<double> Outcome::detected_after_s() const {
 }
 
 std::optional<double> Outcome::right_after_m() const {
-  const Sample *since = nullptr;
-  for (const Sample &s : samples) {
-    if (!right(s))
-      since = nullptr;
-    else if (since == nullptr)
-      since = &s;
-    if (since != nullptr && s.t_s - since->t_s >= 2) return since->way_m;
-  }
-  return std::nullopt;
+  const Sample *since = first_lasting(samples, 2, right);
+  return since != nullptr ? std::optional(since->way_m) : std::nullopt;
 }
 
 double Outcome::astray_s() const {
-  double since = NAN, longest = 0;
-  for (const Sample &s : samples) {
-    const bool astray = s.tracking && s.error_m > 1;
-    if (astray && std::isnan(since)) since = s.t_s;
-    if (astray) longest = std::max(longest, s.t_s - since);
-    if (!astray) since = NAN;
-  }
-  return longest;
+  return longest(samples, [](const Sample &s) { return s.tracking && s.error_m > 1; });
 }
 
 double Outcome::covered() const {

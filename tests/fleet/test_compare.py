@@ -139,7 +139,7 @@ class Page(unittest.TestCase):
             for name, text in (("before", config), ("after", too_sure)):
                 (pathlib.Path(folder) / "points.yaml").write_text(text)
                 subprocess.run([BIN / "waymark-montecarlo", ROOT / "config/worlds/crossing.yaml", "--config", f"{folder}/points.yaml", "--landmarks", "2",
-                                "--seeds", "30", "--out", f"{folder}/{name}"], check=True, stdout=subprocess.DEVNULL)
+                                "--drives", "30", "--out", f"{folder}/{name}"], check=True, stdout=subprocess.DEVNULL)
             words = "--json", "--out", f"{folder}/page.html"
             code, text = call("compare", f"{folder}/before", f"{folder}/before", *words)
             self.assertEqual((code, json.loads(text)["drives"]), (0, 30))

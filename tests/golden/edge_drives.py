@@ -51,7 +51,7 @@ def main():
             wrong.append("tracks a wrong place")
         if "<svg" not in diagram.read_text():
             wrong.append("no diagram")
-        again, err = run(cache, "--trials", "normal", "--quiet")
+        again, err = run(cache, "--trials", "normal")
         if "rendering" in err:
             wrong.append("rendered again what was there")
         sys.exit("\n".join(wrong) or 0)

@@ -54,7 +54,7 @@ quietly python3 tools/demo/picture.py "$out" "$out/demo.svg"
 quietly python3 tools/demo/moving.py "$out" "$out/moving.svg"
 
 step "$drives drives each, with other wheels, biases, maps and noise"
-statistics=$(build/bin/waymark-montecarlo "$scenario" --config "$config" --seeds "$drives" | sed -n '3,/^$/p')
+statistics=$(build/bin/waymark-montecarlo "$scenario" --config "$config" --drives "$drives" | sed -n '3,/^$/p')
 
 printf '\nA rendered crossing, %s m, %s pictures: RMS error %.3f m and %.2f deg with two cameras, %.3f m with the wheels alone.\n' \
   "$(figure "$out/eval-cameras.json" distance_m | awk '{printf "%.0f", $1}')" \

@@ -1,44 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// waymark-montecarlo-landmarks SCENARIO --config F: an estimator by known landmarks over many simulated drives, as they
-// are and with what may befall them.
-#include <unistd.h>
-
-#include <algorithm>
-#include <cinttypes>
-#include <cmath>
-#include <cstdio>
-#include <fstream>
+// An estimator by known landmarks over many simulated drives, as they are and with what may befall them.
 #include <map>
 
-#include "common/failure.h"
-#include "common/program.h"
-#include "common/statistics.h"
+#include "montecarlo/engines.h"
 #include "montecarlo/landmark_trials.h"
 #include "montecarlo/reliability.h"
 
+namespace wm::montecarlo {
 namespace {
-
-using namespace wm::montecarlo;
-using wm::tools::Failure;
-
-struct Arguments {
-  std::string scenario, config, csv, diagram;
-  std::vector<std::string> kinds;
-  uint64_t first = 1, drives = 100;
-};
 
 using Outcomes = std::vector<LandmarkOutcome>;
 
 constexpr double kWrong_s = 0.55;  // confidently wrong for longer
-
-std::string spread(std::vector<double> v) {
-  std::erase_if(v, [](double x) { return !std::isfinite(x); });
-  if (v.empty()) return "    -      -      -";
-  char text[80];
-  std::snprintf(text, sizeof text, "%6.3f %6.3f %6.3f", wm::tools::percentile(v, 50), wm::tools::percentile(v, 90),
-                *std::max_element(v.begin(), v.end()));
-  return text;
-}
 
 double share_inside(const Outcomes &all) {
   double inside = 0, looks = 0;
@@ -122,45 +95,33 @@ void print_cost(const std::map<std::string, Outcomes> &all) {
   std::printf("as-driven: a landmark was reported as moved in %zu of %zu\n", reported, plain->second.size());
 }
 
-void write_looks(const std::string &file, const std::map<std::string, Outcomes> &all) {
-  std::ofstream out(file);
-  out << "trial,seed,t_s,error_m,error_deg,nees,lost_probability,tracking\n";
-  for (const auto &[name, outcomes] : all)
-    for (const LandmarkOutcome &o : outcomes)
-      for (const Sample &s : o.outcome.samples) {
-        char line[200];
-        std::snprintf(line, sizeof line, "%s,%" PRIu64 ",%.2f,%.4f,%.3f,%.3f,%.6f,%d\n", name.c_str(), o.seed, s.t_s,
-                      s.error_m, s.error_rad * 57.29578, s.nees, s.lost_probability, static_cast<int>(s.tracking));
-        out << line;
-      }
-  if (!out) throw Failure(file + ": could not be written");
+}  // namespace
+
+std::vector<std::string> landmark_trial_names() {
+  std::vector<std::string> out;
+  for (const LandmarkTrial &t : landmark_trials()) out.emplace_back(t.name);
+  return out;
 }
 
-int run(const Arguments &a) {
-  wm::sim::Scenario scenario;
-  wm_config config{};
-  wm_error error{};
-  if (wm::sim::load_scenario(a.scenario, scenario, &error) != WM_OK) throw Failure(error.text, wm::tools::kUsage);
-  if (wm_config_load(a.config.c_str(), &config, &error) != WM_OK) throw Failure(error.text, wm::tools::kUsage);
-  std::fputs(config.warnings, stderr);
+void run_landmarks(const Request &a, const sim::Scenario &scenario, const wm_config &config) {
+  const uint64_t drives = a.drives.value_or(100);
   std::vector<LandmarkTrial> wanted;
   for (const LandmarkTrial &o : landmark_trials())
-    if (a.kinds.empty() || std::find(a.kinds.begin(), a.kinds.end(), o.name) != a.kinds.end()) wanted.push_back(o);
+    if (a.wants(o.name)) wanted.push_back(o);
   std::map<std::string, Outcomes> all;
   Reliability reliability;
-  for (uint64_t i = 0; i < a.drives; i++) {
-    LandmarkWorld world(scenario, a.first + i);
+  for (uint64_t i = 0; i < drives; i++) {
+    LandmarkWorld world(scenario, a.first_seed + i);
     for (const LandmarkTrial &o : wanted) {
       all[o.name].push_back(run_landmark_trial(world, config, o));
       const std::string name = o.name;
       if (name == "as-driven" || name == "kidnap" || name == "start") reliability.take(all[name].back().outcome);
     }
-    if (isatty(STDERR_FILENO)) std::fprintf(stderr, "\r%" PRIu64 " of %" PRIu64 " drives ", i + 1, a.drives);
+    show_progress("landmarks", i + 1, drives);
   }
-  if (isatty(STDERR_FILENO)) std::fprintf(stderr, "\r%40s\r", "");
+  end_progress();
   std::printf("%s, %s of %s, %" PRIu64 " drives each\n\n", scenario.name.c_str(), config.estimator->name,
-              a.config.c_str(), a.drives);
-  wm_config_free(&config);
+              a.config.c_str(), drives);
   print_header();
   for (const LandmarkTrial &o : wanted) print_row(o.name, all[o.name]);
   std::printf("\n");
@@ -170,31 +131,10 @@ int run(const Arguments &a) {
   }
   print_cost(all);
   reliability.print();
-  if (!a.csv.empty()) write_looks(a.csv, all);
+  Looks looks(a.csv);
+  for (const auto &[name, outcomes] : all)
+    for (const LandmarkOutcome &o : outcomes) looks.add(name, std::to_string(o.seed), o.outcome);
   if (!a.diagram.empty()) reliability.draw(a.diagram);
-  return wm::tools::kDone;
 }
 
-}  // namespace
-
-int main(int argc, char **argv) {
-  Arguments a;
-  wm::cli::App app(
-      "An estimator by known landmarks over many simulated drives, features only: as driven, started without a pose, "
-      "carried off, with false detections, wrong identities, moved landmarks, and few of them.",
-      "waymark-montecarlo-landmarks");
-  std::vector<std::string> names;
-  for (const LandmarkTrial &o : landmark_trials()) names.emplace_back(o.name);
-  app.add_option("SCENARIO", a.scenario, "scenario file (YAML)")->required();
-  app.add_option("--config", a.config, "configuration of the estimator")->required();
-  app.add_option("--trials", a.kinds, "which; all if not given")->delimiter(',')->check(wm::cli::one_of(names));
-  app.add_option("--drives", a.drives, "number of seeds")->check(wm::cli::range(1, 100000))->capture_default_str();
-  app.add_option("--first-seed", a.first, "the first one's seed")->capture_default_str();
-  app.add_option("--looks", a.csv, "writes what was judged, a row each 0.1 s, here (CSV)");
-  app.add_option("--diagram", a.diagram, "writes the reliability diagram of the probability of being lost here (SVG)");
-  app.footer(
-      "example: waymark-montecarlo-landmarks config/worlds/crossing-easy.yaml --config "
-      "config/datasets/crossing-cameras.yaml\n"
-      "docs/consistency.md defines each figure. Exit code: 0 done, 1 failed, 2 usage or configuration.");
-  return wm::tools::run_program(app, argc, argv, [&] { return run(a); });
-}
+}  // namespace wm::montecarlo

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// waymark-montecarlo-bound SCENARIO RUN RECORDING: the Cramér-Rao bound of a rendered drive past known landmarks, with
-// the bearings that the run's detector found in its pictures.
-#include <algorithm>
-#include <cmath>
-#include <cstdio>
+// The Cramér-Rao bound of a rendered drive past known landmarks, with the bearings that the run's detector found in its
+// pictures.
+#include "montecarlo/bound.h"
+
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -11,15 +10,14 @@
 #include "common/csv.h"
 #include "common/event_log.h"
 #include "common/failure.h"
-#include "common/program.h"
 #include "common/recording_folder.h"
-#include "montecarlo/bound.h"
+#include "montecarlo/engines.h"
 
+namespace wm::montecarlo {
 namespace {
 
-using namespace wm::montecarlo;
-using wm::tools::Failure;
-using wm::tools::Pose;
+using tools::Failure;
+using tools::Pose;
 
 struct Found {
   std::vector<SeenBearing> bearings;
@@ -31,12 +29,12 @@ class Path {
  public:
   explicit Path(const std::vector<Pose> &poses) {
     for (const Pose &p : poses) {
-      wm::sim::State s{};
+      sim::State s{};
       s.x_m = p.p_m.x(), s.y_m = p.p_m.y();
-      s.heading_rad = wm::tools::heading_rad(p.q);
+      s.heading_rad = tools::heading_rad(p.q);
       if (!states_.empty()) {
-        const wm::sim::State &before = states_.back();
-        s.heading_rad = before.heading_rad + wm::tools::wrap(s.heading_rad - before.heading_rad);
+        const sim::State &before = states_.back();
+        s.heading_rad = before.heading_rad + tools::wrap(s.heading_rad - before.heading_rad);
         const double along =
             std::cos(s.heading_rad) * (s.x_m - before.x_m) + std::sin(s.heading_rad) * (s.y_m - before.y_m);
         s.way_m = before.way_m + std::copysign(std::hypot(s.x_m - before.x_m, s.y_m - before.y_m), along);
@@ -48,14 +46,14 @@ class Path {
   }
   double end_s() const { return times_s_.back(); }
 
-  wm::sim::State at(double t_s) const {
+  sim::State at(double t_s) const {
     const auto after = std::upper_bound(times_s_.begin(), times_s_.end(), t_s) - times_s_.begin();
     const auto b =
         static_cast<size_t>(std::clamp<std::ptrdiff_t>(after, 1, static_cast<std::ptrdiff_t>(times_s_.size()) - 1));
     const size_t a = b - 1;
     const double dt = times_s_[b] - times_s_[a], part = std::clamp((t_s - times_s_[a]) / dt, 0.0, 1.0);
-    const wm::sim::State &from = states_[a], &to = states_[b];
-    wm::sim::State s{};
+    const sim::State &from = states_[a], &to = states_[b];
+    sim::State s{};
     s.x_m = from.x_m + part * (to.x_m - from.x_m);
     s.y_m = from.y_m + part * (to.y_m - from.y_m);
     s.heading_rad = from.heading_rad + part * (to.heading_rad - from.heading_rad);
@@ -67,11 +65,11 @@ class Path {
 
  private:
   std::vector<double> times_s_;
-  std::vector<wm::sim::State> states_;
+  std::vector<sim::State> states_;
 };
 
 std::map<int64_t, Eigen::Vector2d> load_places(const std::filesystem::path &file) {
-  const wm::tools::Csv csv = wm::tools::Csv::load(file);
+  const tools::Csv csv = tools::Csv::load(file);
   const size_t id = csv.need("id"), x = csv.need("x_m"), y = csv.need("y_m");
   std::map<int64_t, Eigen::Vector2d> out;
   for (size_t row = 0; row < csv.rows(); row++) out[csv.integer(row, id)] = {csv.number(row, x), csv.number(row, y)};
@@ -80,7 +78,7 @@ std::map<int64_t, Eigen::Vector2d> load_places(const std::filesystem::path &file
 
 Found load_found(const std::filesystem::path &run, const std::filesystem::path &recording, int64_t begin_ns) {
   const std::map<int64_t, Eigen::Vector2d> places = load_places(recording / "truth-landmarks.csv");
-  wm::tools::EventLog log(run);
+  tools::EventLog log(run);
   const wm_log_head &head = log.head();
   std::map<int64_t, size_t> numbers;
   Found out;
@@ -105,13 +103,12 @@ Found load_found(const std::filesystem::path &run, const std::filesystem::path &
   return out;
 }
 
-int run(const std::string &scenario_file, const std::string &run_folder, const std::string &recording) {
-  wm::sim::Scenario scenario;
-  wm_error error{};
-  if (wm::sim::load_scenario(scenario_file, scenario, &error) != WM_OK) throw Failure(error.text, wm::tools::kUsage);
-  const std::vector<Pose> poses = wm::tools::load_truth(recording);
+}  // namespace
+
+void print_bound(const Request &a, const sim::Scenario &scenario) {
+  const std::vector<Pose> poses = tools::load_truth(a.recording);
   const Path path(poses);
-  const Found found = load_found(run_folder, recording, poses.front().t_ns);
+  const Found found = load_found(a.run, a.recording, poses.front().t_ns);
   std::vector<double> times_s;
   for (double t_s = 0.1; t_s <= path.end_s(); t_s += 0.1) times_s.push_back(t_s);
   const std::vector<Bound> bounds = bound(
@@ -126,22 +123,6 @@ int run(const std::string &scenario_file, const std::string &run_folder, const s
                                       {"bearings", found.bearings.size()},
                                       {"landmarks", found.landmarks}};
   std::printf("%s\n", out.dump(2).c_str());
-  return wm::tools::kDone;
 }
 
-}  // namespace
-
-int main(int argc, char **argv) {
-  std::string scenario, run_folder, recording;
-  wm::cli::App app(
-      "The error that no estimator can go below on a rendered drive past known landmarks, with the bearings (and their "
-      "sigmas) that a run's detector found in its pictures, and errors as large as in the scenario.",
-      "waymark-montecarlo-bound");
-  app.add_option("SCENARIO", scenario, "scenario file (YAML) of the recording")->required();
-  app.add_option("RUN", run_folder, "folder that `waymark replay` wrote")->required();
-  app.add_option("RECORDING", recording, "the recording, with its truth")->required();
-  app.footer(
-      "example: waymark-montecarlo-bound config/worlds/crossing-easy.yaml out/run out/drive\n"
-      "docs/consistency.md derives it. Exit code: 0 done, 1 failed, 2 usage.");
-  return wm::tools::run_program(app, argc, argv, [&] { return run(scenario, run_folder, recording); });
-}
+}  // namespace wm::montecarlo
