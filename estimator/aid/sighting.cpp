@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Constants were chosen on drawn crossings (waymark-montecarlo-landmarks) and not swept.
+// Constants were chosen on drawn crossings (waymark-montecarlo --trials) and not swept.
 #include "aid/sighting.hpp"
 
 #include "math/arc.hpp"

@@ -5,7 +5,7 @@
 
 #include "math/elementary.hpp"
 
-// Constants without another source were chosen on drawn crossings (waymark-montecarlo-landmarks, seeds 1 to 100, easy
+// Constants without another source were chosen on drawn crossings (waymark-montecarlo --trials, seeds 1 to 100, easy
 // and hard) and not swept one by one.
 namespace wm {
 namespace {

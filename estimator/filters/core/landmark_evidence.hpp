@@ -81,7 +81,7 @@ class landmark_evidence {
   };
   static constexpr int kSources = 24;  // landmarks seen in the last seconds; not swept
   // Thresholds on the log odds: 1 is 73 % lost, 3 is 95 %, -2 is 12 %, -2.5 is 8 %, -4 is 2 %. Chosen with the prior of
-  // 8 % on the drawn crossings (waymark-montecarlo-landmarks, seeds 1 to 100); not swept one by one.
+  // 8 % on the drawn crossings (waymark-montecarlo --trials, seeds 1 to 100); not swept one by one.
   static constexpr double kLost = 1.0, kElsewhere = 3.0, kFound = -2.0, kDoubt = -2.5, kTrusted = -4.0;
 
   source &source_of(int key, wm_time_ns t_ns, double angle_rad, bool *known);

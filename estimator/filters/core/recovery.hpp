@@ -10,7 +10,7 @@
 namespace wm {
 
 // Log odds that a stated or a found pose is wrong: one in twelve. Chosen on drawn crossings with wrong starts
-// (waymark-montecarlo-landmarks); not swept.
+// (waymark-montecarlo --trials); not swept.
 inline constexpr double kStartWrong = -2.5, kFoundWrong = -2.5;
 // Sigmas added at each inflation while lost, on each axis: a second of unmeasured driving. Up to kInflateUpTo_m, beyond
 // which an update is far from linear. Not swept.

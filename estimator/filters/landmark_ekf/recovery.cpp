@@ -8,7 +8,7 @@
 namespace wm {
 namespace {
 
-// Constants were chosen on drawn crossings (waymark-montecarlo-landmarks, seeds 1 to 100, easy and hard) and not swept.
+// Constants were chosen on drawn crossings (waymark-montecarlo --trials, seeds 1 to 100, easy and hard) and not swept.
 constexpr double kTestStartEvery_s = 0.1;
 constexpr double kFoundWrongly_s = 60.0;  // lost again within this time: the remembered calibration is wrong, too
 // Numbers that must agree with a pose that is found, two more than it has: three bearings always fit some pose. A pose

@@ -6,7 +6,7 @@
 #include "math/arc.hpp"
 #include "math/cholesky.hpp"
 
-// Constants were chosen on drawn crossings (waymark-montecarlo-landmarks, 100 drives each from seeds 2001 and 5001:
+// Constants were chosen on drawn crossings (waymark-montecarlo --trials, 100 drives each from seeds 2001 and 5001:
 // starts off by 1 m, moved landmarks, false detections) and not swept one by one.
 namespace wm {
 namespace {

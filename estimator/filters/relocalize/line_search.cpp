@@ -6,7 +6,7 @@
 #include "math/arc.hpp"
 #include "math/eigen.hpp"
 
-// Constants were chosen on loops-lines (waymark-montecarlo-slam --renumber, seeds 1 to 6) and not swept.
+// Constants were chosen on loops-lines (waymark-montecarlo --trials --renumber, seeds 1 to 6) and not swept.
 namespace wm {
 namespace {
 

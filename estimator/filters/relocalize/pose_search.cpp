@@ -5,7 +5,7 @@
 #include "filters/relocalize/shortlist.hpp"
 #include "math/arc.hpp"
 
-// Constants were chosen on drawn crossings (waymark-montecarlo-landmarks) and the recordings mrclam-d6-r1 to r5,
+// Constants were chosen on drawn crossings (waymark-montecarlo --trials) and the recordings mrclam-d6-r1 to r5,
 // kidnapped and without a start, and not swept one by one unless stated.
 namespace wm {
 namespace {
