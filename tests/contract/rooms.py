@@ -9,13 +9,13 @@ seeds of each world (each with another floor, light, clutter and sensors' errors
 Worlds: config/worlds/rooms-*.yaml (10 seeds) and, of DATA_DIR, the plan flat-a (20 seeds). A drive is rendered in one to
 three minutes on one core; those in the cache are reused. Another detector or simulator wants another cache."""
 import argparse
-import csv
 import json
 import math
 import pathlib
 import shutil
-import subprocess
 import sys
+
+import replays
 
 RMS_MOST_M = 0.05        # of the stamps that are not lost
 WRONG_M = 0.5            # confidently wrong: so far off, not lost, and truth outside of the ellipse
@@ -23,12 +23,6 @@ ELLIPSE_CHI2 = 9.21      # 99 % of two degrees of freedom
 POSE_95_CHI2 = 7.815     # 95 % of three
 ALONE = "format: waymark-config/1\nestimator: edge_mcl\nvision: {edges: {}}\n"
 SAYS_SO = ("lost", "searching")
-
-
-def call(*command):
-    done = subprocess.run([str(c) for c in command], capture_output=True, text=True)
-    if done.returncode != 0:
-        sys.exit(f"{' '.join(str(c) for c in command)}: {done.returncode}\n{done.stdout}{done.stderr}")
 
 
 def worlds(a):
@@ -45,19 +39,14 @@ def log_of(a, name, world, seed):
         part, run = a.cache / f"{name}-{seed}.part", a.cache / f"{name}-{seed}.run"
         for left in (part, run, folder):
             shutil.rmtree(left, ignore_errors=True)
-        call(a.bin / "waymark-simulate", world, "--seed", seed, "--out", part)
-        call(a.bin / "waymark", "replay", part, "--config", a.source / "config/datasets/corridor.yaml", "--out", run)
+        replays.command(a.bin / "waymark-simulate", world, "--seed", seed, "--out", part)
+        replays.command(a.bin / "waymark", "replay", part, "--config", a.source / "config/datasets/corridor.yaml", "--out", run)
         for gone in (part / "video", part / "labels"):
             shutil.rmtree(gone)
         shutil.move(run / "events.wmlog", part / "events.wmlog")
         shutil.rmtree(run)
         part.rename(folder)
     return folder
-
-
-def rows_of(file):
-    with open(file, encoding="utf8") as f:
-        return list(csv.DictReader(f))
 
 
 def wrap(angle):
@@ -80,25 +69,17 @@ def truth_at(truth, t):
 
 
 def normalised(e, row, size):
-    """e' P^-1 e of the first `size` of x, y, heading, by Cholesky's factor."""
-    c = {k: float(row[k]) for k in ("cov_xx", "cov_xy", "cov_yy", "cov_xt", "cov_yt", "cov_tt")}
-    p = [[c["cov_xx"], c["cov_xy"], c["cov_xt"]], [c["cov_xy"], c["cov_yy"], c["cov_yt"]],
-         [c["cov_xt"], c["cov_yt"], c["cov_tt"]]]
-    low, z = [[0.0] * size for _ in range(size)], [0.0] * size
-    for i in range(size):
-        for j in range(i + 1):
-            rest = p[i][j] - sum(low[i][k] * low[j][k] for k in range(j))
-            low[i][j] = math.sqrt(max(rest, 1e-18)) if i == j else rest / low[j][j]
-        z[i] = (e[i] - sum(low[i][k] * z[k] for k in range(i))) / low[i][i]
-    return sum(v * v for v in z)
+    """e' P^-1 e of the first `size` of x, y, heading."""
+    axes = "xyt"[:size]
+    return replays.mahalanobis2(e[:size], [[float(row["cov_" + "".join(sorted((i, j), key="xyt".index))]) for j in axes] for i in axes])
 
 
 def judge(a, folder, config):
     run = a.cache / "run"
     shutil.rmtree(run, ignore_errors=True)
-    call(a.bin / "waymark", "replay", folder / "events.wmlog", "--map", folder / "map/map.yaml", "--config", config, "--out", run)
-    truth = [(int(r["t_ns"]), pose_of(r)) for r in rows_of(folder / "truth.csv")]
-    rows = rows_of(run / "trajectory.csv")
+    replays.command(a.bin / "waymark", "replay", folder / "events.wmlog", "--map", folder / "map/map.yaml", "--config", config, "--out", run)
+    truth = [(int(r["t_ns"]), pose_of(r)) for r in replays.rows(folder / "truth.csv")]
+    rows = replays.rows(run / "trajectory.csv")
     squares, inside, lost, wrong, most = 0.0, 0, 0, 0, 0.0
     for row, true in zip(rows, truth_at(truth, [int(r["t_ns"]) for r in rows])):
         x, y, heading = pose_of(row)

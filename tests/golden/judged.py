@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What scripts that judge the programs from outside share: where things are, runs of programs, and a line for each check."""
+import csv
 import os
 import pathlib
 import subprocess
@@ -14,6 +15,11 @@ def check(good, text):
     print(("  good  " if good else "  BAD   ") + text)
     if not good:
         failures.append(text)
+
+
+def rows(path):
+    with open(path, newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
 
 
 def run(program, *words, expect=(0,)):

@@ -14,29 +14,18 @@ import os
 import pathlib
 import random
 import shutil
-import subprocess
 import sys
 import tempfile
 
-ROOT = pathlib.Path(os.environ.get("WM_SOURCE_DIR", ".")).resolve()
-BIN = pathlib.Path(os.environ.get("WM_BIN_DIR", ROOT / "build/bin"))
+from judged import ROOT, check, failures, run
+
 DATA = pathlib.Path(os.environ.get("WM_DATA_DIR", "/nonexistent"))
 CASES = [("starry-night-plan", "starry-night-plan-a", "sightings.csv"), ("comma2k19", "comma2k19-a", "gnss.csv")]
 EMULATED = "WM_FEWER" in os.environ  # page faults are counted of the whole emulator, which translates as it goes
-failures = []
-
-
-def check(good, text):
-    print(("  good  " if good else "  BAD   ") + text)
-    if not good:
-        failures.append(text)
 
 
 def waymark(*words):
-    done = subprocess.run([BIN / "waymark", *map(str, words)], capture_output=True, text=True)
-    if done.returncode:
-        sys.exit(f"waymark {' '.join(map(str, words))}: exit code {done.returncode}\n{done.stdout}{done.stderr}")
-    return done.stdout
+    return run("waymark", *words)
 
 
 def same(a, b, *files):
