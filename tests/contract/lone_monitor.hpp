@@ -65,10 +65,3 @@ struct lone {
                    [&](int step, auto take) { take({record_of(verdict, step % 2 ? 0.8 : -0.8)}); });
   }
 };
-
-// Tests of the monitor's windows and counts (monitor_windows.cpp).
-void run_window_tests(void);
-// Of a source's windows (monitor_sources.cpp).
-void run_source_tests(void);
-// Of what it counts from step to step (monitor_ledger.cpp).
-void run_ledger_tests(void);

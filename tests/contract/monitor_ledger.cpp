@@ -4,8 +4,8 @@
 // place off the map, and of the spread of a lost robot.
 #include <cmath>
 
+#include "common/suite.h"
 #include "lone_monitor.hpp"
-#include "unity.h"
 #include "waymark/random.h"
 
 namespace {
@@ -157,7 +157,7 @@ double step_s(uint64_t seed, int i) {
 
 // GIVEN random drives WHEN the estimator loses and finds its pose, and observations agree, contradict
 // or stay away THEN each count is the ledger's after each step.
-void the_counts_are_those_of_a_ledger(void) {
+TEST(the_counts_are_those_of_a_ledger) {
   int tracked = 0, in_doubt = 0, found = 0, steps = 0;
   for (uint64_t seed = 1; seed <= 40; seed++) {
     random_drive drive(seed);
@@ -173,7 +173,7 @@ void the_counts_are_those_of_a_ledger(void) {
 
 // A pose that is set from outside, or a reset, begins everything anew: nothing of the drive before counts, and no
 // source is named any more.
-void a_pose_from_outside_begins_anew(void) {
+TEST(a_pose_from_outside_begins_anew) {
   for (const int kind : {WM_EVENT_SET_POSE, WM_EVENT_RESET}) {
     random_drive drive(3);
     for (int i = 0; i < 700; i++) drive.step(0.31);
@@ -199,7 +199,7 @@ void a_pose_from_outside_begins_anew(void) {
 }
 
 // Between doubt and certainty: the probability of a wrong pose, the state, and what that adds to the covariance.
-void doubt_gives_probability_and_covariance(void) {
+TEST(doubt_gives_probability_and_covariance) {
   lone robot(true);
   wm_monitor &m = robot.monitor;
   m.spread_m2 = 40.0;
@@ -245,7 +245,7 @@ void doubt_gives_probability_and_covariance(void) {
 
 // The source that is silent for longest, by more than two seconds, since its last datum or since the start; of those
 // that may give observations, and of a robot that has none.
-void the_source_that_is_silent_for_longest_is_named(void) {
+TEST(the_source_that_is_silent_for_longest_is_named) {
   const struct {
     double last_s[3];  // of sources 0, 1 and 3; below 0: none came
     uint8_t state;
@@ -281,7 +281,7 @@ void the_source_that_is_silent_for_longest_is_named(void) {
 }
 
 // A map that is turned and shifted: its border, and 5 m and three sigma beyond it, on each side.
-void a_turned_map_ends_at_its_corners(void) {
+TEST(a_turned_map_ends_at_its_corners) {
   wm_raster map{};
   map.width_px = 200, map.height_px = 100, map.resolution_m = 0.1;  // 20 m by 10 m
   map.origin_x_m = 3.0, map.origin_y_m = -2.0, map.origin_yaw_rad = 0.5;
@@ -314,7 +314,7 @@ void a_turned_map_ends_at_its_corners(void) {
 }
 
 // Without a map the box is that of the way; with landmarks it is theirs, wherever the robot drives.
-void the_box_of_landmarks_or_of_the_way(void) {
+TEST(the_box_of_landmarks_or_of_the_way) {
   wm_landmark posts[3] = {};
   posts[0].p_m[0] = -4.0, posts[1].p_m[1] = 7.0, posts[2].p_m[0] = 2.0;
   wm_setup setup{};
@@ -339,7 +339,7 @@ void the_box_of_landmarks_or_of_the_way(void) {
 }
 
 // A step is due each 0.3 s of the events' time, whatever their kind.
-void steps_are_due_each_third_of_a_second(void) {
+TEST(steps_are_due_each_third_of_a_second) {
   lone robot(true);
   int due = 0;
   for (int i = 0; i < 1000; i++) {
@@ -354,14 +354,3 @@ void steps_are_due_each_third_of_a_second(void) {
 }
 
 }  // namespace
-
-void run_ledger_tests(void) {
-  Unity.TestFile = __FILE__;
-  RUN_TEST(the_counts_are_those_of_a_ledger);
-  RUN_TEST(a_pose_from_outside_begins_anew);
-  RUN_TEST(doubt_gives_probability_and_covariance);
-  RUN_TEST(the_source_that_is_silent_for_longest_is_named);
-  RUN_TEST(a_turned_map_ends_at_its_corners);
-  RUN_TEST(the_box_of_landmarks_or_of_the_way);
-  RUN_TEST(steps_are_due_each_third_of_a_second);
-}

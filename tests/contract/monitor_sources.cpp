@@ -4,8 +4,8 @@
 #include <cmath>
 #include <vector>
 
+#include "common/suite.h"
 #include "lone_monitor.hpp"
-#include "unity.h"
 #include "waymark/random.h"
 
 namespace {
@@ -200,7 +200,7 @@ void expect_slots(const plain_source &expected, const wm_monitor_source &s) {
 
 // GIVEN streams that fit, are refused, unknown, biased or wider than stated WHEN the monitor steps THEN slots, causes,
 // support and the time of agreement are those of the plain sums.
-void a_source_is_tested_by_the_sums_of_its_windows(void) {
+TEST(a_source_is_tested_by_the_sums_of_its_windows) {
   int causes[WM_CAUSE_TURN + 8] = {}, fitting = 0, steps = 0, unsupported = 0;
   for (uint64_t seed = 1; seed <= 60; seed++) {
     stream from(seed);
@@ -262,8 +262,3 @@ void a_source_is_tested_by_the_sums_of_its_windows(void) {
 }
 
 }  // namespace
-
-void run_source_tests(void) {
-  Unity.TestFile = __FILE__;
-  RUN_TEST(a_source_is_tested_by_the_sums_of_its_windows);
-}

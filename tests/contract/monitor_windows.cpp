@@ -3,13 +3,13 @@
 // makes up for them.
 #include <cmath>
 
+#include "common/suite.h"
 #include "lone_monitor.hpp"
-#include "unity.h"
 
 namespace {
 
 // Agreement that lasts ten times as long makes up for a contradiction: a fault after it counts as the first one did.
-void what_was_contradicted_is_forgiven_in_time(void) {
+TEST(what_was_contradicted_is_forgiven_in_time) {
   for (const bool once : {false, true}) {
     lone robot(true);
     if (once) (void)robot.drive(30, WM_REJECTED_GATE);
@@ -20,7 +20,7 @@ void what_was_contradicted_is_forgiven_in_time(void) {
 }
 
 // Sightings of landmarks that the map lacks are no evidence for the pose: they do not lower the doubt.
-void unknown_landmarks_do_not_lower_the_doubt(void) {
+TEST(unknown_landmarks_do_not_lower_the_doubt) {
   lone robot(true);
   (void)robot.drive(20, WM_FUSED);
   TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, robot.drive(8, WM_REJECTED_GATE).state);
@@ -41,7 +41,7 @@ uint8_t state_of_refused(int of_ten, bool half) {
 
 // Binomial, of 33 slots with 20 % false detections: 40 % are refused by chance with 3e-2 (exp(-n D) of Chernoff), 60 %
 // with 3e-6, below an alarm's 1e-4. A sighting of which one of two numbers is refused is half a one.
-void refused_sightings_are_doubt_beyond_what_chance_gives(void) {
+TEST(refused_sightings_are_doubt_beyond_what_chance_gives) {
   TEST_ASSERT_EQUAL(WM_STATE_TRACKING, state_of_refused(1, false));
   TEST_ASSERT_EQUAL(WM_STATE_TRACKING, state_of_refused(4, false));
   TEST_ASSERT_NOT_EQUAL(WM_STATE_TRACKING, state_of_refused(6, false));
@@ -49,7 +49,7 @@ void refused_sightings_are_doubt_beyond_what_chance_gives(void) {
 }
 
 // Of the mean square of 33 slots 1.5 is as stated, and chi-square exceeds 2 times that with less than 1e-4.
-void innovations_larger_than_stated_are_inconsistent(void) {
+TEST(innovations_larger_than_stated_are_inconsistent) {
   for (const double sigmas : {1.2, 2.2}) {
     lone robot(true);
     const wm_estimate out = robot.observe(
@@ -73,14 +73,14 @@ uint8_t state_of_pictures(int landmarks, double sigmas) {
 
 // In 33 slots a mean of m observations has the sigma sqrt(1.5 / 33 / m), and 3.9 of these are an alarm: 0.83 sigmas of
 // one landmark, 0.41 of four. They share errors of their picture, so that eight are no more than four.
-void landmarks_of_one_picture_count_as_four_at_most(void) {
+TEST(landmarks_of_one_picture_count_as_four_at_most) {
   TEST_ASSERT_EQUAL(WM_STATE_TRACKING, state_of_pictures(1, 0.6));
   TEST_ASSERT_NOT_EQUAL(WM_STATE_TRACKING, state_of_pictures(4, 0.6));
   TEST_ASSERT_EQUAL(WM_STATE_TRACKING, state_of_pictures(8, 0.35));
 }
 
 // Errors of positions that are 5 s apart are independent: six that are off by two sigmas to one side are an alarm.
-void positions_five_seconds_apart_count_each(void) {
+TEST(positions_five_seconds_apart_count_each) {
   lone robot(true);
   const auto east = [](int step, auto take) {
     wm_innovation record = record_of(WM_FUSED, 2.0);
@@ -93,7 +93,7 @@ void positions_five_seconds_apart_count_each(void) {
 }
 
 // A robot that no position reaches has no mirror image: its covariance is the filter's, wherever it is.
-void without_positions_nothing_is_mirrored(void) {
+TEST(without_positions_nothing_is_mirrored) {
   lone robot(true);
   robot.estimate.pose_map_base.p_m[0] = 100.0;
   robot.estimate.heading_rad = 1.0;
@@ -102,7 +102,7 @@ void without_positions_nothing_is_mirrored(void) {
 }
 
 // A contradiction of all sources is none of the one that was refused before.
-void a_contradicted_calibration_names_no_source(void) {
+TEST(a_contradicted_calibration_names_no_source) {
   lone robot(true);
   (void)robot.drive(20, WM_FUSED);
   TEST_ASSERT_EQUAL(0, robot.drive(8, WM_REJECTED_GATE).cause_source);
@@ -123,7 +123,7 @@ uint8_t state_of_found(lone *robot) {
 }
 
 // A found pose that is lost within a minute was a wrong one: the next has to fit for longer.
-void a_pose_that_is_found_again_soon_is_on_probation(void) {
+TEST(a_pose_that_is_found_again_soon_is_on_probation) {
   for (const double fits_s : {10.0, 70.0}) {
     lone robot(true);
     robot.estimate.v_mps[0] = 0.5;
@@ -138,7 +138,7 @@ void a_pose_that_is_found_again_soon_is_on_probation(void) {
 // GIVEN innovations of one sign, smaller than their sigma, WHEN they last for a minute THEN on a given map the pose is
 // lost, and on a map that the filter makes it is degraded, with a place that is known to some metres. One that was lost
 // by larger ones is degraded again when these are all that is left.
-void a_bias_on_a_map_of_its_own_degrades(void) {
+TEST(a_bias_on_a_map_of_its_own_degrades) {
   const auto biased = [](lone *robot, double sigmas) {
     return robot->observe(60, WM_EVENT_SIGHTING, [&](int, auto take) { take({record_of(WM_FUSED, sigmas)}); });
   };
@@ -154,17 +154,3 @@ void a_bias_on_a_map_of_its_own_degrades(void) {
 }
 
 }  // namespace
-
-void run_window_tests(void) {
-  Unity.TestFile = __FILE__;
-  RUN_TEST(what_was_contradicted_is_forgiven_in_time);
-  RUN_TEST(unknown_landmarks_do_not_lower_the_doubt);
-  RUN_TEST(refused_sightings_are_doubt_beyond_what_chance_gives);
-  RUN_TEST(innovations_larger_than_stated_are_inconsistent);
-  RUN_TEST(a_bias_on_a_map_of_its_own_degrades);
-  RUN_TEST(landmarks_of_one_picture_count_as_four_at_most);
-  RUN_TEST(positions_five_seconds_apart_count_each);
-  RUN_TEST(without_positions_nothing_is_mirrored);
-  RUN_TEST(a_contradicted_calibration_names_no_source);
-  RUN_TEST(a_pose_that_is_found_again_soon_is_on_probation);
-}

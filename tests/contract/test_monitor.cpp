@@ -8,11 +8,11 @@
 #include <string>
 #include <vector>
 
+#include "common/suite.h"
 #include "drives.hpp"
 #include "filters/core/calibration_list.hpp"
 #include "lone_monitor.hpp"
 #include "parameter_sweep.hpp"
-#include "unity.h"
 
 namespace {
 
@@ -125,23 +125,23 @@ void check(const char *name, drives::scene &scene, const std::vector<parameters:
 using drives::motion;
 constexpr unsigned kSightings = drives::kBearings | drives::kRanges;
 
-void landmark_ekf_is_degraded_then_lost(void) {
+TEST(landmark_ekf_is_degraded_then_lost) {
   drives::scene scene(motion::ticks_and_gyro, kSightings, 0, kEnd_s);
   check("landmark_ekf", scene);
 }
-void slam_is_degraded_then_lost(void) {
+TEST(slam_is_degraded_then_lost) {
   drives::scene scene(motion::ticks_and_gyro, kSightings, drives::kNoMap, kEnd_s);
   check("slam", scene);
 }
-void edge_mcl_is_degraded_then_lost(void) {
+TEST(edge_mcl_is_degraded_then_lost) {
   drives::scene scene(motion::ticks_and_gyro, drives::kPoints, 0, kEnd_s);
   check("edge_mcl", scene);
 }
-void pf_edges_is_degraded_then_lost(void) {
+TEST(pf_edges_is_degraded_then_lost) {
   drives::scene scene(motion::ticks_and_gyro, drives::kPoints, 0, kEnd_s);
   check("pf_edges", scene, {{"particles", 500}});
 }
-void stereo_ekf_is_degraded_then_lost(void) {
+TEST(stereo_ekf_is_degraded_then_lost) {
   drives::dive scene(0, kEnd_s);
   check("stereo_ekf", scene);
 }
@@ -149,7 +149,7 @@ void stereo_ekf_is_degraded_then_lost(void) {
 void turn_to_the_right(wm_event *e) {
   if (e->kind == WM_EVENT_TWIST2) e->as.twist2.w_radps *= -1.0;
 }
-void a_turn_with_the_wrong_sign_is_named(void) {
+TEST(a_turn_with_the_wrong_sign_is_named) {
   drives::scene scene(motion::twist, kSightings, 0, kEnd_s);
   const seen good = drive("landmark_ekf", scene, {}, nullptr);
   const seen bad = drive("landmark_ekf", scene, {}, turn_to_the_right);
@@ -206,7 +206,7 @@ wm_estimate drive_by_positions(double seconds, double side, double v_mps, int ev
   return out;
 }
 
-void positions_that_turn_to_the_other_side_are_degraded(void) {
+TEST(positions_that_turn_to_the_other_side_are_degraded) {
   TEST_ASSERT_EQUAL(WM_STATE_TRACKING, drive_by_positions(60, 1, 10).state);
   TEST_ASSERT_EQUAL(WM_STATE_TRACKING, drive_by_positions(600, 1, 10).state);
   const wm_estimate mirrored = drive_by_positions(60, -1, 10);
@@ -216,7 +216,7 @@ void positions_that_turn_to_the_other_side_are_degraded(void) {
 
 // A minute of turns proves the sign. On the straight behind it the wheels slip: what is reckoned bends to the left, the
 // way to the right, and the mirror image fits better.
-void a_sign_that_is_proven_stays(void) {
+TEST(a_sign_that_is_proven_stays) {
   lone robot(false);
   plane way{}, place{};
   wm_estimate out{};
@@ -250,7 +250,7 @@ void a_sign_that_is_proven_stays(void) {
 
 // Before it is certain that positions are mirrored, the covariance is that of the mixture with the mirror image of the
 // drive: about its first straight, the same x, the other side, the other heading. Place and heading have one chance.
-void positions_that_may_be_mirrored_widen_the_covariance(void) {
+TEST(positions_that_may_be_mirrored_widen_the_covariance) {
   for (double seconds = 17.0; seconds < 25.0; seconds += 1.0) {
     const wm_estimate out = drive_by_positions(seconds, -1, 10);
     TEST_ASSERT_EQUAL(WM_STATE_TRACKING, out.state);
@@ -266,13 +266,13 @@ void positions_that_may_be_mirrored_widen_the_covariance(void) {
 
 // A mirror image of fewer than three places fits as well as the way itself. A window of 30 s reaches back less than
 // three times its length: of positions each 44 s it has three, of positions each 45 s two.
-void sparse_positions_show_no_mirror_image(void) {
+TEST(sparse_positions_show_no_mirror_image) {
   TEST_ASSERT_GREATER_THAN_DOUBLE(1.0, drive_by_positions(200, -1, 10, 440).covariance[0]);
   TEST_ASSERT_EQUAL_DOUBLE(0.01, drive_by_positions(200, -1, 10, 450).covariance[0]);
 }
 
 // 60 m/s at 0.3 rad/s are 19 m/s2.
-void a_turn_that_no_vehicle_can_drive_is_degraded(void) {
+TEST(a_turn_that_no_vehicle_can_drive_is_degraded) {
   const wm_estimate out = drive_by_positions(14, 1, 60);
   TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, out.state);
   TEST_ASSERT_EQUAL(WM_CAUSE_TURN, out.cause);
@@ -322,7 +322,7 @@ uint8_t state_with(const wm_setup &setup, const scale_value &scale, int position
 }
 
 // Each kind of alarm; lengths count where no map decides (below).
-void each_alarm_is_degraded(void) {
+TEST(each_alarm_is_degraded) {
   const wm_setup setup{};
   for (uint32_t kind = 0; kind < WM_ALARM_KIND_COUNT; kind++)
     TEST_ASSERT_EQUAL_MESSAGE(WM_STATE_DEGRADED, state_with(setup, std::vector<wm_alarm>{{kind, -1, 5.0}}),
@@ -331,7 +331,7 @@ void each_alarm_is_degraded(void) {
 
 // Markers that are measured with their frame bend the scales of both wheels; a receiver's lasting error is one of a
 // course that the robot does not drive.
-void values_far_from_what_is_stated_are_degraded(void) {
+TEST(values_far_from_what_is_stated_are_degraded) {
   const parameters::values motion(wm_motion_params_table, {{"states.left_scale_sigma", 0.02}});
   wm_setup setup{};
   setup.motion = static_cast<const wm_motion_params *>(static_cast<const void *>(motion.data()));
@@ -342,7 +342,7 @@ void values_far_from_what_is_stated_are_degraded(void) {
 
 // The speed's scale against its prior of 5 %. A known map or fused positions decide which length is wrong; the robot's
 // own does not.
-void lengths_that_contradict_each_other_are_degraded(void) {
+TEST(lengths_that_contradict_each_other_are_degraded) {
   const parameters::values motion(wm_motion_params_table, {});
   wm_setup setup{};
   setup.motion = static_cast<const wm_motion_params *>(static_cast<const void *>(motion.data()));
@@ -359,7 +359,7 @@ void lengths_that_contradict_each_other_are_degraded(void) {
 }
 
 // On a known map a scale is off from a fifth on; one of 0.88 is five sigmas, and no other unit or size.
-void a_scale_that_is_off_by_less_than_a_fifth_is_no_contradiction(void) {
+TEST(a_scale_that_is_off_by_less_than_a_fifth_is_no_contradiction) {
   const parameters::values motion(wm_motion_params_table, {{"states.left_scale_sigma", 0.02}});
   const wm_landmark post{};
   wm_setup setup{};
@@ -373,7 +373,7 @@ void a_scale_that_is_off_by_less_than_a_fifth_is_no_contradiction(void) {
 }
 
 // Of any sensor, against the prior of all of them.
-void a_scale_of_ranges_is_held_against_the_sensors_prior(void) {
+TEST(a_scale_of_ranges_is_held_against_the_sensors_prior) {
   parameters::values sightings(wm_sighting_params_table, {{"states.range_scale_sigma", 0.02}});
   const wm_landmark post{};
   wm_setup setup{};
@@ -386,7 +386,7 @@ void a_scale_of_ranges_is_held_against_the_sensors_prior(void) {
 }
 
 // Its effective track is 1.5 +- 0.25 of the distance of its wheels. The third value of `drive` is skid_steer.
-void the_wide_track_of_skid_steer_is_its_prior(void) {
+TEST(the_wide_track_of_skid_steer_is_its_prior) {
   const parameters::values plain(wm_motion_params_table, {}), skids(wm_motion_params_table, {{"drive", 2}});
   wm_setup setup{};
   setup.motion = static_cast<const wm_motion_params *>(static_cast<const void *>(plain.data()));
@@ -397,7 +397,7 @@ void the_wide_track_of_skid_steer_is_its_prior(void) {
 }
 
 // Contradicted for 10 s: any heading, whose variance is pi^2 / 3.
-void a_contradicted_pose_may_head_anywhere(void) {
+TEST(a_contradicted_pose_may_head_anywhere) {
   lone robot(true);
   (void)robot.drive(20, WM_FUSED);
   const wm_estimate lost = robot.drive(30, WM_REJECTED_GATE);
@@ -406,7 +406,7 @@ void a_contradicted_pose_may_head_anywhere(void) {
 }
 
 // A map with a fault fits by chance now and then: after a minute of contradiction it does not count like a found pose.
-void a_run_that_was_contradicted_for_long_has_to_fit_for_longer(void) {
+TEST(a_run_that_was_contradicted_for_long_has_to_fit_for_longer) {
   lone once(true), again(true);
   (void)once.drive(20, WM_FUSED);
   (void)again.drive(20, WM_FUSED);
@@ -442,7 +442,7 @@ wm_estimate drive_by_landmarks(const double off[4], wm_verdict of_last) {
 }
 
 // Their means cancel in the mean of the source: a mirrored map. One landmark alone has been moved.
-void landmarks_that_are_off_to_both_sides_are_degraded(void) {
+TEST(landmarks_that_are_off_to_both_sides_are_degraded) {
   const double none[4] = {0, 0, 0, 0}, both[4] = {0.9, -0.9, 0.9, -0.9}, one[4] = {0, 0, 0, 9};
   TEST_ASSERT_EQUAL(WM_STATE_TRACKING, drive_by_landmarks(none, WM_FUSED).state);
   TEST_ASSERT_EQUAL(WM_STATE_TRACKING, drive_by_landmarks(one, WM_REJECTED_GATE).state);
@@ -455,7 +455,7 @@ void landmarks_that_are_off_to_both_sides_are_degraded(void) {
 void drift(wm_event *e) {
   if (e->kind == WM_EVENT_POSITION) e->as.position.p_m[0] += 0.5 * wm_seconds_between(0, e->t_ns);
 }
-void positions_far_from_the_way_are_doubt(void) {
+TEST(positions_far_from_the_way_are_doubt) {
   drives::scene scene(motion::twist, drives::kPositions, 0, kEnd_s);
   const std::vector<parameters::setting> settings = {{"correlated.gnss_m", 1.0}, {"correlated.gnss_tau_s", 20.0}};
   const seen good = drive("landmark_ekf", scene, settings, nullptr);
@@ -465,7 +465,7 @@ void positions_far_from_the_way_are_doubt(void) {
   TEST_ASSERT_TRUE(bad.is_lasting);
 }
 
-void a_pose_off_the_map_is_degraded(void) {
+TEST(a_pose_off_the_map_is_degraded) {
   lone robot(false, true);
   TEST_ASSERT_EQUAL(WM_STATE_TRACKING, robot.drive(3, WM_FUSED).state);
   robot.estimate.pose_map_base.p_m[0] = 20.0;  // the map ends at 10 m
@@ -477,7 +477,7 @@ void a_pose_off_the_map_is_degraded(void) {
   TEST_ASSERT_EQUAL(WM_STATE_TRACKING, robot.drive(3, WM_FUSED).state);
 }
 
-void identities_that_the_map_lacks_are_doubt(void) {
+TEST(identities_that_the_map_lacks_are_doubt) {
   lone robot(true);
   robot.estimate.state = WM_STATE_DEAD_RECKONING;
   const wm_estimate unknown = robot.drive(12, WM_REJECTED_UNKNOWN_ID);
@@ -492,7 +492,7 @@ void identities_that_the_map_lacks_are_doubt(void) {
 
 // A search finds a pose for a robot that was lost before its start had been proven by driving, and for one that had
 // driven well for long. A start that fits at rest proves nothing.
-void a_found_pose_is_degraded_unless_the_one_before_was_proven(void) {
+TEST(a_found_pose_is_degraded_unless_the_one_before_was_proven) {
   lone robot(true), proven(true);
   (void)robot.drive(60, WM_FUSED);
   for (lone *one : {&robot, &proven}) one->estimate.v_mps[0] = 0.5;
@@ -512,7 +512,7 @@ void a_found_pose_is_degraded_unless_the_one_before_was_proven(void) {
 }
 
 // Lost for long, a filter inflates its covariance, and another pose fits: that is a found one, though not by a search.
-void a_pose_that_fits_after_long_is_a_found_one(void) {
+TEST(a_pose_that_fits_after_long_is_a_found_one) {
   for (const double lost_s : {1.0, 6.0}) {
     lone robot(true);
     robot.estimate.v_mps[0] = 0.5;
@@ -525,39 +525,3 @@ void a_pose_that_fits_after_long_is_a_found_one(void) {
 }
 
 }  // namespace
-
-void setUp(void) {}
-void tearDown(void) {}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(landmark_ekf_is_degraded_then_lost);
-  RUN_TEST(slam_is_degraded_then_lost);
-  RUN_TEST(edge_mcl_is_degraded_then_lost);
-  RUN_TEST(pf_edges_is_degraded_then_lost);
-  RUN_TEST(stereo_ekf_is_degraded_then_lost);
-  RUN_TEST(a_turn_with_the_wrong_sign_is_named);
-  RUN_TEST(positions_that_turn_to_the_other_side_are_degraded);
-  RUN_TEST(a_sign_that_is_proven_stays);
-  RUN_TEST(positions_that_may_be_mirrored_widen_the_covariance);
-  RUN_TEST(sparse_positions_show_no_mirror_image);
-  RUN_TEST(a_turn_that_no_vehicle_can_drive_is_degraded);
-  RUN_TEST(each_alarm_is_degraded);
-  RUN_TEST(values_far_from_what_is_stated_are_degraded);
-  RUN_TEST(lengths_that_contradict_each_other_are_degraded);
-  RUN_TEST(a_scale_that_is_off_by_less_than_a_fifth_is_no_contradiction);
-  RUN_TEST(a_contradicted_pose_may_head_anywhere);
-  RUN_TEST(a_scale_of_ranges_is_held_against_the_sensors_prior);
-  RUN_TEST(the_wide_track_of_skid_steer_is_its_prior);
-  RUN_TEST(a_run_that_was_contradicted_for_long_has_to_fit_for_longer);
-  RUN_TEST(a_pose_off_the_map_is_degraded);
-  RUN_TEST(identities_that_the_map_lacks_are_doubt);
-  RUN_TEST(landmarks_that_are_off_to_both_sides_are_degraded);
-  RUN_TEST(positions_far_from_the_way_are_doubt);
-  RUN_TEST(a_found_pose_is_degraded_unless_the_one_before_was_proven);
-  RUN_TEST(a_pose_that_fits_after_long_is_a_found_one);
-  run_window_tests();
-  run_source_tests();
-  run_ledger_tests();
-  return UNITY_END();
-}

@@ -18,10 +18,8 @@
 #include "simulate/write.h"
 
 extern "C" {
+#include "common/suite.h"
 #include "replay/replay.h"
-#include "unity.h"
-void setUp(void);
-void tearDown(void);
 }
 
 using namespace wm::sim;
@@ -105,7 +103,7 @@ void is_below(double limit, double value, const char *what) {
 
 // Frames, signs and units from one end to the other: nothing but rounding is left. Dead reckoning that takes its
 // sensors for perfect, as they are here.
-void test_perfect_sensors_lead_to_the_truth_by_odometry() {
+TEST(test_perfect_sensors_lead_to_the_truth_by_odometry) {
   make_perfect(scenario);
   std::filesystem::create_directories(folder);
   const std::string config = folder + "/trusting.yaml";
@@ -119,7 +117,7 @@ void test_perfect_sensors_lead_to_the_truth_by_odometry() {
   TEST_ASSERT_DOUBLE_WITHIN(1e-4, kPi / 2, last.heading_rad);
 }
 
-void test_perfect_sensors_lead_to_the_truth_by_landmarks() {
+TEST(test_perfect_sensors_lead_to_the_truth_by_landmarks) {
   make_perfect(scenario);
   scenario.faults.start_x_m = 0.5;  // so that it is the bearings that lead there
   scenario.faults.start_heading_rad = 0.05;
@@ -130,7 +128,7 @@ void test_perfect_sensors_lead_to_the_truth_by_landmarks() {
 }
 
 // One drive, pinned: a change of these numbers is a change of the filter, to be looked at and told.
-void test_the_numbers_of_one_drive() {
+TEST(test_the_numbers_of_one_drive) {
   drive(shipped(), "run");
   const Row last = for_each_pose("run", [](const Row &, const State &) {});
   std::printf("ends at %.9f %.9f %.9f, %llu poses; left %llu of %llu, right %llu of %llu\n", last.x_m, last.y_m,
@@ -159,7 +157,7 @@ std::string bytes_of(const std::string &path) {
 
 // A frame that comes up to 280 ms late is fused where it belongs: the fused poses are those of frames in order, to the
 // bit.
-void test_lateness_changes_nothing() {
+TEST(test_lateness_changes_nothing) {
   for (Camera &camera : scenario.cameras) camera.latency_s = 0;
   drive(shipped(), "fresh");
   for (Camera &camera : scenario.cameras) camera.latency_s = 0.15, camera.latency_jitter_s = 0.13;
@@ -170,7 +168,7 @@ void test_lateness_changes_nothing() {
   TEST_ASSERT_EQUAL_UINT64(0, source("sightings:left").late);
 }
 
-void test_frames_that_are_too_late_are_counted() {
+TEST(test_frames_that_are_too_late_are_counted) {
   scenario.faults.frames_late = 0.2;
   scenario.faults.frames_late_s = 0.2;  // 350 ms where the configuration allows 300
   drive(shipped(), "run");
@@ -179,7 +177,7 @@ void test_frames_that_are_too_late_are_counted() {
   is_below(0.15, largest_error_m("run"), "with a fifth of the frames too late");
 }
 
-void test_lost_and_repeated_data_do_no_harm() {
+TEST(test_lost_and_repeated_data_do_no_harm) {
   scenario.faults.can_lost = 0.02;
   scenario.faults.can_duplicated = 0.02;
   scenario.faults.sightings_lost = 0.3;
@@ -190,7 +188,7 @@ void test_lost_and_repeated_data_do_no_harm() {
   is_below(0.15, largest_error_m("run"), "with lost and repeated data");
 }
 
-void test_a_dead_encoder_is_noticed_and_survived() {
+TEST(test_a_dead_encoder_is_noticed_and_survived) {
   scenario.faults.dead_encoder = 0;
   scenario.faults.dead_encoder_from_s = 12;
   drive(shipped(), "run");
@@ -199,7 +197,7 @@ void test_a_dead_encoder_is_noticed_and_survived() {
   is_below(0.3, largest_error_m("run", 20), "with the left encoder dead, 8 s later");
 }
 
-void test_a_start_told_wrongly_is_mended() {
+TEST(test_a_start_told_wrongly_is_mended) {
   scenario.faults.start_x_m = 6;
   scenario.faults.start_y_m = -4;
   scenario.faults.start_heading_rad = 1;
@@ -215,16 +213,3 @@ void setUp(void) {
   folder = std::filesystem::temp_directory_path() / ("wm-crossing-" + std::to_string(getpid()));
 }
 void tearDown(void) { std::filesystem::remove_all(folder); }
-
-int main() {
-  UNITY_BEGIN();
-  RUN_TEST(test_perfect_sensors_lead_to_the_truth_by_odometry);
-  RUN_TEST(test_perfect_sensors_lead_to_the_truth_by_landmarks);
-  RUN_TEST(test_the_numbers_of_one_drive);
-  RUN_TEST(test_lateness_changes_nothing);
-  RUN_TEST(test_frames_that_are_too_late_are_counted);
-  RUN_TEST(test_lost_and_repeated_data_do_no_harm);
-  RUN_TEST(test_a_dead_encoder_is_noticed_and_survived);
-  RUN_TEST(test_a_start_told_wrongly_is_mended);
-  return UNITY_END();
-}

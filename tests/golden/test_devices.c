@@ -9,13 +9,13 @@
 #include <unistd.h>
 
 #include "can_device.h"
+#include "common/suite.h"
 #include "live/robot.h"
 #include "live/run.h"
 #include "output/event_log.h"
 #include "output/saved_pose.h"
 #include "rt/clock.h"
 #include "small_recording.h"
-#include "unity.h"
 
 static const char kConfig[] =
     "format: waymark-config/1\nestimator: odometry\npublish: {lcm_url: \"memq://\"}\n"
@@ -162,7 +162,7 @@ static void a_run_on_can_survives_an_interface_that_goes_down(void) {
   TEST_ASSERT_GREATER_THAN_UINT64(10, live.run.health.published);
 }
 
-static void the_log_of_a_run_on_devices_gives_its_poses_again(void) {
+TEST(the_log_of_a_run_on_devices_gives_its_poses_again) {
   a_run_on_can_survives_an_interface_that_goes_down();
   wm_error err;
   wm_log_reader *log;
@@ -180,7 +180,7 @@ static void the_log_of_a_run_on_devices_gives_its_poses_again(void) {
 
 // The second run begins where the first one ended, whatever the configuration says, or as far on as it may have driven
 // since.
-static void a_run_begins_where_the_last_one_ended(void) {
+TEST(a_run_begins_where_the_last_one_ended) {
   wm_error err = {0};
   wm_config config;
   char text[1200];
@@ -225,7 +225,7 @@ static wm_status refuse_then_take(void *context, wm_error *err) {
 }
 
 // A wrong configuration is told and nothing else; a good one ends the run, which says where it is.
-static void another_configuration_is_taken_while_it_drives(void) {
+TEST(another_configuration_is_taken_while_it_drives) {
   wm_error err = {0};
   wm_config config;
   wm_start start;
@@ -256,7 +256,7 @@ static void another_configuration_is_taken_while_it_drives(void) {
 }
 
 // An interface that isn't there, by the configuration and the real kernel.
-static void a_run_without_its_interface_waits_and_says_so(void) {
+TEST(a_run_without_its_interface_waits_and_says_so) {
   wm_error err = {0};
   wm_config config;
   wm_recording *robot;
@@ -281,13 +281,4 @@ static void a_run_without_its_interface_waits_and_says_so(void) {
   wm_config_free(&config);
   TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, is_enough), said);
   TEST_ASSERT_EQUAL(WM_DEVICE_ABSENT, live.run.health.sources[0].device);
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(the_log_of_a_run_on_devices_gives_its_poses_again);
-  RUN_TEST(a_run_begins_where_the_last_one_ended);
-  RUN_TEST(another_configuration_is_taken_while_it_drives);
-  RUN_TEST(a_run_without_its_interface_waits_and_says_so);
-  return UNITY_END();
 }

@@ -7,10 +7,10 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "common/suite.h"
 #include "live/run.h"
 #include "output/event_log.h"
 #include "small_recording.h"
-#include "unity.h"
 
 static const char kConfig[] =
     "format: waymark-config/1\nestimator: landmark_ekf\npublish: {lcm_url: \"memq://\"}\n"
@@ -19,7 +19,6 @@ static const char kConfig[] =
 static wm_live_report live;
 static wm_run_report report;
 
-void setUp(void) {}
 void tearDown(void) { test_folder_remove(); }
 
 static wm_time_ns some_late(size_t frame) { return (wm_time_ns)(frame % 5) * 30 * WM_NS_PER_MS; }
@@ -50,7 +49,7 @@ static void replay_log_into(const char *log_path, const char *run) {
   wm_log_reader_close(log);
 }
 
-static void the_log_of_a_run_gives_exactly_its_fused_poses(void) {
+TEST(the_log_of_a_run_gives_exactly_its_fused_poses) {
   small_recording_write("rec",
                         &(small_recording){.seconds = 3, .late_ns = some_late, .frame_hz = 20, .motion_hz = 100});
   const wm_run_options options = {.out_dir = in_folder("run"), .seed = 1, .speed = 1};
@@ -64,7 +63,7 @@ static void the_log_of_a_run_gives_exactly_its_fused_poses(void) {
   assert_same_file("run", "again", "innovations.csv");
 }
 
-static void the_estimators_thread_allocates_nothing_and_misses_no_page(void) {
+TEST(the_estimators_thread_allocates_nothing_and_misses_no_page) {
   small_recording_write("rec", &(small_recording){.seconds = 2, .motion_hz = 100});
   const wm_run_options options = {.out_dir = in_folder("run"), .seed = 1, .speed = 1};
   run_live("rec", kConfig, &options);
@@ -77,7 +76,7 @@ static void the_estimators_thread_allocates_nothing_and_misses_no_page(void) {
 
 // Nothing that arrived is lost between the threads, at sixteen times real speed, where a thread may be held up for two
 // seconds.
-static void everything_that_arrived_is_fused(void) {
+TEST(everything_that_arrived_is_fused) {
   small_recording_write("rec", &(small_recording){.seconds = 30, .motion_hz = 100});
   const wm_run_options options = {.out_dir = in_folder("run"), .seed = 1, .speed = 16};
   run_live("rec",
@@ -101,7 +100,7 @@ static void *stop_when_poses_are_written(void *path) {
   return NULL;
 }
 
-static void a_stop_ends_the_run_and_everything_is_written(void) {
+TEST(a_stop_ends_the_run_and_everything_is_written) {
   small_recording_write("rec", &(small_recording){.seconds = 60});
   pthread_t thread;
   char path[600];
@@ -118,20 +117,10 @@ static void a_stop_ends_the_run_and_everything_is_written(void) {
   assert_same_file("run", "again", "trajectory.csv");
 }
 
-static void a_duration_ends_the_run(void) {
+TEST(a_duration_ends_the_run) {
   small_recording_write("rec", &(small_recording){.seconds = 60});
   const wm_run_options options = {.seed = 1, .speed = 1, .duration_s = 2};  // and nothing is written
   run_live("rec", kConfig, &options);
   TEST_ASSERT_LESS_THAN_DOUBLE(20, live.run.recorded_s);
   TEST_ASSERT_GREATER_THAN(2, live.run.poses);
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(the_log_of_a_run_gives_exactly_its_fused_poses);
-  RUN_TEST(the_estimators_thread_allocates_nothing_and_misses_no_page);
-  RUN_TEST(everything_that_arrived_is_fused);
-  RUN_TEST(a_stop_ends_the_run_and_everything_is_written);
-  RUN_TEST(a_duration_ends_the_run);
-  return UNITY_END();
 }

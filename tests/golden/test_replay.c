@@ -6,10 +6,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/suite.h"
 #include "findings/findings.h"
 #include "output/event_log.h"
 #include "small_recording.h"
-#include "unity.h"
 
 #define MS WM_NS_PER_MS
 
@@ -19,7 +19,6 @@ static const char kConfig300[] =
 
 static wm_run_report report;
 
-void setUp(void) {}
 void tearDown(void) { test_folder_remove(); }
 
 static const wm_source_health *source(const char *name) {
@@ -29,7 +28,7 @@ static const wm_source_health *source(const char *name) {
   return NULL;
 }
 
-static void the_same_replay_twice_gives_the_same_bytes(void) {
+TEST(the_same_replay_twice_gives_the_same_bytes) {
   small_recording_write("rec", &(small_recording){.seconds = 20});
   replay_into("rec", kConfig, "one", &report);
   replay_into("rec", kConfig, "two", &report);
@@ -39,7 +38,7 @@ static void the_same_replay_twice_gives_the_same_bytes(void) {
   TEST_ASSERT_EQUAL_UINT64(400, report.poses);  // one at each of the driving stream's stamps
 }
 
-static void nothing_is_allocated_and_no_page_is_missing_after_the_start(void) {
+TEST(nothing_is_allocated_and_no_page_is_missing_after_the_start) {
   small_recording_write("rec", &(small_recording){.seconds = 20});
   replay_into("rec", kConfig, "run", &report);
   if (report.allocations_after_start < 0) TEST_IGNORE_MESSAGE("a sanitizer's malloc is in place");
@@ -52,7 +51,7 @@ static void nothing_is_allocated_and_no_page_is_missing_after_the_start(void) {
   free(timing);
 }
 
-static void the_event_log_gives_the_same_poses_without_the_recording(void) {
+TEST(the_event_log_gives_the_same_poses_without_the_recording) {
   small_recording_write("rec", &(small_recording){.seconds = 20});
   replay_into("rec", kConfig, "run", &report);
   wm_error err;
@@ -90,12 +89,12 @@ static void compare_late(wm_time_ns (*late_ns)(size_t), const char *config) {
   TEST_ASSERT_EQUAL_UINT64(0, source("sightings:eye")->late);
 }
 
-static void frames_that_are_all_150_ms_late_change_nothing(void) { compare_late(all_150, kConfig); }
-static void a_single_frame_150_ms_late_changes_nothing(void) { compare_late(one_in_seven_150, kConfig); }
-static void frames_that_are_all_250_ms_late_change_nothing(void) { compare_late(all_250, kConfig300); }
-static void a_single_frame_250_ms_late_changes_nothing(void) { compare_late(one_in_nine_250, kConfig300); }
+TEST(frames_that_are_all_150_ms_late_change_nothing) { compare_late(all_150, kConfig); }
+TEST(a_single_frame_150_ms_late_changes_nothing) { compare_late(one_in_seven_150, kConfig); }
+TEST(frames_that_are_all_250_ms_late_change_nothing) { compare_late(all_250, kConfig300); }
+TEST(a_single_frame_250_ms_late_changes_nothing) { compare_late(one_in_nine_250, kConfig300); }
 
-static void what_is_too_late_is_counted_and_the_number_that_is_told_would_do(void) {
+TEST(what_is_too_late_is_counted_and_the_number_that_is_told_would_do) {
   char stated[192], config[256];
   (void)snprintf(stated, sizeof stated, "%smerge: {lateness_max_ms: 150}\n", kConfig);
   small_recording_write("rec", &(small_recording){.seconds = 10, .late_ns = all_200});
@@ -115,7 +114,7 @@ static void what_is_too_late_is_counted_and_the_number_that_is_told_would_do(voi
   TEST_ASSERT_EQUAL_UINT64(0, source("sightings:eye")->late);
 }
 
-static void where_no_bound_is_stated_three_late_data_raise_it(void) {
+TEST(where_no_bound_is_stated_three_late_data_raise_it) {
   small_recording_write("rec", &(small_recording){.seconds = 10, .late_ns = all_200});
   replay_into("rec", kConfig, "run", &report);
   const wm_source_health *eye = source("sightings:eye");
@@ -124,7 +123,7 @@ static void where_no_bound_is_stated_three_late_data_raise_it(void) {
   TEST_ASSERT_EQUAL_INT64(220 * MS, eye->lateness_max_ns);
 }
 
-static void landmarks_that_moved_are_told(void) {
+TEST(landmarks_that_moved_are_told) {
   static const wm_health health = {.counter_count = 2,
                                    .counters = {{.kind = WM_COUNTER_LANDMARKS_MOVED, .landmark_id = 7, .count = 2},
                                                 {.kind = WM_COUNTER_IDENTITIES_AMBIGUOUS, .landmark_id = -1}}};
@@ -143,7 +142,7 @@ static void landmarks_that_moved_are_told(void) {
 
 static wm_time_ns all_140(size_t frame) { return (void)frame, 140 * MS; }
 
-static void the_first_datum_after_a_silence_is_fused(void) {
+TEST(the_first_datum_after_a_silence_is_fused) {
   small_recording_write(
       "rec", &(small_recording){.seconds = 20, .late_ns = all_140, .silent_from_s = 5, .silent_until_s = 12});
   replay_into("rec", kConfig, "run", &report);
@@ -160,7 +159,7 @@ static void the_first_datum_after_a_silence_is_fused(void) {
 }
 
 // In the silence the fused time lags by lateness_max, and poses go on being published for now.
-static void silence_costs_the_published_pose_nothing(void) {
+TEST(silence_costs_the_published_pose_nothing) {
   small_recording_write("rec", &(small_recording){.seconds = 20, .silent_from_s = 5, .silent_until_s = 12});
   replay_into("rec", kConfig, "run", &report);
   size_t length;
@@ -186,7 +185,7 @@ static void silence_costs_the_published_pose_nothing(void) {
 
 static wm_time_ns some_too_late(size_t frame) { return (wm_time_ns)(frame % 11) * 40 * MS; }
 
-static void every_datum_is_accounted_for(void) {
+TEST(every_datum_is_accounted_for) {
   small_recording_write("rec", &(small_recording){.seconds = 30, .late_ns = some_too_late});
   replay_into("rec", kConfig, "run", &report);
   for (uint32_t i = 0; i < report.health.source_count; i++) {
@@ -201,7 +200,7 @@ static void every_datum_is_accounted_for(void) {
 }
 
 // What is wrong outside of the part is not the part's.
-static void from_and_until_take_a_part_of_a_source(void) {
+TEST(from_and_until_take_a_part_of_a_source) {
   small_recording_write("rec", &(small_recording){.seconds = 20});
   FILE *f = fopen(in_folder("rec/sightings.csv"), "a");
   TEST_ASSERT_NOT_NULL(f);
@@ -223,7 +222,7 @@ static void from_and_until_take_a_part_of_a_source(void) {
   TEST_ASSERT_GREATER_THAN(0, source("sightings:eye")->ignored);
 }
 
-static void a_source_that_is_not_used_does_not_hold_time_back(void) {
+TEST(a_source_that_is_not_used_does_not_hold_time_back) {
   small_recording_write("rec", &(small_recording){.seconds = 5});
   replay_into("rec", "format: waymark-config/1\nestimator: odometry\n", "run", &report);
   TEST_ASSERT_EQUAL_UINT32(1, report.health.source_count);
@@ -254,7 +253,7 @@ static double last_heading_rad(const char *run) {
 }
 
 // CAN turns at 0.5 rad/s, the IMU at 0.1: mixed, the two would be one gyro.
-static void a_streams_turn_rate_is_taken_instead_of_cans(void) {
+TEST(a_streams_turn_rate_is_taken_instead_of_cans) {
   small_recording_write("rec", &(small_recording){.seconds = 1});
   TEST_ASSERT_EQUAL(0, remove(in_folder("rec/motion.csv")) | remove(in_folder("rec/sightings.csv")));
   FILE *f = create("rec/recording.yaml");
@@ -288,25 +287,4 @@ static void a_streams_turn_rate_is_taken_instead_of_cans(void) {
   replay_into("rec", "format: waymark-config/1\nestimator: odometry\nsources: [{name: imu, use: false}]\n", "can",
               &report);
   TEST_ASSERT_DOUBLE_WITHIN(0.01, 2.0, last_heading_rad("can"));
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(the_same_replay_twice_gives_the_same_bytes);
-  RUN_TEST(nothing_is_allocated_and_no_page_is_missing_after_the_start);
-  RUN_TEST(the_event_log_gives_the_same_poses_without_the_recording);
-  RUN_TEST(frames_that_are_all_150_ms_late_change_nothing);
-  RUN_TEST(a_single_frame_150_ms_late_changes_nothing);
-  RUN_TEST(frames_that_are_all_250_ms_late_change_nothing);
-  RUN_TEST(a_single_frame_250_ms_late_changes_nothing);
-  RUN_TEST(landmarks_that_moved_are_told);
-  RUN_TEST(what_is_too_late_is_counted_and_the_number_that_is_told_would_do);
-  RUN_TEST(where_no_bound_is_stated_three_late_data_raise_it);
-  RUN_TEST(the_first_datum_after_a_silence_is_fused);
-  RUN_TEST(silence_costs_the_published_pose_nothing);
-  RUN_TEST(every_datum_is_accounted_for);
-  RUN_TEST(from_and_until_take_a_part_of_a_source);
-  RUN_TEST(a_source_that_is_not_used_does_not_hold_time_back);
-  RUN_TEST(a_streams_turn_rate_is_taken_instead_of_cans);
-  return UNITY_END();
 }

@@ -3,23 +3,20 @@
 #include <cmath>
 #include <limits>
 
+#include "common/suite.h"
 #include "ros2/incoming.h"
 #include "ros2/outgoing.h"
 #include "ros2/participant.h"
 #include "ros2/track.h"
-#include "unity.h"
 
 using namespace wm::ros2;
-
-void setUp() {}
-void tearDown() {}
 
 namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 char map_frame[] = "map", other_frame[] = "odom";
 
-void test_covariances_turn_into_the_axes_of_the_map() {
+TEST(test_covariances_turn_into_the_axes_of_the_map) {
   wm_estimate estimate{};
   // A quarter turn about z: the body's x is the map's y.
   estimate.pose_map_base.q_xyzw[2] = estimate.pose_map_base.q_xyzw[3] = std::sqrt(0.5);
@@ -33,7 +30,7 @@ void test_covariances_turn_into_the_axes_of_the_map() {
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 9, out[wm_cov_index(5, 5)]);
 }
 
-void test_a_pose_has_the_quaternion_of_the_run() {
+TEST(test_a_pose_has_the_quaternion_of_the_run) {
   wm_published published{};
   published.now.pose_map_base.q_xyzw[2] = std::sin(-1.25);  // a heading of -2.5 rad
   published.now.pose_map_base.q_xyzw[3] = std::cos(-1.25);
@@ -42,7 +39,7 @@ void test_a_pose_has_the_quaternion_of_the_run() {
   TEST_ASSERT_DOUBLE_WITHIN(1e-15, std::cos(-1.25), out.pose.pose.orientation.w);
 }
 
-void test_a_track_has_the_poses_between_its_stamps_and_none_outside() {
+TEST(test_a_track_has_the_poses_between_its_stamps_and_none_outside) {
   Track track;
   Eigen::Isometry3d a = Eigen::Isometry3d::Identity(), b = a;
   b.translation().x() = 2;
@@ -60,7 +57,7 @@ void test_a_track_has_the_poses_between_its_stamps_and_none_outside() {
   TEST_ASSERT_EQUAL_INT64(50, *track.newest_ns());
 }
 
-void test_odom_in_map_takes_the_corrections() {
+TEST(test_odom_in_map_takes_the_corrections) {
   Eigen::Isometry3d in_map = Eigen::Isometry3d::Identity(), in_odom = in_map;
   in_map.translation() << 3, 4, 0;
   in_map.linear() = Eigen::AngleAxisd(0.7, Eigen::Vector3d::UnitZ()).matrix();
@@ -69,7 +66,7 @@ void test_odom_in_map_takes_the_corrections() {
   TEST_ASSERT_TRUE((odom_in_map(in_map, in_odom) * in_odom).isApprox(in_map));
 }
 
-void test_a_pose_to_set_needs_the_frame_of_the_map_and_numbers() {
+TEST(test_a_pose_to_set_needs_the_frame_of_the_map_and_numbers) {
   PoseStamped message{};
   message.header.frame_id = map_frame;
   message.pose.pose = {{1, 2, 0}, {0, 0, 0, 1}};
@@ -91,7 +88,7 @@ void test_a_pose_to_set_needs_the_frame_of_the_map_and_numbers() {
   TEST_ASSERT_EQUAL_STRING("its frame is 'odom', not 'map'", set_pose_of(message, "map", &out)->c_str());
 }
 
-void test_an_imu_without_an_accelerometer_and_one_without_a_gyro() {
+TEST(test_an_imu_without_an_accelerometer_and_one_without_a_gyro) {
   Imu message{};
   message.angular_velocity = {0.1, 0.2, 0.3};
   message.linear_acceleration = {1, 2, 3};
@@ -107,7 +104,7 @@ void test_an_imu_without_an_accelerometer_and_one_without_a_gyro() {
   TEST_ASSERT_TRUE(imu_of(message, &row).has_value());
 }
 
-void test_fixes_are_metres_from_the_origin() {
+TEST(test_fixes_are_metres_from_the_origin) {
   const double origin[3] = {48, 11, 500};
   wm_can_gnss gnss;
   wm_can_gnss_init(&gnss, origin);
@@ -130,14 +127,14 @@ void test_fixes_are_metres_from_the_origin() {
   TEST_ASSERT_TRUE(position_of(message, &gnss, &row)->size() > 0);
 }
 
-void test_stamps() {
+TEST(test_stamps) {
   TEST_ASSERT_EQUAL_INT64(0, monotonic_stamp({0, 0}, 5));
   TEST_ASSERT_EQUAL_INT64(2'000'000'001 - 7, monotonic_stamp({2, 1}, 7));
   TEST_ASSERT_EQUAL_INT64(0, from_time(to_time(-5)));
   TEST_ASSERT_EQUAL_INT64(1'500'000'000, from_time(to_time(1'500'000'000)));
 }
 
-void test_silence_is_a_stale_diagnostic() {
+TEST(test_silence_is_a_stale_diagnostic) {
   Diagnostics texts;
   static wm_health health{};
   health.state = WM_STATE_TRACKING;
@@ -151,7 +148,7 @@ void test_silence_is_a_stale_diagnostic() {
   TEST_ASSERT_EQUAL_STRING("no poses for 3 s", out.status._buffer[0].message);
 }
 
-void test_bridges_that_are_in_each_other_s_way() {
+TEST(test_bridges_that_are_in_each_other_s_way) {
   const Peer self{2, 10, "here", "", "WAYMARK_@udpm"};
   TEST_ASSERT_FALSE(conflict(self, {1, 11, "there", "", "WAYMARK_@udpm"}).empty());       // the same topics
   TEST_ASSERT_TRUE(conflict(self, {1, 11, "there", "robot2", "WAYMARK_@udpm"}).empty());  // another robot
@@ -159,18 +156,3 @@ void test_bridges_that_are_in_each_other_s_way() {
 }
 
 }  // namespace
-
-int main() {
-  UNITY_BEGIN();
-  RUN_TEST(test_covariances_turn_into_the_axes_of_the_map);
-  RUN_TEST(test_a_pose_has_the_quaternion_of_the_run);
-  RUN_TEST(test_a_track_has_the_poses_between_its_stamps_and_none_outside);
-  RUN_TEST(test_odom_in_map_takes_the_corrections);
-  RUN_TEST(test_a_pose_to_set_needs_the_frame_of_the_map_and_numbers);
-  RUN_TEST(test_an_imu_without_an_accelerometer_and_one_without_a_gyro);
-  RUN_TEST(test_fixes_are_metres_from_the_origin);
-  RUN_TEST(test_stamps);
-  RUN_TEST(test_silence_is_a_stale_diagnostic);
-  RUN_TEST(test_bridges_that_are_in_each_other_s_way);
-  return UNITY_END();
-}

@@ -16,7 +16,7 @@
 extern "C" {
 #include "aruco_codes.h"
 }
-#include "unity.h"
+#include "common/suite.h"
 #include "waymark/detectors.h"
 
 namespace {
@@ -30,10 +30,10 @@ uint64_t checksum() {
   return sum;
 }
 
-void the_table_is_what_was_made() { TEST_ASSERT_EQUAL_HEX64(UINT64_C(0xC5DB3C93F958064A), checksum()); }
+TEST(the_table_is_what_was_made) { TEST_ASSERT_EQUAL_HEX64(UINT64_C(0xC5DB3C93F958064A), checksum()); }
 
 // Codes of one family, in all rotations, have the stated least distance. It bounds the correctable modules.
-void distances_are_as_said() {
+TEST(distances_are_as_said) {
   for (const char *const *name = wm_marker_family_names + 1; *name; name++) {
     wm_square_family family;
     uint64_t *codes;
@@ -76,7 +76,7 @@ uint64_t code_of(const cv::aruco::Dictionary &dictionary, int id) {
   return code;
 }
 
-void each_code_is_opencvs() {
+TEST(each_code_is_opencvs) {
   for (int across = 4; across <= 7; across++)
     for (int size = 0; size < 4; size++) {
       const auto dictionary = cv::aruco::getPredefinedDictionary(4 * (across - 4) + size);
@@ -121,23 +121,16 @@ void write() {
       "}");
 }
 #else
-void each_code_is_opencvs() { TEST_IGNORE_MESSAGE("libopencv-contrib-dev wasn't there when this was built"); }
+TEST(each_code_is_opencvs) { TEST_IGNORE_MESSAGE("libopencv-contrib-dev wasn't there when this was built"); }
 void write() {}
 #endif
 
 }  // namespace
 
-void setUp() {}
-void tearDown() {}
-
-int main(int argc, char **argv) {
+int suite_begin(int argc, char **argv) {
   if (argc > 1 && std::strcmp(argv[1], "write") == 0) {
     write();
     return 0;
   }
-  UNITY_BEGIN();
-  RUN_TEST(the_table_is_what_was_made);
-  RUN_TEST(each_code_is_opencvs);
-  RUN_TEST(distances_are_as_said);
-  return UNITY_END();
+  return SUITE_RUNS;
 }

@@ -9,8 +9,8 @@
 #include <string.h>
 #include <turbojpeg.h>
 
+#include "common/suite.h"
 #include "fake_camera.h"
-#include "unity.h"
 
 static fake_camera fake;
 static wm_camera_device *device;
@@ -87,7 +87,7 @@ static void expect_state(wm_device_state state, const char *note) {
   TEST_ASSERT_NOT_NULL_MESSAGE(strstr(counts()->device_note, note), counts()->device_note);
 }
 
-static void pictures_become_frames(void) {
+TEST(pictures_become_frames) {
   stale(AT(0), 0);
   picture(AT(10), 1);
   picture(AT(43), 2);
@@ -108,7 +108,7 @@ static void pictures_become_frames(void) {
 }
 
 // At 4 Hz four pictures are a second of blindness.
-static void the_first_picture_of_a_camera_with_an_empty_ring_is_used(void) {
+TEST(the_first_picture_of_a_camera_with_an_empty_ring_is_used) {
   picture(AT(100), 1);
   picture(AT(350), 2);
   make();
@@ -118,7 +118,7 @@ static void the_first_picture_of_a_camera_with_an_empty_ring_is_used(void) {
 }
 
 // v4l2loopback: a burst of what was in its ring, with old stamps, then the count leaps.
-static void what_was_in_the_ring_before_the_start_is_thrown_away(void) {
+TEST(what_was_in_the_ring_before_the_start_is_thrown_away) {
   for (uint32_t i = 0; i < 4; i++) picture(AT(-3000 + 33 * (int)i), 4 + i)->at_ns = AT(1);
   picture(AT(20), 60);
   picture(AT(53), 61);
@@ -131,7 +131,7 @@ static void what_was_in_the_ring_before_the_start_is_thrown_away(void) {
 }
 
 // v4l2loopback stamps the buffers that it has anew, and numbers them 0, while a reader sets it up.
-static void what_was_stamped_anew_before_the_start_is_thrown_away(void) {
+TEST(what_was_stamped_anew_before_the_start_is_thrown_away) {
   fake.start_takes_ns = 5 * MS;
   picture(AT(2), 0)->at_ns = AT(6);
   picture(AT(20), 60);
@@ -144,7 +144,7 @@ static void what_was_stamped_anew_before_the_start_is_thrown_away(void) {
 }
 
 // vivid, percentage_of_dropped_buffers=30: 7 -> 10, 15 -> 17; and numbers near their wrap (wrap_sequence_number).
-static void gaps_in_the_drivers_count_are_lost_pictures(void) {
+TEST(gaps_in_the_drivers_count_are_lost_pictures) {
   stale(AT(0), 4294967290u);
   const uint32_t numbers[] = {4294967293u, 4294967295u, 0, 3};
   for (int i = 0; i < 4; i++) picture(AT(10 + 33 * i), numbers[i]);
@@ -155,7 +155,7 @@ static void gaps_in_the_drivers_count_are_lost_pictures(void) {
 }
 
 // vivid, inject_v4l2_buf_flag_error; v4l2loopback with a producer of another size.
-static void damaged_buffers_are_counted_and_passed_over(void) {
+TEST(damaged_buffers_are_counted_and_passed_over) {
   stale(AT(0), 0);
   picture(AT(10), 1)->flags = CAMERA_BUFFER_ERROR;
   picture(AT(43), 2)->bytes = 100;
@@ -166,7 +166,7 @@ static void damaged_buffers_are_counted_and_passed_over(void) {
   TEST_ASSERT_EQUAL_UINT64(0, counts()->lost);
 }
 
-static void only_the_newest_of_what_waits_is_handed_out(void) {
+TEST(only_the_newest_of_what_waits_is_handed_out) {
   stale(AT(0), 0);
   for (uint32_t i = 0; i < 3; i++) picture(AT(10 + 10 * (int)i), 1 + i)->at_ns = AT(40);
   make();
@@ -176,7 +176,7 @@ static void only_the_newest_of_what_waits_is_handed_out(void) {
 }
 
 // v4l2loopback whose producer was killed: no error, no buffer. Then a new producer on the open device.
-static void a_stalled_camera_is_noticed_and_switched_off_and_on(void) {
+TEST(a_stalled_camera_is_noticed_and_switched_off_and_on) {
   stale(AT(0), 0);
   picture(AT(10), 1);
   stale(AT(9000), 5);
@@ -191,7 +191,7 @@ static void a_stalled_camera_is_noticed_and_switched_off_and_on(void) {
 }
 
 // v4l2loopback with `timeout`: the last picture again, the same number, the same stamp.
-static void a_frozen_camera_gives_no_frames(void) {
+TEST(a_frozen_camera_gives_no_frames) {
   stale(AT(0), 0);
   picture(AT(10), 1);
   for (int i = 0; i < 60; i++) {
@@ -210,7 +210,7 @@ static void a_frozen_camera_gives_no_frames(void) {
 }
 
 // The same picture with new stamps and numbers: frozen all the same.
-static void a_camera_that_repeats_its_picture_with_new_stamps_is_frozen(void) {
+TEST(a_camera_that_repeats_its_picture_with_new_stamps_is_frozen) {
   stale(AT(0), 0);
   for (int i = 0; i < 50; i++) picture(AT(10 + 33 * i), 1 + (uint32_t)i)->grey = 77;
   make();
@@ -236,7 +236,7 @@ static void unplug(int reason, const char *bus_after) {
   (void)snprintf(fake.bus, sizeof fake.bus, "%s", bus_after);
 }
 
-static void an_unplugged_camera_is_taken_again_when_it_is_back(void) {
+TEST(an_unplugged_camera_is_taken_again_when_it_is_back) {
   const int reasons[] = {ENODEV, EINVAL, EIO};  // uvcvideo; vivid's unbind; a fatal streaming error
   for (int i = 0; i < 3; i++) {
     unplug(reasons[i], "usb-1");
@@ -247,14 +247,14 @@ static void an_unplugged_camera_is_taken_again_when_it_is_back(void) {
   }
 }
 
-static void another_camera_in_its_place_is_not_taken(void) {
+TEST(another_camera_in_its_place_is_not_taken) {
   unplug(ENODEV, "usb-2");
   TEST_ASSERT_EQUAL(WM_AGAIN, next_within(8 * WM_NS_PER_S));
   expect_state(WM_DEVICE_ABSENT, "looking for it");
   TEST_ASSERT_EQUAL(1, fake.opened);
 }
 
-static void what_the_driver_changed_is_said(void) {
+TEST(what_the_driver_changed_is_said) {
   config.control_count = 3;
   (void)snprintf(config.controls[0].name, 32, "gain");
   config.controls[0].value = 500;
@@ -273,7 +273,7 @@ static void what_the_driver_changed_is_said(void) {
   TEST_ASSERT_EQUAL(1, fake.set_count);
 }
 
-static void another_size_than_the_calibrations_is_refused(void) {
+TEST(another_size_than_the_calibrations_is_refused) {
   fake.changes_to = (camera_mode){.width = 32, .height = FAKE_HEIGHT};
   stale(AT(0), 0);
   picture(AT(10), 1);
@@ -283,7 +283,7 @@ static void another_size_than_the_calibrations_is_refused(void) {
   TEST_ASSERT_EQUAL(0, fake.started);
 }
 
-static void the_exposure_the_driver_tells_moves_the_stamp(void) {
+TEST(the_exposure_the_driver_tells_moves_the_stamp) {
   fake.exposure_ns = 6 * MS;
   calibrated.readout_ns = 10 * MS;
   stale(AT(0), 0);
@@ -295,7 +295,7 @@ static void the_exposure_the_driver_tells_moves_the_stamp(void) {
   expect_picture_of(AT(61));
 }
 
-static void a_camera_clock_29_s_off_is_followed_and_said(void) {
+TEST(a_camera_clock_29_s_off_is_followed_and_said) {
   stale(AT(0), 0);
   for (int i = 0; i < 60; i++) picture(AT(10 + 33 * i), 1 + (uint32_t)i)->stamp_ns += 29 * WM_NS_PER_S;
   make();
@@ -307,7 +307,7 @@ static void a_camera_clock_29_s_off_is_followed_and_said(void) {
   TEST_ASSERT_LESS_OR_EQUAL_UINT64(3, counts()->bad_stamps);
 }
 
-static void jpegs_are_decoded_and_garbage_is_not(void) {
+TEST(jpegs_are_decoded_and_garbage_is_not) {
   static uint8_t grey[FAKE_WIDTH * FAKE_HEIGHT];
   unsigned char *jpeg = NULL;
   unsigned long jpeg_bytes = 0;
@@ -328,26 +328,4 @@ static void jpegs_are_decoded_and_garbage_is_not(void) {
   TEST_ASSERT_EQUAL_UINT64(1, counts()->damaged);
   tjFree(jpeg);
   (void)tjDestroy(handle);
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(pictures_become_frames);
-  RUN_TEST(the_first_picture_of_a_camera_with_an_empty_ring_is_used);
-  RUN_TEST(what_was_in_the_ring_before_the_start_is_thrown_away);
-  RUN_TEST(what_was_stamped_anew_before_the_start_is_thrown_away);
-  RUN_TEST(gaps_in_the_drivers_count_are_lost_pictures);
-  RUN_TEST(damaged_buffers_are_counted_and_passed_over);
-  RUN_TEST(only_the_newest_of_what_waits_is_handed_out);
-  RUN_TEST(a_stalled_camera_is_noticed_and_switched_off_and_on);
-  RUN_TEST(a_frozen_camera_gives_no_frames);
-  RUN_TEST(a_camera_that_repeats_its_picture_with_new_stamps_is_frozen);
-  RUN_TEST(an_unplugged_camera_is_taken_again_when_it_is_back);
-  RUN_TEST(another_camera_in_its_place_is_not_taken);
-  RUN_TEST(what_the_driver_changed_is_said);
-  RUN_TEST(another_size_than_the_calibrations_is_refused);
-  RUN_TEST(the_exposure_the_driver_tells_moves_the_stamp);
-  RUN_TEST(a_camera_clock_29_s_off_is_followed_and_said);
-  RUN_TEST(jpegs_are_decoded_and_garbage_is_not);
-  return UNITY_END();
 }

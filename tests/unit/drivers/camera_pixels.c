@@ -3,12 +3,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/suite.h"
 #include "frame_clock.h"
 #include "pixels.h"
-#include "unity.h"
-
-void setUp(void) {}
-void tearDown(void) {}
 
 #define W 4
 #define H 3
@@ -28,7 +25,7 @@ static void expect_grey(const char *format, uint32_t stride, uint32_t bytes_per_
   TEST_ASSERT_EQUAL(f, pixels_of_fourcc(pixels_fourcc(f)));
 }
 
-static void each_format_has_its_luma_where_it_should_be(void) {
+TEST(each_format_has_its_luma_where_it_should_be) {
   expect_grey("GREY", 4, 1, 0);
   expect_grey("GREY", 9, 1, 0);
   expect_grey("NV12", 6, 1, 0);
@@ -37,7 +34,7 @@ static void each_format_has_its_luma_where_it_should_be(void) {
   expect_grey("Y16", 8, 2, 1);
 }
 
-static void ten_bits_keep_their_upper_eight(void) {
+TEST(ten_bits_keep_their_upper_eight) {
   const uint8_t from[8] = {0x03, 0x00, 0x04, 0x00, 0xff, 0x03, 0xff, 0xff};  // 3, 4, 1023, rubbish above
   uint8_t grey[4];
   pixels_to_grey(pixels_find("Y10"), from, 4, 1, 8, grey);
@@ -45,7 +42,7 @@ static void ten_bits_keep_their_upper_eight(void) {
   TEST_ASSERT_EQUAL_UINT8_ARRAY(expected, grey, 4);
 }
 
-static void colours_weigh_as_the_eye_sees_them(void) {
+TEST(colours_weigh_as_the_eye_sees_them) {
   const uint8_t from[12] = {255, 0, 0, 0, 255, 0, 0, 0, 255, 255, 255, 255};
   const uint8_t rgb[4] = {77, 149, 29, 255}, bgr[4] = {29, 149, 77, 255};
   uint8_t grey[4];
@@ -57,7 +54,7 @@ static void colours_weigh_as_the_eye_sees_them(void) {
   TEST_ASSERT_EQUAL(0, pixels_are_grey(PIXELS_RGB));
 }
 
-static void names_of_formats(void) {
+TEST(names_of_formats) {
   TEST_ASSERT_EQUAL(PIXELS_MJPEG, pixels_find("MJPEG"));
   TEST_ASSERT_EQUAL(PIXELS_MJPEG, pixels_find("MJPG"));
   TEST_ASSERT_EQUAL_HEX32(0x59455247, pixels_fourcc(PIXELS_GREY));
@@ -66,7 +63,7 @@ static void names_of_formats(void) {
   TEST_ASSERT_EQUAL(-1, pixels_of_fourcc(0));
 }
 
-static void a_changed_picture_has_another_fingerprint(void) {
+TEST(a_changed_picture_has_another_fingerprint) {
   uint8_t *picture = calloc(640 * 400, 1);
   uint64_t before = pixels_fingerprint(picture, 640 * 400);
   TEST_ASSERT_EQUAL_HEX64(before, pixels_fingerprint(picture, 640 * 400));
@@ -80,7 +77,7 @@ static void a_changed_picture_has_another_fingerprint(void) {
 #define MS WM_NS_PER_MS
 #define NOW (1000 * WM_NS_PER_S)
 
-static void stamps_of_start_and_end_become_the_middle_of_the_middle_row(void) {
+TEST(stamps_of_start_and_end_become_the_middle_of_the_middle_row) {
   frame_clock clock = {.readout_ns = 10 * MS, .latency_ns = 2 * MS};
   wm_time_ns t_ns;
   // Exposure of 6 ms; the first row begins at 0, the last one ends at 16, the middle of all is 8.
@@ -90,7 +87,7 @@ static void stamps_of_start_and_end_become_the_middle_of_the_middle_row(void) {
   TEST_ASSERT_EQUAL_INT64(NOW + 8 * MS, t_ns);
 }
 
-static void without_a_stamp_the_arrival_is_its_end(void) {
+TEST(without_a_stamp_the_arrival_is_its_end) {
   frame_clock clock = {0};
   wm_time_ns t_ns;
   TEST_ASSERT_EQUAL(STAMP_GUESSED, frame_clock_stamp(&clock, 0, STAMP_START, NOW, 6 * MS, &t_ns));
@@ -114,13 +111,13 @@ static void follow(wm_time_ns offset_ns, wm_time_ns limit_ns) {
   TEST_ASSERT_TRUE(clock.is_foreign);
 }
 
-static void a_camera_with_a_clock_of_its_own_is_followed(void) {
+TEST(a_camera_with_a_clock_of_its_own_is_followed) {
   follow(29 * WM_NS_PER_S, MS);
   follow(-29 * WM_NS_PER_S, MS);
   follow(INT64_MAX - NOW - 20 * WM_NS_PER_S, MS);  // as vivid's wrap_timestamp: 16 s below 2^63
 }
 
-static void one_absurd_stamp_changes_no_belief(void) {
+TEST(one_absurd_stamp_changes_no_belief) {
   frame_clock clock = {0};
   wm_time_ns t_ns;
   for (int i = 0; i < 10; i++) {
@@ -135,7 +132,7 @@ static void one_absurd_stamp_changes_no_belief(void) {
 
 // ── numbers ─────────────────────────────────────────────────────────────────────────────────────────────────────────
 
-static void gaps_are_counted_and_wraps_are_none(void) {
+TEST(gaps_are_counted_and_wraps_are_none) {
   frame_count count = {0};
   uint64_t lost;
   TEST_ASSERT_EQUAL(COUNT_NEXT, frame_count_take(&count, 4294967294u, &lost));
@@ -148,19 +145,4 @@ static void gaps_are_counted_and_wraps_are_none(void) {
   TEST_ASSERT_EQUAL(COUNT_SAME, frame_count_take(&count, 3, &lost));
   TEST_ASSERT_EQUAL(COUNT_RESTARTED, frame_count_take(&count, 1, &lost));
   TEST_ASSERT_EQUAL_UINT64(0, lost);
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(each_format_has_its_luma_where_it_should_be);
-  RUN_TEST(ten_bits_keep_their_upper_eight);
-  RUN_TEST(colours_weigh_as_the_eye_sees_them);
-  RUN_TEST(names_of_formats);
-  RUN_TEST(a_changed_picture_has_another_fingerprint);
-  RUN_TEST(stamps_of_start_and_end_become_the_middle_of_the_middle_row);
-  RUN_TEST(without_a_stamp_the_arrival_is_its_end);
-  RUN_TEST(a_camera_with_a_clock_of_its_own_is_followed);
-  RUN_TEST(one_absurd_stamp_changes_no_belief);
-  RUN_TEST(gaps_are_counted_and_wraps_are_none);
-  return UNITY_END();
 }

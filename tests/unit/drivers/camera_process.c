@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "unity.h"
+#include "common/suite.h"
 
 #define WIDTH 8
 #define HEIGHT 4
@@ -91,7 +91,6 @@ static void *camera;
 static const camera_io *const kIo = &kCameraProcess;
 
 void setUp(void) { camera = NULL; }
-void tearDown(void) {}
 
 static void begin(const char *path) {
   camera_identity identity = {0};
@@ -116,7 +115,7 @@ static void expect_picture(uint32_t number) {
   TEST_ASSERT_EQUAL(0, kIo->give_back(camera, b.index));
 }
 
-static void calls_and_pictures_come_through(void) {
+TEST(calls_and_pictures_come_through) {
   camera_buffer b;
   camera_control gain = {.name = "gain", .value = 99}, other = {.name = "other"};
   begin("whole");
@@ -129,7 +128,7 @@ static void calls_and_pictures_come_through(void) {
   kIo->close(camera);
 }
 
-static void a_library_that_ends_its_process_is_a_camera_that_is_gone(void) {
+TEST(a_library_that_ends_its_process_is_a_camera_that_is_gone) {
   camera_buffer b;
   for (int times = 0; times < 2; times++) {  // and it may come back
     begin("fragile");
@@ -149,7 +148,7 @@ static int open_files(void) {
   return count;
 }
 
-static void nothing_is_left_of_cameras_that_were_closed(void) {
+TEST(nothing_is_left_of_cameras_that_were_closed) {
   const int before = open_files();
   for (int i = 0; i < 20; i++) {
     camera_identity absent = {.path = "absent"};
@@ -161,14 +160,10 @@ static void nothing_is_left_of_cameras_that_were_closed(void) {
   TEST_ASSERT_EQUAL(before, open_files());
 }
 
-int main(int argc, char **argv) {
+int suite_begin(int argc, char **argv) {
   if (argc == 2 && strcmp(argv[1], CAMERA_PROCESS) == 0) {
     camera_process_serve(&kLibrary);
     return 0;
   }
-  UNITY_BEGIN();
-  RUN_TEST(calls_and_pictures_come_through);
-  RUN_TEST(a_library_that_ends_its_process_is_a_camera_that_is_gone);
-  RUN_TEST(nothing_is_left_of_cameras_that_were_closed);
-  return UNITY_END();
+  return SUITE_RUNS;
 }

@@ -3,11 +3,9 @@
 #include <math.h>
 #include <stdlib.h>
 #include <unistd.h>
+#include "common/suite.h"
 
 #include "can_fixture.h"
-
-void setUp(void) {}
-void tearDown(void) {}
 
 static fixture f;
 
@@ -24,7 +22,7 @@ static void refused(const wm_can_binding *bindings, size_t count, const char *wo
   TEST_ASSERT_NULL(f.decoder);
 }
 
-static void numbers_that_are_none(void) {
+TEST(numbers_that_are_none) {
   wm_can_binding b = binding(WM_Q_VEHICLE_SPEED, "M", "A");
   b.quantity = -1;
   refused(&b, 1, "-1 is not a quantity");
@@ -42,7 +40,7 @@ static void numbers_that_are_none(void) {
   refused(&b, 1, "offset");
 }
 
-static void one_raw_value_is_one_gear(void) {
+TEST(one_raw_value_is_one_gear) {
   wm_can_binding b = binding(WM_Q_GEAR, "M", "G");
   b.gear_count = 2;
   b.gear[0].raw = b.gear[1].raw = 3;
@@ -56,7 +54,7 @@ static void one_raw_value_is_one_gear(void) {
 }
 
 // A refusal lists the names of its own signal: none of the one that was refused before.
-static void names_that_are_no_gears(void) {
+TEST(names_that_are_no_gears) {
   static const char kNamed[] =
       "BO_ 256 M: 8 X\n SG_ G : 16|8@1+ (1,0) [0|0] \"\" X\nVAL_ 256 G 0 \"open\" 1 \"closed\" ;\n";
   const wm_can_binding b = binding(WM_Q_GEAR, "M", "G");
@@ -68,14 +66,14 @@ static void names_that_are_no_gears(void) {
   }
 }
 
-static void messages_that_are_not_there(void) {
+TEST(messages_that_are_not_there) {
   const wm_can_binding b = binding(WM_Q_VEHICLE_SPEED, "quite_another_name", "A");
   refused(&b, 1, "message 'quite_another_name' is not among the 2 messages of car.dbc");
   const wm_can_binding near = binding(WM_Q_VEHICLE_SPEED, "MM", "A");
   refused(&near, 1, "did you mean M?");
 }
 
-static void sums_keep_signs_and_units(void) {
+TEST(sums_keep_signs_and_units) {
   wm_can_binding b = binding(WM_Q_VEHICLE_SPEED, "M", "A");
   b.signal_count = 2;
   (void)snprintf(b.signal[1], sizeof b.signal[1], "B");
@@ -90,7 +88,7 @@ static void sums_keep_signs_and_units(void) {
 #define RANGED(signal) "BO_ 256 M: 8 X\n SG_ A : " signal " \"m/s\" X\n"
 
 // The outermost raw values are no measurement where the range excludes them; others are taken, whatever the range.
-static void outermost_values_are_no_measurement(void) {
+TEST(outermost_values_are_no_measurement) {
   open_one(&f, RANGED("0|16@1- (1,0) [-32000|32000]"), binding(WM_Q_VEHICLE_SPEED, "M", "A"));
   TEST_ASSERT_EQUAL(WM_BAD_DATA, feed(&f, "can0 100#0080000000000000"));
   TEST_ASSERT_EQUAL(WM_BAD_DATA, feed(&f, "can0 100#FF7F000000000000"));
@@ -111,7 +109,7 @@ static void outermost_values_are_no_measurement(void) {
   close_it(&f);
 }
 
-static void a_dbc_from_a_file(void) {
+TEST(a_dbc_from_a_file) {
   char path[] = "/tmp/wm-dbc-XXXXXX";
   const int fd = mkstemp(path);
   TEST_ASSERT_GREATER_OR_EQUAL(0, fd);
@@ -129,16 +127,4 @@ static void a_dbc_from_a_file(void) {
   TEST_ASSERT_EQUAL(WM_IO, wm_dbc_load("/proc/self", &dbc, &err));  // a folder
   TEST_ASSERT_NULL(dbc);
   TEST_ASSERT_NOT_NULL(strstr(err.text, "cannot be read"));
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(numbers_that_are_none);
-  RUN_TEST(one_raw_value_is_one_gear);
-  RUN_TEST(names_that_are_no_gears);
-  RUN_TEST(messages_that_are_not_there);
-  RUN_TEST(sums_keep_signs_and_units);
-  RUN_TEST(outermost_values_are_no_measurement);
-  RUN_TEST(a_dbc_from_a_file);
-  return UNITY_END();
 }

@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Extraction of signals: by hand, and against a bit-by-bit twin for every start and length in both byte orders.
 #include "can_signal.h"
-#include "unity.h"
-
-void setUp(void) {}
-void tearDown(void) {}
+#include "common/suite.h"
 
 // Deterministic bytes, no two neighbours alike.
 static void fill(uint8_t *bytes, size_t count, uint32_t seed) {
@@ -32,7 +29,7 @@ static uint64_t bit_by_bit(const signal_bits *s, const uint8_t *data) {
   return out;
 }
 
-static void every_place_and_length(void) {
+TEST(every_place_and_length) {
   unsigned tried = 0;
   for (uint32_t seed = 1; seed <= 3; seed++) {
     uint8_t data[WM_CAN_DATA_MAX];
@@ -51,7 +48,7 @@ static void every_place_and_length(void) {
   TEST_ASSERT_GREATER_THAN(150000, tried);
 }
 
-static void by_hand(void) {
+TEST(by_hand) {
   static const struct {
     uint16_t start;
     uint8_t length, motorola;
@@ -82,7 +79,7 @@ static void by_hand(void) {
   }
 }
 
-static void signs(void) {
+TEST(signs) {
   TEST_ASSERT_EQUAL_INT64(-1, sign_extend(1, 1));
   TEST_ASSERT_EQUAL_INT64(0, sign_extend(0, 1));
   TEST_ASSERT_EQUAL_INT64(-8, sign_extend(8, 4));
@@ -97,7 +94,7 @@ static double number(signal_kind kind, uint8_t length, uint64_t raw) {
   return signal_number(&s, raw);
 }
 
-static void numbers(void) {
+TEST(numbers) {
   TEST_ASSERT_EQUAL_DOUBLE(65535.0, number(SIGNAL_UNSIGNED, 16, 65535));
   TEST_ASSERT_EQUAL_DOUBLE(-1.0, number(SIGNAL_SIGNED, 16, 65535));
   TEST_ASSERT_EQUAL_DOUBLE(18446744073709551615.0, number(SIGNAL_UNSIGNED, 64, UINT64_MAX));
@@ -106,21 +103,11 @@ static void numbers(void) {
 }
 
 // What a short frame doesn't have reads as zero, never as what was there before.
-static void short_frames(void) {
+TEST(short_frames) {
   const uint8_t data[2] = {0xFF, 0xFF};
   payload p;
   memset(&p, 0xAA, sizeof p);
   payload_set(&p, data, 1);
   signal_bits s = {0, 64, 0, SIGNAL_UNSIGNED};
   TEST_ASSERT_EQUAL_HEX64(0xFF, signal_raw(&s, &p));
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(every_place_and_length);
-  RUN_TEST(by_hand);
-  RUN_TEST(signs);
-  RUN_TEST(numbers);
-  RUN_TEST(short_frames);
-  return UNITY_END();
 }

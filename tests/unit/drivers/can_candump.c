@@ -4,11 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "unity.h"
+#include "common/suite.h"
 #include "waymark/can.h"
-
-void setUp(void) {}
-void tearDown(void) {}
 
 static wm_can_frame frame;
 static wm_error err;
@@ -30,7 +27,7 @@ static void expect(const char *line, uint32_t id, int extended, int remote, int 
   TEST_ASSERT_EQUAL_MESSAGE(length, frame.length, line);
 }
 
-static void forms(void) {
+TEST(forms) {
   //                                                          id        ext rem err fd length
   expect("(1700000000.000000) can0 123#", 0x123, 0, 0, 0, 0, 0);
   expect("(1700000000.000100) can0 123#00", 0x123, 0, 0, 0, 0, 1);
@@ -55,7 +52,7 @@ static void forms(void) {
   expect("(1.0) /dev/serial/by-id/usb-Adapter_0123456789-if00 123#00", 0x123, 0, 0, 0, 0, 1);
 }
 
-static void contents(void) {
+TEST(contents) {
   good("(30.005041) vcan1 1C4D80A7##B12C20304 T");
   TEST_ASSERT_EQUAL_STRING("vcan1", frame.iface);
   TEST_ASSERT_EQUAL_HEX8(0xB, frame.fd_flags);
@@ -70,7 +67,7 @@ static void contents(void) {
   TEST_ASSERT_EQUAL(WM_BAD_DATA, parse(line));
 }
 
-static void times_are_exact(void) {
+TEST(times_are_exact) {
   static const struct {
     const char *line;
     int64_t t_ns;
@@ -96,14 +93,14 @@ static void times_are_exact(void) {
   TEST_ASSERT_EQUAL(WM_OUT_OF_RANGE, parse("(99999999999999999999999999.0) c 1FF#"));
 }
 
-static void nothing_there(void) {
+TEST(nothing_there) {
   TEST_ASSERT_EQUAL(WM_AGAIN, parse(""));
   TEST_ASSERT_EQUAL(WM_AGAIN, parse(" \t\r\n"));
   TEST_ASSERT_EQUAL(WM_AGAIN, parse("# recorded on the red robot"));
 }
 
 // Whatever is cut off, the parser says so and reads nothing behind the end: each prefix in a block of its own.
-static void every_prefix(void) {
+TEST(every_prefix) {
   const char *whole = "(1700000000.001500) can0 12345678##1122334455667788 T";
   for (size_t n = 0; n <= strlen(whole); n++) {
     char *prefix = malloc(n + 1);
@@ -113,14 +110,4 @@ static void every_prefix(void) {
     TEST_ASSERT_TRUE(status == WM_OK || status == WM_AGAIN || status == WM_BAD_DATA);
     if (n < strlen("(1700000000.001500) can0 12345678#")) TEST_ASSERT_NOT_EQUAL(WM_OK, status);
   }
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(forms);
-  RUN_TEST(contents);
-  RUN_TEST(times_are_exact);
-  RUN_TEST(nothing_there);
-  RUN_TEST(every_prefix);
-  return UNITY_END();
 }

@@ -3,11 +3,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 
+#include "common/suite.h"
 #include "dbc.h"
-#include "unity.h"
-
-void setUp(void) {}
-void tearDown(void) {}
 
 static wm_dbc *dbc;
 static wm_error err;
@@ -60,7 +57,7 @@ static const char kOdd[] =
     "SIG_VALTYPE_ 4711 NOBODY : 1;\r\n"
     "MADE_UP_SECTION_ 1 2 \"3\" ;";
 
-static void odd_but_right(void) {
+TEST(odd_but_right) {
   load(kOdd);
   TEST_ASSERT_EQUAL_size_t(2, dbc->message_count);
   TEST_ASSERT_EQUAL_size_t(3, dbc->signal_count);
@@ -79,7 +76,7 @@ static void odd_but_right(void) {
 }
 
 // With CR alone as line end, and with LF alone: the same content, in the same lines.
-static void line_ends_of_other_editors(void) {
+TEST(line_ends_of_other_editors) {
   static const char kEnds[] = {'\r', '\n'};
   for (size_t k = 0; k < sizeof kEnds; k++) {
     char text[sizeof kOdd];
@@ -96,7 +93,7 @@ static void line_ends_of_other_editors(void) {
 }
 
 // An attribute without a message's number, or with one that is too large, names no message.
-static void long_names_of_no_message(void) {
+TEST(long_names_of_no_message) {
   load("BO_ 0 M: 8 X\nBA_ \"SystemMessageLongSymbol\" BO_ \"WITHOUT_A_NUMBER\";\n");
   TEST_ASSERT_EQUAL_size_t(0, wm_dbc_find(dbc, dbc_key(0, 0))->long_name.length);
   wm_dbc_free(dbc);
@@ -106,13 +103,13 @@ static void long_names_of_no_message(void) {
 }
 
 // A list of new symbols without a name, before the first message.
-static void a_message_right_behind_an_empty_list(void) {
+TEST(a_message_right_behind_an_empty_list) {
   load("NS_ :\nBO_ 291 WHEELS: 8 ESP\n SG_ SPEED : 0|16@1+ (1,0) [0|0] \"\" X\n");
   TEST_ASSERT_NOT_NULL(wm_dbc_find(dbc, dbc_key(291, 0)));
   wm_dbc_free(dbc);
 }
 
-static void nothing_in_it(void) {
+TEST(nothing_in_it) {
   load("");
   TEST_ASSERT_EQUAL_size_t(0, dbc->message_count);
   wm_dbc_free(dbc);
@@ -121,14 +118,14 @@ static void nothing_in_it(void) {
   wm_dbc_free(dbc);
 }
 
-static void overlapping_signals_are_makers_wish(void) {
+TEST(overlapping_signals_are_makers_wish) {
   load("BO_ 1 M: 2 X\n SG_ A : 0|16@1+ (1,0) [0|0] \"\" X\n SG_ B : 4|8@1+ (1,0) [0|0] \"\" X\n");
   TEST_ASSERT_EQUAL_size_t(2, dbc->signal_count);
   wm_dbc_free(dbc);
 }
 
 // A factor is one whole number that a double holds.
-static void factors_that_are_no_numbers(void) {
+TEST(factors_that_are_no_numbers) {
   static const char *const kFactors[] = {"1e999", "-1e999", "1-2", "1.2.3", "1e5e5", "e", "."};
   for (size_t i = 0; i < sizeof kFactors / sizeof kFactors[0]; i++) {
     char text[120];
@@ -139,7 +136,7 @@ static void factors_that_are_no_numbers(void) {
 }
 
 // Of two lists of a signal's names the last one holds.
-static void names_that_are_stated_twice(void) {
+TEST(names_that_are_stated_twice) {
   load(
       "BO_ 1 M: 8 X\n SG_ A : 0|8@1+ (1,0) [0|0] \"\" X\n"
       "VAL_ 1 A 0 \"off\" 1 \"on\" 2 \"error\";\nVAL_ 1 A 7 \"seven\" 8 \"eight\";\n");
@@ -150,7 +147,7 @@ static void names_that_are_stated_twice(void) {
   wm_dbc_free(dbc);
 }
 
-static void multiplexers_in_a_ring(void) {
+TEST(multiplexers_in_a_ring) {
   load(
       "BO_ 1 M: 8 X\n SG_ A m1M : 0|8@1+ (1,0) [0|0] \"\" X\n SG_ B m1M : 8|8@1+ (1,0) [0|0] \"\" X\n"
       "SG_MUL_VAL_ 1 A B 1-1;\nSG_MUL_VAL_ 1 B A 1-1;\n");
@@ -159,7 +156,7 @@ static void multiplexers_in_a_ring(void) {
   wm_dbc_free(dbc);
 }
 
-static void not_text(void) {
+TEST(not_text) {
   const char utf16[] = "V\0E\0R\0S\0";
   TEST_ASSERT_EQUAL(WM_BAD_CONFIG, wm_dbc_parse(utf16, sizeof utf16, "car.dbc", &dbc, &err));
   TEST_ASSERT_NOT_NULL(strstr(err.text, "car.dbc: holds zero bytes"));
@@ -170,7 +167,7 @@ static void not_text(void) {
 
 // Cut anywhere, in a block of its own, the text is read or refused with a line in it, and nothing behind its end is
 // touched (the sanitizers look).
-static void every_prefix(void) {
+TEST(every_prefix) {
   size_t whole = strlen(kOdd);
   for (size_t n = 0; n <= whole; n++) {
     char *part = malloc(n + 1);
@@ -185,7 +182,7 @@ static void every_prefix(void) {
 }
 
 // How many letters two names differ by, from both sides alike; names that are too long to compare are beyond any limit.
-static void distances_of_names_are_the_same_from_both_sides(void) {
+TEST(distances_of_names_are_the_same_from_both_sides) {
   char name[80];
   memset(name, 'n', sizeof name);
   for (size_t n = 2; n < sizeof name; n++) {
@@ -196,21 +193,4 @@ static void distances_of_names_are_the_same_from_both_sides(void) {
   }
   TEST_ASSERT_EQUAL_size_t(2, wm_text_distance(text_of("speed_lf"), text_of("SPEED_FL"), 5));
   TEST_ASSERT_EQUAL_size_t(2, wm_text_distance(text_of("SPEED_FL"), text_of("speed_lf"), 1));  // one beyond the limit
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(odd_but_right);
-  RUN_TEST(line_ends_of_other_editors);
-  RUN_TEST(long_names_of_no_message);
-  RUN_TEST(a_message_right_behind_an_empty_list);
-  RUN_TEST(nothing_in_it);
-  RUN_TEST(overlapping_signals_are_makers_wish);
-  RUN_TEST(factors_that_are_no_numbers);
-  RUN_TEST(names_that_are_stated_twice);
-  RUN_TEST(multiplexers_in_a_ring);
-  RUN_TEST(distances_of_names_are_the_same_from_both_sides);
-  RUN_TEST(not_text);
-  RUN_TEST(every_prefix);
-  return UNITY_END();
 }

@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // From frames to quantities: units, sums, gears, multiplexing, ticks that wrap, counters, and what is counted.
 #include <math.h>
+#include "common/suite.h"
 
 #include "can_fixture.h"
-
-void setUp(void) {}
-void tearDown(void) {}
 
 #define PI 3.14159265358979323846
 
@@ -25,7 +23,7 @@ static double si_of(int quantity, const char *unit) {
 #define SPELLED_MOST 16
 
 // Every spelling that is taken, by its dimension and its size in SI. Names of real files, and with blanks and capitals.
-static void every_spelling_of_a_unit_has_its_size(void) {
+TEST(every_spelling_of_a_unit_has_its_size) {
   static const struct {
     int quantity;
     double si;
@@ -66,7 +64,7 @@ static void every_spelling_of_a_unit_has_its_size(void) {
                                         rows[r].spelled[i]);
 }
 
-static void unit_scale_and_offset_of_the_binding(void) {
+TEST(unit_scale_and_offset_of_the_binding) {
   wm_can_binding b = binding(WM_Q_YAW_RATE, "M", "S");
   (void)snprintf(b.unit, sizeof b.unit, "deg/s");
   b.scale = -1.0;
@@ -77,7 +75,7 @@ static void unit_scale_and_offset_of_the_binding(void) {
   close_it(&f);
 }
 
-static void sum_of_signals(void) {
+TEST(sum_of_signals) {
   wm_can_binding b = binding(WM_Q_STEERING_WHEEL, "M", "COARSE");
   (void)snprintf(b.signal[1], sizeof b.signal[1], "FINE");
   b.signal_count = 2;
@@ -89,7 +87,7 @@ static void sum_of_signals(void) {
   close_it(&f);
 }
 
-static void floats(void) {
+TEST(floats) {
   const char *dbc =
       "BO_ 291 M: 8 X\n SG_ S : 0|32@1- (1,0) [0|0] \"m/s\" X\n SG_ D : 7|64@0- (1,0) [0|0] \"m/s\" X\n"
       "SIG_VALTYPE_ 291 S : 1;\nSIG_VALTYPE_ 291 D : 2;\n";
@@ -108,7 +106,7 @@ static void floats(void) {
 
 #define GEAR_DBC "BO_ 956 G: 8 X\n SG_ GEAR : 13|6@0+ (1,0) [0|63] \"\" X\n"
 
-static void gears_by_names(void) {
+TEST(gears_by_names) {
   open_one(&f, GEAR_DBC "VAL_ 956 GEAR 0 \"D\" 1 \"S\" 8 \"N\" 16 \"R\" 32 \"P\" 63 \"SNA\";\n",
            binding(WM_Q_GEAR, "G", "GEAR"));
   TEST_ASSERT_EQUAL_DOUBLE(1, value_of(&f, "can0 3BC#0000000000000000"));
@@ -122,7 +120,7 @@ static void gears_by_names(void) {
   close_it(&f);
 }
 
-static void gears_by_makers_words(void) {
+TEST(gears_by_makers_words) {
   static const struct {
     const char *name;
     double direction;
@@ -147,7 +145,7 @@ static void gears_by_makers_words(void) {
   }
 }
 
-static void gears_by_values(void) {
+TEST(gears_by_values) {
   wm_can_binding b = binding(WM_Q_GEAR, "G", "GEAR");
   b.gear_count = 2;
   b.gear[0].raw = 4;
@@ -162,7 +160,7 @@ static void gears_by_values(void) {
 
 // ── multiplexing ────────────────────────────────────────────────────────────────────────────────────────────────────
 
-static void only_when_the_multiplexer_fits(void) {
+TEST(only_when_the_multiplexer_fits) {
   open_one(&f,
            "BO_ 291 M: 8 X\n SG_ MUX M : 0|8@1+ (1,0) [0|0] \"\" X\n SG_ A m3 : 8|8@1+ (1,0) [0|0] \"m/s\" X\n"
            " SG_ B m4 : 8|56@1+ (1,0) [0|0] \"m/s\" X\n",
@@ -175,7 +173,7 @@ static void only_when_the_multiplexer_fits(void) {
   close_it(&f);
 }
 
-static void multiplexers_above_each_other(void) {
+TEST(multiplexers_above_each_other) {
   open_one(&f,
            "BO_ 2147483649 M: 8 X\n SG_ A M : 0|8@1+ (1,0) [0|0] \"\" X\n SG_ B m2M : 8|8@1+ (1,0) [0|0] \"\" X\n"
            " SG_ C m1 : 16|8@1+ (1,0) [0|0] \"m/s\" X\n"
@@ -199,7 +197,7 @@ static void ticks_of(const char *bits, const char *const *frames, const double *
   close_it(&f);
 }
 
-static void ticks_wrap(void) {
+TEST(ticks_wrap) {
   const char *frames16[] = {"c 101#F0FF", "c 101#0A00", "c 101#F0FF", "c 101#F07F", "c 101#EFFF"};
   const double want16[] = {65520, 65546, 65520, 32752, 65519};  // half a cycle down, then one short of half up
   ticks_of("0|16@1+", frames16, want16, 5);
@@ -217,7 +215,7 @@ static void ticks_wrap(void) {
   ticks_of("0|64@1+", frames64, want64, 2);
 }
 
-static void ticks_grow_without_end(void) {
+TEST(ticks_grow_without_end) {
   open_one(&f, "BO_ 257 W: 2 X\n SG_ T : 0|8@1+ (2,5) [0|0] \"\" X\n", binding(WM_Q_WHEEL_TICKS_RIGHT, "W", "T"));
   double last = 0;
   for (unsigned i = 0; i < 3000; i++) {
@@ -251,7 +249,7 @@ static double moved_in_silence(int per_s, double silence_s, long moved) {
 
 // At 1500 ticks a second half a cycle takes 22 s. Backwards a robot drives slower, so that 30 s are one number of
 // cycles; in 60 s more are possible. A robot that stood may have driven at any speed.
-static void ticks_after_a_silence(void) {
+TEST(ticks_after_a_silence) {
   TEST_ASSERT_EQUAL_DOUBLE(200, moved_in_silence(1500, 0.2, 200));
   TEST_ASSERT_EQUAL_DOUBLE(22000, moved_in_silence(1500, 20, 22000));
   TEST_ASSERT_EQUAL_DOUBLE(35000, moved_in_silence(1500, 25, 35000));  // beyond half a cycle
@@ -279,7 +277,7 @@ static wm_status count(unsigned value) {
   return feed(&f, text);
 }
 
-static void lost_by_the_counter(void) {
+TEST(lost_by_the_counter) {
   open_counted("WS_ALIVE : 16|8@1+ (1,0) [0|255] \"\"");
   for (unsigned i = 250; i < 270; i++) TEST_ASSERT_EQUAL(WM_OK, count(i & 0xFF));
   TEST_ASSERT_EQUAL_UINT64(0, f.counts.lost);
@@ -294,7 +292,7 @@ static void lost_by_the_counter(void) {
 }
 
 // Frames that overtook each other in a bridge are missing until they come.
-static void late_by_the_counter(void) {
+TEST(late_by_the_counter) {
   open_counted("WS_ALIVE : 16|8@1+ (1,0) [0|255] \"\"");
   for (unsigned i = 250; i < 270; i++) TEST_ASSERT_EQUAL(WM_OK, count(i & 0xFF));
   const unsigned swapped[] = {15, 14, 16, 19, 17, 18, 20};
@@ -319,7 +317,7 @@ static void late_by_the_counter(void) {
   close_it(&f);
 }
 
-static void frozen_counter(void) {
+TEST(frozen_counter) {
   open_counted("MsgCounter : 16|4@1+ (1,0) [0|15] \"\"");
   for (unsigned i = 0; i < 20; i++) TEST_ASSERT_EQUAL(WM_OK, count(i & 15));
   TEST_ASSERT_EQUAL(WM_AGAIN, count(3));  // a repeated frame or two say nothing
@@ -336,7 +334,7 @@ static void frozen_counter(void) {
 }
 
 // AUTOSAR E2E profile 1 counts 0 to 14, others 1 to 15.
-static void counters_that_leave_a_value_out(void) {
+TEST(counters_that_leave_a_value_out) {
   open_counted("COUNTER : 16|4@1+ (1,0) [0|14] \"\"");
   for (unsigned i = 0; i < 60; i++) TEST_ASSERT_EQUAL(WM_OK, count(i % 15));
   TEST_ASSERT_EQUAL_UINT64(0, f.counts.lost);
@@ -347,7 +345,7 @@ static void counters_that_leave_a_value_out(void) {
   close_it(&f);
 }
 
-static void what_only_looks_like_a_counter(void) {
+TEST(what_only_looks_like_a_counter) {
   open_counted("ERROR_COUNT : 16|8@1+ (1,0) [0|255] \"\"");  // never steps: no proof, no doubt
   for (unsigned i = 0; i < 50; i++) TEST_ASSERT_EQUAL(WM_OK, count(i / 10));
   TEST_ASSERT_EQUAL_UINT64(0, f.counts.lost + f.counts.frozen);
@@ -359,7 +357,7 @@ static void what_only_looks_like_a_counter(void) {
 }
 
 // A signal that is bound is none, whichever part of a sum it is: it may do what it wants.
-static void a_bound_signal_is_no_counter(void) {
+TEST(a_bound_signal_is_no_counter) {
   for (int part = 0; part < 2; part++) {
     wm_can_binding b = binding(WM_Q_WHEEL_TICKS_LEFT, "W", part ? "V" : "ALIVE_COUNTER");
     b.signal_count = 2;
@@ -375,7 +373,7 @@ static void a_bound_signal_is_no_counter(void) {
 }
 
 // A decoder gives the quantities that are bound, and no others.
-static void one_quantity_alone(void) {
+TEST(one_quantity_alone) {
   for (int quantity = 0; quantity < WM_Q_COUNT; quantity++) {
     wm_can_binding b = binding(quantity, "W", "V");
     if (open_with(&f, "BO_ 257 W: 3 X\n SG_ V : 0|16@1+ (1,0) [0|0] \"\" X\nVAL_ 257 V 0 \"P\" 1 \"R\" 2 \"D\";\n", &b,
@@ -388,7 +386,7 @@ static void one_quantity_alone(void) {
 
 // ── what is no value, what is no frame ──────────────────────────────────────────────────────────────────────────────
 
-static void no_value(void) {
+TEST(no_value) {
   open_one(&f,
            "BO_ 257 W: 3 X\n SG_ V : 0|16@1+ (0.01,0) [0|100] \"m/s\" X\n"
            "VAL_ 257 V 65534 \"Error\" 300 \"three\";\n",
@@ -411,7 +409,7 @@ static void no_value(void) {
   close_it(&f);
 }
 
-static void what_is_not_decoded(void) {
+TEST(what_is_not_decoded) {
   wm_can_binding b = binding(WM_Q_VEHICLE_SPEED, "W", "V");
   (void)snprintf(b.bus, sizeof b.bus, "can1");
   open_one(&f, "BO_ 257 W: 3 X\n SG_ V : 0|16@1+ (1,0) [0|0] \"m/s\" X\n", b);
@@ -429,7 +427,7 @@ static void what_is_not_decoded(void) {
   close_it(&f);
 }
 
-static void several_quantities_and_ids(void) {
+TEST(several_quantities_and_ids) {
   const wm_can_binding b[] = {binding(WM_Q_WHEEL_TICKS_LEFT, "W", "L"), binding(WM_Q_YAW_RATE, "Y", "R"),
                               binding(WM_Q_WHEEL_TICKS_RIGHT, "W", "R")};
   wm_status status = open_with(&f,
@@ -455,31 +453,4 @@ static void several_quantities_and_ids(void) {
   TEST_ASSERT_EQUAL_HEX32(1u << WM_Q_WHEEL_TICKS_LEFT | 1u << WM_Q_WHEEL_TICKS_RIGHT | 1u << WM_Q_YAW_RATE,
                           wm_can_decoder_quantities(f.decoder));
   close_it(&f);
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(every_spelling_of_a_unit_has_its_size);
-  RUN_TEST(unit_scale_and_offset_of_the_binding);
-  RUN_TEST(sum_of_signals);
-  RUN_TEST(floats);
-  RUN_TEST(gears_by_names);
-  RUN_TEST(gears_by_makers_words);
-  RUN_TEST(gears_by_values);
-  RUN_TEST(only_when_the_multiplexer_fits);
-  RUN_TEST(multiplexers_above_each_other);
-  RUN_TEST(ticks_wrap);
-  RUN_TEST(ticks_after_a_silence);
-  RUN_TEST(ticks_grow_without_end);
-  RUN_TEST(lost_by_the_counter);
-  RUN_TEST(late_by_the_counter);
-  RUN_TEST(frozen_counter);
-  RUN_TEST(counters_that_leave_a_value_out);
-  RUN_TEST(what_only_looks_like_a_counter);
-  RUN_TEST(a_bound_signal_is_no_counter);
-  RUN_TEST(one_quantity_alone);
-  RUN_TEST(no_value);
-  RUN_TEST(what_is_not_decoded);
-  RUN_TEST(several_quantities_and_ids);
-  return UNITY_END();
 }

@@ -12,8 +12,8 @@
 
 #include "can_clock.h"
 #include "can_fixture.h"
+#include "common/suite.h"
 #include "fake_can.h"
-#include "unity.h"
 
 static const char kDbc[] = "BO_ 256 Speed: 2 X\n SG_ V : 0|16@1+ (0.001,0) [0|65] \"m/s\" X\n";
 
@@ -66,7 +66,7 @@ static void expect_nothing_for(wm_time_ns ns) {
 #define END \
   { INT64_MAX, FAKE_END, {.hardware_ns = 0}, 0 }
 
-static void frames_become_events_with_the_kernels_stamp(void) {
+TEST(frames_become_events_with_the_kernels_stamp) {
   fake_step steps[] = {FRAME(3, 1500), FRAME(13, 1600), END};
   make(steps);
   fake.reads_late_ns = 7 * WM_NS_PER_MS;
@@ -82,14 +82,14 @@ static void frames_become_events_with_the_kernels_stamp(void) {
   TEST_ASSERT_TRUE(source->is_live && source->in_order && source->is_motion);
 }
 
-static void a_wait_in_vain_ends_so_that_a_stop_is_noticed(void) {
+TEST(a_wait_in_vain_ends_so_that_a_stop_is_noticed) {
   fake_step steps[] = {END};
   make(steps);
   TEST_ASSERT_EQUAL(WM_AGAIN, next());
   TEST_ASSERT_LESS_OR_EQUAL_INT64(2 * WM_DEVICE_WAIT_MS * WM_NS_PER_MS, fake.now_ns - FAKE_BOOT_NS);
 }
 
-static void an_interface_that_goes_down_keeps_its_socket_and_comes_up_again(void) {
+TEST(an_interface_that_goes_down_keeps_its_socket_and_comes_up_again) {
   fake_step steps[] = {FRAME(3, 1500),      STEP(20, FAKE_DOWN), FAILS(20, ENETDOWN),
                        STEP(2000, FAKE_UP), FRAME(2100, 1700),   END};
   make(steps);
@@ -101,7 +101,7 @@ static void an_interface_that_goes_down_keeps_its_socket_and_comes_up_again(void
   TEST_ASSERT_EQUAL(1, fake.opened);
 }
 
-static void an_adapter_that_is_unplugged_and_comes_back_is_opened_anew(void) {
+TEST(an_adapter_that_is_unplugged_and_comes_back_is_opened_anew) {
   fake_step steps[] = {FRAME(3, 1500),        STEP(20, FAKE_REMOVED), FAILS(20, ENODEV),
                        STEP(3000, FAKE_BACK), FRAME(4000, 1800),      END};
   make(steps);
@@ -115,7 +115,7 @@ static void an_adapter_that_is_unplugged_and_comes_back_is_opened_anew(void) {
 }
 
 // Without a word from the kernel: the name has another index now.
-static void an_adapter_that_was_changed_silently_is_noticed(void) {
+TEST(an_adapter_that_was_changed_silently_is_noticed) {
   fake_step steps[] = {FRAME(3, 1500), STEP(20, FAKE_BACK), FRAME(2000, 1900), END};
   make(steps);
   expect_speed(1.5, WM_NS_PER_S);
@@ -124,7 +124,7 @@ static void an_adapter_that_was_changed_silently_is_noticed(void) {
 }
 
 // The interface is looked for before its socket fails: the same is stated.
-static void an_adapter_that_is_missed_before_its_socket_fails_is_gone(void) {
+TEST(an_adapter_that_is_missed_before_its_socket_fails_is_gone) {
   fake_step steps[] = {FRAME(3, 1500), STEP(20, FAKE_REMOVED), STEP(3000, FAKE_BACK), FRAME(4000, 1800), END};
   make(steps);
   expect_speed(1.5, WM_NS_PER_S);
@@ -134,7 +134,7 @@ static void an_adapter_that_is_missed_before_its_socket_fails_is_gone(void) {
   TEST_ASSERT_EQUAL(2, fake.opened);
 }
 
-static void an_interface_that_was_never_there_is_waited_for(void) {
+TEST(an_interface_that_was_never_there_is_waited_for) {
   fake_step steps[] = {STEP(0, FAKE_REMOVED), STEP(5000, FAKE_BACK), FRAME(6000, 1500), END};
   make(steps);
   expect_nothing_for(WM_NS_PER_S);
@@ -143,7 +143,7 @@ static void an_interface_that_was_never_there_is_waited_for(void) {
   expect_speed(1.5, 7 * WM_NS_PER_S);
 }
 
-static void error_frames_say_how_the_controller_is(void) {
+TEST(error_frames_say_how_the_controller_is) {
   fake_step steps[] = {FRAME(1, 1500),
                        ERROR_FRAME(10, CAN_ERR_CRTL, CAN_ERR_CRTL_RX_PASSIVE),
                        FRAME(20, 1501),
@@ -164,7 +164,7 @@ static void error_frames_say_how_the_controller_is(void) {
   TEST_ASSERT_EQUAL_UINT64(1, source->counts.overflows);
 }
 
-static void what_the_sockets_queue_lost_is_counted(void) {
+TEST(what_the_sockets_queue_lost_is_counted) {
   fake_step steps[] = {FRAME(1, 1500), FRAME(2, 1500), FRAME(3, 1500), END};
   for (int i = 0; i < 3; i++) steps[i].received.has_queue_dropped = 1;
   steps[0].received.queue_dropped = 2;
@@ -176,7 +176,7 @@ static void what_the_sockets_queue_lost_is_counted(void) {
 }
 
 // The kernel counts with 32 bits.
-static void the_count_of_what_the_sockets_queue_lost_wraps(void) {
+TEST(the_count_of_what_the_sockets_queue_lost_wraps) {
   fake_step steps[] = {FRAME(1, 1500), FRAME(2, 1500), END};
   for (int i = 0; i < 2; i++) steps[i].received.has_queue_dropped = 1;
   steps[0].received.queue_dropped = UINT32_MAX - 1;
@@ -190,14 +190,14 @@ static void the_count_of_what_the_sockets_queue_lost_wraps(void) {
 
 // ── stamps ──────────────────────────────────────────────────────────────────────────────────────────────────────────
 
-static void without_a_stamp_the_time_of_reading_is_taken(void) {
+TEST(without_a_stamp_the_time_of_reading_is_taken) {
   can_clock clock = {0};
   can_received none = {0};
   TEST_ASSERT_EQUAL_INT64(AT(5), can_clock_stamp(&clock, &none, AT(5), AT(5) + FAKE_UTC_NS));
   TEST_ASSERT_EQUAL_INT64(10 * WM_NS_PER_MS, clock.uncertainty_ns);
 }
 
-static void a_wall_clock_that_is_set_between_stamp_and_reading_does_no_harm(void) {
+TEST(a_wall_clock_that_is_set_between_stamp_and_reading_does_no_harm) {
   can_clock clock = {0};
   can_received a = fake_frame(AT(1), 0), b = fake_frame(AT(2), 0), c = fake_frame(AT(3), 0);
   TEST_ASSERT_EQUAL_INT64(AT(1), can_clock_stamp(&clock, &a, AT(4), AT(4) + FAKE_UTC_NS));
@@ -209,7 +209,7 @@ static void a_wall_clock_that_is_set_between_stamp_and_reading_does_no_harm(void
 }
 
 // The two clocks are read one after the other.
-static void a_stamp_that_is_slightly_in_the_future_is_now(void) {
+TEST(a_stamp_that_is_slightly_in_the_future_is_now) {
   can_clock clock = {0};
   can_received soon = fake_frame(AT(7) + WM_NS_PER_MS / 2, 0), later = fake_frame(AT(9), 0);
   TEST_ASSERT_EQUAL_INT64(AT(7), can_clock_stamp(&clock, &soon, AT(7), AT(7) + FAKE_UTC_NS));
@@ -220,7 +220,7 @@ static void a_stamp_that_is_slightly_in_the_future_is_now(void) {
   TEST_ASSERT_EQUAL_UINT64(1, clock.implausible);
 }
 
-static void an_absurd_stamp_is_not_believed(void) {
+TEST(an_absurd_stamp_is_not_believed) {
   can_clock clock = {0};
   can_received absurd = {.software_ns = 12345};
   TEST_ASSERT_EQUAL_INT64(AT(7), can_clock_stamp(&clock, &absurd, AT(7), AT(7) + FAKE_UTC_NS));
@@ -228,7 +228,7 @@ static void an_absurd_stamp_is_not_believed(void) {
 }
 
 // An adapter of 40 ppm whose frames reach the kernel 0.1 to 3 ms late, a long stall, and a restart of its clock.
-static void an_adapters_own_clock_is_followed(void) {
+TEST(an_adapters_own_clock_is_followed) {
   can_clock clock = {0};
   wm_time_ns worst_ns = 0, boot_ns = 77 * WM_NS_PER_S;
   uint32_t dice = 1;
@@ -251,7 +251,7 @@ static void an_adapters_own_clock_is_followed(void) {
 }
 
 // A clock of 32 bits in microseconds, as adapters have it, wraps after 71.6 minutes: no frame's stamp is held back.
-static void an_adapters_clock_of_32_bits_wraps(void) {
+TEST(an_adapters_clock_of_32_bits_wraps) {
   can_clock clock = {0};
   const wm_time_ns wrap_ns = (INT64_C(1) << 32) * WM_NS_PER_US, period_ns = 10 * WM_NS_PER_MS;
   for (int i = 0; i < 2000; i++) {
@@ -266,7 +266,7 @@ static void an_adapters_clock_of_32_bits_wraps(void) {
 
 // ── what the kernel hands out ───────────────────────────────────────────────────────────────────────────────────────
 
-static void a_message_of_the_kernel_is_read_with_its_stamps(void) {
+TEST(a_message_of_the_kernel_is_read_with_its_stamps) {
   struct canfd_frame raw = {.can_id = 0x12345678u | CAN_EFF_FLAG, .len = 8, .data = {1, 2, 3, 4, 5, 6, 7, 8}};
   _Alignas(struct cmsghdr) char beside[256] = {0};
   struct iovec io = {&raw, sizeof raw};
@@ -302,26 +302,4 @@ static void a_message_of_the_kernel_is_read_with_its_stamps(void) {
   TEST_ASSERT_TRUE(can_message_read(&message, CAN_MTU, &got));
   TEST_ASSERT_EQUAL(8, got.frame.length);
   TEST_ASSERT_FALSE(can_message_read(&message, 3, &got));
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(frames_become_events_with_the_kernels_stamp);
-  RUN_TEST(a_wait_in_vain_ends_so_that_a_stop_is_noticed);
-  RUN_TEST(an_interface_that_goes_down_keeps_its_socket_and_comes_up_again);
-  RUN_TEST(an_adapter_that_is_unplugged_and_comes_back_is_opened_anew);
-  RUN_TEST(an_adapter_that_was_changed_silently_is_noticed);
-  RUN_TEST(an_adapter_that_is_missed_before_its_socket_fails_is_gone);
-  RUN_TEST(an_interface_that_was_never_there_is_waited_for);
-  RUN_TEST(error_frames_say_how_the_controller_is);
-  RUN_TEST(what_the_sockets_queue_lost_is_counted);
-  RUN_TEST(the_count_of_what_the_sockets_queue_lost_wraps);
-  RUN_TEST(without_a_stamp_the_time_of_reading_is_taken);
-  RUN_TEST(a_wall_clock_that_is_set_between_stamp_and_reading_does_no_harm);
-  RUN_TEST(a_stamp_that_is_slightly_in_the_future_is_now);
-  RUN_TEST(an_absurd_stamp_is_not_believed);
-  RUN_TEST(an_adapters_own_clock_is_followed);
-  RUN_TEST(an_adapters_clock_of_32_bits_wraps);
-  RUN_TEST(a_message_of_the_kernel_is_read_with_its_stamps);
-  return UNITY_END();
 }

@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "unity.h"
+#include "common/suite.h"
 #include "waymark/can.h"
 
 typedef enum kind { CANDUMP, DBC, BINDING } kind;
@@ -218,10 +218,7 @@ static wm_status try_input(const bad_input *bad, wm_error *err) {
   return WM_INTERNAL;
 }
 
-void setUp(void) {}
-void tearDown(void) {}
-
-static void each_gives_its_message(void) {
+TEST(each_gives_its_message) {
   for (int i = 0; i < kCases; i++) {
     wm_error err = {WM_OK, ""};
     wm_status status = try_input(&kTable[i], &err);
@@ -258,9 +255,7 @@ static int print_markdown(void) {
   return 0;
 }
 
-int main(int argc, char **argv) {
+int suite_begin(int argc, char **argv) {
   if (argc > 1 && strcmp(argv[1], "--markdown") == 0) return print_markdown();
-  UNITY_BEGIN();
-  RUN_TEST(each_gives_its_message);
-  return UNITY_END();
+  return SUITE_RUNS;
 }

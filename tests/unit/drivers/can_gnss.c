@@ -4,11 +4,8 @@
 #include <math.h>
 #include <string.h>
 
-#include "unity.h"
+#include "common/suite.h"
 #include "waymark/can.h"
-
-void setUp(void) {}
-void tearDown(void) {}
 
 #define DEGREE (M_PI / 180.0)
 // A degree at latitude 45: of the parallel and of the meridian.
@@ -38,7 +35,7 @@ static int fix(double latitude, double longitude) {
 
 static int value(uint8_t id, double v) { return take(1, &id, &v); }
 
-static void lengths_of_a_degree(void) {
+TEST(lengths_of_a_degree) {
   begin(45, 10, (double)NAN);
   TEST_ASSERT_EQUAL(1, fix(45, 10.002));
   TEST_ASSERT_DOUBLE_WITHIN(0.001, 0.002 * EAST_45_M, at.p_m[0]);
@@ -54,7 +51,7 @@ static void lengths_of_a_degree(void) {
 }
 
 // East, north and up by PROJ 9.1, +proj=topocentric +ellps=WGS84, kilometres away: what gpsd's positions get, too.
-static void far_places_are_in_the_tangent_plane(void) {
+TEST(far_places_are_in_the_tangent_plane) {
   static const struct {
     double place[3], at_m[3];
   } kPlaces[] = {{{48.11, 11.51, 510}, {744.72519, 1112.06103, 9.85956}},
@@ -69,7 +66,7 @@ static void far_places_are_in_the_tangent_plane(void) {
 }
 
 // A pole has every longitude: 0.001 degrees from it are 111.69 m.
-static void near_the_pole(void) {
+TEST(near_the_pole) {
   begin(89.999, 0, 0);
   TEST_ASSERT_EQUAL(1, fix(89.999, 180));
   TEST_ASSERT_DOUBLE_WITHIN(0.01, 0, at.p_m[0]);
@@ -77,7 +74,7 @@ static void near_the_pole(void) {
 }
 
 // On a plateau a degree is longer by altitude over radius.
-static void altitude_of_the_map(void) {
+TEST(altitude_of_the_map) {
   begin(45, 10, 4000);
   (void)value(WM_CAN_ALTITUDE, 4010.5);
   TEST_ASSERT_EQUAL(1, fix(45.0, 10.001));
@@ -86,7 +83,7 @@ static void altitude_of_the_map(void) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-6, 10.5, at.p_m[2]);
 }
 
-static void first_fix_is_the_origin(void) {
+TEST(first_fix_is_the_origin) {
   begin((double)NAN, (double)NAN, (double)NAN);
   (void)value(WM_CAN_ALTITUDE, 250);
   TEST_ASSERT_EQUAL(1, fix(45, 10));
@@ -98,7 +95,7 @@ static void first_fix_is_the_origin(void) {
   TEST_ASSERT_DOUBLE_WITHIN(0.002, 2.0, at.p_m[2]);  // less what the earth falls away in 111 m
 }
 
-static void both_coordinates_make_a_position(void) {
+TEST(both_coordinates_make_a_position) {
   begin(45, 10, (double)NAN);
   TEST_ASSERT_EQUAL(0, value(WM_CAN_LATITUDE, 45 * DEGREE));
   TEST_ASSERT_EQUAL(0, value(WM_CAN_SIGMA_XY, 1.5));
@@ -110,7 +107,7 @@ static void both_coordinates_make_a_position(void) {
   TEST_ASSERT_EQUAL(0, value(WM_CAN_COUNT, 1.0));
 }
 
-static void accuracy(void) {
+TEST(accuracy) {
   begin(45, 10, 0);
   TEST_ASSERT_EQUAL(1, fix(45, 10));
   TEST_ASSERT_EQUAL_DOUBLE(5.0, at.sigma_xy_m);  // stated by none
@@ -130,7 +127,7 @@ static void accuracy(void) {
   TEST_ASSERT_DOUBLE_IS_NAN(at.sigma_z_m);
 }
 
-static void without_a_fix(void) {
+TEST(without_a_fix) {
   begin(45, 10, 0);
   TEST_ASSERT_EQUAL(0, fix(0, 0));
   TEST_ASSERT_EQUAL(1, fix(0, 0.001));  // a fix on the equator
@@ -144,7 +141,7 @@ static void without_a_fix(void) {
   TEST_ASSERT_EQUAL(1, fix(45, 10));
 }
 
-static void names_of_quantities(void) {
+TEST(names_of_quantities) {
   TEST_ASSERT_EQUAL_STRING("yaw_rate", wm_can_quantity_name(WM_Q_YAW_RATE));
   TEST_ASSERT_EQUAL_STRING("acceleration_z", wm_can_quantity_name(WM_Q_COUNT - 1));
   TEST_ASSERT_EQUAL_STRING("gnss_latitude", wm_can_quantity_name(WM_CAN_LATITUDE));
@@ -152,7 +149,7 @@ static void names_of_quantities(void) {
   TEST_ASSERT_EQUAL_STRING("?", wm_can_quantity_name(WM_CAN_COUNT));
 }
 
-static void written_lines_are_read_again(void) {
+TEST(written_lines_are_read_again) {
   const char *const lines[] = {"(1700000000.000001) can0 123#",
                                "(0.000000) can0 7FF#0011223344556677",
                                "(1.500000) vcan1 00000123#DE",
@@ -173,7 +170,7 @@ static void written_lines_are_read_again(void) {
   }
 }
 
-static void lines_before_the_epoch_and_without_room(void) {
+TEST(lines_before_the_epoch_and_without_room) {
   wm_can_frame frame = {.t_ns = -1500000000, .id = 0x12, .length = 8};
   char out[64];
   strcpy(frame.iface, "can0");
@@ -186,20 +183,4 @@ static void lines_before_the_epoch_and_without_room(void) {
     TEST_ASSERT_LESS_THAN(room, written);
     if (room < sizeof out) TEST_ASSERT_EQUAL_HEX8(0x7e, out[room]);
   }
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(lengths_of_a_degree);
-  RUN_TEST(far_places_are_in_the_tangent_plane);
-  RUN_TEST(near_the_pole);
-  RUN_TEST(altitude_of_the_map);
-  RUN_TEST(first_fix_is_the_origin);
-  RUN_TEST(both_coordinates_make_a_position);
-  RUN_TEST(accuracy);
-  RUN_TEST(without_a_fix);
-  RUN_TEST(names_of_quantities);
-  RUN_TEST(written_lines_are_read_again);
-  RUN_TEST(lines_before_the_epoch_and_without_room);
-  return UNITY_END();
 }

@@ -4,11 +4,8 @@
 #include <unistd.h>
 
 #include "can_io.h"
-#include "unity.h"
+#include "common/suite.h"
 #include "waymark/devices.h"
-
-void setUp(void) {}
-void tearDown(void) {}
 
 static int granted_of(int bytes) {
   int fd = socket(AF_UNIX, SOCK_DGRAM, 0), there = 0;
@@ -21,22 +18,15 @@ static int granted_of(int bytes) {
   return granted;
 }
 
-static void what_is_granted_is_read_back(void) {
+TEST(what_is_granted_is_read_back) {
   TEST_ASSERT_EQUAL(60000, granted_of(60000));
   TEST_ASSERT_EQUAL(0, can_queue_grow(-1, 60000));
 }
 
-static void a_kernel_without_can_grants_nothing(void) {
+TEST(a_kernel_without_can_grants_nothing) {
   int wanted = 0, fd = socket(AF_CAN, SOCK_RAW, 1), granted = wm_can_queue_bytes(&wanted);
   TEST_ASSERT_EQUAL(CAN_QUEUE_BYTES, wanted);
   if (fd < 0) TEST_ASSERT_EQUAL(0, granted);
   if (fd >= 0) TEST_ASSERT_GREATER_THAN(0, granted);
   if (fd >= 0) (void)close(fd);
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(what_is_granted_is_read_back);
-  RUN_TEST(a_kernel_without_can_grants_nothing);
-  return UNITY_END();
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Which frames are of a message: J1939 by its PGN, one sender of several, and what is said of messages that never come.
 #include <stdlib.h>
+#include "common/suite.h"
 
 #include "can_fixture.h"
 
@@ -74,7 +75,7 @@ static const pgn_row kPgns[] = {
     {"another PF", "BO_ 2565865470 CCVS1: 8 X\n" SPEED, "can0 18EE2100#F39A03FFFFFFFFFF", 0},
 };
 
-static void j1939_is_matched_by_its_pgn(void) {
+TEST(j1939_is_matched_by_its_pgn) {
   for (size_t i = 0; i < sizeof kPgns / sizeof *kPgns; i++) {
     const pgn_row *row = &kPgns[i];
     open_speed(row->dbc, "");
@@ -85,7 +86,7 @@ static void j1939_is_matched_by_its_pgn(void) {
   }
 }
 
-static void a_file_that_has_a_pgn_twice_tells_its_senders_apart(void) {
+TEST(a_file_that_has_a_pgn_twice_tells_its_senders_apart) {
   open_speed("BO_ 2566844672 CCVS1: 8 X\n" SPEED "BO_ 2566844683 CCVS1_B: 8 X\n" SPEED
              "BA_DEF_DEF_ \"VFrameFormat\" \"J1939PG\";\n",
              "");
@@ -94,7 +95,7 @@ static void a_file_that_has_a_pgn_twice_tells_its_senders_apart(void) {
   TEST_ASSERT_EQUAL_UINT64(1, f.counts.ignored);
 }
 
-static void one_of_several_senders_is_taken(void) {
+TEST(one_of_several_senders_is_taken) {
   open_speed("BO_ 2566844926 CCVS1: 8 X\n" SPEED, "");
   const char *const frames[] = {"can0 18FEF10B#F30001FFFFFFFFFF", "can0 18FEF100#F30002FFFFFFFFFF",
                                 "can0 0CFEF10B#F30001FFFFFFFFFF", "can1 18FEF10B#F30003FFFFFFFFFF"};
@@ -111,7 +112,7 @@ static void one_of_several_senders_is_taken(void) {
   TEST_ASSERT_EQUAL(WM_AGAIN, feed_at(&f, 3.2, "can0 18FEF10B#F30001FFFFFFFFFF"));
 }
 
-static void the_dbcs_own_address_goes_before_others(void) {
+TEST(the_dbcs_own_address_goes_before_others) {
   open_speed("BO_ 2566844672 CCVS1: 8 X\n" SPEED "BA_ \"VFrameFormat\" BO_ 2566844672 3;\n", "");
   const char *const frames[] = {"can0 18FEF10B#F30001FFFFFFFFFF", "can0 18FEF100#F30002FFFFFFFFFF",
                                 "can0 18FEF10B#F30001FFFFFFFFFF"};
@@ -120,7 +121,7 @@ static void the_dbcs_own_address_goes_before_others(void) {
   TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "Taken is 18FEF100 on can0; for another one write its whole id"), text);
 }
 
-static void a_message_on_two_buses(void) {
+TEST(a_message_on_two_buses) {
   open_speed("BO_ 256 CCVS1: 8 X\n" SPEED, "");
   const char *const frames[] = {"can1 100#F30001", "can0 100#F30002", "can1 100#F30001"};
   TEST_ASSERT_EQUAL(2, feed_all(frames, 3));
@@ -165,7 +166,7 @@ static const missing_row kMissing[] = {
     {"BO_ 256 CCVS1: 8 X\n" SPEED, "", {"can0 100#000001"}, ""},
 };
 
-static void a_message_that_never_comes_is_named_with_what_came(void) {
+TEST(a_message_that_never_comes_is_named_with_what_came) {
   for (size_t i = 0; i < sizeof kMissing / sizeof *kMissing; i++) {
     const missing_row *row = &kMissing[i];
     size_t count = 0;
@@ -180,7 +181,7 @@ static void a_message_that_never_comes_is_named_with_what_came(void) {
 }
 
 // Integers of 32 bits whose bits are floats, in both byte orders, and ones that are integers.
-static void floats_without_their_type(void) {
+TEST(floats_without_their_type) {
   static const struct {
     const char *bits, *frames[2], *says;
   } rows[] = {
@@ -218,7 +219,7 @@ static int differences_in(const double *stamps, size_t count) {
   return out;
 }
 
-static void times_that_are_differences(void) {
+TEST(times_that_are_differences) {
   static const double kEven[] = {0, .01, .01, .01, .01, .01, .01, .01, .01};
   static const double kUneven[] = {0, .001, .009, .0005, .0095, .0007, .0093, .001, .009};
   static const double kFromStart[] = {3.2, .01, .01, .02, .01, .01, .01, .02, .01};  // after candump was started
@@ -232,17 +233,4 @@ static void times_that_are_differences(void) {
   TEST_ASSERT_FALSE(differences_in(kBursts, 9));
   TEST_ASSERT_FALSE(differences_in(kWall, 9));
   TEST_ASSERT_FALSE(differences_in(kEven, 4));  // too few to tell
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(j1939_is_matched_by_its_pgn);
-  RUN_TEST(a_file_that_has_a_pgn_twice_tells_its_senders_apart);
-  RUN_TEST(one_of_several_senders_is_taken);
-  RUN_TEST(the_dbcs_own_address_goes_before_others);
-  RUN_TEST(a_message_on_two_buses);
-  RUN_TEST(a_message_that_never_comes_is_named_with_what_came);
-  RUN_TEST(floats_without_their_type);
-  RUN_TEST(times_that_are_differences);
-  return UNITY_END();
 }

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "unity.h"
+#include "common/suite.h"
 #include "waymark/cascade_file.h"
 
 #define HEAD                                                                                                       \
@@ -51,7 +51,7 @@ static void refused(const char *text, const char *from, const char *to, const ch
   TEST_ASSERT_NULL(cascade.nodes);
 }
 
-static void lbp(void) {
+TEST(lbp) {
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, parse(GOOD), err.text);
   TEST_ASSERT_EQUAL(1, cascade.is_lbp);
   TEST_ASSERT_EQUAL(9, cascade.width_px);
@@ -67,7 +67,7 @@ static void lbp(void) {
   TEST_ASSERT_EQUAL(3, cascade.features[0].y[0]);
 }
 
-static void haar(void) {
+TEST(haar) {
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, parse(HAAR), err.text);
   TEST_ASSERT_EQUAL(0, cascade.is_lbp);
   TEST_ASSERT_EQUAL(2, cascade.node_count);
@@ -77,7 +77,7 @@ static void haar(void) {
   TEST_ASSERT_EQUAL_FLOAT(0.0f, cascade.features[0].weight[2]);
 }
 
-static void mistakes(void) {
+TEST(mistakes) {
   refused(GOOD, "BOOST", "FOREST", "BOOST is needed");
   refused(GOOD, ">LBP", ">HOG", "'HOG' is unknown");
   refused(GOOD, "<height>12", "<height>-3", "height: one number from 3 to 200");
@@ -105,7 +105,7 @@ static void mistakes(void) {
 }
 
 // Cut anywhere, or any byte of it changed: read or refused, and nothing is left behind.
-static void damage(void) {
+TEST(damage) {
   const char good[] = GOOD;
   for (size_t n = 0; n + 20 < sizeof good; n++) {
     wm_cascade_free(&cascade);
@@ -121,13 +121,4 @@ static void damage(void) {
       wm_cascade_free(&cascade);
       (void)wm_cascade_parse(changed, sizeof good - 1, "changed.xml", &cascade, &err);
     }
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(lbp);
-  RUN_TEST(haar);
-  RUN_TEST(mistakes);
-  RUN_TEST(damage);
-  return UNITY_END();
 }

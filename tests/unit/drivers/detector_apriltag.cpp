@@ -9,7 +9,7 @@
 #include <cstring>
 #include <vector>
 
-#include "unity.h"
+#include "common/suite.h"
 #include "waymark/detectors.h"
 
 namespace {
@@ -117,7 +117,7 @@ size_t look(wm_event *out) {
   return count;
 }
 
-void test_place_direction_and_distance_are_right_whatever_the_response(void) {
+TEST(test_place_direction_and_distance_are_right_whatever_the_response) {
   for (double gamma : {1.0, 0.5})
     for (double yaw : {0.3, -2.4}) {
       begin();
@@ -138,7 +138,7 @@ void test_place_direction_and_distance_are_right_whatever_the_response(void) {
 
 // Along its border a code's modules are white here, black there, and white grows less over a stretch that is narrow. A
 // mean of both would make each code another size: where which is, each picture tells.
-void test_codes_are_as_far_as_they_are_whatever_lies_along_their_borders(void) {
+TEST(test_codes_are_as_far_as_they_are_whatever_lies_along_their_borders) {
   begin();
   wm_event seen[4];
   for (int id : {77, 103, 175})
@@ -150,7 +150,7 @@ void test_codes_are_as_far_as_they_are_whatever_lies_along_their_borders(void) {
 }
 
 // The corner's module of the ring lies partly beyond the picture's rim: two sides end there and are extended.
-void test_a_print_is_read_whose_corner_is_outside_of_the_picture(void) {
+TEST(test_a_print_is_read_whose_corner_is_outside_of_the_picture) {
   for (double corner_px : {2.0, -1.0, -4.0}) {  // distance of the corner from the rim
     begin();
     const double distance_m = 2.0, half_diagonal_px = 450 * 0.70710678 * kSize_m / distance_m;
@@ -167,7 +167,7 @@ void test_a_print_is_read_whose_corner_is_outside_of_the_picture(void) {
   }
 }
 
-void test_an_empty_picture_and_one_of_another_size(void) {
+TEST(test_an_empty_picture_and_one_of_another_size) {
   begin();
   grey.assign(kWidth * kHeight, 128);
   wm_event seen[4];
@@ -182,7 +182,7 @@ void test_an_empty_picture_and_one_of_another_size(void) {
   TEST_ASSERT_EQUAL(0, count);
 }
 
-void test_what_it_lacks_is_said(void) {
+TEST(test_what_it_lacks_is_said) {
   begin();
   static const int32_t cameras[1] = {0};
   const wm_view view = {&rig, cameras, nullptr, 0, nullptr, 0, nullptr, 0};
@@ -197,16 +197,4 @@ void test_what_it_lacks_is_said(void) {
 
 }  // namespace
 
-void setUp(void) {}
-void tearDown(void) {}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_place_direction_and_distance_are_right_whatever_the_response);
-  RUN_TEST(test_codes_are_as_far_as_they_are_whatever_lies_along_their_borders);
-  RUN_TEST(test_a_print_is_read_whose_corner_is_outside_of_the_picture);
-  RUN_TEST(test_an_empty_picture_and_one_of_another_size);
-  RUN_TEST(test_what_it_lacks_is_said);
-  std::free(state);
-  return UNITY_END();
-}
+void suite_end() { std::free(state); }

@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "unity.h"
+#include "common/suite.h"
 
 static wm_faults faults;
 static wm_error err;
@@ -34,7 +34,7 @@ static void begins_with(const char *text, const char *message) {
   TEST_ASSERT_EQUAL_STRING(message, err.text);
 }
 
-static void a_fault_has_its_times_parameters_and_statements(void) {
+TEST(a_fault_has_its_times_parameters_and_statements) {
   TEST_ASSERT_EQUAL_MESSAGE(
       WM_OK,
       parse(HEAD "- name: camera drops\n  fault: camera_dropped\n  from_s: 10\n  for_s: 5\n  camera: front\n"
@@ -74,7 +74,7 @@ static void a_fault_has_its_times_parameters_and_statements(void) {
   TEST_ASSERT_EQUAL_HEX32(0x101, faults.fault[2].ids[1]);
 }
 
-static void a_wrong_file_is_refused_with_its_line(void) {
+TEST(a_wrong_file_is_refused_with_its_line) {
   refuse("faults: []\n", "f.yaml:1: format: is missing; 'format: waymark-faults/1' is needed");
   refuse("format: waymark-faults/2\nfaults: []\n",
          "f.yaml:1: format: 'waymark-faults/2' is not a format that this program reads; it reads waymark-faults/1");
@@ -101,7 +101,7 @@ static void a_wrong_file_is_refused_with_its_line(void) {
          "f.yaml:3: faults[0].ids[0]: 'xyz' is not a CAN id in hexadecimal digits, 0 to 1FFFFFFF");
 }
 
-static void statements_and_bounds_are_checked(void) {
+TEST(statements_and_bounds_are_checked) {
 #define WITH(health) HEAD "- name: a\n  fault: bus_off\n  from_s: 5\n  health:\n  - " health "\n"
   refuse(WITH("{device: down}"),
          "f.yaml:7: faults[0].health[0]: source: is missing; device is of a source (a name in health.json, e.g. can or "
@@ -123,7 +123,7 @@ static void statements_and_bounds_are_checked(void) {
          "f.yaml:3: faults[0].pose.postion_m: unknown key; did you mean 'position_m'?");
 }
 
-static void two_that_contradict_are_refused(void) {
+TEST(two_that_contradict_are_refused) {
   refuse(HEAD "- {name: a, fault: bus_off, from_s: 5}\n- {name: a, fault: bus_down, from_s: 9}\n",
          "f.yaml:4: faults[1]: the name 'a' appears twice (first in line 3)");
   refuse(HEAD "- {name: a, fault: bus_off, from_s: 5}\n- {name: b, fault: bus_off, bus: can0, from_s: 9}\n",
@@ -132,7 +132,7 @@ static void two_that_contradict_are_refused(void) {
                                       "- {name: b, fault: bus_off, bus: can0, from_s: 9}\n"));
 }
 
-static void it_is_known_what_lasts_when(void) {
+TEST(it_is_known_what_lasts_when) {
   TEST_ASSERT_EQUAL(WM_OK, parse(HEAD "- {name: a, fault: bus_off, bus: can1, from_s: 5, until_s: 6}\n"
                                       "- {name: b, fault: bus_silent, from_s: 5, until_s: 6}\n"));
   TEST_ASSERT_NULL(wm_faults_at(&faults, WM_FAULT_BUS_OFF, "can1", 4.999));
@@ -143,7 +143,7 @@ static void it_is_known_what_lasts_when(void) {
   TEST_ASSERT_NULL(wm_faults_at(NULL, WM_FAULT_BUS_SILENT, "can0", 5));
 }
 
-static void a_share_is_hit_as_often_as_it_is_large(void) {
+TEST(a_share_is_hit_as_often_as_it_is_large) {
   static const double kShares[] = {0.01, 0.2, 0.5, 1};
   for (size_t k = 0; k < sizeof kShares / sizeof kShares[0]; k++) {
     int hits = 0;
@@ -152,7 +152,7 @@ static void a_share_is_hit_as_often_as_it_is_large(void) {
   }
 }
 
-static void its_json_has_the_defaults(void) {
+TEST(its_json_has_the_defaults) {
   char *text = NULL;
   size_t length;
   TEST_ASSERT_EQUAL(WM_OK, parse(HEAD "- {name: 'a \"b\"', fault: camera_dark, from_s: 5, health: [{state: lost}], "
@@ -175,24 +175,11 @@ static void its_json_has_the_defaults(void) {
 }
 
 // The player does what happens to data, the runner what happens to the computer: no kind is left without one.
-static void each_kind_is_caused_by_someone(void) {
+TEST(each_kind_is_caused_by_someone) {
   for (int i = 0; i < WM_FAULT_KIND_COUNT; i++) {
     const wm_fault_kind_row *row = wm_fault_kind_of((wm_fault_kind)i);
     TEST_ASSERT_TRUE_MESSAGE(row->by != 0, row->name);
     TEST_ASSERT_TRUE_MESSAGE((row->of != NULL) == ((row->by & WM_FAULT_BY_PLAYED_DRIVER) != 0), row->name);
     TEST_ASSERT_TRUE_MESSAGE(strlen(row->about) > 20, row->name);
   }
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(a_fault_has_its_times_parameters_and_statements);
-  RUN_TEST(a_wrong_file_is_refused_with_its_line);
-  RUN_TEST(statements_and_bounds_are_checked);
-  RUN_TEST(two_that_contradict_are_refused);
-  RUN_TEST(it_is_known_what_lasts_when);
-  RUN_TEST(a_share_is_hit_as_often_as_it_is_large);
-  RUN_TEST(its_json_has_the_defaults);
-  RUN_TEST(each_kind_is_caused_by_someone);
-  return UNITY_END();
 }

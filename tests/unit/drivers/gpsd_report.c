@@ -5,20 +5,17 @@
 #include <math.h>
 #include <string.h>
 
-#include "unity.h"
+#include "common/suite.h"
 #include "waymark/local_frame.h"
 
 static gpsd_report report;
-
-void setUp(void) {}
-void tearDown(void) {}
 
 static void expect(const char *line) {
   const char *why = gpsd_report_read(line, strlen(line), &report);
   TEST_ASSERT_NULL_MESSAGE(why, why);
 }
 
-static void positions_are_read(void) {
+TEST(positions_are_read) {
   expect(
       "{\"class\":\"TPV\",\"device\":\"/dev/ttyACM0\",\"status\":3,\"mode\":3,\"time\":\"2026-11-23T23:50:58.125Z\","
       "\"leapseconds\":18,\"ept\":0.005,\"lat\":48.123456789,\"lon\":-11.5,\"altHAE\":545.25,\"altMSL\":498.1,"
@@ -38,7 +35,7 @@ static void positions_are_read(void) {
   TEST_ASSERT_EQUAL_STRING("fix", gpsd_fix_name(99));
 }
 
-static void other_reports_are_read(void) {
+TEST(other_reports_are_read) {
   expect("{\"class\":\"VERSION\",\"release\":\"3.22\",\"rev\":\"3.22\",\"proto_major\":3,\"proto_minor\":14}");
   TEST_ASSERT_EQUAL(GPSD_OTHER, report.kind);
   expect("{\"class\":\"TPV\",\"device\":\"/dev/pts/1\",\"mode\":1}");
@@ -63,7 +60,7 @@ static void other_reports_are_read(void) {
 }
 
 // What gpsdecode 3.22 prints for an HDT behind a GST: no valid JSON, and the deviations as accelerations.
-static void headings_of_gpsd_322_are_read(void) {
+TEST(headings_of_gpsd_322_are_read) {
   expect(
       "{\"class\":\"ATT\",\"device\":\"stdin\",,\"time\":\"2024-03-23T12:00:00.000Z\"\"heading\":123.400,\"dip\":0.022,"
       "\"acc_len\":0.020}");
@@ -72,7 +69,7 @@ static void headings_of_gpsd_322_are_read(void) {
   TEST_ASSERT_EQUAL_INT64(1711195200 * WM_NS_PER_S, report.time_ns);
 }
 
-static void broken_lines_are_refused(void) {
+TEST(broken_lines_are_refused) {
   static const char *const kBroken[] = {
       "",         "[]",         "{",          "{\"class\"", "{\"class\":", "{\"class\":\"TPV", "{\"a\":[1,2",
       "{\"a\":1", "$GPGGA,1,2", "{\"a\":\"\\"};
@@ -82,7 +79,7 @@ static void broken_lines_are_refused(void) {
 
 // East, north and up by PROJ 9.1, +proj=topocentric +ellps=WGS84: `cct -d 4 +proj=pipeline +step +proj=cart +step
 // +proj=topocentric +lon_0=11.5 +lat_0=48.1 +h_0=500`.
-static void places_are_metres_about_the_origin(void) {
+TEST(places_are_metres_about_the_origin) {
   static const double kOrigin[3] = {48.1, 11.5, 500};
   static const struct {
     double place[3], at_m[3];
@@ -96,14 +93,4 @@ static void places_are_metres_about_the_origin(void) {
     local_frame(kOrigin, kPlaces[i].place, at_m);
     for (int k = 0; k < 3; k++) TEST_ASSERT_DOUBLE_WITHIN(1e-4, kPlaces[i].at_m[k], at_m[k]);
   }
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(positions_are_read);
-  RUN_TEST(other_reports_are_read);
-  RUN_TEST(headings_of_gpsd_322_are_read);
-  RUN_TEST(broken_lines_are_refused);
-  RUN_TEST(places_are_metres_about_the_origin);
-  return UNITY_END();
 }

@@ -3,11 +3,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "common/suite.h"
 #include "scan.h"
-#include "unity.h"
-
-void setUp(void) {}
-void tearDown(void) {}
 
 static int64_t raw(const char *type, const char *bytes) {
   iio_type t;
@@ -15,7 +12,7 @@ static int64_t raw(const char *type, const char *bytes) {
   return iio_type_raw(&t, (const uint8_t *)bytes);
 }
 
-static void numbers_are_read_by_their_type(void) {
+TEST(numbers_are_read_by_their_type) {
   TEST_ASSERT_EQUAL_INT64(-2, raw("le:s16/16>>0", "\xfe\xff"));
   TEST_ASSERT_EQUAL_INT64(-2, raw("be:s16/16>>0", "\xff\xfe"));
   TEST_ASSERT_EQUAL_INT64(65534, raw("le:u16/16>>0", "\xfe\xff"));
@@ -27,7 +24,7 @@ static void numbers_are_read_by_their_type(void) {
   TEST_ASSERT_EQUAL_INT64(-1, raw("be:s64/64>>0", "\xff\xff\xff\xff\xff\xff\xff\xff"));
 }
 
-static void other_types_are_refused(void) {
+TEST(other_types_are_refused) {
   static const char *const kWrong[] = {"",
                                        "le",
                                        "me:s16/16>>0",
@@ -48,7 +45,7 @@ static void other_types_are_refused(void) {
 }
 
 // Three numbers of 16 bits, then a stamp of 64: it stands at byte 8, as in the kernel's own example.
-static void elements_are_aligned_to_their_size(void) {
+TEST(elements_are_aligned_to_their_size) {
   iio_element elements[5] = {{.index = 6}, {.index = 0}, {.index = 2}, {.index = 1}, {.index = 4}};
   TEST_ASSERT_TRUE(iio_type_read("le:s64/64>>0", &elements[0].type));
   for (int i = 1; i < 4; i++) TEST_ASSERT_TRUE(iio_type_read("le:s16/16>>0", &elements[i].type));
@@ -60,7 +57,7 @@ static void elements_are_aligned_to_their_size(void) {
   TEST_ASSERT_EQUAL(0, iio_layout(elements, 0));
 }
 
-static void matrices_turn_and_never_mirror(void) {
+TEST(matrices_turn_and_never_mirror) {
   double m[9];
   TEST_ASSERT_NULL(iio_matrix_read("0, 1, 0; -1, 0, 0; 0, 0, 1", m));
   TEST_ASSERT_EQUAL_DOUBLE(-1, m[3]);
@@ -69,13 +66,4 @@ static void matrices_turn_and_never_mirror(void) {
   TEST_ASSERT_NOT_NULL(strstr(iio_matrix_read("2, 0, 0; 0, 1, 0; 0, 0, 1", m), "not a rotation"));
   TEST_ASSERT_NOT_NULL(strstr(iio_matrix_read("nan, 0, 0; 0, 1, 0; 0, 0, 1", m), "not a rotation"));
   TEST_ASSERT_NOT_NULL(strstr(iio_matrix_read("1, 0, 0; 0, 1", m), "fewer"));
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(numbers_are_read_by_their_type);
-  RUN_TEST(other_types_are_refused);
-  RUN_TEST(elements_are_aligned_to_their_size);
-  RUN_TEST(matrices_turn_and_never_mirror);
-  return UNITY_END();
 }

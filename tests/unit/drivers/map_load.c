@@ -5,8 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/suite.h"
 #include "folder.h"
-#include "unity.h"
 #include "waymark/map.h"
 
 #define GEOMETRY "image: plan.pgm\nresolution: 0.05\norigin: [-1.5, 2.5, 0.5]\nnegate: 0\n"
@@ -55,7 +55,7 @@ static void refused(const char *yaml, const char *where, const char *what) {
   TEST_ASSERT_NOT_NULL_MESSAGE(strstr(err.text, what), err.text);
 }
 
-static void layers(void) {
+TEST(layers) {
   const wm_raster *r = load();
   const uint8_t edges[6] = {0, 255, 0, 255, 0, 255}, drivable[6] = {255, 255, 0, 0, 0, 255};
   TEST_ASSERT_EQUAL(3, r->width_px);
@@ -68,7 +68,7 @@ static void layers(void) {
   TEST_ASSERT_EQUAL_UINT8_ARRAY(drivable, r->drivable, 6);
 }
 
-static void what_is_free_is_drivable_where_there_is_no_layer(void) {
+TEST(what_is_free_is_drivable_where_there_is_no_layer) {
   folder_write("map.yaml", GEOMETRY "layers: {edges: edges.pgm}\n");
   const uint8_t free_pixels[6] = {255, 0, 0, 255, 255, 0};  // 205 is unknown
   TEST_ASSERT_EQUAL_UINT8_ARRAY(free_pixels, load()->drivable, 6);
@@ -78,7 +78,7 @@ static void what_is_free_is_drivable_where_there_is_no_layer(void) {
   TEST_ASSERT_NULL(load()->edges);
 }
 
-static void the_hash_tells_maps_apart(void) {
+TEST(the_hash_tells_maps_apart) {
   const uint64_t hash = load()->hash;
   TEST_ASSERT_TRUE(load()->hash == hash);
   folder_write("edges.pgm", "P2\n3 2\n255\n0 255 0 255 255 255\n");
@@ -91,13 +91,13 @@ static void the_hash_tells_maps_apart(void) {
   TEST_ASSERT_FALSE(load()->hash == hash);
 }
 
-static void deep_pgm(void) {
+TEST(deep_pgm) {
   folder_write_bytes("edges.pgm", "P5\n3 2\n1000\n\x00\x00\x03\xe8\x01\xf3\x01\xf5\xff\xff\x00\x01", 24);
   const uint8_t edges[6] = {0, 255, 0, 255, 255, 0};
   TEST_ASSERT_EQUAL_UINT8_ARRAY(edges, load()->edges, 6);
 }
 
-static void wrong_yaml(void) {
+TEST(wrong_yaml) {
   refused("resolution: 0\norigin: [0, 0, 0]\nlayers: {edges: edges.pgm}\n", "map.yaml:1: resolution", "above 0");
   refused("resolution: -0.1\norigin: [0, 0, 0]\nlayers: {edges: edges.pgm}\n", "map.yaml:1: resolution", "above 0");
   refused("resolution: .nan\norigin: [0, 0, 0]\nlayers: {edges: edges.pgm}\n", "map.yaml:1: resolution", "nan");
@@ -120,7 +120,7 @@ static void wrong_yaml(void) {
   TEST_ASSERT_NOT_NULL_MESSAGE(strstr(warnings, "colour"), warnings);
 }
 
-static void wrong_pictures(void) {
+TEST(wrong_pictures) {
   static const struct {
     const char *bytes;
     size_t size;
@@ -148,15 +148,4 @@ static void wrong_pictures(void) {
     folder_write_bytes("edges.pgm", kCases[i].bytes, kCases[i].size);
     refused(YAML, "map.yaml:5: layers", kCases[i].what);
   }
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(layers);
-  RUN_TEST(what_is_free_is_drivable_where_there_is_no_layer);
-  RUN_TEST(the_hash_tells_maps_apart);
-  RUN_TEST(deep_pgm);
-  RUN_TEST(wrong_yaml);
-  RUN_TEST(wrong_pictures);
-  return UNITY_END();
 }

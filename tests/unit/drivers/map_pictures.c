@@ -5,8 +5,8 @@
 #include <string.h>
 #include <zlib.h>
 
+#include "common/suite.h"
 #include "folder.h"
-#include "unity.h"
 #include "waymark/map.h"
 
 void setUp(void) { folder_make(); }
@@ -160,7 +160,7 @@ static int8_t meant(uint8_t level) {
 
 #define ABOUT "resolution: 0.05\norigin: [0, 0, 0]\n"
 
-static void one_map_in_every_kind_of_picture(void) {
+TEST(one_map_in_every_kind_of_picture) {
   for (size_t i = 0; i < sizeof kPictures / sizeof *kPictures; i++) {
     const picture *p = &kPictures[i];
     wm_raster place;
@@ -180,7 +180,7 @@ static void one_map_in_every_kind_of_picture(void) {
 }
 
 // A layer: what is transparent is not in it.
-static void transparent_is_not_in_a_layer(void) {
+TEST(transparent_is_not_in_a_layer) {
   wm_map *map;
   write_png("edges.png", &(picture){"", 8, 6, 0, 0, 1, 0});
   folder_write("map.yaml", ABOUT "layers: {edges: edges.png}\n");
@@ -189,7 +189,7 @@ static void transparent_is_not_in_a_layer(void) {
   wm_map_free(map);
 }
 
-static void pictures_that_are_cut_off(void) {
+TEST(pictures_that_are_cut_off) {
   for (size_t i = 0; i < sizeof kPictures / sizeof *kPictures; i++) {
     write_png("plan.png", &kPictures[i]);
     FILE *file = fopen(folder_path("plan.png"), "rb");
@@ -206,7 +206,7 @@ static void pictures_that_are_cut_off(void) {
   }
 }
 
-static void levels_by_mode(void) {
+TEST(levels_by_mode) {
   static const struct {
     const char *keys;
     int8_t meant[8];
@@ -234,7 +234,7 @@ static void levels_by_mode(void) {
   }
 }
 
-static void modes_that_are_refused(void) {
+TEST(modes_that_are_refused) {
   static const char *const rows[][2] = {
       {"image: plan.pgm\n" ABOUT "mode: rwa\n", "map.yaml:4: mode"},
       {"image: plan.pgm\n" ABOUT "mode: raw\nnegate: 1\n", "map.yaml:5: negate: the map servers of ROS 1 and 2 differ"},
@@ -250,14 +250,4 @@ static void modes_that_are_refused(void) {
     TEST_ASSERT_NULL(cells);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(err.text, rows[i][1]), err.text);
   }
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(one_map_in_every_kind_of_picture);
-  RUN_TEST(transparent_is_not_in_a_layer);
-  RUN_TEST(pictures_that_are_cut_off);
-  RUN_TEST(levels_by_mode);
-  RUN_TEST(modes_that_are_refused);
-  return UNITY_END();
 }

@@ -9,8 +9,8 @@
 #include <memory>
 
 #include "common/marker_views.hpp"
+#include "common/suite.h"
 #include "common/trials.h"
-#include "unity.h"
 #include "waymark/detectors.h"
 #include "waymark/mr_code.h"
 
@@ -156,7 +156,7 @@ Machines machines_of(const wm_detector *detector, const char *family, double par
   return out;
 }
 
-void mr_codes_are_found_and_none_is_false() {
+TEST(mr_codes_are_found_and_none_is_false) {
   const Machines mr = machines_of(wm_detector_find("mr"), "mr", 1);
   Tally tally;
   wm_event events[16];
@@ -176,7 +176,7 @@ void mr_codes_are_found_and_none_is_false() {
 }
 
 // The picture of each print is shown to the next family's detector, and to mr, too: it has none of their identities.
-void all_families_are_found() {
+TEST(all_families_are_found) {
   size_t library_count;
   const wm_detector *squares = wm_library_detectors(&library_count)[0];
   const Machines mr = machines_of(wm_detector_find("mr"), "mr", 1);
@@ -218,14 +218,8 @@ void all_families_are_found() {
 
 }  // namespace
 
-void setUp() {}
-void tearDown() {}
-
-int main(int argc, char **argv) {
+int suite_begin(int argc, char **argv) {
   if (argc > 1) views = std::strtoull(argv[1], nullptr, 10);
   views = wm_trials(views, 12);
-  UNITY_BEGIN();
-  RUN_TEST(mr_codes_are_found_and_none_is_false);
-  RUN_TEST(all_families_are_found);
-  return UNITY_END();
+  return SUITE_RUNS;
 }

@@ -8,8 +8,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "common/suite.h"
 #include "folder.h"
-#include "unity.h"
 #include "video_files.h"
 #include "waymark/lcm_messages.h"
 #include "waymark/lcm_streams.h"
@@ -124,7 +124,7 @@ static int count_of(const char *stream, double from_s, double until_s) {
   return n;
 }
 
-static void all_data_come_in_the_order_of_their_times(void) {
+TEST(all_data_come_in_the_order_of_their_times) {
   int can0 = 0, can1 = 0, pictures = 0, messages = 0;
   wm_time_ns before_ns = 0;
   size_t count;
@@ -154,7 +154,7 @@ static void all_data_come_in_the_order_of_their_times(void) {
   TEST_ASSERT_NOT_NULL(wm_play_streams(play, &count)[wm_play_find(play, "points")].lacking);
 }
 
-static void pictures_of_a_trigger_follow_each_other(void) {
+TEST(pictures_of_a_trigger_follow_each_other) {
   open_at(0, 0, 1);
   while (next()) {
     if (!is("camera:left")) continue;
@@ -164,7 +164,7 @@ static void pictures_of_a_trigger_follow_each_other(void) {
   }
 }
 
-static void messages_come_at_their_arrival_with_their_stamp(void) {
+TEST(messages_come_at_their_arrival_with_their_stamp) {
   wm_stream_row row;
   wm_sighting seen[WM_LCM_OBSERVATIONS_MAX];
   char sensor[32];
@@ -222,7 +222,7 @@ static uint64_t hash_of(double open_s, double from_s, int *count) {
   return hash;
 }
 
-static void the_same_items_come_again_also_from_later_on(void) {
+TEST(the_same_items_come_again_also_from_later_on) {
   int n[4];
   break_it(
       "- {name: a, fault: camera_frozen, camera: left, from_s: 1.2, until_s: 2.9}\n"
@@ -240,7 +240,7 @@ static void the_same_items_come_again_also_from_later_on(void) {
   TEST_ASSERT_NOT_EQUAL_HEX64(once, hash_of(0, 0, &n[3]));
 }
 
-static void passes_follow_each_other(void) {
+TEST(passes_follow_each_other) {
   int n = 0;
   wm_time_ns before_ns = -1;
   open_at(1, 2, 3);
@@ -255,7 +255,7 @@ static void passes_follow_each_other(void) {
 
 // ── faults ──────────────────────────────────────────────────────────────────────────────────────────────────────────
 
-static void a_camera_breaks_in_its_ways(void) {
+TEST(a_camera_breaks_in_its_ways) {
   break_it(
       "- {name: a, fault: camera_unplugged, camera: left, from_s: 0.5, until_s: 1}\n"
       "- {name: b, fault: camera_stalled, camera: right, from_s: 1, until_s: 2}\n"
@@ -280,7 +280,7 @@ static void a_camera_breaks_in_its_ways(void) {
   TEST_ASSERT_EQUAL(4, edges);  // d and e begin and end; the others are over
 }
 
-static void a_frozen_camera_gives_its_last_picture(void) {
+TEST(a_frozen_camera_gives_its_last_picture) {
   uint8_t last[65536];
   uint32_t bytes_of_last = 0;
   int same = 0, others = 0;
@@ -301,7 +301,7 @@ static void a_frozen_camera_gives_its_last_picture(void) {
   TEST_ASSERT_EQUAL(20, others);
 }
 
-static void a_dark_camera_keeps_its_share_of_light(void) {
+TEST(a_dark_camera_keeps_its_share_of_light) {
   uint8_t bright = 0, dark = 0;
   break_it("- {name: a, fault: camera_dark, brightness: 0.1, camera: left, from_s: 2, until_s: 4}\n");
   open_at(0, 0, 1);
@@ -316,7 +316,7 @@ static void a_dark_camera_keeps_its_share_of_light(void) {
   TEST_ASSERT_INT_WITHIN(1, 20, dark);
 }
 
-static void pictures_have_the_format_that_is_asked_for(void) {
+TEST(pictures_have_the_format_that_is_asked_for) {
   open_at(0, 0, 1);
   const int left = wm_play_find(play, "camera:left");
   TEST_ASSERT_EQUAL(WM_OK, wm_play_set_format(play, (size_t)left, "YUYV", &err));
@@ -330,7 +330,7 @@ static void pictures_have_the_format_that_is_asked_for(void) {
   TEST_ASSERT_EQUAL_INT64(117000000, item.due_ns);
 }
 
-static void a_bus_breaks_in_its_ways(void) {
+TEST(a_bus_breaks_in_its_ways) {
   break_it(
       "- {name: a, fault: bus_down, bus: can0, from_s: 0.5, until_s: 1}\n"
       "- {name: b, fault: bus_silent, bus: can0, ids: [1A1], from_s: 1, until_s: 1.5}\n"
@@ -349,7 +349,7 @@ static void a_bus_breaks_in_its_ways(void) {
   TEST_ASSERT_EQUAL(1000 + 20, count_of("can:can0", 3, 4));
 }
 
-static void a_stream_breaks_in_its_ways(void) {
+TEST(a_stream_breaks_in_its_ways) {
   int ahead = 0;
   break_it(
       "- {name: a, fault: stream_silent, stream: imu, from_s: 0, until_s: 1}\n"
@@ -363,7 +363,7 @@ static void a_stream_breaks_in_its_ways(void) {
   TEST_ASSERT_EQUAL(25, ahead);
 }
 
-static void bytes_of_words_are_reversed(void) {
+TEST(bytes_of_words_are_reversed) {
   break_it("- {name: a, fault: bus_wrong_byte_order, bus: can0, word_bytes: 4, from_s: 0, until_s: 2}\n");
   open_at(0, 0, 1);
   const uint8_t swapped[] = {0x22, 0x11, 0x00, 0x00, 0x66, 0x55, 0x44, 0x33};
@@ -372,7 +372,7 @@ static void bytes_of_words_are_reversed(void) {
   TEST_ASSERT_EQUAL_HEX8_ARRAY(swapped, item.frame.data, 8);
 }
 
-static void a_fault_of_what_is_not_there_is_refused(void) {
+TEST(a_fault_of_what_is_not_there_is_refused) {
   break_it("- {name: no, fault: camera_frozen, camera: lft, from_s: 1}\n");
   const wm_play_options options = {.faults = &faults};
   char message[512];
@@ -381,7 +381,7 @@ static void a_fault_of_what_is_not_there_is_refused(void) {
   TEST_ASSERT_EQUAL_STRING(message, err.text);
 }
 
-static void a_folder_that_is_no_recording_is_refused(void) {
+TEST(a_folder_that_is_no_recording_is_refused) {
   const wm_play_options options = {0};
   char message[512];
   (void)snprintf(message, sizeof message, "%s: has no CAN frame, picture or row that can be played", dir);
@@ -398,23 +398,4 @@ static void a_folder_that_is_no_recording_is_refused(void) {
   }
   TEST_ASSERT_EQUAL(WM_BAD_DATA, wm_play_open(dir, &options, &play, &err));
   TEST_ASSERT_EQUAL_STRING(message, err.text);
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(all_data_come_in_the_order_of_their_times);
-  RUN_TEST(pictures_of_a_trigger_follow_each_other);
-  RUN_TEST(messages_come_at_their_arrival_with_their_stamp);
-  RUN_TEST(the_same_items_come_again_also_from_later_on);
-  RUN_TEST(passes_follow_each_other);
-  RUN_TEST(a_camera_breaks_in_its_ways);
-  RUN_TEST(a_frozen_camera_gives_its_last_picture);
-  RUN_TEST(a_dark_camera_keeps_its_share_of_light);
-  RUN_TEST(pictures_have_the_format_that_is_asked_for);
-  RUN_TEST(a_bus_breaks_in_its_ways);
-  RUN_TEST(a_stream_breaks_in_its_ways);
-  RUN_TEST(bytes_of_words_are_reversed);
-  RUN_TEST(a_fault_of_what_is_not_there_is_refused);
-  RUN_TEST(a_folder_that_is_no_recording_is_refused);
-  return UNITY_END();
 }

@@ -7,14 +7,11 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "common/suite.h"
 #include "folder.h"
-#include "unity.h"
 #include "waymark/recording.h"
 
 static const char *data_dir;
-
-void setUp(void) {}
-void tearDown(void) {}
 
 static void print_warning(void *context, const char *text) { printf("  %s: %s\n", (const char *)context, text); }
 
@@ -117,7 +114,7 @@ static void check_recording(const char *name) {
   wm_recording_close(recording);
 }
 
-static void every_recording(void) {
+TEST(every_recording) {
   DIR *dir = opendir(data_dir);
   TEST_ASSERT_NOT_NULL(dir);
   int checked = 0;
@@ -157,7 +154,7 @@ static void copy_reversed(const char *dir, const char *file) {
 }
 
 // The same data in another order of columns, with CRLF and arrival_ns, are the same events to the last bit.
-static void columns_in_any_order(void) {
+TEST(columns_in_any_order) {
   static wm_event a, b;
   char dir[512];
   wm_error err = {0};
@@ -187,14 +184,12 @@ static void columns_in_any_order(void) {
   folder_remove();
 }
 
-int main(void) {
+int suite_begin(int argc, char **argv) {
+  (void)argc, (void)argv;
   data_dir = getenv("WM_DATA_DIR");
   if (!data_dir || access(data_dir, R_OK) != 0) {
     puts("skipped: no recordings in WM_DATA_DIR");
     return 77;
   }
-  UNITY_BEGIN();
-  RUN_TEST(every_recording);
-  RUN_TEST(columns_in_any_order);
-  return UNITY_END();
+  return SUITE_RUNS;
 }

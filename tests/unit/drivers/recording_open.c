@@ -6,8 +6,8 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "common/suite.h"
 #include "folder.h"
-#include "unity.h"
 #include "waymark/can.h"
 #include "waymark/recording.h"
 
@@ -53,7 +53,7 @@ static void refused(const char *tail) {
   TEST_ASSERT_NOT_NULL_MESSAGE(strstr(err.text, tail), err.text);
 }
 
-static void bare(void) {
+TEST(bare) {
   open_it();
   TEST_ASSERT_EQUAL_STRING("drive", wm_recording_name(recording));
   TEST_ASSERT_EQUAL_DOUBLE(12.5, wm_recording_duration_s(recording));
@@ -72,14 +72,14 @@ static void bare(void) {
   TEST_ASSERT_EQUAL_STRING("", warnings);
 }
 
-static void name_of_the_folder(void) {
+TEST(name_of_the_folder) {
   folder_write("recording.yaml", "format: waymark-recording/1\n");
   open_it();
   TEST_ASSERT_EQUAL_STRING_LEN("waymark-test-", wm_recording_name(recording), 13);
   TEST_ASSERT_DOUBLE_IS_NAN(wm_recording_duration_s(recording));
 }
 
-static void start_pose(void) {
+TEST(start_pose) {
   folder_write("recording.yaml",
                ABOUT "vehicle:\n  initial_pose: {t_ns: 5, x_m: 1, y_m: 2, heading_rad: 4, sigma_heading_deg: 9}\n");
   open_it();
@@ -102,7 +102,7 @@ static void start_pose(void) {
   TEST_ASSERT_NOT_NULL_MESSAGE(strstr(warnings, "hedaing_rad: unknown key; did you mean 'heading_rad'?"), warnings);
 }
 
-static void whole_calibration(void) {
+TEST(whole_calibration) {
   folder_write(
       "calibration.yaml",
       "sensors:\n  laser: {mounting: {xyz_m: [1, 2, 3], rpy_deg: [0, 90, -45]}, bearing_sigma_deg: 1, "
@@ -152,7 +152,7 @@ static void whole_calibration(void) {
   TEST_ASSERT_EQUAL_STRING_LEN("sensors:\n", text, 9);
 }
 
-static void bad_calibrations(void) {
+TEST(bad_calibrations) {
   static const char *const kBad[][2] = {
       {"cameras: {a: {model: double-sphere, size: [640, 480], intrinsics: [0, 1.5, 3, 3, 320, 240]}}",
        "cameras.a.intrinsics[1]: '1.5' is out of range; a number from 0 to 1 is needed"},
@@ -179,7 +179,7 @@ static void bad_calibrations(void) {
   }
 }
 
-static void landmarks(void) {
+TEST(landmarks) {
   folder_write("landmarks.csv", "id,x_m,y_m,z_m,sigma_m,yaw_rad\r\n7,1,2,,0.5,\r\n3,4,5,6,,1.5\r\n");
   open_it();
   size_t count;
@@ -212,7 +212,7 @@ static void landmarks(void) {
   refused("landmarks.csv:3: 2 fields where the header has 3");
 }
 
-static void overridden(void) {
+TEST(overridden) {
   folder_write("landmarks.csv", "id,x_m,y_m,z_m,sigma_m\n1,0,0,0,0\n");
   folder_write("other.csv", "id,x_m,y_m,z_m,sigma_m\n1,0,0,0,0\n2,0,0,0,0\n");
   snprintf(overrides.landmarks, sizeof overrides.landmarks, "%s", folder_path("other.csv"));
@@ -224,7 +224,7 @@ static void overridden(void) {
   refused("no/such.yaml: there is no such file");
 }
 
-static void unlisted_streams(void) {
+TEST(unlisted_streams) {
   folder_write("recording.yaml", ABOUT "streams: [motion.csv]\n");
   folder_write("gnss.csv", "t_ns,x_m,y_m,z_m,sigma_xy_m,sigma_z_m\n");
   open_it();
@@ -235,7 +235,7 @@ static void unlisted_streams(void) {
       strstr(warnings, "gnss.csv: is not listed under streams in recording.yaml, but there: it is read"));
 }
 
-static void can_and_its_binding(void) {
+TEST(can_and_its_binding) {
   folder_write("vehicle.dbc",
                "BU_: CAR\nBO_ 291 SPEED: 4 CAR\n SG_ A : 0|8@1+ (1,0) [0|0] \"m/s\" CAR\n SG_ B : 8|8@1+ (0.1,0) [0|0] "
                "\"m/s\" CAR\n"
@@ -273,7 +273,7 @@ static void can_and_its_binding(void) {
 }
 
 // Positions of a receiver on the bus: about the origin of calibration.yaml, with its own accuracy, none without a fix.
-static void gnss_over_can(void) {
+TEST(gnss_over_can) {
   folder_write("vehicle.dbc",
                "BU_: CAR\nBO_ 3 GPS: 8 CAR\n SG_ LAT : 0|32@1- (1e-07,0) [0|0] \"deg\" CAR\n"
                " SG_ LON : 32|32@1- (1e-07,0) [0|0] \"deg\" CAR\n"
@@ -311,7 +311,7 @@ static void gnss_over_can(void) {
 }
 
 // A fix without an altitude: the last altitude is not of this position.
-static void gnss_altitude_over_can(void) {
+TEST(gnss_altitude_over_can) {
   const double origin[3] = {52.5, 13.4, 30};
   wm_can_gnss gnss;
   wm_can_gnss_init(&gnss, origin);
@@ -328,36 +328,18 @@ static void gnss_altitude_over_can(void) {
   }
 }
 
-static void too_many_sensors(void) {
+TEST(too_many_sensors) {
   char text[8192] = "t_ns,sensor,id,bearing_rad,range_m\n";
   for (int i = 0; i < 33; i++) sprintf(text + strlen(text), "%d,s%d,1,0,1\n", i, i);
   folder_write("sightings.csv", text);
   refused("sightings.csv:34: more than 32 different sensors");
 }
 
-static void motion_kind_is_refused_by_name(void) {
+TEST(motion_kind_is_refused_by_name) {
   open_it();
   TEST_ASSERT_NULL(strstr(warnings, "motion_kind"));
   folder_write("recording.yaml", ABOUT "vehicle:\n  motion_kind: commands, not encoders\n");
   open_it();
   TEST_ASSERT_NOT_NULL_MESSAGE(strstr(warnings, "recording.yaml:6: vehicle.motion_kind: is not read"), warnings);
   TEST_ASSERT_NOT_NULL(strstr(warnings, "motion.twist"));
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(bare);
-  RUN_TEST(name_of_the_folder);
-  RUN_TEST(start_pose);
-  RUN_TEST(whole_calibration);
-  RUN_TEST(bad_calibrations);
-  RUN_TEST(landmarks);
-  RUN_TEST(overridden);
-  RUN_TEST(unlisted_streams);
-  RUN_TEST(can_and_its_binding);
-  RUN_TEST(gnss_over_can);
-  RUN_TEST(gnss_altitude_over_can);
-  RUN_TEST(too_many_sensors);
-  RUN_TEST(motion_kind_is_refused_by_name);
-  return UNITY_END();
 }

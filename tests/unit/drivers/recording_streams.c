@@ -5,8 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/suite.h"
 #include "folder.h"
-#include "unity.h"
 #include "waymark/event_fields.h"
 #include "waymark/recording.h"
 
@@ -59,7 +59,7 @@ static void at_end(wm_source *from) {
   TEST_ASSERT_EQUAL(WM_END, from->ops->next(from, &event, &err));
 }
 
-static void motion_exact(void) {
+TEST(motion_exact) {
   folder_write("motion.csv", "t_ns,v_mps,w_radps\n9007199254740993,0.1,-0.25\n9007199254740994,-1e-3,.5\n");
   wm_source *motion = source("motion");
   wm_event event = next(motion);
@@ -78,7 +78,7 @@ static void motion_exact(void) {
   TEST_ASSERT_EQUAL(2, motion->counts.received);
 }
 
-static void motion_sideways(void) {
+TEST(motion_sideways) {
   folder_write("motion.csv", "t_ns,v_mps,vy_mps,w_radps\n1,0.5,0.25,-0.125\n2,0.5,,-0.125\n");
   wm_source *motion = source("motion");
   TEST_ASSERT_EQUAL_HEX32(WM_EVENT_BIT(WM_EVENT_TWIST2) | WM_EVENT_BIT(WM_EVENT_TWIST6), motion->kinds);
@@ -93,7 +93,7 @@ static void motion_sideways(void) {
 }
 
 // The turn rate about base_link's z axis, by the mounting: here the IMU's x axis points up.
-static void imu_by_its_mounting(void) {
+TEST(imu_by_its_mounting) {
   folder_write("calibration.yaml", "imu: {mounting: {rpy_deg: [0, -90, 0]}}\n");
   folder_write("imu.csv", "t_ns,wx_radps,wy_radps,wz_radps,temperature_c\n1,0.5,0.25,0.125,21\n2,0.5,2e9,0,\n");
   wm_source *imu = source("imu");
@@ -109,7 +109,7 @@ static void imu_by_its_mounting(void) {
 }
 
 // The same data, written in the ways that the format allows.
-static void spellings(void) {
+TEST(spellings) {
   static const char *const kFiles[] = {
       "w_radps,t_ns,v_mps\n2,10,1\n4,20,3\n",
       "t_ns,v_mps,w_radps,arrival_ns\n10,1,2,\n20,3,4,20\n",
@@ -137,7 +137,7 @@ static void spellings(void) {
   TEST_ASSERT_NOT_NULL(strstr(warnings, "motion.csv:1: unknown column 'note', ignored"));
 }
 
-static void broken_rows(void) {
+TEST(broken_rows) {
   static char text[200000];
   strcpy(text,
          "t_ns,v_mps,w_radps\n1,1,1\nx,1,1\n2,1\n3,1,1,1\n4,nan,0\n5,1e9,0\n6,,0\n99999999999999999999,1,1\n1.5,1,1\n");
@@ -159,7 +159,7 @@ static void broken_rows(void) {
 }
 
 // Stamps that a program held as floating point: whole ones are taken by their digits, exactly.
-static void float_stamps(void) {
+TEST(float_stamps) {
   folder_write("motion.csv",
                "t_ns,v_mps,w_radps\n-5.0,1,0\n1.0,1,0\n2e0,1,0\n30e-1,1,0\n1.5,1,0\n1.7000000001e1,1,0\n"
                "1700000000123456789.000,1,0\n1.700000000123456790e+18,1,0\n1.7e+25,1,0\n1e-400000,1,0\n");
@@ -172,7 +172,7 @@ static void float_stamps(void) {
   TEST_ASSERT_EQUAL(1, motion->counts.not_finite);
 }
 
-static void zero_bytes(void) {
+TEST(zero_bytes) {
   static const char kText[] = "t_ns,v_mps,w_radps\n1,1,1\n2,\0,1\n\0\0\0\n3,1,1\n";
   folder_write_bytes("motion.csv", kText, sizeof kText - 1);
   wm_source *motion = source("motion");
@@ -183,7 +183,7 @@ static void zero_bytes(void) {
 }
 
 // Many buffers' worth of rows, so that lines fall across the buffer's end.
-static void long_file(void) {
+TEST(long_file) {
   enum { ROWS = 20000 };
   char *text = malloc(ROWS * 48);
   size_t n = (size_t)sprintf(text, "t_ns,v_mps,w_radps\n");
@@ -199,7 +199,7 @@ static void long_file(void) {
   at_end(motion);
 }
 
-static void order_of_arrival(void) {
+TEST(order_of_arrival) {
   folder_write("motion.csv", "t_ns,v_mps,w_radps\n10,1,0\n30,2,0\n20,3,0\n40,4,0\n");
   folder_write("gnss.csv",
                "t_ns,x_m,y_m,z_m,sigma_xy_m,sigma_z_m,arrival_ns\n10,1,1,,2,,200\n5,2,2,3,2,4,210\n20,3,3,,2,,205\n");
@@ -224,7 +224,7 @@ static void order_of_arrival(void) {
 }
 
 // Rows stamped with the beginning of their interval: each row's values get the stamp of the next good row.
-static void values_of_the_row_before(void) {
+TEST(values_of_the_row_before) {
   folder_write("motion.csv", "t_ns,v_mps,w_radps\n10,1,0\n20,2,0\n9000000000000000,9,0\n35,3,0\n50,4,0\n");
   wm_source *motion = source("motion");
   motion->sample_at_next = 1;
@@ -239,7 +239,7 @@ static void values_of_the_row_before(void) {
 }
 
 // One stamp far ahead must not make the rest of the drive late.
-static void leaping_stamps(void) {
+TEST(leaping_stamps) {
   folder_write(
       "motion.csv",
       "t_ns,v_mps,w_radps\n900000000000000,1,0\n0,1,0\n100,2,0\n3000000000000000000,3,0\n300,4,0\n60000000300,5,0\n"
@@ -255,7 +255,7 @@ static void leaping_stamps(void) {
                                motion->counts.first_problem);
 }
 
-static void sightings_by_sensor(void) {
+TEST(sightings_by_sensor) {
   folder_write("calibration.yaml",
                "sensors:\n  right: {mounting: {xyz_m: [0, -1, 0], rpy_deg: [0, 0, 90]}, bearing_sigma_rad: 0.01}\n"
                "cameras:\n  front: {model: equidistant, size: [640, 480], intrinsics: [300, 300, 320, 240], mounting: "
@@ -296,7 +296,7 @@ static void sightings_by_sensor(void) {
 }
 
 // By the table: each number has a column of its name, which takes its limits.
-static void each_number_of_a_sighting_has_a_column(void) {
+TEST(each_number_of_a_sighting_has_a_column) {
   char header[1000] = "t_ns,sensor,id", row[1000] = "1,eye,7";
   wm_sighting given = wm_sighting_without_numbers();
   double step = 0;
@@ -315,7 +315,7 @@ static void each_number_of_a_sighting_has_a_column(void) {
 }
 
 // Sigmas of a row, its covariance on axes turned by the bearing, and what is not whole.
-static void sightings_with_their_own_noise(void) {
+TEST(sightings_with_their_own_noise) {
   folder_write("calibration.yaml", "sensors:\n  eye: {bearing_sigma_rad: 0.01}\n");
   folder_write(
       "sightings.csv",
@@ -342,7 +342,7 @@ static void sightings_with_their_own_noise(void) {
   TEST_ASSERT_EQUAL(4, eye->counts.malformed);
 }
 
-static void increments_with_and_without_covariance(void) {
+TEST(increments_with_and_without_covariance) {
   folder_write("increments.csv",
                "t_ns,from_ns,dx_m,dy_m,dheading_rad,cov_xx,cov_xy,cov_yy,cov_xt,cov_yt,cov_tt\n"
                "5,0,0.1,0.2,0.3,1,0.1,2,0.2,0.3,3\n10,5,0.1,0,0.01,,,,,,\n15,15,1,0,0,,,,,,\n20,15,1,0,0,1,0,1,0,0,\n");
@@ -365,7 +365,7 @@ static void increments_with_and_without_covariance(void) {
   TEST_ASSERT_EQUAL(2, increments->counts.malformed);
 }
 
-static void points_by_stamp(void) {
+TEST(points_by_stamp) {
   folder_write("points.csv", "t_ns,x_m,y_m\n1,1,2\n1,3,4\n2,5,6\n");
   wm_source *points = source("points");
   wm_event event = next(points);
@@ -378,7 +378,7 @@ static void points_by_stamp(void) {
   at_end(points);
 }
 
-static void too_many_points(void) {
+TEST(too_many_points) {
   char *text = malloc(20000);
   size_t n = (size_t)sprintf(text, "t_ns,x_m,y_m\n");
   for (int i = 0; i < WM_POINTS_MAX + 5; i++) n += (size_t)sprintf(text + n, "1,%d,0\n", i);
@@ -389,7 +389,7 @@ static void too_many_points(void) {
   TEST_ASSERT_EQUAL(5, event.as.points.dropped);
 }
 
-static void other_streams(void) {
+TEST(other_streams) {
   folder_write("motion6.csv", "t_ns,vx_mps,vy_mps,vz_mps,wx_radps,wy_radps,wz_radps\n1,1,2,3,4,5,6\n");
   folder_write("markers.csv", "t_ns,sensor,id,x_m,y_m,z_m,yaw_rad\n1,up,10,1,2,3,-3.2\n");
 #define DIGITS_48 "0000000000000001000000000000000000000000000000ff"
@@ -430,7 +430,7 @@ static void other_streams(void) {
 }
 
 // Raw corners of a print 2 m ahead on a wall, seen askew by 0.5 rad: the pose of the print, with sigmas by its size.
-static void marker_corners(void) {
+TEST(marker_corners) {
   const double place[3] = {2, 0.3, 0.1}, askew = 0.5, half_m = 0.1, focal = 500;  // x forward, y left, z up
   const int right[4] = {-1, 1, 1, -1}, down[4] = {-1, -1, 1, 1};
   char text[1024], row[512] = "";
@@ -464,35 +464,10 @@ static void marker_corners(void) {
   TEST_ASSERT_EQUAL(1, corners->counts.malformed);
 }
 
-static void corners_need_a_camera(void) {
+TEST(corners_need_a_camera) {
   folder_write("marker-corners.csv",
                "t_ns,sensor,id,u0_px,v0_px,u1_px,v1_px,u2_px,v2_px,u3_px,v3_px\n"
                "1,front,7,1,1,2,1,2,2,1,2\n");
   TEST_ASSERT_EQUAL(WM_BAD_CONFIG, wm_recording_open(folder_path("."), NULL, keep_warning, NULL, &recording, &err));
   TEST_ASSERT_NOT_NULL(strstr(err.text, "'front' is not a camera"));
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(motion_exact);
-  RUN_TEST(motion_sideways);
-  RUN_TEST(imu_by_its_mounting);
-  RUN_TEST(spellings);
-  RUN_TEST(broken_rows);
-  RUN_TEST(float_stamps);
-  RUN_TEST(zero_bytes);
-  RUN_TEST(long_file);
-  RUN_TEST(order_of_arrival);
-  RUN_TEST(values_of_the_row_before);
-  RUN_TEST(leaping_stamps);
-  RUN_TEST(sightings_by_sensor);
-  RUN_TEST(each_number_of_a_sighting_has_a_column);
-  RUN_TEST(sightings_with_their_own_noise);
-  RUN_TEST(increments_with_and_without_covariance);
-  RUN_TEST(points_by_stamp);
-  RUN_TEST(too_many_points);
-  RUN_TEST(other_streams);
-  RUN_TEST(marker_corners);
-  RUN_TEST(corners_need_a_camera);
-  return UNITY_END();
 }

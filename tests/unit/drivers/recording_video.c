@@ -6,8 +6,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "common/suite.h"
 #include "folder.h"
-#include "unity.h"
 #include "video_files.h"
 #include "waymark/video.h"
 
@@ -77,7 +77,7 @@ static void expect_end(void) {
   TEST_ASSERT_EQUAL(WM_END, wm_video_peek(video, &frame, &err));
 }
 
-static void avi_of_jpegs(void) {
+TEST(avi_of_jpegs) {
   avi_head(&file, "MJPG", W, H, 1);
   size_t size = make_jpeg(W, H, 20, jpeg, sizeof jpeg);
   avi_chunk(&file, "00wb", "sound", 5);
@@ -111,7 +111,7 @@ static void avi_of_jpegs(void) {
   TEST_ASSERT_EQUAL_STRING("", wm_video_counted(video)->first_problem);
 }
 
-static void matroska(void) {
+TEST(matroska) {
   mkv_head(&file, "V_MJPEG", W, H);
   for (int i = 0; i < 3; i++) {
     size_t size = make_jpeg(W, H, 30 * i, jpeg, sizeof jpeg);
@@ -127,7 +127,7 @@ static void matroska(void) {
   TEST_ASSERT_EQUAL_UINT64(1, wm_video_counted(video)->empty);
 }
 
-static void uncompressed(void) {
+TEST(uncompressed) {
   uint8_t pixels[W * H];
   avi_head(&file, "Y800", W, H, 0);
   for (int i = 0; i < 2; i++) {
@@ -146,7 +146,7 @@ static void uncompressed(void) {
   TEST_ASSERT_EQUAL_UINT64(1, wm_video_counted(video)->wrong_size);
 }
 
-static void a_folder_of_files(void) {
+TEST(a_folder_of_files) {
   (void)mkdir(folder_path("video/front"), 0777);
   for (int i = 0; i < 4; i++) {
     char name[64];
@@ -167,7 +167,7 @@ static void a_folder_of_files(void) {
   TEST_ASSERT_EQUAL_UINT64(1, wm_video_counted(video)->without_picture);
 }
 
-static void colour_is_its_luma(void) {
+TEST(colour_is_its_luma) {
   avi_head(&file, "MJPG", W, H, 0);
   size_t size = make_colour_jpeg(W, H, jpeg, sizeof jpeg);
   avi_chunk(&file, "00dc", jpeg, size);
@@ -179,7 +179,7 @@ static void colour_is_its_luma(void) {
   TEST_ASSERT_INT_WITHIN(3, 95, frame.grey[100]);  // 0.299 * 200 + 0.701 * 50
 }
 
-static void what_is_not_right_is_counted(void) {
+TEST(what_is_not_right_is_counted) {
   avi_head(&file, "MJPG", W, H, 0);
   add_jpeg(10);                                     // 0
   avi_chunk(&file, "00dc", "", 0);                  // no picture
@@ -213,7 +213,7 @@ static void what_is_not_right_is_counted(void) {
   TEST_ASSERT_NOT_NULL_MESSAGE(strstr(c->first_problem, "frame 1 is the one before"), c->first_problem);
 }
 
-static void a_damaged_container_ends_the_pictures(void) {
+TEST(a_damaged_container_ends_the_pictures) {
   avi_head(&file, "MJPG", W, H, 0);
   add_jpeg(10);
   bytes_put(&file, "\0\1\2\3\4\5\6\7\10", 9);
@@ -228,7 +228,7 @@ static void a_damaged_container_ends_the_pictures(void) {
   TEST_ASSERT_NOT_NULL(strstr(wm_video_counted(video)->first_problem, "the file is damaged"));
 }
 
-static void cut_files_end_where_they_end(void) {
+TEST(cut_files_end_where_they_end) {
   for (int is_mkv = 0; is_mkv < 2; is_mkv++) {
     if (is_mkv) {
       mkv_head(&file, "V_MJPEG", W, H);
@@ -268,7 +268,7 @@ static void cut_files_end_where_they_end(void) {
 #define SHARED 40
 // GIVEN two readers of one video WHEN one is ahead, far ahead (beyond what is kept), or skips THEN each has the pixels
 // and counts that it has alone.
-static void readers_share_what_is_decoded(void) {
+TEST(readers_share_what_is_decoded) {
   wm_video *other;
   wm_frame frame;
   avi_head(&file, "MJPG", W, H, 0);
@@ -319,7 +319,7 @@ static void refused(wm_status status, const char *text) {
   TEST_ASSERT_NOT_NULL_MESSAGE(strstr(err.text, text), err.text);
 }
 
-static void what_is_refused(void) {
+TEST(what_is_refused) {
   refused(WM_NOT_FOUND, "no pictures of the camera 'front'");
   folder_write("video/front.mp4", "....ftypisom....");
   refused(WM_UNSUPPORTED, "waymark import");
@@ -337,19 +337,4 @@ static void what_is_refused(void) {
   refused(WM_BAD_CONFIG, "t_ns");
   folder_write("video/front.avi", "RIFF");
   refused(WM_BAD_DATA, "not a video");
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(avi_of_jpegs);
-  RUN_TEST(matroska);
-  RUN_TEST(uncompressed);
-  RUN_TEST(a_folder_of_files);
-  RUN_TEST(colour_is_its_luma);
-  RUN_TEST(what_is_not_right_is_counted);
-  RUN_TEST(a_damaged_container_ends_the_pictures);
-  RUN_TEST(cut_files_end_where_they_end);
-  RUN_TEST(readers_share_what_is_decoded);
-  RUN_TEST(what_is_refused);
-  return UNITY_END();
 }

@@ -11,7 +11,7 @@
 #include <sys/mman.h>
 
 #include "camera_io.h"
-#include "unity.h"
+#include "common/suite.h"
 
 #define FD 77
 #define W 8
@@ -153,7 +153,6 @@ int __wrap_ioctl(int fd, unsigned long request, ...) {
 // NOLINTEND(bugprone-reserved-identifier)
 
 void setUp(void) { memset(&driver, 0, sizeof driver); }
-void tearDown(void) {}
 
 static void *open_camera(uint32_t capabilities, uint32_t planes, int expected) {
   void *camera = NULL;
@@ -194,25 +193,14 @@ static void take_pictures(void *camera, size_t offset) {
   TEST_ASSERT_FALSE(driver.is_streaming);
 }
 
-static void single_planar(void) { take_pictures(open_camera(V4L2_CAP_VIDEO_CAPTURE, 0, 0), 0); }
-static void multi_planar_of_one_plane(void) { take_pictures(open_camera(V4L2_CAP_VIDEO_CAPTURE_MPLANE, 1, 0), OFFSET); }
+TEST(single_planar) { take_pictures(open_camera(V4L2_CAP_VIDEO_CAPTURE, 0, 0), 0); }
+TEST(multi_planar_of_one_plane) { take_pictures(open_camera(V4L2_CAP_VIDEO_CAPTURE_MPLANE, 1, 0), OFFSET); }
 
-static void several_planes_are_refused(void) {
-  kV4l2.close(open_camera(V4L2_CAP_VIDEO_CAPTURE_MPLANE, 2, -EOPNOTSUPP));
-}
+TEST(several_planes_are_refused) { kV4l2.close(open_camera(V4L2_CAP_VIDEO_CAPTURE_MPLANE, 2, -EOPNOTSUPP)); }
 
-static void what_captures_nothing_is_no_camera(void) {
+TEST(what_captures_nothing_is_no_camera) {
   void *camera;
   camera_identity identity = {.path = "/dev/video9"};
   driver.capabilities = V4L2_CAP_STREAMING | V4L2_CAP_VIDEO_OUTPUT_MPLANE;
   TEST_ASSERT_EQUAL(-ENOTTY, kV4l2.open(NULL, &identity, &camera));
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(single_planar);
-  RUN_TEST(multi_planar_of_one_plane);
-  RUN_TEST(several_planes_are_refused);
-  RUN_TEST(what_captures_nothing_is_no_camera);
-  return UNITY_END();
 }

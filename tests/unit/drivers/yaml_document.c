@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "unity.h"
+#include "common/suite.h"
 #include "waymark/yaml.h"
 
 static wm_yaml *doc;
@@ -26,7 +26,7 @@ static void refused(const char *text, const char *message) {
   TEST_ASSERT_EQUAL_STRING(message, err.text);
 }
 
-static void walks(void) {
+TEST(walks) {
   wm_yaml_node root = parse("a: 1\nb:\n  c: [1, 2.5, 3]\n  d: ~\n  'e f': \"7\"\n");
   TEST_ASSERT_TRUE(wm_yaml_is_map(&root));
   TEST_ASSERT_EQUAL(2, wm_yaml_count(&root));
@@ -70,7 +70,7 @@ static void is_written(const char *text, const wm_yaml_change *changes, size_t c
   free(out);
 }
 
-static void is_written_again_with_changes(void) {
+TEST(is_written_again_with_changes) {
   is_written("a: 1.5  # of course\nb:\n  - c: [x, 'y, z', ~]\n    d: \"7\"\n  - usb-1.0:1\ne f: |\n  two\n  lines\n",
              NULL, 0, "a: 1.5\nb: [{c: [x, \"y, z\", null], d: \"7\"}, usb-1.0:1]\n\"e f\": \"two\\x0Alines\\x0A\"\n");
   wm_yaml_free(doc);
@@ -85,7 +85,7 @@ static void says(wm_status status, const char *message) {
   TEST_ASSERT_EQUAL_STRING(message, err.text);
 }
 
-static void typed_reads(void) {
+TEST(typed_reads) {
   wm_yaml_node root = parse(
       "f: abc\nbig: 5000\ni: 1.5\nb: 'true'\nc: mpas\nl: [1, x]\ninf: .inf\nnan: .nan\nyes: true\nhuge: 1e999\nt: "
       "9007199254740993\n");
@@ -134,7 +134,7 @@ static void typed_reads(void) {
   TEST_ASSERT_EQUAL_INT64(INT64_C(9007199254740993), i);
 }
 
-static void unknown_keys(void) {
+TEST(unknown_keys) {
   static const char *const kKnown[] = {"gate", "window_s", NULL};
   wm_yaml_node root = parse("gaet: 1\n");
   says(wm_yaml_check_keys(&root, kKnown, WM_YAML_NEAR, NULL, &err),
@@ -152,7 +152,7 @@ static void unknown_keys(void) {
   says(wm_yaml_check_keys(&root, kKnown, WM_YAML_NEAR, &unknown, &err), "x.yaml:1: a list is not a map (KEY: VALUE)");
 }
 
-static void bad_documents(void) {
+TEST(bad_documents) {
   refused("a: 1\nb: 2\na: 3\n", "x.yaml:3: a: the key appears twice (first in line 1)");
   refused("a: [1, 2\nb: 3\n",
           "x.yaml:2: not valid YAML: did not find expected ',' or ']', while parsing a flow sequence that begins in "
@@ -169,7 +169,7 @@ static void bad_documents(void) {
 }
 
 // As editors of Windows and of old Macs save it: a byte order mark, CRLF, CR alone.
-static void encodings(void) {
+TEST(encodings) {
   static const char *const kTexts[] = {
       "\xEF\xBB\xBF"
       "a: 1\nb: x\n",
@@ -198,7 +198,7 @@ static void encodings(void) {
       "x.yaml:1: the file is in UTF-16; save it as UTF-8");
 }
 
-static void bounded(void) {
+TEST(bounded) {
   char text[4096] = "a: &a [x, x, x, x, x, x, x, x, x, x]\n";
   for (int c = 'b'; c < 'j'; c++) {
     char line[128];
@@ -220,7 +220,7 @@ static void bounded(void) {
   TEST_ASSERT_TRUE(wm_yaml_there(&x));
 }
 
-static void empty_documents(void) {
+TEST(empty_documents) {
   wm_yaml_node root = parse("");
   TEST_ASSERT_FALSE(wm_yaml_there(&root) || wm_yaml_is_map(&root));
   wm_yaml_node a = wm_yaml_get(&root, "a");
@@ -244,7 +244,7 @@ static void edited(const char *text, const char *path, const char *value, const 
   free(out);
 }
 
-static void is_edited_in_place(void) {
+TEST(is_edited_in_place) {
   edited("# é\na: {b: [1, 2], c: x}  # ok\nd: 1\n", "a.b", "[3, 4]", "was 1",
          "# é\na: {b: [3, 4], c: x}  # ok  # was 1\nd: 1\n");
   edited("- {q: a}\n- q: b\n  s: c\n", "[1].s", "d", "", "- {q: a}\n- q: b\n  s: d\n");
@@ -259,22 +259,7 @@ static void is_edited_in_place(void) {
   TEST_ASSERT_NULL(out);
 }
 
-static void missing_file(void) {
+TEST(missing_file) {
   TEST_ASSERT_EQUAL(WM_NOT_FOUND, wm_yaml_load("no/such.yaml", &doc, &err));
   TEST_ASSERT_EQUAL_STRING("no/such.yaml: there is no such file", err.text);
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(walks);
-  RUN_TEST(is_written_again_with_changes);
-  RUN_TEST(is_edited_in_place);
-  RUN_TEST(typed_reads);
-  RUN_TEST(unknown_keys);
-  RUN_TEST(bad_documents);
-  RUN_TEST(encodings);
-  RUN_TEST(bounded);
-  RUN_TEST(empty_documents);
-  RUN_TEST(missing_file);
-  return UNITY_END();
 }

@@ -4,16 +4,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "unity.h"
+#include "common/suite.h"
 #include "waymark/text.h"
-
-void setUp(void) {}
-void tearDown(void) {}
 
 static wm_text_number f64(const char *text, double *out) { return wm_text_to_f64(text, strlen(text), out); }
 static wm_text_number i64(const char *text, int64_t *out) { return wm_text_to_i64(text, strlen(text), out); }
 
-static void numbers(void) {
+TEST(numbers) {
   static const char *const kGood[] = {"0",   "-0.5", "+1",       ".5",  "5.",
                                       "1e3", "1E-3", "-1.25e+2", "0.1", "123456789012345678"};
   for (size_t i = 0; i < sizeof kGood / sizeof *kGood; i++) {
@@ -36,7 +33,7 @@ static void numbers(void) {
   TEST_ASSERT_EQUAL(WM_TEXT_NOT_A_NUMBER, wm_text_to_f64("1\0", 2, &value));
 }
 
-static void whole_numbers(void) {
+TEST(whole_numbers) {
   int64_t value = 0;
   TEST_ASSERT_EQUAL(WM_TEXT_OK, i64("9223372036854775807", &value));
   TEST_ASSERT_EQUAL_INT64(INT64_MAX, value);
@@ -55,7 +52,7 @@ static void whole_numbers(void) {
   TEST_ASSERT_EQUAL(WM_TEXT_NOT_A_NUMBER, i64("", &value));
 }
 
-static void nearest_word(void) {
+TEST(nearest_word) {
   static const char *const kWords[] = {"gate", "horizon_ms", "rate_hz", NULL};
   TEST_ASSERT_EQUAL(0, wm_word_distance("gate", "gate"));
   TEST_ASSERT_EQUAL(1, wm_word_distance("gaet", "gate"));
@@ -67,7 +64,7 @@ static void nearest_word(void) {
   TEST_ASSERT_NULL(wm_word_nearest("ga", kWords));  // two of two letters is no likeness
 }
 
-static void shown_text(void) {
+TEST(shown_text) {
   char out[16];
   TEST_ASSERT_EQUAL_STRING("a?b", wm_show_text("a\nb", 3, out, sizeof out));
   TEST_ASSERT_EQUAL_STRING("\xC3\xBC?", wm_show_text("\xC3\xBC\xFF", 3, out, sizeof out));
@@ -75,7 +72,7 @@ static void shown_text(void) {
   TEST_ASSERT_EQUAL_STRING("12345678901...", wm_show_text("12345678901\xC3\xBC\xC3\xBC", 15, out, sizeof out));
 }
 
-static void files(void) {
+TEST(files) {
   char *text;
   size_t length;
   wm_error err;
@@ -86,14 +83,4 @@ static void files(void) {
   TEST_ASSERT_EQUAL(WM_OK, wm_text_read_file("LICENSE", 1 << 20, &text, &length, &err));
   TEST_ASSERT_EQUAL(length, strlen(text));
   free(text);
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(numbers);
-  RUN_TEST(whole_numbers);
-  RUN_TEST(nearest_word);
-  RUN_TEST(shown_text);
-  RUN_TEST(files);
-  return UNITY_END();
 }

@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "unity.h"
+#include "common/suite.h"
 #include "vision/markers/bch.hpp"
 #include "waymark/random.h"
 
@@ -25,7 +25,7 @@ uint64_t flip(uint64_t modules, int count, uint64_t seed) {
   return modules ^ flipped;
 }
 
-void every_identity_comes_back() {
+TEST(every_identity_comes_back) {
   for (uint32_t id = 0; id < WM_MR_IDS; id++) {
     uint32_t read = ~id;
     int wrong = -1;
@@ -37,7 +37,7 @@ void every_identity_comes_back() {
 }
 
 // Linear code: the smallest weight is the smallest distance.
-void the_distance_is_as_stated() {
+TEST(the_distance_is_as_stated) {
   int least = 64;
   const uint64_t zero = wm_mr_encode(0);
   for (uint32_t id = 1; id < WM_MR_IDS; id++) {
@@ -47,7 +47,7 @@ void the_distance_is_as_stated() {
   TEST_ASSERT_EQUAL(WM_MR_DISTANCE, least);
 }
 
-void flipped_modules_are_corrected_or_refused() {
+TEST(flipped_modules_are_corrected_or_refused) {
   for (uint64_t trial = 0; trial < 20000; trial++) {
     const auto id = static_cast<uint32_t>(WM_MR_IDS * wm_random_uniform(9, 3, trial));
     const int flips = static_cast<int>(trial % (WM_MR_DISTANCE - WM_MR_CORRECTED));
@@ -61,7 +61,7 @@ void flipped_modules_are_corrected_or_refused() {
 }
 
 // Of all patterns 2^16 V(6) / 2^64 = 3.0e-7 are within 6 modules of an identity.
-void random_patterns_are_refused() {
+TEST(random_patterns_are_refused) {
   int accepted = 0;
   for (uint64_t i = 0; i < 1000000; i++) {
     uint32_t id;
@@ -72,7 +72,7 @@ void random_patterns_are_refused() {
   TEST_ASSERT_LESS_OR_EQUAL(1, accepted);
 }
 
-void regular_patterns_are_refused() {
+TEST(regular_patterns_are_refused) {
   for (int dx = 1; dx <= 8; dx++)
     for (int dy = 1; dy <= 8; dy++)
       for (int shift = 0; shift < 16; shift++) {
@@ -93,7 +93,7 @@ void regular_patterns_are_refused() {
 }
 
 // The decoder alone, up to what its distance allows.
-void the_bch_code_corrects_eleven() {
+TEST(the_bch_code_corrects_eleven) {
   for (uint64_t trial = 0; trial < 2000; trial++) {
     const auto data = static_cast<uint32_t>(trial * 33);
     const int flips = static_cast<int>(trial % 12);
@@ -109,7 +109,7 @@ void the_bch_code_corrects_eleven() {
 }
 
 // Whatever bits: an answer that says how far it is from the code word is that far from it.
-void any_bits_are_read_or_refused() {
+TEST(any_bits_are_read_or_refused) {
   for (uint64_t i = 0; i < 100000; i++) {
     const uint64_t bits = i < 65536 ? i << (i % 48) : flip(wm_mr_encode(static_cast<uint32_t>(i)), 5, i);
     uint32_t id = 0;
@@ -121,18 +121,3 @@ void any_bits_are_read_or_refused() {
 }
 
 }  // namespace
-
-void setUp() {}
-void tearDown() {}
-
-int main() {
-  UNITY_BEGIN();
-  RUN_TEST(every_identity_comes_back);
-  RUN_TEST(the_distance_is_as_stated);
-  RUN_TEST(flipped_modules_are_corrected_or_refused);
-  RUN_TEST(random_patterns_are_refused);
-  RUN_TEST(regular_patterns_are_refused);
-  RUN_TEST(the_bch_code_corrects_eleven);
-  RUN_TEST(any_bits_are_read_or_refused);
-  return UNITY_END();
-}

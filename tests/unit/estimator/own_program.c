@@ -5,13 +5,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "unity.h"
+#include "common/suite.h"
 #include "waymark/own_program.h"
 
-void setUp(void) {}
-void tearDown(void) {}
-
-static void parameters_by_key(void) {
+TEST(parameters_by_key) {
   const wm_estimator *ekf = wm_estimator_find("landmark_ekf");
   void *params = malloc(ekf->params.bytes);
   wm_params_defaults(&ekf->params, params);
@@ -38,7 +35,7 @@ static void parameters_by_key(void) {
 }
 
 // Straight on at 1 m/s from 0.3 m beside the start that it was given; a landmark ahead on the left.
-static void a_drive(void) {
+TEST(a_drive) {
   const wm_estimator *ekf = wm_estimator_find("landmark_ekf");
   wm_motion_params *motion = malloc(wm_motion_params_table.bytes);
   wm_sighting_params *sightings = malloc(wm_sighting_params_table.bytes);
@@ -101,11 +98,4 @@ static void a_drive(void) {
   free(params);
   free(sightings);
   free(motion);
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(parameters_by_key);
-  RUN_TEST(a_drive);
-  return UNITY_END();
 }

@@ -4,9 +4,9 @@
 #include <cstdlib>
 #include <vector>
 
+#include "common/suite.h"
 #include "filters/edge_mcl/hypotheses.hpp"
 #include "math/arc.hpp"
-#include "unity.h"
 
 namespace {
 
@@ -67,7 +67,7 @@ void look(int scans, const wm_pose2 &pose, double new_m) {
 
 // GIVEN a robot in the first room WHEN it has seen all of it a few times THEN the same place of the second room is
 // listed, turned by half, with a small weight, and nothing else is.
-void the_same_place_of_a_room_that_looks_the_same_is_listed(void) {
+TEST(the_same_place_of_a_room_that_looks_the_same_is_listed) {
   see(kHere, false);
   look(6, kHere, 0.0);
   const wm::hypothesis *there = listed(twin(kHere));
@@ -80,7 +80,7 @@ void the_same_place_of_a_room_that_looks_the_same_is_listed(void) {
 }
 
 // GIVEN that WHEN the robot drives on THEN odometry carries the place along.
-void odometry_carries_it_along(void) {
+TEST(odometry_carries_it_along) {
   see(kHere, false);
   look(6, kHere, 0.0);
   const wm_pose2 way = {0.7, 0.1, 0.4};
@@ -89,7 +89,7 @@ void odometry_carries_it_along(void) {
 }
 
 // GIVEN that WHEN a box comes into view that stands in the first room only THEN the second is dropped.
-void a_view_that_tells_them_apart_drops_it(void) {
+TEST(a_view_that_tells_them_apart_drops_it) {
   see(kHere, false);
   look(6, kHere, 0.0);
   TEST_ASSERT_NOT_NULL(listed(twin(kHere)));
@@ -100,7 +100,7 @@ void a_view_that_tells_them_apart_drops_it(void) {
 
 // GIVEN that WHEN what is seen fits there, but no longer where the robot is believed to be THEN the odds turn with the
 // way, and stop somewhere.
-void the_odds_turn_with_what_is_seen(void) {
+TEST(the_odds_turn_with_what_is_seen) {
   see(kHere, false);
   look(6, kHere, 0.0);
   const double before = listed(twin(kHere))->odds;
@@ -118,7 +118,7 @@ void the_odds_turn_with_what_is_seen(void) {
 }
 
 // GIVEN that WHEN the map usually explains no more than it does where the robot is believed to be THEN nothing turns.
-void what_is_explained_beyond_the_usual_says_nothing(void) {
+TEST(what_is_explained_beyond_the_usual_says_nothing) {
   see(kHere, false);
   look(6, kHere, 0.0);
   const wm_pose2 believed = wm::compose(kHere, {0.3, 0.3, 0.0});
@@ -129,7 +129,7 @@ void what_is_explained_beyond_the_usual_says_nothing(void) {
 
 // GIVEN a fit whose information can't be inverted WHEN its covariance is asked for THEN there is none, and what the
 // caller had stays.
-void a_failed_inverse_gives_no_covariance(void) {
+TEST(a_failed_inverse_gives_no_covariance) {
   wm::matrix<3> information = 100.0 * wm::matrix<3>::Identity();
   double out[6] = {-1, -1, -1, -1, -1, -1};
   TEST_ASSERT_TRUE(wm::place_covariance(information, out));
@@ -142,7 +142,7 @@ void a_failed_inverse_gives_no_covariance(void) {
 
 // GIVEN a wall at x = 1 and a camera at (3, 2) THEN what is seen on this side of it, by at most half of the way, may be
 // its image in the floor; what is seen behind it, or nearer, is none.
-void an_image_lies_before_an_edge(void) {
+TEST(an_image_lies_before_an_edge) {
   const auto before = [](double x) { return wm::before_an_edge(map, x, 2.0, x - 3.0, 0.0); };
   TEST_ASSERT_TRUE(before(1.2));
   TEST_ASSERT_TRUE(before(1.6));
@@ -152,7 +152,7 @@ void an_image_lies_before_an_edge(void) {
 
 // GIVEN the same camera THEN only what is behind the wall by more than its place may be off is seen through it; nothing
 // is that lies along a wall, at the camera's own place or outside of the map.
-void nothing_is_seen_through_a_wall(void) {
+TEST(nothing_is_seen_through_a_wall) {
   const auto through = [](double x, double y, double eye_x, double eye_y) {
     return wm::through_an_edge(map, x, y, x - eye_x, y - eye_y);
   };
@@ -172,9 +172,8 @@ void setUp(void) {
   alike.init(map);
   alike.clear({}, {});
 }
-void tearDown(void) {}
 
-int main(void) {
+int suite_begin(int, char **) {
   edges.assign((size_t)kWidth * kHeight, 0);
   drivable.assign(edges.size(), 0);
   for (const segment &w : kRoom)
@@ -194,17 +193,10 @@ int main(void) {
   map.init(raster, map_memory);
   field_memory = (char *)aligned_alloc(64, (wm::search_field::bytes(raster) + 63) / 64 * 64);
   field.init(map, field_memory);
-  UNITY_BEGIN();
-  RUN_TEST(the_same_place_of_a_room_that_looks_the_same_is_listed);
-  RUN_TEST(odometry_carries_it_along);
-  RUN_TEST(a_view_that_tells_them_apart_drops_it);
-  RUN_TEST(the_odds_turn_with_what_is_seen);
-  RUN_TEST(what_is_explained_beyond_the_usual_says_nothing);
-  RUN_TEST(a_failed_inverse_gives_no_covariance);
-  RUN_TEST(an_image_lies_before_an_edge);
-  RUN_TEST(nothing_is_seen_through_a_wall);
-  const int failed = UNITY_END();
+  return SUITE_RUNS;
+}
+
+void suite_end() {
   free(map_memory);
   free(field_memory);
-  return failed;
 }

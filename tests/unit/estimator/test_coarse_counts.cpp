@@ -4,11 +4,11 @@
 #include <cstdlib>
 #include <cstring>
 
+#include "common/suite.h"
 #include "events.hpp"
 #include "filters/landmark_ekf/params.h"
 #include "math/arc.hpp"
 #include "motion/motion_params.h"
-#include "unity.h"
 #include "waymark/estimator.h"
 #include "waymark/random.h"
 
@@ -104,7 +104,7 @@ struct counted_robot {
 };
 
 // The rounding of the newest count is in the pose that it carries on, and in that pose's correlation with the track.
-void test_rounding_of_counts_is_no_track(void) {
+TEST(test_rounding_of_counts_is_no_track) {
   double sum = 0.0;
   for (uint64_t seed = 1; seed <= 4; seed++) {
     counted_robot robot(seed);
@@ -115,12 +115,3 @@ void test_rounding_of_counts_is_no_track(void) {
 }
 
 }  // namespace
-
-void setUp(void) {}
-void tearDown(void) {}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_rounding_of_counts_is_no_track);
-  return UNITY_END();
-}

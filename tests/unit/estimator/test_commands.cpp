@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Twists that are commands: response, onset, gentle turns, what a change leaves unsure.
+#include "common/suite.h"
 #include "motion_fixture.hpp"
 
 namespace {
@@ -15,7 +16,7 @@ void start_commands(double response_s, double delay_sigma_s) {
   front.init(&params, &wheels);
 }
 
-void test_a_command_is_obeyed_with_a_response(void) {
+TEST(test_a_command_is_obeyed_with_a_response) {
   for (int cuts : {1, 7}) {
     start_commands(0.2, 0.0);
     feed(make::twist(0, 0.1, 0.0));
@@ -29,7 +30,7 @@ void test_a_command_is_obeyed_with_a_response(void) {
 }
 
 // The speed obeys as the turn does: from one command to the next it goes on from where it was.
-void test_the_speed_obeys_with_the_same_response(void) {
+TEST(test_the_speed_obeys_with_the_same_response) {
   for (int cuts : {1, 7}) {
     start_commands(0.4, 0.0);
     double speed = 0.2, way = 0.0;
@@ -47,7 +48,7 @@ void test_the_speed_obeys_with_the_same_response(void) {
 }
 
 // A turn slows the speed by slowdown w^2, to a stand, not beyond it; forwards and backwards.
-void test_a_turn_slows_down_to_a_stand(void) {
+TEST(test_a_turn_slows_down_to_a_stand) {
   wm_motion_calibration c = wm::kNeutralCalibration;
   c.value[WM_TURN_SLOWDOWN] = 0.5;
   for (const double v : {-0.4, -0.1, 0.0, 0.1, 0.4})
@@ -64,7 +65,7 @@ void test_a_turn_slows_down_to_a_stand(void) {
 }
 
 // A rise is late, a fall is not: each pulse loses onset times its height. A turn to the other side falls, then rises.
-void test_short_turns_are_obeyed_in_part(void) {
+TEST(test_short_turns_are_obeyed_in_part) {
   for (double before : {0.0, 0.3}) {
     double turned[2] = {};
     for (int with : {0, 1}) {
@@ -80,7 +81,7 @@ void test_short_turns_are_obeyed_in_part(void) {
 }
 
 // A drive by speed and radius turns gentle turns with its largest radius; as asked, where they are tighter.
-void test_gentle_turns_have_the_largest_radius(void) {
+TEST(test_gentle_turns_have_the_largest_radius) {
   for (double rate : {0.02, 0.1}) {
     start_commands(0.05, 0.0);
     calibration.value[WM_GENTLE_TURNS] = 0.75;
@@ -92,7 +93,7 @@ void test_gentle_turns_have_the_largest_radius(void) {
 
 // The dead time differs from change to change: the way and the turn are unsure by it times the change, however the
 // time is cut, and by less for a slow change.
-void test_a_change_of_command_is_doubted(void) {
+TEST(test_a_change_of_command_is_doubted) {
   for (int cuts : {1, 8}) {
     start_commands(0.1, 0.08);
     feed(make::twist(0, 0.1, 0.0));
@@ -107,7 +108,7 @@ void test_a_change_of_command_is_doubted(void) {
 }
 
 // GIVEN a drive that takes speed and radius WHEN a wider turn is commanded THEN it drives the widest that it knows.
-void test_a_drive_knows_no_wider_radius(void) {
+TEST(test_a_drive_knows_no_wider_radius) {
   start_commands(0.01, 0.0);
   params.twist = WM_TWIST_AUTO;
   front.init(&params, &wheels);
@@ -135,7 +136,7 @@ void test_a_drive_knows_no_wider_radius(void) {
 }
 
 // A drive can't overflow at a radius that it obeys; 0 is off for either.
-void test_an_overflow_lies_beyond_what_is_obeyed(void) {
+TEST(test_an_overflow_lies_beyond_what_is_obeyed) {
   const auto wrong = [](double radius_max_m, double overflow_m) {
     wm_params_defaults(&wm_motion_params_table, &params);
     params.commands_radius_max_m = radius_max_m;
@@ -155,19 +156,3 @@ void test_an_overflow_lies_beyond_what_is_obeyed(void) {
 }
 
 }  // namespace
-
-void setUp(void) {}
-void tearDown(void) {}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_a_command_is_obeyed_with_a_response);
-  RUN_TEST(test_the_speed_obeys_with_the_same_response);
-  RUN_TEST(test_a_turn_slows_down_to_a_stand);
-  RUN_TEST(test_short_turns_are_obeyed_in_part);
-  RUN_TEST(test_gentle_turns_have_the_largest_radius);
-  RUN_TEST(test_a_change_of_command_is_doubted);
-  RUN_TEST(test_a_drive_knows_no_wider_radius);
-  RUN_TEST(test_an_overflow_lies_beyond_what_is_obeyed);
-  return UNITY_END();
-}

@@ -4,11 +4,11 @@
 #include <cmath>
 #include <cstring>
 
+#include "common/suite.h"
 #include "events.hpp"
 #include "filters/core/course_test.hpp"
 #include "filters/core/turn_check.hpp"
 #include "math/elementary.hpp"
-#include "unity.h"
 #include "waymark/random.h"
 
 namespace {
@@ -107,7 +107,7 @@ struct turns {
 
 // In each drive the true turn is the measured one times a factor. The factor is listed exactly while the likelihood
 // ratio of a filter with that factor is above its limit.
-void test_a_factor_is_listed_when_its_filter_explains_the_innovations(void) {
+TEST(test_a_factor_is_listed_when_its_filter_explains_the_innovations) {
   wm_random random = {11, 1, 0};
   const auto normal = [&] { return wm_random_next_normal(&random); };
   int listed[2] = {}, none = 0, ended = 0;
@@ -150,7 +150,7 @@ void test_a_factor_is_listed_when_its_filter_explains_the_innovations(void) {
 
 // GIVEN a factor that is certain for long WHEN the turn is right from now on THEN the 40 nats that it has at most are
 // taken back: an observation of three sigma each for either.
-void test_a_factor_is_taken_back_within_as_many_observations(void) {
+TEST(test_a_factor_is_taken_back_within_as_many_observations) {
   turns t;
   double heading = 0.0;
   int until_listed = 0, until_gone = 0;
@@ -242,7 +242,7 @@ struct course_drive {
 
 // GIVEN positions every second WHEN a slot of five seconds is complete THEN the log likelihood ratio of the mirror
 // image is that of the least squares of both, of the means of slots, with the stated variances added.
-void test_the_ratio_is_that_of_the_least_squares(void) {
+TEST(test_the_ratio_is_that_of_the_least_squares) {
   for (uint64_t seed = 1; seed <= 6; seed++) {
     course_drive d(seed);
     point places[33] = {}, ways[33] = {};
@@ -288,7 +288,7 @@ void test_the_ratio_is_that_of_the_least_squares(void) {
 
 // GIVEN positions that are exactly the mirror image of the way WHEN the image is asked for THEN it is the pose on it:
 // the newest position, the other heading.
-void test_the_mirror_image_is_where_the_positions_are(void) {
+TEST(test_the_mirror_image_is_where_the_positions_are) {
   for (uint64_t seed = 1; seed <= 4; seed++) {
     course_drive d(seed);
     const double turn_rad = 1.9 * static_cast<double>(seed);
@@ -307,7 +307,7 @@ void test_the_mirror_image_is_where_the_positions_are(void) {
 
 // The way of a position is that of its own stamp, before or behind the newest estimate by less than 1.5 s. A position
 // that is farther off, or not of numbers, does not count.
-void test_a_position_counts_where_the_way_is_known(void) {
+TEST(test_a_position_counts_where_the_way_is_known) {
   for (const double ahead_s : {-1.6, -1.4, -0.5, 0.7, 1.4, 1.6}) {
     course_drive d(1);
     for (int i = 0; i < 100; i++) d.go(1.0, 0.4, 0.3);
@@ -334,7 +334,7 @@ void test_a_position_counts_where_the_way_is_known(void) {
 }
 
 // Speeds that are no numbers are none: the way stays. A second of silence is driven through, two begin the way anew.
-void test_gaps_and_speeds_that_are_no_numbers(void) {
+TEST(test_gaps_and_speeds_that_are_no_numbers) {
   course_drive d(1);
   d.go(1.0, 0.2, 0.1, 1.0);
   d.go(NAN, NAN, NAN, 1.0);
@@ -361,7 +361,7 @@ void test_gaps_and_speeds_that_are_no_numbers(void) {
 
 // No vehicle drives 16 m/s2 to either side; 14 may be. Two seconds more of it than of other driving contradict, and at
 // most ten are remembered.
-void test_turns_that_no_vehicle_drives_contradict_for_as_long(void) {
+TEST(test_turns_that_no_vehicle_drives_contradict_for_as_long) {
   for (const double w_radps : {0.7, -0.7, 0.8, -0.8}) {
     course_drive d(1);
     const bool is_impossible = std::fabs(w_radps) > 0.75;
@@ -386,18 +386,3 @@ void test_turns_that_no_vehicle_drives_contradict_for_as_long(void) {
 }
 
 }  // namespace
-
-void setUp(void) {}
-void tearDown(void) {}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_a_factor_is_listed_when_its_filter_explains_the_innovations);
-  RUN_TEST(test_a_factor_is_taken_back_within_as_many_observations);
-  RUN_TEST(test_the_ratio_is_that_of_the_least_squares);
-  RUN_TEST(test_the_mirror_image_is_where_the_positions_are);
-  RUN_TEST(test_a_position_counts_where_the_way_is_known);
-  RUN_TEST(test_gaps_and_speeds_that_are_no_numbers);
-  RUN_TEST(test_turns_that_no_vehicle_drives_contradict_for_as_long);
-  return UNITY_END();
-}

@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
+#include "common/suite.h"
 #include "events.hpp"
 #include "math/elementary.hpp"
-#include "unity.h"
 #include "waymark/random.h"
 
 namespace {
@@ -94,7 +94,7 @@ void begin(const char *estimator = "landmark_ekf") {
 }
 
 // Only the sum shows, and each keeps the sigma that the two priors leave: 0.2 0.1 / sqrt(0.2^2 + 0.1^2) = 0.089 s.
-void test_a_lag_and_a_time_offset_are_observed_as_a_sum() {
+TEST(test_a_lag_and_a_time_offset_are_observed_as_a_sum) {
   for (const char *estimator : kEstimators)
     for (const auto &[lag_s, offset_s] : {std::pair{0.3, 0.05}, {0.1, 0.15}, {0.3, -0.1}}) {
       begin(estimator);
@@ -108,7 +108,7 @@ void test_a_lag_and_a_time_offset_are_observed_as_a_sum() {
 }
 
 // No lag is below 0: what the sum has below it is the offset's.
-void test_a_lag_at_its_limit_leaves_the_rest_to_the_offset() {
+TEST(test_a_lag_at_its_limit_leaves_the_rest_to_the_offset) {
   for (const char *estimator : kEstimators) {
     begin(estimator);
     Robot(0.0, -0.15).drive(0);
@@ -119,7 +119,7 @@ void test_a_lag_at_its_limit_leaves_the_rest_to_the_offset() {
 
 // Stamps that are too early are carried ahead of the counts by the last step of them. Steps of 12 mm must neither
 // look like noise of the turns nor falsify the track.
-void test_coarse_counts_behind_early_stamps_leave_the_track() {
+TEST(test_coarse_counts_behind_early_stamps_leave_the_track) {
   setup.wheels = {kWheel_m, 50, kTrack_m, NAN, NAN, NAN, 0, {}, {}};
   begin();
   Robot(0.0, -0.15).drive(50);
@@ -148,7 +148,7 @@ double delay_of(uint64_t seed) {
 }
 
 // 0.034 s (root mean square) and 0.088 s at most; with the derivative of one moment 0.045 and 0.133 s.
-void test_a_receivers_delay_is_found_when_a_robot_drives_off() {
+TEST(test_a_receivers_delay_is_found_when_a_robot_drives_off) {
   double squares = 0.0, worst = 0.0;
   for (uint64_t seed = 1; seed <= 40; seed++) {
     const double off_s = std::fabs(delay_of(seed));
@@ -162,7 +162,7 @@ void test_a_receivers_delay_is_found_when_a_robot_drives_off() {
 
 // At one speed and straight on, from the first datum, a delay and the antenna's place along the way are the same:
 // neither is observed, whether the pose is given or found.
-void test_a_receivers_delay_is_not_observed_at_one_speed() {
+TEST(test_a_receivers_delay_is_not_observed_at_one_speed) {
   for (const bool is_given : {true, false}) {
     const double place = is_given ? 0.0 : static_cast<double>(NAN);
     setup.start = {WM_TIME_NONE, {place, place, 0}, {0, 0, 0, 1}, place, 1.0, 0.1};
@@ -197,13 +197,3 @@ void setUp() {
   setup.start = {WM_TIME_NONE, {0, 0, 0}, {0, 0, 0, 1}, 0.0, 0.05, 0.05};
 }
 void tearDown() { state.reset(); }
-
-int main() {
-  UNITY_BEGIN();
-  RUN_TEST(test_a_lag_and_a_time_offset_are_observed_as_a_sum);
-  RUN_TEST(test_a_lag_at_its_limit_leaves_the_rest_to_the_offset);
-  RUN_TEST(test_coarse_counts_behind_early_stamps_leave_the_track);
-  RUN_TEST(test_a_receivers_delay_is_found_when_a_robot_drives_off);
-  RUN_TEST(test_a_receivers_delay_is_not_observed_at_one_speed);
-  return UNITY_END();
-}

@@ -4,12 +4,12 @@
 #include <cmath>
 #include <initializer_list>
 
+#include "common/suite.h"
 #include "events.hpp"
 #include "filters/planar/planar_filter.hpp"
 #include "math/arc.hpp"
 #include "math/se2.hpp"
 #include "motion/motion_params.h"
-#include "unity.h"
 #include "waymark/random.h"
 
 namespace {
@@ -48,7 +48,7 @@ double sigma_of(int state) { return std::sqrt(filter.variance(state)); }
 
 // GIVEN a base that drives sideways WHEN its noise is asked for THEN it is that of the sideways speed, and forwards it
 // is as exact as a robot at rest but for its slip.
-void test_sideways_has_noise_of_its_own(void) {
+TEST(test_sideways_has_noise_of_its_own) {
   begin(WM_DRIVE_HOLONOMIC, make::no_wheels(), false);
   params.noise_yaw_rate_radps = params.noise_yaw_rate_rel = 0.0;
   params.noise_sideways_mps = 0.04;
@@ -62,7 +62,7 @@ void test_sideways_has_noise_of_its_own(void) {
 
 // GIVEN a base that could drive sideways WHEN it stands THEN its noise has the factor of a robot at rest, sideways as
 // well as forwards.
-void test_at_rest_the_noise_sideways_falls_as_well(void) {
+TEST(test_at_rest_the_noise_sideways_falls_as_well) {
   begin(WM_DRIVE_HOLONOMIC, make::no_wheels(), false);
   params.noise_speed_mps = params.noise_sideways_mps = 0.04;
   params.noise_rest_factor = 0.1;
@@ -75,7 +75,7 @@ void test_at_rest_the_noise_sideways_falls_as_well(void) {
 
 // GIVEN wheels that roll WHEN a twist has a sideways speed THEN it is used, without a state of its own: the odometry of
 // a rolling base by pictures, or of a base_link that is not on the axle, has it, too.
-void test_a_rolling_base_uses_a_sideways_speed_without_a_scale(void) {
+TEST(test_a_rolling_base_uses_a_sideways_speed_without_a_scale) {
   begin(WM_DRIVE_ROLLING, make::no_wheels(), true);
   for (int i = 0; i <= 100; i++) filter.move(make::twist6(0.1 * i, 0.0, 0.3, 0.0));
   TEST_ASSERT_LESS_THAN(0, filter.motion_state(wm::kSideScale));
@@ -84,7 +84,7 @@ void test_a_rolling_base_uses_a_sideways_speed_without_a_scale(void) {
 
 // GIVEN a sideways speed of which rollers lose 12 % WHEN the place is seen THEN the scale is found, apart from that of
 // the speed forwards.
-void test_the_sideways_scale_is_found(void) {
+TEST(test_the_sideways_scale_is_found) {
   begin(WM_DRIVE_HOLONOMIC, make::no_wheels(), true);
   wm_pose2 truth{};
   for (uint64_t i = 0; i <= 1200; i++) {
@@ -103,7 +103,7 @@ void test_the_sideways_scale_is_found(void) {
 
 // GIVEN four wheels that slip in turns, an effective track of 1.35 times the wheels' distance and a centre of rotation
 // 0.12 m ahead WHEN the place is seen THEN both are found.
-void test_skid_steer_finds_its_centre_and_its_track(void) {
+TEST(test_skid_steer_finds_its_centre_and_its_track) {
   constexpr double kTrack = 1.35, kCentre_m = 0.12, kTick_m = 2 * M_PI * 0.1 / 1000;
   begin(WM_DRIVE_SKID_STEER, make::two_wheels(), true);
   TEST_ASSERT_LESS_THAN(0, filter.motion_state(wm::kSideScale));
@@ -128,7 +128,7 @@ void test_skid_steer_finds_its_centre_and_its_track(void) {
 }
 
 // GIVEN sources without motion WHEN no model is configured THEN it is that of a constant velocity.
-void test_what_the_sources_settle(void) {
+TEST(test_what_the_sources_settle) {
   const auto chosen = [](uint32_t kinds) {
     wm_params_defaults(&wm_motion_params_table, &params);
     wm_motion_choose(&params, kinds);
@@ -139,17 +139,3 @@ void test_what_the_sources_settle(void) {
 }
 
 }  // namespace
-
-void setUp(void) {}
-void tearDown(void) {}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_sideways_has_noise_of_its_own);
-  RUN_TEST(test_at_rest_the_noise_sideways_falls_as_well);
-  RUN_TEST(test_a_rolling_base_uses_a_sideways_speed_without_a_scale);
-  RUN_TEST(test_the_sideways_scale_is_found);
-  RUN_TEST(test_skid_steer_finds_its_centre_and_its_track);
-  RUN_TEST(test_what_the_sources_settle);
-  return UNITY_END();
-}

@@ -5,8 +5,8 @@
 #include <cstring>
 #include <vector>
 
+#include "common/suite.h"
 #include "maps/likelihood.hpp"
-#include "unity.h"
 #include "waymark/random.h"
 #include "waymark/vectors.h"
 
@@ -44,7 +44,7 @@ struct drawn {
   }
 };
 
-void distances_are_exact(void) {
+TEST(distances_are_exact) {
   drawn d(300, 220, 0.0);
   for (uint64_t i = 0; i < 40; i++)
     d.edges[(size_t)(wm_random_uniform(1, 1, i) * 220) * 300 + (size_t)(wm_random_uniform(1, 2, i) * 300)] = 255;
@@ -70,7 +70,7 @@ void distances_are_exact(void) {
 }
 
 // A slanted line through the pixels is found to a tenth of a pixel, from both of its sides and with the map turned.
-void lines_are_found_to_a_part_of_a_pixel(void) {
+TEST(lines_are_found_to_a_part_of_a_pixel) {
   for (double yaw : {0.0, 0.7, -2.5}) {
     drawn d(400, 300, yaw);
     const double x0 = 40.3, y0 = 50.2, x1 = 360.7, y1 = 200.9;
@@ -104,7 +104,7 @@ void lines_are_found_to_a_part_of_a_pixel(void) {
 }
 
 // GIVEN a wall whose faces are four pixels apart WHEN lines are looked up THEN each face has its own.
-void the_faces_of_a_thin_wall_have_lines_of_their_own(void) {
+TEST(the_faces_of_a_thin_wall_have_lines_of_their_own) {
   drawn d(200, 100, -0.3);
   d.line(20, 50, 180, 50);
   d.line(20, 54, 180, 54);
@@ -121,7 +121,7 @@ void the_faces_of_a_thin_wall_have_lines_of_their_own(void) {
 
 // GIVEN a wall of 32 cm between two rooms WHEN a place is nearer to the face that the wall hides THEN the face towards
 // the eye is found, from either room; without a drivable layer, and where floor is on both sides, the nearest one.
-void a_wall_hides_its_other_face(void) {
+TEST(a_wall_hides_its_other_face) {
   for (const bool layer : {false, true}) {
     drawn d(200, 150, 0.6);
     d.line(20, 70, 180, 70);
@@ -150,7 +150,7 @@ void a_wall_hides_its_other_face(void) {
   }
 }
 
-void outside_of_the_map_there_is_nothing(void) {
+TEST(outside_of_the_map_there_is_nothing) {
   drawn d(100, 100, 0.3);
   d.line(10, 10, 90, 10);
   d.build();
@@ -162,7 +162,7 @@ void outside_of_the_map_there_is_nothing(void) {
   TEST_ASSERT_FALSE(d.map.nearest(NAN, 0).found);
 }
 
-void what_is_no_map_is_refused(void) {
+TEST(what_is_no_map_is_refused) {
   wm_raster r{};
   TEST_ASSERT_EQUAL(0, wm::edge_map::bytes(r));
   const uint8_t pixel = 255;
@@ -175,7 +175,7 @@ void what_is_no_map_is_refused(void) {
 }
 
 // Near the border and beyond it, too.
-void the_kernel_and_its_scalar_twin_agree_to_the_bit(void) {
+TEST(the_kernel_and_its_scalar_twin_agree_to_the_bit) {
   drawn d(500, 400, 0.4);
   d.line(30, 30, 470, 60);
   d.line(470, 60, 440, 380);
@@ -211,18 +211,3 @@ void the_kernel_and_its_scalar_twin_agree_to_the_bit(void) {
 }
 
 }  // namespace
-
-void setUp(void) {}
-void tearDown(void) {}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(distances_are_exact);
-  RUN_TEST(lines_are_found_to_a_part_of_a_pixel);
-  RUN_TEST(the_faces_of_a_thin_wall_have_lines_of_their_own);
-  RUN_TEST(a_wall_hides_its_other_face);
-  RUN_TEST(outside_of_the_map_there_is_nothing);
-  RUN_TEST(what_is_no_map_is_refused);
-  RUN_TEST(the_kernel_and_its_scalar_twin_agree_to_the_bit);
-  return UNITY_END();
-}

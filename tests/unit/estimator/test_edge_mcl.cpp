@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // edge_mcl in a small drawn building: tracking forwards and backwards, mending a camera's errors, being carried away,
 // starting anywhere, seeing nonsense.
+#include "common/suite.h"
 #include "edge_building.hpp"
 #include "filters/edge_mcl/hypotheses.hpp"
 #include "filters/edge_mcl/odometry_check.hpp"
@@ -10,7 +11,7 @@ namespace {
 
 using namespace edge_building;
 
-void forwards_and_backwards_it_stays_on_the_way(void) {
+TEST(forwards_and_backwards_it_stays_on_the_way) {
   filter f;
   drive d;
   TEST_ASSERT_LESS_THAN_DOUBLE(0.05, d.go(f, 10, 1.0, 0.0));
@@ -20,7 +21,7 @@ void forwards_and_backwards_it_stays_on_the_way(void) {
 
 // GIVEN a corridor, whose walls say nothing of the way along it WHEN the robot stands 4 cm further to the left than it
 // believes THEN the scan's innovation is that distance, with a variance that fits a robot that knows its place to 5 cm.
-void a_scans_innovation_is_a_distance(void) {
+TEST(a_scans_innovation_is_a_distance) {
   filter f;
   drive d;
   d.truth = {2, 2.04, 0};
@@ -45,7 +46,7 @@ void a_scans_innovation_is_a_distance(void) {
 
 // GIVEN a robot that stands WHEN it sees the same for 5 s THEN it is hardly surer than at first, and surer once it
 // drives.
-void seeing_the_same_again_makes_it_no_surer(void) {
+TEST(seeing_the_same_again_makes_it_no_surer) {
   filter f;
   drive d;
   const auto variance = [&f] { return f.estimate().covariance[wm_cov_index(5, 5)]; };  // of the heading
@@ -61,7 +62,7 @@ void seeing_the_same_again_makes_it_no_surer(void) {
 
 // GIVEN 1 s of motion without a scan WHEN the first scan comes THEN it counts for that second, not for a scan's usual
 // interval; WHEN the first scan is the first event THEN there is no interval that it could count for.
-void the_first_scan_counts_for_the_time_since_the_motion_began(void) {
+TEST(the_first_scan_counts_for_the_time_since_the_motion_began) {
   const double start = 0.5;  // lost.explained: what is explained before anything is seen
   for (const bool moved : {true, false}) {
     filter f;
@@ -88,7 +89,7 @@ void the_first_scan_counts_for_the_time_since_the_motion_began(void) {
 }
 
 // GIVEN a scan WHEN it comes a second time, of the same moment THEN it says nothing more.
-void the_same_scan_twice_says_no_more(void) {
+TEST(the_same_scan_twice_says_no_more) {
   filter f;
   drive d;
   d.go(f, 1, 0.5, 0.0);
@@ -106,7 +107,7 @@ void the_same_scan_twice_says_no_more(void) {
 
 // GIVEN a way whose places look alike in part WHEN the robot has driven some metres THEN the others are listed, each
 // apart from its own, hardly likely, and the pose is what it was.
-void places_that_look_the_same_are_listed_beside_the_pose(void) {
+TEST(places_that_look_the_same_are_listed_beside_the_pose) {
   filter f;
   drive d;
   TEST_ASSERT_LESS_THAN_DOUBLE(0.05, d.go(f, 6, 1.0, 0.0));
@@ -133,7 +134,7 @@ void places_that_look_the_same_are_listed_beside_the_pose(void) {
 
 // GIVEN a start pose that is 0.8 m off along a corridor, with a sigma of 0.5 m along it WHEN a corner comes into view
 // THEN the pose is corrected by it at once: a wide prediction does not hold the alignment at its mean.
-void a_corner_corrects_a_pose_that_was_open_along_the_corridor(void) {
+TEST(a_corner_corrects_a_pose_that_was_open_along_the_corridor) {
   for (const double off_m : {-0.8, 0.8}) {
     setup.start = {WM_TIME_NONE, {13.5 + off_m, 1.95, 0}, {0, 0, 0, 1}, 0, 0.5, 0.05};
     filter f;
@@ -148,7 +149,7 @@ void a_corner_corrects_a_pose_that_was_open_along_the_corridor(void) {
 
 // The robot is told to go on at 1 m/s, nobody hears for 3 s that it has stopped after one: it says that it doesn't know
 // where it is, and finds itself again.
-void motion_sensors_that_fall_silent_are_not_believed(void) {
+TEST(motion_sensors_that_fall_silent_are_not_believed) {
   filter f;
   drive d;
   TEST_ASSERT_LESS_THAN_DOUBLE(0.1, d.go(f, 4, 1.0, 0.0));
@@ -166,7 +167,7 @@ void motion_sensors_that_fall_silent_are_not_believed(void) {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.1, d.error_of(f));
 }
 
-void a_camera_that_looks_lower_than_believed_is_found_out(void) {
+TEST(a_camera_that_looks_lower_than_believed_is_found_out) {
   filter f;
   drive d;
   d.pitch_rad = 0.008;
@@ -178,7 +179,7 @@ void a_camera_that_looks_lower_than_believed_is_found_out(void) {
 
 // GIVEN walls of 14 cm between rooms, and a camera that looks so much lower that far points fall beyond the middle of a
 // wall WHEN the robot drives THEN they are not aligned with the face that the wall hides.
-void the_far_face_of_a_thin_wall_is_not_aligned_with(void) {
+TEST(the_far_face_of_a_thin_wall_is_not_aligned_with) {
   for (const double pitch_rad : {-0.015, -0.01, 0.01}) {
     thin_walls(0.14);
     filter f;
@@ -192,7 +193,7 @@ void the_far_face_of_a_thin_wall_is_not_aligned_with(void) {
 
 // GIVEN corrections that draw the scale of the odometry after the pose WHEN the poses are compared with the odometry by
 // its scale before THEN the covariance has their difference; without such corrections it has none.
-void odometry_is_compared_by_its_scale_before(void) {
+TEST(odometry_is_compared_by_its_scale_before) {
   for (const double drawn : {0.0, 0.12}) {
     wm::odometry_check check;
     check.clear();
@@ -210,7 +211,7 @@ void odometry_is_compared_by_its_scale_before(void) {
 
 // GIVEN a pose with a sigma of 0.5 m WHEN it is corrected by 0.8 m, and is sure then THEN odometry, which disagrees by
 // that, leaves no doubt; the same of a pose that was sure before does.
-void a_correction_of_an_open_pose_is_no_disagreement(void) {
+TEST(a_correction_of_an_open_pose_is_no_disagreement) {
   for (const double sigma_m : {0.5, 0.02}) {
     wm::odometry_check check;
     check.clear();
@@ -228,7 +229,7 @@ void a_correction_of_an_open_pose_is_no_disagreement(void) {
 
 // GIVEN a map that has a corridor's end 0.3 m behind a row of cupboards WHEN the robot drives towards them THEN the
 // cupboards do not pull the pose, and it stays within 3 sigma; on the right map it is confident.
-void unmapped_cupboards_pull_no_confident_pose(void) {
+TEST(unmapped_cupboards_pull_no_confident_pose) {
   for (const double cupboards_m : {0.0, 0.3}) {
     for (int row = 0; row < kHeight; row++) {  // the end wall is at 16 m
       const size_t at = (size_t)row * kWidth, end = at + (size_t)(16.0 / kPixel_m);
@@ -258,7 +259,7 @@ void unmapped_cupboards_pull_no_confident_pose(void) {
 
 // GIVEN a map in which the right wall is 0.08 m too far away from x = 7 m on WHEN the robot drives along it THEN the
 // pose stays within a quarter of that, and its sigma covers it all along.
-void a_wall_that_was_drawn_elsewhere_pulls_no_confident_pose(void) {
+TEST(a_wall_that_was_drawn_elsewhere_pulls_no_confident_pose) {
   constexpr double kFrom_m = 7.0, kOff_m = 0.08;
   const int right = (int)(1.0 / kPixel_m), off = (int)(kOff_m / kPixel_m + 0.5);
   for (int column = (int)(kFrom_m / kPixel_m); column < (int)(16.0 / kPixel_m); column++) {
@@ -285,7 +286,7 @@ void a_wall_that_was_drawn_elsewhere_pulls_no_confident_pose(void) {
 // GIVEN pictures that are 0.05 s older than their stamps, or walls with a skirting of 2 cm WHEN the robot drives to and
 // fro THEN that is found, with its sign. Of the skirting only a part: pitch and height explain most of it here, and the
 // offset of each wall would explain the rest.
-void late_pictures_and_skirtings_are_found_out(void) {
+TEST(late_pictures_and_skirtings_are_found_out) {
   reinterpret_cast<wm_edge_mcl_params *>(params.data())->wall_sigma_m = 0.0;
   for (const bool late : {true, false}) {
     filter f;
@@ -302,7 +303,7 @@ void late_pictures_and_skirtings_are_found_out(void) {
 }
 
 // Derivatives of a point on the floor by each error of the mounting, against differences.
-void each_error_of_a_mounting_has_its_derivative(void) {
+TEST(each_error_of_a_mounting_has_its_derivative) {
   wm_camera camera = rig.cameras[0];
   camera.mounting.rpy_rad[2] = 0.6;
   wm::floor_camera c{};
@@ -320,7 +321,7 @@ void each_error_of_a_mounting_has_its_derivative(void) {
   }
 }
 
-void carried_away_it_says_so_and_finds_back(void) {
+TEST(carried_away_it_says_so_and_finds_back) {
   filter f;
   drive d;
   d.go(f, 10, 1.0, 0.0);
@@ -342,7 +343,7 @@ void carried_away_it_says_so_and_finds_back(void) {
 // lost; WHEN as much of what it sees is behind walls THEN it is, in as much time.
 // GIVEN robots that are carried off WHEN they search THEN with each scan the probability of being lost is at least the
 // one that the listed hypotheses have together, in whatever state.
-void listed_hypotheses_are_part_of_the_probability_of_being_lost(void) {
+TEST(listed_hypotheses_are_part_of_the_probability_of_being_lost) {
   const wm_pose2 to[] = {{10.53, 2.02, 5.417}, {3.97, 4.89, 3.707}, {12.55, 2.39, 0.689}};
   for (const wm_pose2 &there : to) {
     filter f;
@@ -360,7 +361,7 @@ void listed_hypotheses_are_part_of_the_probability_of_being_lost(void) {
   }
 }
 
-void something_in_the_way_is_not_being_lost_but_sight_through_walls_is(void) {
+TEST(something_in_the_way_is_not_being_lost_but_sight_through_walls_is) {
   filter f;
   drive d;
   d.go(f, 8, 1.0, 0.0);
@@ -380,7 +381,7 @@ void something_in_the_way_is_not_being_lost_but_sight_through_walls_is(void) {
 }
 
 // GIVEN a building where it sees through some of the walls all along THEN that says nothing.
-void glass_walls_are_usual(void) {
+TEST(glass_walls_are_usual) {
   filter f;
   drive d;
   d.glass = 30;
@@ -392,7 +393,7 @@ void glass_walls_are_usual(void) {
   }
 }
 
-void it_starts_without_being_told_where(void) {
+TEST(it_starts_without_being_told_where) {
   setup.start.p_m[0] = setup.start.p_m[1] = setup.start.heading_rad = NAN;
   filter f;
   drive d;
@@ -439,7 +440,7 @@ struct searching {
   }
 };
 
-void a_step_of_the_search_spends_no_more_than_it_may(void) {
+TEST(a_step_of_the_search_spends_no_more_than_it_may) {
   const int least = wm::place_search::kAligningCost;
   for (const int poses : {least, 20000, 80000}) {
     searching s;
@@ -462,7 +463,7 @@ void a_step_of_the_search_spends_no_more_than_it_may(void) {
 
 // GIVEN a camera that is off by two of its sigmas WHEN the search looks THEN the place that it finds is the true one,
 // and its error is found with it.
-void a_place_is_found_with_what_the_camera_is_off_by(void) {
+TEST(a_place_is_found_with_what_the_camera_is_off_by) {
   for (const double off : {-2.0, 0.0, 2.0}) {
     searching s(off);
     while (!s.search.step(s.edge_map, 80000, s.odom)) continue;
@@ -476,7 +477,7 @@ void a_place_is_found_with_what_the_camera_is_off_by(void) {
   }
 }
 
-void weighing_places_spends_what_it_says(void) {
+TEST(weighing_places_spends_what_it_says) {
   searching s;
   wm::hypotheses others;
   others.clear({2, 2, 0}, s.odom);
@@ -488,7 +489,7 @@ void weighing_places_spends_what_it_says(void) {
   TEST_ASSERT_EQUAL_UINT64(3 * wm::place_search::kWeighingCost, s.search.spent() - before);
 }
 
-void nonsense_makes_it_no_surer_and_never_breaks_it(void) {
+TEST(nonsense_makes_it_no_surer_and_never_breaks_it) {
   filter f;
   drive d;
   d.go(f, 3, 1.0, 0.0);
@@ -498,7 +499,7 @@ void nonsense_makes_it_no_surer_and_never_breaks_it(void) {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.1, d.error_of(f));
 }
 
-void what_it_can_not_work_with_is_said(void) {
+TEST(what_it_can_not_work_with_is_said) {
   const wm_estimator *ops = wm_estimator_find("edge_mcl");
   const char *why = nullptr;
   setup.map = nullptr;
@@ -514,35 +515,3 @@ void what_it_can_not_work_with_is_said(void) {
 }  // namespace
 
 void setUp(void) { draw("edge_mcl"); }
-void tearDown(void) {}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(forwards_and_backwards_it_stays_on_the_way);
-  RUN_TEST(a_scans_innovation_is_a_distance);
-  RUN_TEST(seeing_the_same_again_makes_it_no_surer);
-  RUN_TEST(the_first_scan_counts_for_the_time_since_the_motion_began);
-  RUN_TEST(the_same_scan_twice_says_no_more);
-  RUN_TEST(places_that_look_the_same_are_listed_beside_the_pose);
-  RUN_TEST(a_corner_corrects_a_pose_that_was_open_along_the_corridor);
-  RUN_TEST(motion_sensors_that_fall_silent_are_not_believed);
-  RUN_TEST(a_camera_that_looks_lower_than_believed_is_found_out);
-  RUN_TEST(the_far_face_of_a_thin_wall_is_not_aligned_with);
-  RUN_TEST(odometry_is_compared_by_its_scale_before);
-  RUN_TEST(a_correction_of_an_open_pose_is_no_disagreement);
-  RUN_TEST(unmapped_cupboards_pull_no_confident_pose);
-  RUN_TEST(a_wall_that_was_drawn_elsewhere_pulls_no_confident_pose);
-  RUN_TEST(late_pictures_and_skirtings_are_found_out);
-  RUN_TEST(each_error_of_a_mounting_has_its_derivative);
-  RUN_TEST(carried_away_it_says_so_and_finds_back);
-  RUN_TEST(listed_hypotheses_are_part_of_the_probability_of_being_lost);
-  RUN_TEST(something_in_the_way_is_not_being_lost_but_sight_through_walls_is);
-  RUN_TEST(glass_walls_are_usual);
-  RUN_TEST(it_starts_without_being_told_where);
-  RUN_TEST(a_step_of_the_search_spends_no_more_than_it_may);
-  RUN_TEST(a_place_is_found_with_what_the_camera_is_off_by);
-  RUN_TEST(weighing_places_spends_what_it_says);
-  RUN_TEST(nonsense_makes_it_no_surer_and_never_breaks_it);
-  RUN_TEST(what_it_can_not_work_with_is_said);
-  return UNITY_END();
-}

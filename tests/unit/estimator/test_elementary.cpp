@@ -5,14 +5,11 @@
 #include <cstdint>
 #include <cstring>
 
+#include "common/suite.h"
 #include "common/trials.h"
 #include "math/arc.hpp"
 #include "math/elementary.hpp"
-#include "unity.h"
 #include "waymark/random.h"
-
-void setUp(void) {}
-void tearDown(void) {}
 
 namespace {
 
@@ -42,7 +39,7 @@ double worst(double low, double high, Ours ours, Theirs theirs) {
   return most;
 }
 
-void test_sine_and_cosine_are_within_two_ulp(void) {
+TEST(test_sine_and_cosine_are_within_two_ulp) {
   const auto s = [](double x) { return wm::sin(x); };
   const auto c = [](double x) { return wm::cos(x); };
   const auto sl = [](long double x) { return sinl(x); };
@@ -53,7 +50,7 @@ void test_sine_and_cosine_are_within_two_ulp(void) {
   TEST_ASSERT_LESS_THAN_DOUBLE(2.0, worst(-1e6, 1e6, c, cl));
 }
 
-void test_arctangent_is_within_two_ulp_all_round(void) {
+TEST(test_arctangent_is_within_two_ulp_all_round) {
   double most = 0.0;
   for (int i = 0; i < kTruths; i++) {
     const double x = uniform(2 * (uint64_t)i, -10, 10), y = uniform(2 * (uint64_t)i + 1, -10, 10);
@@ -63,7 +60,7 @@ void test_arctangent_is_within_two_ulp_all_round(void) {
   TEST_ASSERT_LESS_THAN_DOUBLE(2.0, most);
 }
 
-void test_exponential_and_logarithm_are_within_two_ulp(void) {
+TEST(test_exponential_and_logarithm_are_within_two_ulp) {
   const auto el = [](long double x) { return expl(x); };
   const auto ll = [](long double x) { return logl(x); };
   TEST_ASSERT_LESS_THAN_DOUBLE(1.5, worst(
@@ -76,7 +73,7 @@ void test_exponential_and_logarithm_are_within_two_ulp(void) {
                                         1, 1e9, [](double x) { return wm::log(x); }, ll));
 }
 
-void test_corners(void) {
+TEST(test_corners) {
   TEST_ASSERT_EQUAL_DOUBLE(0.0, wm::atan2(0.0, 0.0));
   TEST_ASSERT_EQUAL_DOUBLE(wm::kPi, wm::atan2(0.0, -1.0));
   TEST_ASSERT_EQUAL_DOUBLE(-wm::kHalfPi, wm::atan2(-2.0, 0.0));
@@ -94,7 +91,7 @@ void test_corners(void) {
   TEST_ASSERT_EQUAL_DOUBLE(0.0, wm::log(1.0));
 }
 
-void test_wrap_goes_to_the_half_open_interval(void) {
+TEST(test_wrap_goes_to_the_half_open_interval) {
   TEST_ASSERT_EQUAL_DOUBLE(wm::kPi, wm::wrap(-wm::kPi));
   TEST_ASSERT_EQUAL_DOUBLE(wm::kPi, wm::wrap(wm::kPi));
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, -3.0, wm::wrap(-3.0 + 2 * wm::kTwoPi));
@@ -106,7 +103,7 @@ void test_wrap_goes_to_the_half_open_interval(void) {
 }
 
 // Known answers of Philox4x32-10 from the authors' distribution: all zero, and all ones.
-void test_random_blocks_are_philox(void) {
+TEST(test_random_blocks_are_philox) {
   uint32_t out[4];
   wm_random_block(0, 0, 0, out);
   const uint32_t zeros[4] = {0x6627e8d5u, 0xe169c58du, 0xbc57ac4cu, 0x9b00dbd8u};
@@ -116,7 +113,7 @@ void test_random_blocks_are_philox(void) {
   TEST_ASSERT_EQUAL_HEX32_ARRAY(ones, out, 4);
 }
 
-void test_normal_numbers_have_mean_0_variance_1_and_their_tails(void) {
+TEST(test_normal_numbers_have_mean_0_variance_1_and_their_tails) {
   double sum = 0, squares = 0;
   int beyond_2 = 0;
   for (uint64_t i = 0; i < (uint64_t)kSamples; i++) {
@@ -131,7 +128,7 @@ void test_normal_numbers_have_mean_0_variance_1_and_their_tails(void) {
 }
 
 // The derivatives of an arc, on both sides of the switch to the series and far from it.
-void test_arc_and_its_derivatives(void) {
+TEST(test_arc_and_its_derivatives) {
   const double turns[] = {0.0, 1e-9, -0.00999999, 0.01000001, -0.3, 1.0, 3.0};
   for (double turn : turns) {
     const double way = 1.7, h = 1e-6;
@@ -148,7 +145,7 @@ void test_arc_and_its_derivatives(void) {
   }
 }
 
-void test_parts_of_a_motion_make_the_whole(void) {
+TEST(test_parts_of_a_motion_make_the_whole) {
   const wm_pose2 whole = {0.8, -0.3, 0.9};
   const wm_pose2 part = wm::part_of(whole, 0.3), rest = wm::part_of(whole, 0.7);
   const wm_pose2 again = wm::compose(part, rest);
@@ -161,17 +158,3 @@ void test_parts_of_a_motion_make_the_whole(void) {
 }
 
 }  // namespace
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_sine_and_cosine_are_within_two_ulp);
-  RUN_TEST(test_arctangent_is_within_two_ulp_all_round);
-  RUN_TEST(test_exponential_and_logarithm_are_within_two_ulp);
-  RUN_TEST(test_corners);
-  RUN_TEST(test_wrap_goes_to_the_half_open_interval);
-  RUN_TEST(test_random_blocks_are_philox);
-  RUN_TEST(test_normal_numbers_have_mean_0_variance_1_and_their_tails);
-  RUN_TEST(test_arc_and_its_derivatives);
-  RUN_TEST(test_parts_of_a_motion_make_the_whole);
-  return UNITY_END();
-}

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "unity.h"
+#include "common/suite.h"
 #include "waymark/random.h"
 #include "waymark/vectors.h"
 
@@ -118,7 +118,7 @@ struct row : wm::jacobian_row<8> {
 
 // ── kernels ─────────────────────────────────────────────────────────────────────────────────────────────────────────
 
-void rows_of_the_half_lie_one_behind_the_other_and_begin_at_pairs(void) {
+TEST(rows_of_the_half_lie_one_behind_the_other_and_begin_at_pairs) {
   for (int capacity : {2, 4, 10, 64}) {
     std::vector<int> hits(half_covariance::doubles(capacity));
     std::vector<double> data(half_covariance::doubles(capacity));
@@ -130,7 +130,7 @@ void rows_of_the_half_lie_one_behind_the_other_and_begin_at_pairs(void) {
   }
 }
 
-void kernels_and_their_scalar_twins_give_the_same_bits(void) {
+TEST(kernels_and_their_scalar_twins_give_the_same_bits) {
   constexpr int kCapacity = 38;
   const int shapes[][2] = {{1, 0}, {2, 0}, {3, 0}, {4, 0}, {0, 1}, {1, 1}, {2, 1}, {3, 1}, {0, 3}};
   for (int n : {2, 6, 8, 36, 38})
@@ -165,7 +165,7 @@ void kernels_and_their_scalar_twins_give_the_same_bits(void) {
   TEST_ASSERT_EQUAL(22, list.span[1].to);
 }
 
-void columns_of_the_half(void) {
+TEST(columns_of_the_half) {
   constexpr int kCapacity = 38, kStates = 36;
   alignas(16) double a[kCapacity * (kCapacity + 2) / 2], out[kCapacity] = {}, twin[kCapacity] = {};
   for (double &x : a) x = gauss();
@@ -186,7 +186,7 @@ void columns_of_the_half(void) {
 
 // ── changes ─────────────────────────────────────────────────────────────────────────────────────────────────────────
 
-void states_become_linear_functions_of_the_state(void) {
+TEST(states_become_linear_functions_of_the_state) {
   for (int n : {8, 17, 18, 21})
     for (int first : {0, 1, 2, 3, 6})
       for (int count : {1, 2, 3, 4, 7}) {
@@ -221,7 +221,7 @@ void states_become_linear_functions_of_the_state(void) {
       }
 }
 
-void states_that_fade_are_scaled_or_forgotten(void) {
+TEST(states_that_fade_are_scaled_or_forgotten) {
   for (int state : {0, 1, 4, 5, 12, 16}) {
     made m(17);
     matrix want = m.p();
@@ -253,7 +253,7 @@ void states_that_fade_are_scaled_or_forgotten(void) {
   expect(want, m);
 }
 
-void states_come_and_go(void) {
+TEST(states_come_and_go) {
   for (int width : {2, 3}) {
     made m(kDense + 1 + 4 * width);
     const int first = kDense + 1 + width, n = m.x.states();
@@ -356,7 +356,7 @@ wm::innovation prepared(made *m, const std::vector<row> &rows, int count) {
   return m->x.prepare(views.data(), kInnovation, kNoise, count);
 }
 
-void corrections_are_josephs_form(void) {
+TEST(corrections_are_josephs_form) {
   for (int n : {9, 17, 18, 25})
     for (int count = 1; count <= kRows; count++) {
       made m(n);
@@ -377,7 +377,7 @@ void corrections_are_josephs_form(void) {
     }
 }
 
-void considered_states_stay(void) {
+TEST(considered_states_stay) {
   for (int n : {17, 18})
     for (int count = 1; count <= kRows; count++)
       for (const std::vector<std::pair<int, int>> &spans : std::vector<std::vector<std::pair<int, int>>>{
@@ -399,7 +399,7 @@ void considered_states_stay(void) {
 }
 
 // T P T' of the corrected covariance, T = I + sum of e h'; in one pass, and alone.
-void covariances_are_transported(void) {
+TEST(covariances_are_transported) {
   for (int n : {17, 18})
     for (int count : {0, 1, 3})
       for (int turns : {1, 3}) {
@@ -431,7 +431,7 @@ void covariances_are_transported(void) {
       }
 }
 
-void variances_of_rows(void) {
+TEST(variances_of_rows) {
   made m(18);
   const std::vector<row> rows = rows_of(18);
   const wm::innovation i = prepared(&m, rows, 4);
@@ -444,7 +444,7 @@ void variances_of_rows(void) {
 
 // ── what is stale ───────────────────────────────────────────────────────────────────────────────────────────────────
 
-void a_stale_innovation_is_refused(void) {
+TEST(a_stale_innovation_is_refused) {
   const std::vector<row> rows = rows_of(17);
   const wm::sparse_row one = rows[0];
   const double number = 1.0;
@@ -471,7 +471,7 @@ void a_stale_innovation_is_refused(void) {
 }
 
 // The mean moves between an update's halves; after it the innovation is used up.
-void an_innovation_is_used_once(void) {
+TEST(an_innovation_is_used_once) {
   made m(17);
   wm::innovation i = prepared(&m, rows_of(17), 2), none;
   TEST_ASSERT_FALSE(m.x.solve(&none, nullptr));
@@ -486,7 +486,7 @@ void an_innovation_is_used_once(void) {
   TEST_ASSERT_EQUAL_DOUBLE(after, m.x.variance(0));
 }
 
-void an_innovation_without_a_covariance_is_refused(void) {
+TEST(an_innovation_without_a_covariance_is_refused) {
   made m(17);
   const double nan = NAN, zero = 0.0, innovation = 0.3, infinite = INFINITY;
   row too_long;
@@ -509,7 +509,7 @@ void an_innovation_without_a_covariance_is_refused(void) {
   }
 }
 
-void a_vast_variance_leaves_some(void) {
+TEST(a_vast_variance_leaves_some) {
   made m(17);
   m.x.add_variance(0, 5.9e15);
   const row first = {{0, 1.0}};
@@ -527,23 +527,3 @@ void a_vast_variance_leaves_some(void) {
 }  // namespace
 
 void setUp(void) { drawn = 0; }
-void tearDown(void) {}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(rows_of_the_half_lie_one_behind_the_other_and_begin_at_pairs);
-  RUN_TEST(kernels_and_their_scalar_twins_give_the_same_bits);
-  RUN_TEST(columns_of_the_half);
-  RUN_TEST(states_become_linear_functions_of_the_state);
-  RUN_TEST(states_that_fade_are_scaled_or_forgotten);
-  RUN_TEST(states_come_and_go);
-  RUN_TEST(corrections_are_josephs_form);
-  RUN_TEST(considered_states_stay);
-  RUN_TEST(covariances_are_transported);
-  RUN_TEST(variances_of_rows);
-  RUN_TEST(a_stale_innovation_is_refused);
-  RUN_TEST(an_innovation_is_used_once);
-  RUN_TEST(an_innovation_without_a_covariance_is_refused);
-  RUN_TEST(a_vast_variance_leaves_some);
-  return UNITY_END();
-}

@@ -3,6 +3,7 @@
 // motion a refused sensor leaves open, which source gives the speed, the steering's table, how far off the plane is
 // off, which samples follow others.
 #include <vector>
+#include "common/suite.h"
 
 #include "motion/event_time.hpp"
 #include "motion/plausibility.hpp"
@@ -13,7 +14,7 @@ namespace {
 double just_beyond(double value) { return value * (1.0 + 1e-12); }
 
 // Each value up to its limit, of either sign, is taken; beyond it, or where it is no number, it is not.
-void test_every_quantity_has_its_limit(void) {
+TEST(test_every_quantity_has_its_limit) {
   const struct {
     std::vector<wm_quantity> of;
     double limit;
@@ -46,7 +47,7 @@ void test_every_quantity_has_its_limit(void) {
   TEST_ASSERT_EQUAL(WM_OUT_OF_RANGE, front.check(unknown));
 }
 
-void test_every_part_of_a_twist_has_its_limit(void) {
+TEST(test_every_part_of_a_twist_has_its_limit) {
   start(make::no_wheels());
   for (const double sign : {-1.0, 1.0}) {
     TEST_ASSERT_EQUAL(WM_OK, front.check(make::twist(0, sign * 150.0, -sign * 50.0)));
@@ -67,7 +68,7 @@ void test_every_part_of_a_twist_has_its_limit(void) {
 }
 
 // Stamps beyond 2^62 ns are absurd; before the present time they run back; an increment lasts.
-void test_stamps_and_increments_that_can_not_be(void) {
+TEST(test_stamps_and_increments_that_can_not_be) {
   start(make::no_wheels());
   wm_event e = make::twist(0, 0, 0);
   for (const wm_time_ns sign : {-1, 1}) {
@@ -132,7 +133,7 @@ void check_refusal(const char *what, int model, const wm_wheels &w, Good good, B
 
 // GIVEN a sensor whose samples jump WHEN they are refused THEN the part of the motion that it measures is open until
 // the next good one, and no other part.
-void test_a_refused_sensor_leaves_its_own_part_open(void) {
+TEST(test_a_refused_sensor_leaves_its_own_part_open) {
   constexpr double kTick = 2 * M_PI * 0.1 / 1000;
   const auto car = [](double v, double w) {
     return [v, w](double t_s, int i) {
@@ -159,7 +160,7 @@ void test_a_refused_sensor_leaves_its_own_part_open(void) {
 
 // GIVEN a good sample half a second ago WHEN the next one differs by a little less than a robot can change in that
 // time, or by a little more THEN it is taken, or refused: 3 m/s and 15 m/s2, 6 rad/s and 30 rad/s2, for each sensor.
-void test_each_sensor_follows_within_its_limits(void) {
+TEST(test_each_sensor_follows_within_its_limits) {
   const auto of = [](int sensor, double t_s, double value) {
     if (sensor == 0) return make::quantities(t_s, {{WM_Q_VEHICLE_SPEED, value}, {WM_Q_YAW_RATE, 0.0}});
     if (sensor == 1) return make::quantities(t_s, {{WM_Q_VEHICLE_SPEED, 0.0}, {WM_Q_YAW_RATE, value}});
@@ -181,7 +182,7 @@ void test_each_sensor_follows_within_its_limits(void) {
 
 // While samples are refused the robot may have accelerated since the last good one: 15 m/s2, evenly distributed,
 // (15^2 / 12) t^4, and the speed itself is not known.
-void test_a_refusal_counts_from_the_last_good_sample(void) {
+TEST(test_a_refusal_counts_from_the_last_good_sample) {
   for (const bool refused : {false, true}) {
     start(make::car(), WM_MOTION_SPEED_YAW_RATE);
     params.noise_speed_mps = params.noise_speed_rel = 0.0;
@@ -197,7 +198,7 @@ void test_a_refusal_counts_from_the_last_good_sample(void) {
 
 // The counter shows a lost frame. The next one comes after two periods: counter and stamp agree, and its jump of 6 cm
 // is accepted. After one period it is refused.
-void test_a_lost_frame_is_no_doubt_where_the_stamp_agrees(void) {
+TEST(test_a_lost_frame_is_no_doubt_where_the_stamp_agrees) {
   constexpr double kTick = 2 * M_PI * 0.1 / 1000;
   for (const bool agrees : {true, false}) {
     start(make::two_wheels());
@@ -213,7 +214,7 @@ void test_a_lost_frame_is_no_doubt_where_the_stamp_agrees(void) {
 }
 
 // Beside a gyro and beside a steering the counts give the distance, too: as positions, whatever comes between them.
-void test_counts_beside_a_gyro_or_a_steering_are_positions(void) {
+TEST(test_counts_beside_a_gyro_or_a_steering_are_positions) {
   constexpr double kTick = 2 * M_PI * 0.3 / 1000;
   const int models[] = {WM_MOTION_SPEED_YAW_RATE, WM_MOTION_ACKERMANN};
   for (const int model : models) {
@@ -233,7 +234,7 @@ void test_counts_beside_a_gyro_or_a_steering_are_positions(void) {
 }
 
 // A silent part is reported for sources that have parts. Increments and a velocity as a state have none.
-void test_which_models_can_be_silent(void) {
+TEST(test_which_models_can_be_silent) {
   const double exact[6] = {1e-4, 0, 1e-4, 0, 0, 1e-4};
   const int models[] = {WM_MOTION_AUTO, WM_MOTION_INCREMENTS, WM_MOTION_CONSTANT_VELOCITY, WM_MOTION_SPEED_YAW_RATE};
   for (const int model : models) {
@@ -248,7 +249,7 @@ void test_which_models_can_be_silent(void) {
 }
 
 // Without limits nothing is refused.
-void test_without_limits_nothing_is_refused(void) {
+TEST(test_without_limits_nothing_is_refused) {
   constexpr double kTick = 2 * M_PI * 0.1 / 1000;
   start(make::two_wheels());
   params.limits_mps2 = params.limits_radps2 = 0.0;
@@ -261,7 +262,7 @@ void test_without_limits_nothing_is_refused(void) {
 }
 
 // A base that stands shows the bias of its twists' turn rate; one that turns on the spot, or creeps, does not stand.
-void test_when_twists_stand(void) {
+TEST(test_when_twists_stand) {
   const struct {
     double v, u, w;
     bool stands;
@@ -283,7 +284,7 @@ void test_when_twists_stand(void) {
 }
 
 // The wheel of a dead encoder rolls like the other one, from the last count on, too.
-void test_a_dead_encoders_wheel_rolls_like_the_other_one(void) {
+TEST(test_a_dead_encoders_wheel_rolls_like_the_other_one) {
   constexpr double kTick = 2 * M_PI * 0.1 / 1000;
   for (const bool left_is_dead : {false, true}) {
     start(make::two_wheels(), WM_MOTION_TICKS);
@@ -305,7 +306,7 @@ void test_a_dead_encoders_wheel_rolls_like_the_other_one(void) {
 using wm::plausibility;
 
 // A level may step by so much, and by so much more for each second since the sample before.
-void test_levels_follow_within_step_and_rate(void) {
+TEST(test_levels_follow_within_step_and_rate) {
   for (const double sign : {-1.0, 1.0})
     for (const double dt_s : {0.01, 0.5, 2.0})
       for (const double share : {0.999, 1.001}) {
@@ -319,7 +320,7 @@ void test_levels_follow_within_step_and_rate(void) {
 
 // Another level is taken after a second of three samples that follow each other; at once, if they are more than those
 // that were trusted. A sample that follows the trusted ones, or none, ends it.
-void test_another_level_replaces_the_trusted_one(void) {
+TEST(test_another_level_replaces_the_trusted_one) {
   const auto until_taken = [](int trusted, double each_s, bool interrupted, bool scattered) {
     wm::sample_check check{};
     for (int i = 0; i < trusted; i++) (void)check.check_level(make::at(0.01 * i), 0.0, 3.0, 0.0);
@@ -344,7 +345,7 @@ void test_another_level_replaces_the_trusted_one(void) {
 
 // A count goes on by its speed so far; from one period to the next it may differ by (3 m/s + 15 m/s2 dt) dt, by a
 // period's error of the stamps, and by two ticks. The second count may be anywhere that 150 m/s reach.
-void test_positions_follow_their_speed(void) {
+TEST(test_positions_follow_their_speed) {
   for (const double sign : {-1.0, 1.0})
     for (const double bound : {1.0, 0.2})
       for (const double share : {0.999, 1.001}) {
@@ -374,7 +375,7 @@ void test_positions_follow_their_speed(void) {
 }
 
 // Counts that go on from elsewhere are taken after a tenth of a second.
-void test_positions_from_elsewhere_are_a_new_run(void) {
+TEST(test_positions_from_elsewhere_are_a_new_run) {
   wm::sample_check check{};
   int taken = 0;
   for (int i = 0; i < 100 && taken == 0; i++) {
@@ -389,7 +390,7 @@ void test_positions_from_elsewhere_are_a_new_run(void) {
 // ── choices ─────────────────────────────────────────────────────────────────────────────────────────────────────────
 
 // The rear wheels' mean, then the dashboard's, then the front wheels'; one wheel alone stands for both.
-void test_the_source_of_the_speed(void) {
+TEST(test_the_source_of_the_speed) {
   const std::pair<wm_quantity, double> rear_left = {WM_Q_WHEEL_SPEED_REAR_LEFT, 1.0},
                                        rear_right = {WM_Q_WHEEL_SPEED_REAR_RIGHT, 2.0},
                                        dash = {WM_Q_VEHICLE_SPEED, 4.0}, left = {WM_Q_WHEEL_SPEED_FRONT_LEFT, 8.0},
@@ -412,7 +413,7 @@ void test_the_source_of_the_speed(void) {
 }
 
 // Counts of wheels of which radius, ticks or track are not known are no motion.
-void test_counts_of_unknown_wheels_are_no_motion(void) {
+TEST(test_counts_of_unknown_wheels_are_no_motion) {
   for (int which = 0; which < 6; which++) {
     wm_wheels w = make::two_wheels();
     if (which == 1) w.ticks_per_turn = 0.0;
@@ -429,7 +430,7 @@ void test_counts_of_unknown_wheels_are_no_motion(void) {
 }
 
 // The road wheel's angle by the actuator's table: straight between two points, held beyond the ends.
-void test_the_actuators_table(void) {
+TEST(test_the_actuators_table) {
   wm_wheels w = make::car();
   const double x[4] = {-0.02, 0.01, 0.05, 0.1}, y[4] = {-0.5, -0.1, 0.2, 0.6};
   for (const uint32_t points : {2u, 3u, 4u}) {
@@ -461,7 +462,7 @@ void test_the_actuators_table(void) {
 
 // Off the plane: a climb beyond three sigma of the speed's noise, a roll or a pitch beyond three of the turn rate's and
 // of a gyro's bias of 0.02 rad/s; for two seconds to one side. A recording's own sigmas take the place of the noise's.
-void test_how_far_off_the_plane_is_off(void) {
+TEST(test_how_far_off_the_plane_is_off) {
   for (const bool stated : {false, true})
     for (int axis = 0; axis < 3; axis++)
       for (const double sign : {-1.0, 1.0})
@@ -497,7 +498,7 @@ void test_how_far_off_the_plane_is_off(void) {
 
 // GIVEN samples of a holonomic drive with a noise of their own WHEN they change by less than it THEN no change is noise
 // between samples.
-void test_the_sampling_noise_of_a_holonomic_drive_is_never_below_zero(void) {
+TEST(test_the_sampling_noise_of_a_holonomic_drive_is_never_below_zero) {
   start(make::no_wheels(), WM_MOTION_TWIST);
   params.twist = WM_TWIST_MEASURED;
   params.states.drive = WM_DRIVE_HOLONOMIC;
@@ -512,7 +513,7 @@ void test_the_sampling_noise_of_a_holonomic_drive_is_never_below_zero(void) {
 
 // GIVEN samples of one axis that change by 0.4 to and fro WHEN their own noise explains a part of it THEN the rest is
 // noise between samples of that axis: (change^2 - 2 own / dt) dt^2 / 12.
-void test_the_sampling_noise_is_what_the_own_noise_does_not_explain(void) {
+TEST(test_the_sampling_noise_is_what_the_own_noise_does_not_explain) {
   for (int axis = 0; axis < 3; axis++) {
     start(make::no_wheels(), WM_MOTION_TWIST);
     params.twist = WM_TWIST_MEASURED;
@@ -538,7 +539,7 @@ void test_the_sampling_noise_is_what_the_own_noise_does_not_explain(void) {
 }
 
 // The twist of an increment holds until the next one comes, which takes off what was moved by it.
-void test_the_twist_of_an_increment_holds_until_the_next(void) {
+TEST(test_the_twist_of_an_increment_holds_until_the_next) {
   start(make::no_wheels(), WM_MOTION_INCREMENTS);
   const double exact[6] = {1e-4, 0, 1e-4, 0, 0, 1e-4};
   feed(make::increment(0.0, 1.0, {1.0, 0.0, 0.0}, exact));
@@ -554,34 +555,3 @@ void test_the_twist_of_an_increment_holds_until_the_next(void) {
 }
 
 }  // namespace
-
-void setUp(void) {}
-void tearDown(void) {}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_every_quantity_has_its_limit);
-  RUN_TEST(test_every_part_of_a_twist_has_its_limit);
-  RUN_TEST(test_stamps_and_increments_that_can_not_be);
-  RUN_TEST(test_a_refused_sensor_leaves_its_own_part_open);
-  RUN_TEST(test_each_sensor_follows_within_its_limits);
-  RUN_TEST(test_a_refusal_counts_from_the_last_good_sample);
-  RUN_TEST(test_a_lost_frame_is_no_doubt_where_the_stamp_agrees);
-  RUN_TEST(test_counts_beside_a_gyro_or_a_steering_are_positions);
-  RUN_TEST(test_which_models_can_be_silent);
-  RUN_TEST(test_without_limits_nothing_is_refused);
-  RUN_TEST(test_when_twists_stand);
-  RUN_TEST(test_a_dead_encoders_wheel_rolls_like_the_other_one);
-  RUN_TEST(test_levels_follow_within_step_and_rate);
-  RUN_TEST(test_another_level_replaces_the_trusted_one);
-  RUN_TEST(test_positions_follow_their_speed);
-  RUN_TEST(test_positions_from_elsewhere_are_a_new_run);
-  RUN_TEST(test_the_source_of_the_speed);
-  RUN_TEST(test_counts_of_unknown_wheels_are_no_motion);
-  RUN_TEST(test_the_actuators_table);
-  RUN_TEST(test_how_far_off_the_plane_is_off);
-  RUN_TEST(test_the_sampling_noise_of_a_holonomic_drive_is_never_below_zero);
-  RUN_TEST(test_the_sampling_noise_is_what_the_own_noise_does_not_explain);
-  RUN_TEST(test_the_twist_of_an_increment_holds_until_the_next);
-  return UNITY_END();
-}

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "unity.h"
+#include "common/suite.h"
 
 namespace {
 
@@ -26,10 +26,7 @@ void compare(Formula formula) {
 
 }  // namespace
 
-void setUp(void) {}
-void tearDown(void) {}
-
-void test_arithmetic(void) {
+TEST(test_arithmetic) {
   compare([](auto x, auto y) { return x + y; });
   compare([](auto x, auto y) { return x - y; });
   compare([](auto x, auto y) { return x * y; });
@@ -37,7 +34,7 @@ void test_arithmetic(void) {
   compare([](auto x, auto y) { return -x * y; });
 }
 
-void test_arithmetic_with_constants(void) {
+TEST(test_arithmetic_with_constants) {
   compare([](auto x, auto y) { return 2.5 + x * y; });
   compare([](auto x, auto y) { return x * y + 2.5; });
   compare([](auto x, auto y) { return 2.5 - x * y; });
@@ -50,7 +47,7 @@ void test_arithmetic_with_constants(void) {
   TEST_ASSERT_EQUAL_DOUBLE(0.0, constant.derivative(1));
 }
 
-void test_functions(void) {
+TEST(test_functions) {
   compare([](auto x, auto y) { return wm::sine_cosine(x * y).sin; });
   compare([](auto x, auto y) { return wm::sine_cosine(x * y).cos; });
   compare([](auto x, auto y) { return wm::atan2(y, x); });
@@ -60,7 +57,7 @@ void test_functions(void) {
 }
 
 // Of many directions each is apart from the others.
-void test_directions_are_apart(void) {
+TEST(test_directions_are_apart) {
   using ten = jet<10>;
   ten x[10], sum = 0.0;
   for (int i = 0; i < 10; i++) {
@@ -68,13 +65,4 @@ void test_directions_are_apart(void) {
     sum = sum + x[i] * x[i];
   }
   for (int i = 0; i < 10; i++) TEST_ASSERT_EQUAL_DOUBLE(2.0 * (i + 1.0), sum.derivative(i));
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_arithmetic);
-  RUN_TEST(test_arithmetic_with_constants);
-  RUN_TEST(test_functions);
-  RUN_TEST(test_directions_are_apart);
-  return UNITY_END();
 }

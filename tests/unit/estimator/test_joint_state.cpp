@@ -7,10 +7,10 @@
 #include <new>
 #include <vector>
 
+#include "common/suite.h"
 #include "events.hpp"
 #include "filters/slam/joint_state.hpp"
 #include "math/arc.hpp"
-#include "unity.h"
 #include "waymark/random.h"
 
 namespace {
@@ -85,7 +85,7 @@ matrix times(const matrix &a, const matrix &b, bool transposed) {
 }
 
 // F by differences of the mean: what the prediction's derivatives are, landmarks included.
-void test_prediction_is_that_of_the_whole_matrix(void) {
+TEST(test_prediction_is_that_of_the_whole_matrix) {
   made a(true);
   a.add(4, 3);
   a.add(-2, 5);
@@ -128,7 +128,7 @@ void test_prediction_is_that_of_the_whole_matrix(void) {
 
 // The plain form is the textbook's P - K S K'; the invariant one carries it over by T besides, and by another T with
 // the scale. The scale itself lies where the speed's start says, which alone tells it.
-void test_correction_is_that_of_the_whole_matrix(void) {
+TEST(test_correction_is_that_of_the_whole_matrix) {
   enum { kPlain, kInvariant, kScaled };
   std::vector<double> unscaled;  // the invariant form's mean
   for (int form : {kPlain, kInvariant, kScaled}) {
@@ -210,7 +210,7 @@ void test_correction_is_that_of_the_whole_matrix(void) {
 
 // Another sensor tells the speed, whose scale is another: what the rest of the map's scale has come to counts from then
 // on, not what it began with. (The turn's scale stands in for a range's here.)
-void test_a_new_sensor_of_the_speed_does_not_take_the_map_s_scale_back(void) {
+TEST(test_a_new_sensor_of_the_speed_does_not_take_the_map_s_scale_back) {
   made a(true);
   const int s = a.state->landmark_state(a.add(4, 3)), range = a.state->motion_state(wm::kYawRateScale);
   TEST_ASSERT_TRUE(a.state->find_scale(false));
@@ -230,7 +230,7 @@ void test_a_new_sensor_of_the_speed_does_not_take_the_map_s_scale_back(void) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 4.0, a.state->value(s));
 }
 
-void test_a_landmark_that_leaves_takes_its_part_of_the_matrix_and_nothing_else(void) {
+TEST(test_a_landmark_that_leaves_takes_its_part_of_the_matrix_and_nothing_else) {
   made a(true), b(true);
   a.add(4, 3);
   a.add(-2, 5);
@@ -244,7 +244,7 @@ void test_a_landmark_that_leaves_takes_its_part_of_the_matrix_and_nothing_else(v
   assert_near(b.covariance(), a.covariance());
 }
 
-void test_frozen_landmarks_stay_and_the_robot_is_corrected(void) {
+TEST(test_frozen_landmarks_stay_and_the_robot_is_corrected) {
   made a(true);
   const int s = a.state->landmark_state(a.add(4, 3));
   const matrix before = a.covariance();
@@ -280,7 +280,7 @@ double heading_sigma_after_many_views(bool invariant) {
   return std::sqrt(a.state->variance(wm::kHeading));
 }
 
-void test_the_map_s_heading_is_not_learnt_from_looking(void) {
+TEST(test_the_map_s_heading_is_not_learnt_from_looking) {
   const double invariant = heading_sigma_after_many_views(true);
   dice.next = 0;
   const double plain = heading_sigma_after_many_views(false);
@@ -289,7 +289,7 @@ void test_the_map_s_heading_is_not_learnt_from_looking(void) {
 }
 
 // A wheel's scale forgets what it slipped, and never its mean; both stay as unsure as they are.
-void test_a_wheel_that_slips_comes_back_to_its_mean(void) {
+TEST(test_a_wheel_that_slips_comes_back_to_its_mean) {
   made m(true, 2, 8, {0.005, 5.0});
   const int left = m.state->motion_state(wm::kLeftScale), mean = left + 3;  // behind both wheels and the lag
   m.state->move(make::twist(1.0, 0, 0));
@@ -301,7 +301,7 @@ void test_a_wheel_that_slips_comes_back_to_its_mean(void) {
 }
 
 // A row that has no room for all its derivatives is not fused.
-void test_a_row_with_missing_entries_is_refused(void) {
+TEST(test_a_row_with_missing_entries_is_refused) {
   made a(true);
   joint_row row;
   for (int i = 0; i <= joint_row::kMax; i++) row.add(0, 0.01);
@@ -313,7 +313,7 @@ void test_a_row_with_missing_entries_is_refused(void) {
 }
 
 // In doubt a correction moves the pose; calibration and map stay, and the half matrix stays symmetric.
-void test_the_pose_alone_is_corrected(void) {
+TEST(test_the_pose_alone_is_corrected) {
   made a(true);
   a.state->move(make::twist(0.0, 0.0, 0.0));
   const int s = a.state->landmark_state(a.add(1.6, 2.1));
@@ -340,7 +340,7 @@ static wm::innovation see_landmark(made *m, int first, double innovation, double
 }
 
 // [Schmidt1966] with the gain of one landmark alone, on the whole matrix: P <- (I - K H) P (I - K H)' + K R K'.
-void test_a_landmark_alone_is_corrected(void) {
+TEST(test_a_landmark_alone_is_corrected) {
   made m(false);
   for (int i = 0; i < 3; i++) m.add(3.0 + i, 1.0 - 0.5 * i);
   const matrix before = m.covariance();
@@ -367,7 +367,7 @@ void test_a_landmark_alone_is_corrected(void) {
 }
 
 // The invariant filter's is the plain one's, transported by T = I + e h', e = J (new place - old place).
-void test_a_landmark_alone_is_transported_to_its_new_place(void) {
+TEST(test_a_landmark_alone_is_transported_to_its_new_place) {
   matrix covariance[2];
   double moved[2];
   int first = 0;
@@ -390,7 +390,7 @@ void test_a_landmark_alone_is_transported_to_its_new_place(void) {
   assert_near(times(times(t, covariance[0], false), t, true), covariance[1]);
 }
 
-void test_states_that_join_in_front_of_landmarks_leave_the_others_as_they_were(void) {
+TEST(test_states_that_join_in_front_of_landmarks_leave_the_others_as_they_were) {
   const int robot = 10, more = 15, landmarks = 4, wide = 3;
   made m(true, 2, landmarks, {}, wm::even(robot + more) + landmarks * wide);
   for (int i = 0; i < landmarks; i++) m.add(3.0 + i, 1.0 - 0.5 * i);
@@ -422,21 +422,3 @@ void test_states_that_join_in_front_of_landmarks_leave_the_others_as_they_were(v
 }  // namespace
 
 void setUp(void) { dice = {7, 1, 0}; }
-void tearDown(void) {}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_prediction_is_that_of_the_whole_matrix);
-  RUN_TEST(test_correction_is_that_of_the_whole_matrix);
-  RUN_TEST(test_a_new_sensor_of_the_speed_does_not_take_the_map_s_scale_back);
-  RUN_TEST(test_a_landmark_that_leaves_takes_its_part_of_the_matrix_and_nothing_else);
-  RUN_TEST(test_frozen_landmarks_stay_and_the_robot_is_corrected);
-  RUN_TEST(test_the_map_s_heading_is_not_learnt_from_looking);
-  RUN_TEST(test_a_wheel_that_slips_comes_back_to_its_mean);
-  RUN_TEST(test_a_row_with_missing_entries_is_refused);
-  RUN_TEST(test_the_pose_alone_is_corrected);
-  RUN_TEST(test_a_landmark_alone_is_corrected);
-  RUN_TEST(test_a_landmark_alone_is_transported_to_its_new_place);
-  RUN_TEST(test_states_that_join_in_front_of_landmarks_leave_the_others_as_they_were);
-  return UNITY_END();
-}

@@ -7,13 +7,13 @@
 #include <map>
 #include <vector>
 
+#include "common/suite.h"
 #include "events.hpp"
 #include "filters/core/chi_square.hpp"
 #include "filters/core/first_sightings.hpp"
 #include "filters/core/landmark_bias.hpp"
 #include "filters/core/landmark_evidence.hpp"
 #include "math/elementary.hpp"
-#include "unity.h"
 #include "waymark/random.h"
 
 namespace {
@@ -68,7 +68,7 @@ double share_of_limit(const std::vector<series> &all, wm_time_ns t_ns) {
 
 // GIVEN ranges, bearings and two sensors of some landmarks, each with a mean of its own WHEN they are tested THEN sums
 // and verdict are those of all that was seen.
-void test_means_of_landmarks_are_those_of_all_slots(void) {
+TEST(test_means_of_landmarks_are_those_of_all_slots) {
   int contradicted = 0, near_limit = 0;
   for (uint64_t seed = 0; seed < 60; seed++) {
     wm_random random = {seed, 4, 0};
@@ -126,7 +126,7 @@ void test_means_of_landmarks_are_those_of_all_slots(void) {
 }
 
 // Innovations of no landmark, without a variance, or of no numbers are none.
-void test_innovations_that_say_nothing_of_a_landmark(void) {
+TEST(test_innovations_that_say_nothing_of_a_landmark) {
   wm_innovation good{};
   good.variance = 1.0;
   wm_innovation bad[4] = {good, good, good, good};
@@ -247,7 +247,7 @@ struct habit {
 
 // GIVEN drives with landmarks that fit, that have moved, that are misread, with positions and headings among them WHEN
 // they are noted THEN odds, proof, doubt, moved and biased landmarks are those of the plain sums, at each step.
-void test_evidence_is_that_of_the_plain_sums(void) {
+TEST(test_evidence_is_that_of_the_plain_sums) {
   int proven = 0, contradicted = 0, moved = 0, biased = 0, doubted = 0;
   for (uint64_t seed = 0; seed < 80; seed++) {
     wm_random random = {seed, 9, 0};
@@ -316,7 +316,7 @@ void test_evidence_is_that_of_the_plain_sums(void) {
 }
 
 // Of more landmarks than there is room for those not seen for longest are forgotten: 24 are kept.
-void test_sources_not_seen_for_longest_make_room(void) {
+TEST(test_sources_not_seen_for_longest_make_room) {
   wm::landmark_evidence evidence;
   evidence.begin(-3.0);
   plain_evidence plain(-3.0);
@@ -337,7 +337,7 @@ void test_sources_not_seen_for_longest_make_room(void) {
 }
 
 // "Anywhere" against "as expected", with a fifth of false detections.
-void test_the_bayes_factor_of_an_observation(void) {
+TEST(test_the_bayes_factor_of_an_observation) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, -std::log(0.8 * 3.0 * 2.0 + 0.2), wm::landmark_evidence::log_bayes_factor(3.0, 2.0));
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.0, wm::landmark_evidence::log_bayes_factor(0.25, 4.0));
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, std::log(5.0), wm::landmark_evidence::max_log_bayes_factor());
@@ -393,7 +393,7 @@ const double kPose[3][3] = {{0.04, 0.01, -0.005}, {0.01, 0.03, 0.004}, {-0.005, 
 
 // GIVEN sightings of one or two numbers that were refused WHEN their joint NIS is just below the limit THEN they
 // contradict the sensor's states, and just above it they do not: the last four, whatever came before.
-void test_refused_sightings_contradict_up_to_the_joint_limit(void) {
+TEST(test_refused_sightings_contradict_up_to_the_joint_limit) {
   wm_random random = {21, 2, 0};
   double prior[wm::kSensorStates];
   for (int k = 0; k < wm::kSensorStates; k++) prior[k] = 0.02 * (k + 1);
@@ -420,7 +420,7 @@ void test_refused_sightings_contradict_up_to_the_joint_limit(void) {
 
 // Four of one landmark say nothing: it may have moved. One that is fused ends the row; with as many fused as refused
 // the states are no longer in question, until they begin anew.
-void test_when_refused_sightings_do_not_count(void) {
+TEST(test_when_refused_sightings_do_not_count) {
   wm_random random = {22, 2, 0};
   double prior[wm::kSensorStates];
   for (double &each : prior) each = 100.0;
@@ -452,18 +452,3 @@ void test_when_refused_sightings_do_not_count(void) {
 }
 
 }  // namespace
-
-void setUp(void) {}
-void tearDown(void) {}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_means_of_landmarks_are_those_of_all_slots);
-  RUN_TEST(test_innovations_that_say_nothing_of_a_landmark);
-  RUN_TEST(test_evidence_is_that_of_the_plain_sums);
-  RUN_TEST(test_sources_not_seen_for_longest_make_room);
-  RUN_TEST(test_the_bayes_factor_of_an_observation);
-  RUN_TEST(test_refused_sightings_contradict_up_to_the_joint_limit);
-  RUN_TEST(test_when_refused_sightings_do_not_count);
-  return UNITY_END();
-}

@@ -6,6 +6,7 @@
 #include <cstring>
 #include <limits>
 
+#include "common/suite.h"
 #include "events.hpp"
 #include "filters/landmark_ekf/params.h"
 #include "math/arc.hpp"
@@ -13,7 +14,6 @@
 #include "motion/motion_params.h"
 #include "sensors/sensor_model.hpp"
 #include "state/row.hpp"
-#include "unity.h"
 #include "waymark/estimator.h"
 #include "waymark/random.h"
 
@@ -173,7 +173,7 @@ int drive(double for_s, unsigned sight, int seen = 3, bool carried_blind = false
 // ---- the model ----
 
 // By the pose and by every row of the table of sensor states, so that a new row without a right derivative fails here.
-void test_expected_sighting_and_its_derivatives(void) {
+TEST(test_expected_sighting_and_its_derivatives) {
   wm_sensor s = sensor;
   s.mounting = {{0.4, -0.2, 0.7}, {0.1, 0.35, 2.2}};
   const double landmark[3] = {3.0, -1.5, 1.9};
@@ -212,7 +212,7 @@ void test_expected_sighting_and_its_derivatives(void) {
 
 // A camera that is rolled, pitched or of another focal length than thought: what the model says of small errors is what
 // a camera that is mounted so sees.
-void test_tilt_and_angle_scale(void) {
+TEST(test_tilt_and_angle_scale) {
   const double landmark[3] = {3.0, 1.5, 2.9}, h = 1e-5;
   const wm_pose2 pose = {0.5, 0.3, 0.2};
   wm_sensor s = sensor;
@@ -246,7 +246,7 @@ void test_tilt_and_angle_scale(void) {
 }
 
 // The paper's own formula, for a level sensor: alpha = atan2(y_b - y_c, x_b - x_c) - theta - theta_c.
-void test_expected_bearing_is_the_papers(void) {
+TEST(test_expected_bearing_is_the_papers) {
   wm::mounted_sensor m;
   m.init(sensor);
   const wm_pose2 pose = {1, 2, 0.7};
@@ -261,7 +261,7 @@ void test_expected_bearing_is_the_papers(void) {
 
 // ---- accuracy and self-calibration ----
 
-void test_it_tracks_and_its_covariance_is_honest(void) {
+TEST(test_it_tracks_and_its_covariance_is_honest) {
   begin();
   int inside = 0, steps = 0;
   for (int i = 0; i < 100; i++) {
@@ -278,7 +278,7 @@ void test_it_tracks_and_its_covariance_is_honest(void) {
   TEST_ASSERT_EQUAL_UINT32(1, estimate().resets);
 }
 
-void test_it_finds_every_error_of_its_sensors(void) {
+TEST(test_it_finds_every_error_of_its_sensors) {
   motion.states.sigma[0] = 0.1;
   motion.states.sigma[1] = 0.1;
   motion.states.sigma[2] = 0.05;
@@ -314,7 +314,7 @@ void test_it_finds_every_error_of_its_sensors(void) {
 }
 
 // A rotating laser whose angle encoder sits beside its axis.
-void test_an_eccentric_turntable_is_found(void) {
+TEST(test_an_eccentric_turntable_is_found) {
   make::sightings.states.sigma[WM_SENSOR_ROW_kEccentricX] = 0.05;
   fault.eccentric_x = 0.04;
   fault.eccentric_y = -0.03;
@@ -329,7 +329,7 @@ void test_an_eccentric_turntable_is_found(void) {
   }
 }
 
-void test_gnss_and_its_delay(void) {
+TEST(test_gnss_and_its_delay) {
   params.gnss.time_offset_sigma_s = 0.5;
   fault.gnss_delay_s = 0.3;
   begin();
@@ -339,7 +339,7 @@ void test_gnss_and_its_delay(void) {
 }
 
 // RTK is lost for ten seconds: the receiver falls back to a solution that is half a metre off, and states it.
-void test_positions_of_another_solution_have_an_error_of_their_own(void) {
+TEST(test_positions_of_another_solution_have_an_error_of_their_own) {
   params.gnss.correlated_m = -2;
   params.gnss.correlated_tau_s = 20;
   fault.gnss_sigma_m = 0.02;
@@ -356,7 +356,7 @@ void test_positions_of_another_solution_have_an_error_of_their_own(void) {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.05, std::sqrt(estimate().covariance[0]));
 }
 
-void test_misread_codes_are_rejected_and_do_no_harm(void) {
+TEST(test_misread_codes_are_rejected_and_do_no_harm) {
   fault.misread = 0.1;
   begin();
   TEST_ASSERT_INT_WITHIN(60, 1620, drive(60, kBearings | kRanges));  // 90 % of 1800
@@ -365,7 +365,7 @@ void test_misread_codes_are_rejected_and_do_no_harm(void) {
 }
 
 // GIVEN sightings without an identity WHEN one landmark fits THEN it is that one; WHEN two fit THEN none is.
-void test_nameless_sightings_are_of_the_one_that_fits(void) {
+TEST(test_nameless_sightings_are_of_the_one_that_fits) {
   fault.nameless = true;
   make::sightings.use_unidentified = 1;
   begin();
@@ -387,7 +387,7 @@ void test_nameless_sightings_are_of_the_one_that_fits(void) {
 
 // GIVEN one landmark whose place on the map is wrong WHEN it is seen again and again THEN the filter does not get surer
 // than the map.
-void test_a_maps_error_is_not_averaged_away(void) {
+TEST(test_a_maps_error_is_not_averaged_away) {
   landmarks[0].sigma_m = landmarks[3].sigma_m = landmarks[6].sigma_m = 0.2;
   params.landmarks.map_slots = 4;
   setup.landmark_count = 1;
@@ -405,7 +405,7 @@ void test_a_maps_error_is_not_averaged_away(void) {
 
 // ---- lost and found ----
 
-void test_given_a_wrong_start_when_landmarks_contradict_it_then_it_is_said_and_mended(void) {
+TEST(test_given_a_wrong_start_when_landmarks_contradict_it_then_it_is_said_and_mended) {
   setup.start.p_m[0] = -3;
   setup.start.p_m[1] = 2;
   setup.start.heading_rad = -1;
@@ -424,7 +424,7 @@ void test_given_a_wrong_start_when_landmarks_contradict_it_then_it_is_said_and_m
   TEST_ASSERT_LESS_THAN_DOUBLE(0.06, off());
 }
 
-void test_given_a_kidnapped_robot_when_it_sees_bearings_only_then_it_finds_itself(void) {
+TEST(test_given_a_kidnapped_robot_when_it_sees_bearings_only_then_it_finds_itself) {
   begin();
   drive(20, kBearings);
   TEST_ASSERT_LESS_THAN_DOUBLE(0.1, off());
@@ -436,7 +436,7 @@ void test_given_a_kidnapped_robot_when_it_sees_bearings_only_then_it_finds_itsel
   TEST_ASSERT_LESS_THAN_DOUBLE(0.05, heading_off());
 }
 
-void test_given_an_unknown_heading_when_landmarks_are_seen_then_it_is_found(void) {
+TEST(test_given_an_unknown_heading_when_landmarks_are_seen_then_it_is_found) {
   setup.start.heading_rad = NAN;
   begin();
   TEST_ASSERT_EQUAL(WM_STATE_SEARCHING, estimate().state);
@@ -446,7 +446,7 @@ void test_given_an_unknown_heading_when_landmarks_are_seen_then_it_is_found(void
   TEST_ASSERT_LESS_THAN_DOUBLE(0.05, heading_off());
 }
 
-void test_given_no_start_at_all_when_it_sees_then_it_knows(void) {
+TEST(test_given_no_start_at_all_when_it_sees_then_it_knows) {
   setup.start.p_m[0] = setup.start.p_m[1] = setup.start.heading_rad = NAN;
   begin();
   drive(1, kNothing);
@@ -456,7 +456,7 @@ void test_given_no_start_at_all_when_it_sees_then_it_knows(void) {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.1, off());
 }
 
-void test_given_no_start_when_positions_come_and_it_drives_then_its_heading_is_found(void) {
+TEST(test_given_no_start_when_positions_come_and_it_drives_then_its_heading_is_found) {
   setup.start.p_m[0] = setup.start.p_m[1] = setup.start.heading_rad = NAN;
   begin();
   drive(30, kPositions);
@@ -465,7 +465,7 @@ void test_given_no_start_when_positions_come_and_it_drives_then_its_heading_is_f
   TEST_ASSERT_LESS_THAN_DOUBLE(0.2, heading_off());
 }
 
-void test_given_silence_then_it_says_dead_reckoning_and_grows_unsure(void) {
+TEST(test_given_silence_then_it_says_dead_reckoning_and_grows_unsure) {
   begin();
   drive(10, kBearings | kRanges);
   const double before = estimate().covariance[0];
@@ -476,7 +476,7 @@ void test_given_silence_then_it_says_dead_reckoning_and_grows_unsure(void) {
   TEST_ASSERT_EQUAL(WM_STATE_TRACKING, estimate().state);
 }
 
-void test_set_pose_and_reset(void) {
+TEST(test_set_pose_and_reset) {
   begin();
   drive(3, kNothing);
   wm_innovation records[8];
@@ -494,7 +494,7 @@ void test_set_pose_and_reset(void) {
 
 // ---- refusals explain themselves ----
 
-void test_each_refusal_has_its_verdict(void) {
+TEST(test_each_refusal_has_its_verdict) {
   sensor.max_range_m = 10;
   begin();
   drive(1, kNothing);
@@ -519,7 +519,7 @@ void test_each_refusal_has_its_verdict(void) {
 }
 
 // Sixteen sensors, each with every error as a state, beside the largest pools of lent states.
-void test_sixteen_fully_calibrated_sensors(void) {
+TEST(test_sixteen_fully_calibrated_sensors) {
   static wm_sensor sensors[17];
   for (wm_sensor &s : sensors) s = sensor;
   make::sightings.correlated_slots = 24;
@@ -551,7 +551,7 @@ void test_sixteen_fully_calibrated_sensors(void) {
 }
 
 // A full row counts what it could not take; it must not write behind its end.
-void test_a_full_row_counts_what_is_missing(void) {
+TEST(test_a_full_row_counts_what_is_missing) {
   wm::jacobian_row<3> row;
   row.add(-1, 1.0);
   row.add(2, 0.0);
@@ -569,29 +569,3 @@ void setUp(void) {
   state = nullptr;
 }
 void tearDown(void) { free(state); }
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_expected_sighting_and_its_derivatives);
-  RUN_TEST(test_tilt_and_angle_scale);
-  RUN_TEST(test_expected_bearing_is_the_papers);
-  RUN_TEST(test_it_tracks_and_its_covariance_is_honest);
-  RUN_TEST(test_it_finds_every_error_of_its_sensors);
-  RUN_TEST(test_an_eccentric_turntable_is_found);
-  RUN_TEST(test_gnss_and_its_delay);
-  RUN_TEST(test_positions_of_another_solution_have_an_error_of_their_own);
-  RUN_TEST(test_misread_codes_are_rejected_and_do_no_harm);
-  RUN_TEST(test_nameless_sightings_are_of_the_one_that_fits);
-  RUN_TEST(test_a_maps_error_is_not_averaged_away);
-  RUN_TEST(test_given_a_wrong_start_when_landmarks_contradict_it_then_it_is_said_and_mended);
-  RUN_TEST(test_given_a_kidnapped_robot_when_it_sees_bearings_only_then_it_finds_itself);
-  RUN_TEST(test_given_an_unknown_heading_when_landmarks_are_seen_then_it_is_found);
-  RUN_TEST(test_given_no_start_at_all_when_it_sees_then_it_knows);
-  RUN_TEST(test_given_no_start_when_positions_come_and_it_drives_then_its_heading_is_found);
-  RUN_TEST(test_given_silence_then_it_says_dead_reckoning_and_grows_unsure);
-  RUN_TEST(test_set_pose_and_reset);
-  RUN_TEST(test_each_refusal_has_its_verdict);
-  RUN_TEST(test_sixteen_fully_calibrated_sensors);
-  RUN_TEST(test_a_full_row_counts_what_is_missing);
-  return UNITY_END();
-}

@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <cstring>
 
+#include "common/suite.h"
 #include "events.hpp"
 #include "filters/landmark_ekf/params.h"
 #include "filters/landmark_ekf/start_hypotheses.hpp"
@@ -13,7 +14,6 @@
 #include "math/elementary.hpp"
 #include "motion/motion_params.h"
 #include "sensors/sensor_model.hpp"
-#include "unity.h"
 #include "waymark/estimator.h"
 #include "waymark/random.h"
 
@@ -67,7 +67,7 @@ void stand(double from_s, double to_s) {
   }
 }
 
-void test_expected_elevation_and_its_derivatives(void) {
+TEST(test_expected_elevation_and_its_derivatives) {
   wm_sensor s = sensor;
   s.mounting = {{0.4, -0.2, 0.7}, {0.1, 0.35, 2.2}};
   wm::mounted_sensor m;
@@ -117,7 +117,7 @@ void test_expected_elevation_and_its_derivatives(void) {
 }
 
 // A ray as told and the same ray levelled; the way there and back.
-void test_a_ray_is_levelled(void) {
+TEST(test_a_ray_is_levelled) {
   wm_sensor s = sensor;
   s.mounting = {{0.4, -0.2, 0.7}, {0.1, -0.2, 1.2}};
   wm::mounted_sensor m;
@@ -147,7 +147,7 @@ void run_without(int use, bool told, wm_estimate *out) {
   *out = estimate();
 }
 
-void test_without_elevations_all_bits_are_as_without_the_parameter(void) {
+TEST(test_without_elevations_all_bits_are_as_without_the_parameter) {
   wm_estimate off, on, not_used, used;
   run_without(0, false, &off);
   run_without(1, false, &on);
@@ -158,7 +158,7 @@ void test_without_elevations_all_bits_are_as_without_the_parameter(void) {
   TEST_ASSERT_TRUE(std::memcmp(&off, &used, sizeof off) != 0);
 }
 
-void test_absurd_elevations_are_refused_and_told(void) {
+TEST(test_absurd_elevations_are_refused_and_told) {
   begin();
   stand(0, 1);
   const auto refused = [](double elevation_rad, double sigma_rad, wm_status status) {
@@ -183,7 +183,7 @@ void test_absurd_elevations_are_refused_and_told(void) {
   TEST_ASSERT_EQUAL(WM_REJECTED_GATE, records[1].verdict);
 }
 
-void test_where_a_height_is_not_known_there_is_no_elevation(void) {
+TEST(test_where_a_height_is_not_known_there_is_no_elevation) {
   begin();
   stand(0, 1);
   const wm_event e = seen(1, 0, 0.01);
@@ -195,7 +195,7 @@ void test_where_a_height_is_not_known_there_is_no_elevation(void) {
 
 // Straight ahead, 8 m away and 1.5 m up: it tells the distance, as well as the tilt allows, and no better for being
 // looked at a hundred times in two seconds: a robot that stands on a slope stands on it all the time.
-void test_it_tells_the_distance_and_not_more_than_the_tilt_allows(void) {
+TEST(test_it_tells_the_distance_and_not_more_than_the_tilt_allows) {
   setup.start.sigma_xy_m = 2.0;
   setup.start.p_m[0] = -1.0;
   begin();
@@ -214,7 +214,7 @@ void test_it_tells_the_distance_and_not_more_than_the_tilt_allows(void) {
 
 // Bearings of three landmarks fit some pose, as three always do, and those of two while driving: the pose is found with
 // heights that agree with it and without heights, but not with one that contradicts it.
-void test_a_contradicting_height_rejects_a_found_pose(void) {
+TEST(test_a_contradicting_height_rejects_a_found_pose) {
   static wm::pose_search search;
   const double place_m[3][2] = {{5.0, 3.0}, {7.0, -4.0}, {1.0, 6.0}};
   const auto found = [&](int count, double heights, double wrong_m) {
@@ -249,7 +249,7 @@ void test_a_contradicting_height_rejects_a_found_pose(void) {
 
 // Three landmarks ahead while the robot stands: a start that is half a metre short is explained by a heading and three
 // places that are a little off as well, but then all three hang too low.
-void test_heights_reject_a_wrong_start(void) {
+TEST(test_heights_reject_a_wrong_start) {
   static wm::pose_search observations;
   static wm::start_hypotheses start;
   const double place_m[3][2] = {{4.0, 1.0}, {5.0, -1.2}, {4.5, 0.2}};
@@ -305,17 +305,4 @@ void setUp(void) {
 void tearDown(void) {
   std::free(state);
   state = nullptr;
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_expected_elevation_and_its_derivatives);
-  RUN_TEST(test_a_ray_is_levelled);
-  RUN_TEST(test_without_elevations_all_bits_are_as_without_the_parameter);
-  RUN_TEST(test_absurd_elevations_are_refused_and_told);
-  RUN_TEST(test_where_a_height_is_not_known_there_is_no_elevation);
-  RUN_TEST(test_it_tells_the_distance_and_not_more_than_the_tilt_allows);
-  RUN_TEST(test_a_contradicting_height_rejects_a_found_pose);
-  RUN_TEST(test_heights_reject_a_wrong_start);
-  return UNITY_END();
 }

@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <cstring>
 
+#include "common/suite.h"
 #include "events.hpp"
 #include "filters/core/landmark_bias.hpp"
 #include "filters/core/landmark_evidence.hpp"
@@ -15,7 +16,6 @@
 #include "math/arc.hpp"
 #include "math/elementary.hpp"
 #include "motion/motion_params.h"
-#include "unity.h"
 #include "waymark/estimator.h"
 #include "waymark/random.h"
 
@@ -127,7 +127,7 @@ bool among(const wm_pose2 *poses, int count, const wm_pose2 &wanted) {
   return false;
 }
 
-void test_three_bearings_give_the_pose(void) {
+TEST(test_three_bearings_give_the_pose) {
   const wm_pose2 frame = {1.5, -2.0, 2.3};
   const wm_pose2 still[3] = {{0.4, 0.1, 0}, {0.4, 0.1, 0}, {0.4, 0.1, 0}};
   const wm_pose2 moving[3] = {{0, 0, 0}, {1.0, 0.2, 0.2}, {2.1, 0.6, 0.4}};
@@ -139,7 +139,7 @@ void test_three_bearings_give_the_pose(void) {
   TEST_ASSERT_TRUE(among(out, wm::resect(line, out), frame));
 }
 
-void test_bearings_that_say_nothing_give_no_pose(void) {
+TEST(test_bearings_that_say_nothing_give_no_pose) {
   wm::line_of_sight line[3] = {};
   wm_pose2 out[2];
   TEST_ASSERT_EQUAL(0, wm::resect(line, out));
@@ -153,7 +153,7 @@ void test_bearings_that_say_nothing_give_no_pose(void) {
 
 // GIVEN a landmark that contradicts WHEN it is seen again after 9 s, as likely here as anywhere THEN of the old
 // contradiction exp(-3) is left.
-void test_an_old_contradiction_is_forgotten(void) {
+TEST(test_an_old_contradiction_is_forgotten) {
   wm::landmark_evidence evidence;
   const double prior = -3.0;
   evidence.begin(prior);
@@ -167,7 +167,7 @@ void test_an_old_contradiction_is_forgotten(void) {
 
 // GIVEN positions that contradict the pose WHEN they do so for twenty seconds THEN that is no multipath, which passes
 // in five: they count more than the one wrong position in twenty by which a single one is explained.
-void test_positions_that_contradict_for_long_are_no_multipath(void) {
+TEST(test_positions_that_contradict_for_long_are_no_multipath) {
   wm::landmark_evidence evidence;
   const double prior = -3.0, by_multipath = std::log(1.0 / 0.05);
   evidence.begin(prior);
@@ -198,7 +198,7 @@ bool mean_contradicts(int off, int count, bool last = false, double sigmas = 2.0
 
 // The worst landmark may have moved, whichever it is; a second one whose innovations have a mean contradicts. Of one
 // alone nothing is left. What was tested before is of no effect.
-void test_the_worst_landmark_is_left_out(void) {
+TEST(test_the_worst_landmark_is_left_out) {
   for (int off = 0; off <= 3; off++)
     for (int count = 1; count <= 3; count++) {
       TEST_ASSERT_TRUE(mean_contradicts(5, 5, false, 3.0));
@@ -209,7 +209,7 @@ void test_the_worst_landmark_is_left_out(void) {
 
 // GIVEN three landmarks WHEN so many others come that there is no room for all THEN those not seen for longest make
 // room.
-void test_landmarks_not_seen_for_longest_make_room(void) {
+TEST(test_landmarks_not_seen_for_longest_make_room) {
   const int old = 3;
   for (const int later : {WM_MONITOR_LANDMARKS - 3, WM_MONITOR_LANDMARKS - 2, WM_MONITOR_LANDMARKS}) {
     wm_monitor_landmarks seen;
@@ -230,7 +230,7 @@ void test_landmarks_not_seen_for_longest_make_room(void) {
   }
 }
 
-void test_one_that_contradicts_has_moved_and_many_mean_lost(void) {
+TEST(test_one_that_contradicts_has_moved_and_many_mean_lost) {
   wm::landmark_record record[kLandmarks] = {};
   wm::landmark_evidence w;
   std::memset(static_cast<void *>(&w), 0, sizeof w);
@@ -255,7 +255,7 @@ void test_one_that_contradicts_has_moved_and_many_mean_lost(void) {
 
 // Of two landmarks one fits and one doesn't, again and again: whoever stated the pose is as likely to be right as the
 // map and the picture. Two that don't fit are enough.
-void test_one_against_one_is_doubt_not_lost(void) {
+TEST(test_one_against_one_is_doubt_not_lost) {
   const double fits = wm::landmark_evidence::log_bayes_factor(20.0, wm::kTwoPi),
                contradicts = wm::landmark_evidence::max_log_bayes_factor();
   for (const int wrong : {1, 2}) {
@@ -274,7 +274,7 @@ void test_one_against_one_is_doubt_not_lost(void) {
 
 // Detections of nothing, 30 degrees apart, of three landmarks out of view, while one in view fits: not lost. The same
 // misfits all in one place: lost, whatever the one that fits says.
-void test_misfits_that_scatter_say_nothing_those_in_one_place_do(void) {
+TEST(test_misfits_that_scatter_say_nothing_those_in_one_place_do) {
   const double fits = wm::landmark_evidence::log_bayes_factor(20.0, wm::kTwoPi),
                contradicts = wm::landmark_evidence::max_log_bayes_factor();
   for (const bool scattered : {true, false}) {
@@ -297,7 +297,7 @@ void test_misfits_that_scatter_say_nothing_those_in_one_place_do(void) {
 
 // ---- the whole filter ----
 
-void test_started_without_a_pose_three_bearings_are_enough(void) {
+TEST(test_started_without_a_pose_three_bearings_are_enough) {
   begin_without_pose();
   TEST_ASSERT_EQUAL_DOUBLE(1.0, estimate().lost_probability);
   TEST_ASSERT_EQUAL(0, counter(WM_COUNTER_RELOCALIZATIONS).count);
@@ -308,7 +308,7 @@ void test_started_without_a_pose_three_bearings_are_enough(void) {
 }
 
 // The three landmarks that are seen at first make a pose, and one of them has moved: the next ones tell which.
-void test_a_pose_found_by_a_moved_landmark_is_mended(void) {
+TEST(test_a_pose_found_by_a_moved_landmark_is_mended) {
   begin_without_pose();
   stands_m[2][0] += 1.5;
   stands_m[2][1] -= 1.5;
@@ -326,7 +326,7 @@ void test_a_pose_found_by_a_moved_landmark_is_mended(void) {
 
 // Driving by one landmark something is taken for another one once: a pose that fits both is found, and not believed.
 // Seen from two places it is.
-void test_a_second_landmark_seen_from_one_place_alone_is_not_enough(void) {
+TEST(test_a_second_landmark_seen_from_one_place_alone_is_not_enough) {
   static wm::pose_search search;
   search.clear();
   const double place_m[2][2] = {{5.0, 3.0}, {7.0, -4.0}};
@@ -354,7 +354,7 @@ void test_a_second_landmark_seen_from_one_place_alone_is_not_enough(void) {
 
 // A vague pose is searched for, by what is known of it. One set anew is another pose: what was known before does not
 // count.
-void test_a_vague_pose_set_anew_is_searched_anew(void) {
+TEST(test_a_vague_pose_set_anew_is_searched_anew) {
   setup.start.sigma_heading_rad = 1.0;
   begin();
   const auto verdict_of_a_sighting = [] {
@@ -378,14 +378,14 @@ void test_a_vague_pose_set_anew_is_searched_anew(void) {
   TEST_ASSERT_EQUAL(WM_REJECTED_SEARCHING, verdict_of_a_sighting());
 }
 
-void test_two_landmarks_and_driving_are_enough(void) {
+TEST(test_two_landmarks_and_driving_are_enough) {
   begin_without_pose();
   drive(20, 2);
   TEST_ASSERT_EQUAL(WM_STATE_TRACKING, estimate().state);
   TEST_ASSERT_LESS_THAN_DOUBLE(0.5, off());
 }
 
-void test_a_known_place_and_an_unknown_heading(void) {
+TEST(test_a_known_place_and_an_unknown_heading) {
   setup.start.heading_rad = NAN;
   begin();
   drive(3, 1);
@@ -394,7 +394,7 @@ void test_a_known_place_and_an_unknown_heading(void) {
 }
 
 // Off by twenty of its sigmas: told within half a second, mended, and forgotten.
-void test_a_start_that_is_surer_than_right_is_told_and_mended(void) {
+TEST(test_a_start_that_is_surer_than_right_is_told_and_mended) {
   setup.start.p_m[0] += 0.8;
   setup.start.p_m[1] += 0.6;
   begin();
@@ -410,7 +410,7 @@ void test_a_start_that_is_surer_than_right_is_told_and_mended(void) {
 }
 
 // What is seen of two landmarks fits many places: a good start is not given up for one of them.
-void test_a_good_start_is_kept(void) {
+TEST(test_a_good_start_is_kept) {
   for (const int seen : {2, kLandmarks}) {
     setUp();
     begin();
@@ -422,12 +422,12 @@ void test_a_good_start_is_kept(void) {
   }
 }
 
-void test_all_identities_wrong(void) {
+TEST(test_all_identities_wrong) {
   begin_without_pose();
   drive(20, kLandmarks, sees::wrong_identities);
 }
 
-void test_bearings_that_are_no_numbers(void) {
+TEST(test_bearings_that_are_no_numbers) {
   begin_without_pose();
   drive(5, kLandmarks, sees::no_numbers);
   TEST_ASSERT_EQUAL(WM_STATE_SEARCHING, estimate().state);
@@ -436,13 +436,13 @@ void test_bearings_that_are_no_numbers(void) {
 }
 
 // In a line, and the robot in it at the start: its mirror image sees the same of them but for the order.
-void test_landmarks_in_a_line(void) {
+TEST(test_landmarks_in_a_line) {
   for (int i = 0; i < kLandmarks; i++) landmarks[i].p_m[0] = 4.0 * i - 6.0, landmarks[i].p_m[1] = 0.0;
   begin_without_pose();
   drive(15, kLandmarks);
 }
 
-void test_a_landmark_on_top_of_the_robot(void) {
+TEST(test_a_landmark_on_top_of_the_robot) {
   landmarks[0].p_m[0] = truth.x_m;
   landmarks[0].p_m[1] = truth.y_m;
   begin();
@@ -450,7 +450,7 @@ void test_a_landmark_on_top_of_the_robot(void) {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.3, off());
 }
 
-void test_landmarks_all_in_one_place(void) {
+TEST(test_landmarks_all_in_one_place) {
   for (wm_landmark &l : landmarks) l.p_m[0] = 5.0, l.p_m[1] = 5.0;
   begin_without_pose();
   drive(15, kLandmarks);
@@ -458,7 +458,7 @@ void test_landmarks_all_in_one_place(void) {
 
 // A camera that finds little: each landmark is seen once a second. What fitted before it was carried off has no weight,
 // as another pose explains all that is seen since.
-void test_carried_off_it_says_so_though_little_is_seen(void) {
+TEST(test_carried_off_it_says_so_though_little_is_seen) {
   in_turn = 10;
   begin();
   drive(10, kLandmarks);
@@ -473,7 +473,7 @@ void test_carried_off_it_says_so_though_little_is_seen(void) {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.3, off());
 }
 
-void test_a_moved_landmark_is_told_and_does_no_harm(void) {
+TEST(test_a_moved_landmark_is_told_and_does_no_harm) {
   begin();
   drive(3, kLandmarks);
   stands_m[2][0] += 3.0;
@@ -503,32 +503,3 @@ void setUp(void) {
   state = nullptr;
 }
 void tearDown(void) { free(state); }
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_three_bearings_give_the_pose);
-  RUN_TEST(test_bearings_that_say_nothing_give_no_pose);
-  RUN_TEST(test_an_old_contradiction_is_forgotten);
-  RUN_TEST(test_positions_that_contradict_for_long_are_no_multipath);
-  RUN_TEST(test_the_worst_landmark_is_left_out);
-  RUN_TEST(test_landmarks_not_seen_for_longest_make_room);
-  RUN_TEST(test_one_that_contradicts_has_moved_and_many_mean_lost);
-  RUN_TEST(test_one_against_one_is_doubt_not_lost);
-  RUN_TEST(test_misfits_that_scatter_say_nothing_those_in_one_place_do);
-  RUN_TEST(test_started_without_a_pose_three_bearings_are_enough);
-  RUN_TEST(test_a_pose_found_by_a_moved_landmark_is_mended);
-  RUN_TEST(test_a_second_landmark_seen_from_one_place_alone_is_not_enough);
-  RUN_TEST(test_a_vague_pose_set_anew_is_searched_anew);
-  RUN_TEST(test_two_landmarks_and_driving_are_enough);
-  RUN_TEST(test_a_known_place_and_an_unknown_heading);
-  RUN_TEST(test_a_start_that_is_surer_than_right_is_told_and_mended);
-  RUN_TEST(test_a_good_start_is_kept);
-  RUN_TEST(test_all_identities_wrong);
-  RUN_TEST(test_bearings_that_are_no_numbers);
-  RUN_TEST(test_landmarks_in_a_line);
-  RUN_TEST(test_a_landmark_on_top_of_the_robot);
-  RUN_TEST(test_landmarks_all_in_one_place);
-  RUN_TEST(test_carried_off_it_says_so_though_little_is_seen);
-  RUN_TEST(test_a_moved_landmark_is_told_and_does_no_harm);
-  return UNITY_END();
-}

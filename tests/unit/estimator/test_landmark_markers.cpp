@@ -5,8 +5,8 @@
 #include <numbers>
 #include <tuple>
 
+#include "common/suite.h"
 #include "events.hpp"
-#include "unity.h"
 
 namespace {
 
@@ -40,7 +40,7 @@ struct Filter {
 };
 
 // The same pose as by its bearing and range, where its own noise is far below the sensor's.
-void test_a_marker_is_a_landmark(void) {
+TEST(test_a_marker_is_a_landmark) {
   Filter by_marker, by_sighting;
   TEST_ASSERT_EQUAL(WM_OK, by_marker.correct(marker(2.0, 1.0)));
   TEST_ASSERT_EQUAL(WM_OK,
@@ -56,7 +56,7 @@ void test_a_marker_is_a_landmark(void) {
 }
 
 // A camera that looks straight up: its x axis is the vertical, and the marker hangs 2 m above it.
-void test_a_marker_on_the_ceiling(void) {
+TEST(test_a_marker_on_the_ceiling) {
   sensor.mounting.rpy_rad[1] = -std::numbers::pi / 2;
   landmark.p_m[2] = 2.0;
   Filter filter;
@@ -73,7 +73,7 @@ void test_a_marker_on_the_ceiling(void) {
 
 // Nothing is known of the start. Three markers at a height of 2 m, whose slant ranges are up to twice the horizontal
 // ones.
-void test_a_pose_is_found_below_a_ceiling(void) {
+TEST(test_a_pose_is_found_below_a_ceiling) {
   wm_landmark ceiling[3] = {landmark, landmark, landmark};
   const double places[3][2] = {{3, 3}, {1, 4}, {2.5, 1}};
   for (int i = 0; i < 3; i++)
@@ -100,7 +100,7 @@ void test_a_pose_is_found_below_a_ceiling(void) {
 
 // Seen where it is expected, but turned by 0.04 rad: so is the robot, the other way. Its heading was known to 0.05 rad,
 // and is by the marker to 0.01 with the marker's own 0.01 on the map.
-void test_a_markers_heading_is_fused(void) {
+TEST(test_a_markers_heading_is_fused) {
   landmark = {100, {2.0, 1.0, 0}, 0.001, 1.0, {}, 0.01};
   params.markers.heading_sigma_rad = 0.01;
   setup.start.sigma_xy_m = 1e-4;
@@ -124,7 +124,7 @@ void test_a_markers_heading_is_fused(void) {
 }
 
 // Each view of one marker has the same error on the map: a hundred of them know the heading no better than that.
-void test_a_markers_direction_on_the_map_is_one_error(void) {
+TEST(test_a_markers_direction_on_the_map_is_one_error) {
   landmark = {100, {2.0, 1.0, 0}, 0.001, 1.0, {}, 0.02};
   setup.start.sigma_xy_m = 1e-4;
   sensor.bearing_sigma_rad = sensor.range_sigma_m = 1.0;
@@ -146,7 +146,7 @@ void test_a_markers_direction_on_the_map_is_one_error(void) {
 }
 
 // Where the map states no direction, and where the detector's is too vague, the place alone counts.
-void test_a_heading_that_says_nothing_is_left_out(void) {
+TEST(test_a_heading_that_says_nothing_is_left_out) {
   {
     Filter filter;
     TEST_ASSERT_EQUAL(WM_OK, filter.correct(marker(2.05, 1.02)));
@@ -162,7 +162,7 @@ void test_a_heading_that_says_nothing_is_left_out(void) {
 }
 
 // Two poses fit its corners: the one that fits the map counts, and neither where the map can't tell.
-void test_the_pose_of_two_that_fits_the_map(void) {
+TEST(test_the_pose_of_two_that_fits_the_map) {
   landmark.yaw_rad = 0.5;
   for (const auto &[first, second, rows] : {std::tuple{0.1, 0.5, 3}, {0.5, 0.1, 3}, {0.48, 0.52, 2}}) {
     Filter filter;
@@ -180,7 +180,7 @@ void test_the_pose_of_two_that_fits_the_map(void) {
 
 // Nothing is known of the start, and the robot stands: one marker tells the whole pose, where its direction is on the
 // map, and only a circle around it where it is not.
-void test_one_marker_finds_a_lost_robot(void) {
+TEST(test_one_marker_finds_a_lost_robot) {
   setup.start = {WM_TIME_NONE, {NAN, NAN, NAN}, {NAN, NAN, NAN, NAN}, NAN, NAN, NAN};
   const double heading = 2.0, x = 1.5, y = -0.5;
   for (double yaw : {2.8, (double)NAN}) {
@@ -207,7 +207,7 @@ void test_one_marker_finds_a_lost_robot(void) {
 }
 
 // Five markers fit for ten seconds. Then somebody turns one by 1 rad: it contradicts for a minute, and the pose stays.
-void test_a_turned_marker_moves_no_robot(void) {
+TEST(test_a_turned_marker_moves_no_robot) {
   const double places[5][2] = {{2.05, 1.02}, {3.0, -1.0}, {1.5, -2.0}, {-2.0, 0.5}, {0.5, 3.0}};
   wm_landmark five[5];
   for (int i = 0; i < 5; i++) {
@@ -234,7 +234,7 @@ void test_a_turned_marker_moves_no_robot(void) {
   TEST_ASSERT_DOUBLE_WITHIN(0.1, 0.0, e.pose_map_base.p_m[0]);
 }
 
-void test_bad_markers_are_refused(void) {
+TEST(test_bad_markers_are_refused) {
   Filter filter;
   TEST_ASSERT_EQUAL(WM_NOT_FINITE, filter.correct(marker(NAN, 1.0)));
   TEST_ASSERT_EQUAL(WM_OUT_OF_RANGE, filter.correct(marker(2.0, 1.0, 99)));
@@ -253,20 +253,4 @@ void setUp(void) {
   setup.landmarks = &landmark;
   setup.landmark_count = 1;
   setup.start = {WM_TIME_NONE, {0, 0, 0}, {0, 0, 0, 1}, 0.0, 0.05, 0.05};
-}
-void tearDown(void) {}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_a_marker_is_a_landmark);
-  RUN_TEST(test_a_marker_on_the_ceiling);
-  RUN_TEST(test_a_pose_is_found_below_a_ceiling);
-  RUN_TEST(test_a_markers_heading_is_fused);
-  RUN_TEST(test_a_markers_direction_on_the_map_is_one_error);
-  RUN_TEST(test_a_heading_that_says_nothing_is_left_out);
-  RUN_TEST(test_the_pose_of_two_that_fits_the_map);
-  RUN_TEST(test_one_marker_finds_a_lost_robot);
-  RUN_TEST(test_a_turned_marker_moves_no_robot);
-  RUN_TEST(test_bad_markers_are_refused);
-  return UNITY_END();
 }

@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
+#include "common/suite.h"
 #include "events.hpp"
 #include "math/arc.hpp"
-#include "unity.h"
 #include "waymark/random.h"
 
 namespace {
@@ -81,7 +81,7 @@ double drive_among(int count) {
   return sum;
 }
 
-void test_more_landmarks_than_slots_are_no_more_certain_than_their_map() {
+TEST(test_more_landmarks_than_slots_are_no_more_certain_than_their_map) {
   for (const int count : {12, 30}) {
     const double nees = drive_among(count);
     char text[64];
@@ -92,7 +92,7 @@ void test_more_landmarks_than_slots_are_no_more_certain_than_their_map() {
 }
 
 // Wheels whose radii differ by 1 %: on a straight the counts turn, and the robot doesn't.
-void test_a_straight_is_no_evidence_of_the_sign_of_a_turn() {
+TEST(test_a_straight_is_no_evidence_of_the_sign_of_a_turn) {
   wm_params_defaults(&wm_motion_params_table, &motion);
   wm_params_defaults(&wm_sighting_params_table, &make::sightings);
   wm_params_defaults(&wm_landmark_ekf_params_table, &params);
@@ -128,10 +128,3 @@ void setUp(void) {
   setup.start = {WM_TIME_NONE, {0, 0, 0}, {0, 0, 0, 1}, 0.0, 0.5, 0.05};
 }
 void tearDown(void) { state.reset(); }
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_more_landmarks_than_slots_are_no_more_certain_than_their_map);
-  RUN_TEST(test_a_straight_is_no_evidence_of_the_sign_of_a_turn);
-  return UNITY_END();
-}

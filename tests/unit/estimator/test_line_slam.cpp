@@ -8,12 +8,12 @@
 #include <initializer_list>
 #include <limits>
 
+#include "common/suite.h"
 #include "events.hpp"
 #include "filters/slam/params.h"
 #include "math/arc.hpp"
 #include "motion/motion_params.h"
 #include "sensors/sighting.hpp"
-#include "unity.h"
 #include "waymark/estimator.h"
 #include "waymark/random.h"
 
@@ -174,7 +174,7 @@ outcome drive(double seconds, int lies_of_ten) {
   return out;
 }
 
-void test_honest_sightings(void) {
+TEST(test_honest_sightings) {
   for (int method : {WM_SLAM_LINE_UNSCENTED, WM_SLAM_LINE_INVERSE_DISTANCE}) {
     begin(method);
     const outcome o = drive(50, 0);
@@ -184,7 +184,7 @@ void test_honest_sightings(void) {
   }
 }
 
-void test_six_of_ten_are_lies(void) {
+TEST(test_six_of_ten_are_lies) {
   for (int method : {WM_SLAM_LINE_UNSCENTED, WM_SLAM_LINE_INVERSE_DISTANCE}) {
     begin(method);
     const outcome o = drive(50, 6);
@@ -199,7 +199,7 @@ void test_six_of_ten_are_lies(void) {
 
 // GIVEN lines that are all lost at times and come back under other numbers THEN the map does not double; but lines that
 // stand beside the lost ones are others.
-void test_lost_lines_are_found_again(void) {
+TEST(test_lost_lines_are_found_again) {
   for (int method : {WM_SLAM_LINE_UNSCENTED, WM_SLAM_LINE_INVERSE_DISTANCE}) {
     for (bool rejoin : {false, true}) {
       begin(method, rejoin);
@@ -221,7 +221,7 @@ void test_lost_lines_are_found_again(void) {
 
 // GIVEN more lines in view than rays (as in a hall after the lights failed: all are new) THEN those that have a ray
 // keep it until they are places, and the others follow: all lines come onto the map.
-void test_more_lines_than_rays(void) {
+TEST(test_more_lines_than_rays) {
   begin(WM_SLAM_LINE_INVERSE_DISTANCE, false, kLines / 2);
   shuffle = 7;
   const outcome o = drive(50, 0);
@@ -232,7 +232,7 @@ void test_more_lines_than_rays(void) {
 
 // GIVEN wheel counts whose stamps scatter and which are 15 ms old at each picture WHEN the robot turns to and fro THEN
 // the offset of the camera's clock is not that age.
-void test_the_time_offset_is_not_the_counts_age(void) {
+TEST(test_the_time_offset_is_not_the_counts_age) {
   constexpr double kTrack_m = 0.44, kPerTick_m = wm::kTwoPi * 0.1 / 2048;
   double offset_s = 0.0;
   for (uint64_t trial = 0; trial < 4; trial++) {
@@ -265,7 +265,7 @@ void test_the_time_offset_is_not_the_counts_age(void) {
 
 // GIVEN bearings that state the sigma of one picture, while an edge is found beside its place for two seconds THEN it
 // is no noise of single pictures: few are refused, and the pose is right (240 of 16000 and 0.13 m without).
-void test_errors_that_last_though_a_sigma_is_stated(void) {
+TEST(test_errors_that_last_though_a_sigma_is_stated) {
   for (int method : {WM_SLAM_LINE_UNSCENTED, WM_SLAM_LINE_INVERSE_DISTANCE}) {
     begin(method, false, 24, false, true);
     lasting_rad = kSigma;
@@ -278,7 +278,7 @@ void test_errors_that_last_though_a_sigma_is_stated(void) {
 
 // A bearing's error that lasts: by default as large as its sigma and a landmark's breadth at that distance. An edge
 // that states its sigma has no breadth; where a motion with covariances and ranges state all errors, there is none.
-void test_the_error_that_lasts_of_a_bearing(void) {
+TEST(test_the_error_that_lasts_of_a_bearing) {
   wm_sighting_params p;
   wm_params_defaults(&wm_sighting_params_table, &p);
   wm::sighting_reading r{};
@@ -302,7 +302,7 @@ double counted(wm_counter_kind kind) {
 
 // GIVEN lines that are well known WHEN the robot is turned, and no wheel tells THEN a second later it knows, and the
 // lines stay where they are.
-void test_a_robot_that_is_turned_by_hand_keeps_its_map(void) {
+TEST(test_a_robot_that_is_turned_by_hand_keeps_its_map) {
   for (int method : {WM_SLAM_LINE_UNSCENTED, WM_SLAM_LINE_INVERSE_DISTANCE}) {
     begin(method);
     jolt_rad = 0.12;
@@ -318,19 +318,4 @@ void test_a_robot_that_is_turned_by_hand_keeps_its_map(void) {
 
 }  // namespace
 
-void setUp(void) {}
-void tearDown(void) {}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_honest_sightings);
-  RUN_TEST(test_six_of_ten_are_lies);
-  RUN_TEST(test_lost_lines_are_found_again);
-  RUN_TEST(test_more_lines_than_rays);
-  RUN_TEST(test_errors_that_last_though_a_sigma_is_stated);
-  RUN_TEST(test_the_error_that_lasts_of_a_bearing);
-  RUN_TEST(test_the_time_offset_is_not_the_counts_age);
-  RUN_TEST(test_a_robot_that_is_turned_by_hand_keeps_its_map);
-  std::free(state);
-  return UNITY_END();
-}
+void suite_end() { std::free(state); }

@@ -8,9 +8,9 @@
 #include <cstdio>
 #include <initializer_list>
 
+#include "common/suite.h"
 #include "filters/slam/bearing_tracks.hpp"
 #include "math/elementary.hpp"
-#include "unity.h"
 #include "waymark/random.h"
 
 namespace {
@@ -78,7 +78,7 @@ void judge(const wm::line_bundle &b, const wm::line_landmark &l, const double pl
       0.5 * (p[1][1] * dx * dx - 2.0 * p[0][1] * dx * dy + p[0][0] * dy * dy) / (p[0][0] * p[1][1] - p[0][1] * p[0][1]);
 }
 
-void test_the_unscented_start_is_not_worse_than_the_linear_one(void) {
+TEST(test_the_unscented_start_is_not_worse_than_the_linear_one) {
   std::printf("parallax  tried  unscented: error  NEES/dof  time us   linear: error  NEES/dof  time us\n");
   for (double parallax : {2.0, 5.0, 10.0, 20.0}) {
     const double distance = 0.5 / std::tan(0.5 * parallax * kDeg);
@@ -116,7 +116,7 @@ void test_the_unscented_start_is_not_worse_than_the_linear_one(void) {
 
 // The derivatives by the poses against differences, and the covariance against their sum with the azimuths' noise: of a
 // bundle without errors, whose weights then do not matter. Both methods.
-void test_the_derivatives_are_those_of_differences(void) {
+TEST(test_the_derivatives_are_those_of_differences) {
   double place[2] = {4.0, 1.5};
   wm::line_bundle b{};
   b.count = kPoses;
@@ -170,7 +170,7 @@ void test_the_derivatives_are_those_of_differences(void) {
 }
 
 // A place behind one of the poses solves the equations and is none.
-void test_a_place_behind_a_pose_is_none(void) {
+TEST(test_a_place_behind_a_pose_is_none) {
   double place[2];
   wm::line_bundle b = draw(2.0, 1, place);
   TEST_ASSERT_TRUE(wm::find_line(b, true).solved);
@@ -179,14 +179,3 @@ void test_a_place_behind_a_pose_is_none(void) {
 }
 
 }  // namespace
-
-void setUp(void) {}
-void tearDown(void) {}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_the_unscented_start_is_not_worse_than_the_linear_one);
-  RUN_TEST(test_the_derivatives_are_those_of_differences);
-  RUN_TEST(test_a_place_behind_a_pose_is_none);
-  return UNITY_END();
-}

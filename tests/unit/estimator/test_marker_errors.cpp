@@ -4,12 +4,12 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "common/suite.h"
 #include "events.hpp"
 #include "filters/slam/params.h"
 #include "math/arc.hpp"
 #include "math/elementary.hpp"
 #include "motion/motion_params.h"
-#include "unity.h"
 #include "waymark/estimator.h"
 #include "waymark/random.h"
 
@@ -83,7 +83,7 @@ double mean_nees() {
   return sum;
 }
 
-void test_errors_that_last_are_not_averaged_away(void) {
+TEST(test_errors_that_last_are_not_averaged_away) {
   TEST_ASSERT_GREATER_THAN_DOUBLE(5.0, mean_nees());
   params.marker_correlated = kLasts_rad / std::sqrt(kFresh_rad * kFresh_rad + kLasts_rad * kLasts_rad);
   make::sightings.correlated_slots = 8;
@@ -105,12 +105,4 @@ void setUp(void) {
   sensor = make::sensor("camera", NAN, NAN);
   setup = make::setup(motion, sensor);
   setup.start = {WM_TIME_NONE, {2, 0, 0}, {0, 0, 0, 1}, wm::kHalfPi, 0.001, 0.001};
-}
-
-void tearDown(void) {}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_errors_that_last_are_not_averaged_away);
-  return UNITY_END();
 }

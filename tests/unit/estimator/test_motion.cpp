@@ -2,6 +2,7 @@
 // The motion front end: models and their derivatives, ticks as positions, signs by the gear, standstill, dead sensors.
 #include <cstring>
 #include <initializer_list>
+#include "common/suite.h"
 
 #include "motion_fixture.hpp"
 
@@ -14,7 +15,7 @@ void ticks(double t_s, double left, double right) {
 constexpr double kTick = 2 * M_PI * 0.1 / 1000;  // of make::two_wheels()
 
 // Each model, each calibration state: derivative by central differences, and scales' meaning at a turn.
-void test_every_derivative_of_every_model(void) {
+TEST(test_every_derivative_of_every_model) {
   const int kCommand = -1;
   const int models[] = {WM_MOTION_TICKS, WM_MOTION_SPEED_YAW_RATE, WM_MOTION_ACKERMANN,
                         WM_MOTION_TWIST, WM_MOTION_INCREMENTS,     kCommand};
@@ -53,13 +54,13 @@ void test_every_derivative_of_every_model(void) {
   TEST_ASSERT_EQUAL(4 + 5 + 3 + 8 + 5 + 12, checked);
 }
 
-void test_a_derivative_without_room_is_counted(void) {
+TEST(test_a_derivative_without_room_is_counted) {
   wm::motion_twist t{};
   while (t.missing < 2 && t.count + t.missing < 100) t.add(0, 1.0, 2.0);
   TEST_ASSERT_EQUAL(wm::motion_twist::kMax + 2, t.count + t.missing);
 }
 
-void test_ticks_make_exact_arcs(void) {
+TEST(test_ticks_make_exact_arcs) {
   start(make::two_wheels());
   ticks(0, 0, 0);
   ticks(1, 1000, 2000);  // a radius of 0.75 m
@@ -72,7 +73,7 @@ void test_ticks_make_exact_arcs(void) {
 }
 
 // GIVEN an observation between two counts WHEN the speed changes meanwhile THEN the total is that of the counts.
-void test_counts_are_positions_whatever_comes_between(void) {
+TEST(test_counts_are_positions_whatever_comes_between) {
   start(make::two_wheels());
   ticks(0, 0, 0);
   ticks(1, 1000, 1000);
@@ -90,7 +91,7 @@ void test_counts_are_positions_whatever_comes_between(void) {
 // GIVEN counts each 20 ms, of wheels that jerk WHEN another event's stamp lies two nanoseconds before one of them THEN
 // the way's 3 mm that the count still brings, at a million metres a second, leave the robot as sure of where it is
 // sideways.
-void test_a_count_right_behind_another_event_is_no_doubt(void) {
+TEST(test_a_count_right_behind_another_event_is_no_doubt) {
   double plain = 0.0;
   for (bool behind : {false, true}) {
     start(make::two_wheels());
@@ -109,7 +110,7 @@ void test_a_count_right_behind_another_event_is_no_doubt(void) {
 
 // GIVEN counts each 20 ms WHEN one is late and the next comes right behind it THEN the speed between their stamps (50
 // m/s, 400 m/s) is not carried on, and no way is lost.
-void test_a_late_count_and_the_next_right_behind_it(void) {
+TEST(test_a_late_count_and_the_next_right_behind_it) {
   for (const double behind_s : {0.0012, 0.00015}) {
     start(make::two_wheels());
     const double each = 0.06 / kTick;  // 3 m/s
@@ -124,7 +125,7 @@ void test_a_late_count_and_the_next_right_behind_it(void) {
   }
 }
 
-void test_counts_of_both_wheels_may_come_one_after_the_other(void) {
+TEST(test_counts_of_both_wheels_may_come_one_after_the_other) {
   start(make::two_wheels());
   for (int i = 0; i <= 100; i++) {
     feed(make::quantities(0.01 * i, {{WM_Q_WHEEL_TICKS_LEFT, 10.0 * i}}));
@@ -135,7 +136,7 @@ void test_counts_of_both_wheels_may_come_one_after_the_other(void) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 200 * kTick / 0.5, pose.heading_rad);
 }
 
-void test_an_unsigned_speed_takes_its_sign_from_the_gear(void) {
+TEST(test_an_unsigned_speed_takes_its_sign_from_the_gear) {
   start(make::car());
   feed(make::quantities(0, {{WM_Q_GEAR, -1}, {WM_Q_VEHICLE_SPEED, 1.0}, {WM_Q_YAW_RATE, 0.0}}));
   feed(make::quantities(1, {{WM_Q_VEHICLE_SPEED, 1.0}, {WM_Q_YAW_RATE, 0.0}}));
@@ -149,7 +150,7 @@ void test_an_unsigned_speed_takes_its_sign_from_the_gear(void) {
 }
 
 // A sensor's zero error, of either sign, is no sign of its own: the gear still gives it. Beyond it, it is.
-void test_a_zero_error_is_no_sign(void) {
+TEST(test_a_zero_error_is_no_sign) {
   for (const double zero_mps : {0.05, -0.05, -0.2}) {
     start(make::car());
     feed(make::quantities(0, {{WM_Q_GEAR, 1}, {WM_Q_VEHICLE_SPEED, zero_mps}, {WM_Q_YAW_RATE, 0.0}}));
@@ -159,7 +160,7 @@ void test_a_zero_error_is_no_sign(void) {
 }
 
 // Noise of the steering angle alone: the variance of the turn is that of the derivative by the angle.
-void test_steering_noise_by_the_angles_derivative(void) {
+TEST(test_steering_noise_by_the_angles_derivative) {
   start(make::car());
   params.noise_speed_mps = params.noise_speed_rel = params.noise_yaw_rate_radps = params.noise_yaw_rate_rel = 0;
   const double angle = 0.6, h = 1e-6;
@@ -170,7 +171,7 @@ void test_steering_noise_by_the_angles_derivative(void) {
                             turn_var);
 }
 
-void test_rear_wheels_are_preferred_and_a_silent_source_yields(void) {
+TEST(test_rear_wheels_are_preferred_and_a_silent_source_yields) {
   start(make::car());
   feed(make::quantities(0, {{WM_Q_VEHICLE_SPEED, 1.0}, {WM_Q_YAW_RATE, 0.0}}));
   TEST_ASSERT_FALSE(front.speed_source_changed());
@@ -186,7 +187,7 @@ void test_rear_wheels_are_preferred_and_a_silent_source_yields(void) {
 
 // A speed that is overdue holds, and its way's variance is that of a robot that may have braked, however often it is
 // asked. A source that is slow by habit is not overdue.
-void test_a_held_speed_is_doubted_more_and_more(void) {
+TEST(test_a_held_speed_is_doubted_more_and_more) {
   double grown[2];
   for (int steps : {1, 7}) {
     start(make::car());
@@ -209,7 +210,7 @@ void test_a_held_speed_is_doubted_more_and_more(void) {
 
 // A sampled speed changed at any time since the sample before it; counts are of the whole time, a command is obeyed
 // from its stamp on.
-void test_a_change_between_samples_is_noise_of_its_moment(void) {
+TEST(test_a_change_between_samples_is_noise_of_its_moment) {
   for (const int model : {WM_MOTION_SPEED_YAW_RATE, WM_MOTION_TWIST}) {
     start(make::car(), model);
     params.noise_speed_mps = params.noise_speed_rel = params.noise_yaw_rate_radps = params.noise_yaw_rate_rel = 0;
@@ -252,7 +253,7 @@ void drive_a_second(int model) {
 
 // A second of silence. Nobody looked meanwhile: the counts bring all of the way at its end; only the gyro's turn is
 // unknown. The pose went through it without them, corrected by what was seen: they don't move it once more.
-void test_counts_after_a_silence(void) {
+TEST(test_counts_after_a_silence) {
   for (int model : {WM_MOTION_TICKS, WM_MOTION_SPEED_YAW_RATE})
     for (int looked = 0; looked < 2; looked++)
       for (int gyro_first = 0; gyro_first < 2; gyro_first++) {
@@ -274,7 +275,7 @@ void test_counts_after_a_silence(void) {
 
 // Counts that may have wrapped in a silence of 10 s: the robot may be anywhere that it could have driven to. What
 // follows counts as ever, and nothing of the silence comes with it.
-void test_counts_that_may_have_wrapped(void) {
+TEST(test_counts_that_may_have_wrapped) {
   for (int model : {WM_MOTION_TICKS, WM_MOTION_SPEED_YAW_RATE})
     for (int looked = 0; looked < 2; looked++) {
       drive_a_second(model);
@@ -300,7 +301,7 @@ void test_counts_that_may_have_wrapped(void) {
 }
 
 // Of a bus that is silent for a minute: a correction ends what may have been driven until then.
-void test_an_unknown_motion_begins_at_the_last_correction(void) {
+TEST(test_an_unknown_motion_begins_at_the_last_correction) {
   start(make::car());
   params.noise_speed_mps = params.noise_speed_rel = 0;
   for (int i = 0; i <= 10; i++) feed(make::quantities(0.1 * i, {{WM_Q_VEHICLE_SPEED, 1.5}, {WM_Q_YAW_RATE, 0.0}}));
@@ -316,7 +317,7 @@ void test_an_unknown_motion_begins_at_the_last_correction(void) {
   TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.375 * 0.375, way_var - before_m2);
 }
 
-void test_ackermann_by_table_ratio_and_road_wheel(void) {
+TEST(test_ackermann_by_table_ratio_and_road_wheel) {
   start(make::car());
   feed(make::quantities(0, {{WM_Q_VEHICLE_SPEED, 2.0}, {WM_Q_STEERING_WHEEL, 3.0}}));
   TEST_ASSERT_EQUAL(WM_MOTION_ACKERMANN, front.model());
@@ -327,7 +328,7 @@ void test_ackermann_by_table_ratio_and_road_wheel(void) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 2.0 * tan(-0.1) / 2.5, front.twist_at(0, calibration).w);
 }
 
-void test_standing_still_shows_the_gyros_bias_and_holds_the_heading(void) {
+TEST(test_standing_still_shows_the_gyros_bias_and_holds_the_heading) {
   start(make::car());
   double rate;
   feed(make::quantities(0, {{WM_Q_VEHICLE_SPEED, 0.0}, {WM_Q_YAW_RATE, 0.01}}));
@@ -343,7 +344,7 @@ void test_standing_still_shows_the_gyros_bias_and_holds_the_heading(void) {
 }
 
 // GIVEN a lag WHEN a command comes THEN the robot obeys it that much later, between events, too.
-void test_commands_are_obeyed_late(void) {
+TEST(test_commands_are_obeyed_late) {
   start(make::no_wheels());
   calibration.value[wm::kLag] = 0.25;
   feed(make::twist(0, 0, 0));
@@ -358,7 +359,7 @@ void test_commands_are_obeyed_late(void) {
 }
 
 // A velocity that is the estimator's state holds without an end; each second has the noise of its walk alone.
-void test_a_velocity_as_a_state_is_never_overdue(void) {
+TEST(test_a_velocity_as_a_state_is_never_overdue) {
   start(make::no_wheels(), WM_MOTION_CONSTANT_VELOCITY);
   front.set_now(0);
   front.set_velocity({0.5, 0.0, 0.0});
@@ -368,7 +369,7 @@ void test_a_velocity_as_a_state_is_never_overdue(void) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, params.velocity_turn_walk * params.velocity_turn_walk * 30 / 3.0, turn_var);
 }
 
-void test_a_dead_encoder_is_noticed_and_not_taken_for_a_turn(void) {
+TEST(test_a_dead_encoder_is_noticed_and_not_taken_for_a_turn) {
   start(make::car());
   const double metre = 1000 / (2 * M_PI * 0.3);
   for (int i = 0; i <= 50; i++) ticks(0.1 * i, 0.2 * metre * i, 0.2 * metre * i);
@@ -385,7 +386,7 @@ void test_a_dead_encoder_is_noticed_and_not_taken_for_a_turn(void) {
   TEST_ASSERT_EQUAL_UINT32(0, front.health());
 }
 
-void test_a_frozen_counter_is_doubt_not_standstill(void) {
+TEST(test_a_frozen_counter_is_doubt_not_standstill) {
   start(make::car());
   double rate;
   for (int i = 0; i < 10; i++) feed(make::quantities(0.1 * i, {{WM_Q_VEHICLE_SPEED, 5.0}, {WM_Q_YAW_RATE, 0.0}}));
@@ -404,7 +405,7 @@ void test_a_frozen_counter_is_doubt_not_standstill(void) {
 }
 
 // GIVEN a car at 3 m/s WHEN 138 m/s come for 0.2 s THEN its speed holds, with noise of what it may have done meanwhile.
-void test_a_speed_that_no_robot_reaches_is_refused(void) {
+TEST(test_a_speed_that_no_robot_reaches_is_refused) {
   start(make::no_wheels());
   for (int i = 0; i <= 40; i++) feed(make::twist(0.025 * i, 3.0, 0.1));
   TEST_ASSERT_EQUAL_UINT32(0, front.health());
@@ -424,7 +425,7 @@ void test_a_speed_that_no_robot_reaches_is_refused(void) {
 
 // GIVEN a speed that was refused WHEN it falls silent while the gyro goes on THEN it is silent, as without the refusal:
 // the noise of what the robot may have done since the last plausible sample has an end.
-void test_a_refused_speed_that_falls_silent_is_silent(void) {
+TEST(test_a_refused_speed_that_falls_silent_is_silent) {
   double held[2], grown[2];
   for (const bool wrong : {false, true}) {
     start(make::no_wheels());
@@ -445,7 +446,7 @@ void test_a_refused_speed_that_falls_silent_is_silent(void) {
 
 // GIVEN a first sample that is wrong, or a sensor that stays at another level WHEN more samples agree THEN they are
 // taken; with the limit off, at once.
-void test_samples_that_agree_replace_the_trusted_ones(void) {
+TEST(test_samples_that_agree_replace_the_trusted_ones) {
   start(make::no_wheels());
   feed(make::twist(0.0, 138.0, 0.0));
   for (int i = 1; i <= 3; i++) feed(make::twist(0.025 * i, 3.0, 0.0));
@@ -464,7 +465,7 @@ void test_samples_that_agree_replace_the_trusted_ones(void) {
 
 // A count is off by a step / sqrt(12): the mean of both wheels' differences over a period, and their difference over
 // the track.
-void test_noise_of_counts(void) {
+TEST(test_noise_of_counts) {
   const double each = 0.02 / kTick;
   double speed_mps, turn_radps;
   start(make::two_wheels());
@@ -479,7 +480,7 @@ void test_noise_of_counts(void) {
 
 // GIVEN counts each 20 ms WHEN one message's are 0.7 m off THEN they are refused with noise, and nothing of the way is
 // lost; so, too, with a gyro. A jump of one wheel refuses the message's other one.
-void test_a_wrong_count_is_refused(void) {
+TEST(test_a_wrong_count_is_refused) {
   for (bool gyro : {false, true}) {
     start(make::two_wheels());
     const double each = 0.02 / kTick;  // 1 m/s
@@ -499,7 +500,7 @@ void test_a_wrong_count_is_refused(void) {
 
 // GIVEN a controller that restarts WHEN its counts go on from elsewhere THEN these are taken after a tenth of a second,
 // and the robot drove on meanwhile.
-void test_counts_that_go_on_from_elsewhere_are_a_new_start(void) {
+TEST(test_counts_that_go_on_from_elsewhere_are_a_new_start) {
   start(make::two_wheels());
   const double each = 0.02 / kTick;  // 1 m/s
   for (int i = 0; i <= 100; i++) ticks(0.02 * i, each * (i - (i >= 50 ? 50 : 0)), each * (i - (i >= 50 ? 50 : 0)));
@@ -510,7 +511,7 @@ void test_counts_that_go_on_from_elsewhere_are_a_new_start(void) {
 // GIVEN counts each 20 ms WHEN a message's counter claims that frames were lost THEN its jump of 6 cm is
 // refused where it comes too early for that. A bus that hands on every other frame is no doubt, nor is a good count
 // whose stamp is late.
-void test_a_counter_that_contradicts_the_stamp_is_doubt(void) {
+TEST(test_a_counter_that_contradicts_the_stamp_is_doubt) {
   const auto count_at = [](double t_s, double way_m, int lost) {  // both wheels
     wm_event e =
         make::quantities(t_s, {{WM_Q_WHEEL_TICKS_LEFT, way_m / kTick}, {WM_Q_WHEEL_TICKS_RIGHT, way_m / kTick}});
@@ -535,7 +536,7 @@ void test_a_counter_that_contradicts_the_stamp_is_doubt(void) {
   TEST_ASSERT_EQUAL_UINT32(0, front.health());
 }
 
-void test_a_stuck_yaw_rate_is_noticed_where_the_steering_turns(void) {
+TEST(test_a_stuck_yaw_rate_is_noticed_where_the_steering_turns) {
   start(make::car());
   for (int i = 0; i <= 60; i++)
     feed(make::quantities(0.1 * i, {{WM_Q_VEHICLE_SPEED, 5.0}, {WM_Q_YAW_RATE, 0.01}, {WM_Q_ROAD_WHEEL, 0.004 * i}}));
@@ -544,7 +545,7 @@ void test_a_stuck_yaw_rate_is_noticed_where_the_steering_turns(void) {
   TEST_ASSERT_EQUAL_UINT32(0, front.health());
 }
 
-void test_what_can_not_be_is_refused(void) {
+TEST(test_what_can_not_be_is_refused) {
   start(make::car());
   feed(make::twist(1, 1, 0));
   TEST_ASSERT_EQUAL(WM_NOT_FINITE, front.check(make::twist(2, NAN, 0)));
@@ -559,42 +560,3 @@ void test_what_can_not_be_is_refused(void) {
 }
 
 }  // namespace
-
-void setUp(void) {}
-void tearDown(void) {}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_every_derivative_of_every_model);
-  RUN_TEST(test_a_derivative_without_room_is_counted);
-  RUN_TEST(test_ticks_make_exact_arcs);
-  RUN_TEST(test_counts_are_positions_whatever_comes_between);
-  RUN_TEST(test_a_count_right_behind_another_event_is_no_doubt);
-  RUN_TEST(test_a_late_count_and_the_next_right_behind_it);
-  RUN_TEST(test_counts_of_both_wheels_may_come_one_after_the_other);
-  RUN_TEST(test_an_unsigned_speed_takes_its_sign_from_the_gear);
-  RUN_TEST(test_a_zero_error_is_no_sign);
-  RUN_TEST(test_steering_noise_by_the_angles_derivative);
-  RUN_TEST(test_rear_wheels_are_preferred_and_a_silent_source_yields);
-  RUN_TEST(test_ackermann_by_table_ratio_and_road_wheel);
-  RUN_TEST(test_a_held_speed_is_doubted_more_and_more);
-  RUN_TEST(test_a_change_between_samples_is_noise_of_its_moment);
-  RUN_TEST(test_counts_after_a_silence);
-  RUN_TEST(test_counts_that_may_have_wrapped);
-  RUN_TEST(test_an_unknown_motion_begins_at_the_last_correction);
-  RUN_TEST(test_standing_still_shows_the_gyros_bias_and_holds_the_heading);
-  RUN_TEST(test_commands_are_obeyed_late);
-  RUN_TEST(test_a_velocity_as_a_state_is_never_overdue);
-  RUN_TEST(test_a_dead_encoder_is_noticed_and_not_taken_for_a_turn);
-  RUN_TEST(test_a_frozen_counter_is_doubt_not_standstill);
-  RUN_TEST(test_a_speed_that_no_robot_reaches_is_refused);
-  RUN_TEST(test_a_refused_speed_that_falls_silent_is_silent);
-  RUN_TEST(test_samples_that_agree_replace_the_trusted_ones);
-  RUN_TEST(test_noise_of_counts);
-  RUN_TEST(test_a_wrong_count_is_refused);
-  RUN_TEST(test_counts_that_go_on_from_elsewhere_are_a_new_start);
-  RUN_TEST(test_a_counter_that_contradicts_the_stamp_is_doubt);
-  RUN_TEST(test_a_stuck_yaw_rate_is_noticed_where_the_steering_turns);
-  RUN_TEST(test_what_can_not_be_is_refused);
-  return UNITY_END();
-}

@@ -4,15 +4,15 @@
 #include <cmath>
 #include <initializer_list>
 
+#include "common/suite.h"
 #include "events.hpp"
 #include "math/arc.hpp"
 #include "motion/front_end.hpp"
-#include "unity.h"
 
 namespace {
 
 // Data that a model needs and that don't come are named before the drive; with all of them it drives (tests above).
-void test_what_a_model_lacks(void) {
+TEST(test_what_a_model_lacks) {
   const auto lacks = [](int model, const wm_wheels &w, uint32_t quantities, bool twists = false) {
     wm_motion_params params;
     wm_params_defaults(&wm_motion_params_table, &params);
@@ -92,7 +92,7 @@ struct drive {
 };
 
 // GIVEN ticks and a gyro WHEN no model is configured THEN the way is the ticks' and the turn the gyro's.
-void test_ticks_and_a_gyro_are_both_used(void) {
+TEST(test_ticks_and_a_gyro_are_both_used) {
   drive d;
   d.go(10, true);
   TEST_ASSERT_EQUAL(WM_MOTION_SPEED_YAW_RATE, d.front.model());
@@ -105,7 +105,7 @@ void test_ticks_and_a_gyro_are_both_used(void) {
 }
 
 // GIVEN both WHEN the gyro falls silent THEN the wheels' difference turns on without a jump, and the gyro again later.
-void test_a_silent_gyro_yields_to_the_ticks(void) {
+TEST(test_a_silent_gyro_yields_to_the_ticks) {
   drive d;
   d.go(10, true);
   d.go(10, false);
@@ -118,7 +118,7 @@ void test_a_silent_gyro_yields_to_the_ticks(void) {
 }
 
 // A gyro that is stuck at a bias is left, but not where the configuration names the model.
-void test_a_stuck_gyro_yields_to_the_ticks(void) {
+TEST(test_a_stuck_gyro_yields_to_the_ticks) {
   for (int model : {WM_MOTION_AUTO, WM_MOTION_SPEED_YAW_RATE}) {
     drive d(model);
     for (; d.steps < 50 * 60; d.steps++) {
@@ -146,14 +146,14 @@ bool is_found_stuck(double seconds, double speed_mps, double turn_radps, double 
   return (d.front.health() & WM_MOTION_HEALTH_YAW_RATE_STUCK) != 0;
 }
 
-void test_a_slow_robots_stuck_gyro_is_found(void) {
+TEST(test_a_slow_robots_stuck_gyro_is_found) {
   TEST_ASSERT_TRUE(is_found_stuck(5, 0.1, 0.2, 0.01));
   TEST_ASSERT_TRUE(is_found_stuck(5, 0.0, 0.2, 0.01));   // turns on the spot
   TEST_ASSERT_TRUE(is_found_stuck(200, 0.1, 0.0, 0.0));  // straight on for 15 m
 }
 
 // A coarse gyro may repeat its number while that is right, and while the robot stands.
-void test_repeated_numbers_that_are_right_are_no_fault(void) {
+TEST(test_repeated_numbers_that_are_right_are_no_fault) {
   TEST_ASSERT_FALSE(is_found_stuck(20, 0.1, 0.2, 0.21));
   TEST_ASSERT_FALSE(is_found_stuck(100, 0.1, 0.0, 0.0));
   TEST_ASSERT_FALSE(is_found_stuck(120, 0.0, 0.0, 0.02));
@@ -161,7 +161,7 @@ void test_repeated_numbers_that_are_right_are_no_fault(void) {
 
 // Without motion data a robot may have braked, accelerated or turned for hold_max_s; then its heading walks by 0.3 rad
 // per sqrt(s).
-void test_what_may_have_moved_unseen(void) {
+TEST(test_what_may_have_moved_unseen) {
   wm_motion_params params;
   wm_params_defaults(&wm_motion_params_table, &params);
   params.hold_max_s = 2.0;
@@ -186,7 +186,7 @@ void test_what_may_have_moved_unseen(void) {
 // A gyro that is overdue while the counts go on: the way is known, its direction walks, up to any direction at all.
 // The variance of the heading after it is that of a turn rate that changes by noise_hold_radps2 for hold_max_s, then of
 // 0.3 rad per sqrt(s).
-void test_a_known_way_in_an_unknown_direction(void) {
+TEST(test_a_known_way_in_an_unknown_direction) {
   wm_motion_params params;
   wm_params_defaults(&wm_motion_params_table, &params);
   params.hold_max_s = 2.0;
@@ -211,7 +211,7 @@ void test_a_known_way_in_an_unknown_direction(void) {
 }
 
 // Factors of the variances of way and turn leave the correlation of the two as it is.
-void test_factors_of_the_noise_keep_its_correlation(void) {
+TEST(test_factors_of_the_noise_keep_its_correlation) {
   wm_motion_params params;
   wm_params_defaults(&wm_motion_params_table, &params);
   const wm_wheels wheels = make::two_wheels();
@@ -237,7 +237,7 @@ void count(drive *d, double t_s, double way_m) {
 
 // GIVEN a bus on which a frame may come twice with one stamp WHEN the robot drives THEN each count counts once, and is
 // as exact as one of its period.
-void test_a_count_that_comes_twice_counts_once(void) {
+TEST(test_a_count_that_comes_twice_counts_once) {
   drive d;
   for (int i = 0; i <= 50; i++)
     for (int twice = 0; twice < 2; twice++) count(&d, 0.02 * i, 0.02 * i);
@@ -251,7 +251,7 @@ void test_a_count_that_comes_twice_counts_once(void) {
 
 // GIVEN a robot in reverse gear WHEN its counts rise THEN it drives backwards: they have no sign. Where they have
 // fallen before, they have one, and the gear is of no effect.
-void test_counts_without_a_sign_take_it_from_the_gear(void) {
+TEST(test_counts_without_a_sign_take_it_from_the_gear) {
   for (const bool has_sign : {false, true}) {
     drive d;
     double way_m = 0.0;
@@ -269,7 +269,7 @@ void test_counts_without_a_sign_take_it_from_the_gear(void) {
 
 // GIVEN two seconds without counts, in which observations corrected the pose WHEN counts come again THEN from the first
 // one on the way is the counted one, whatever the speed and however often the pose is asked for between two counts.
-void test_the_way_is_counted_again_after_a_silence(void) {
+TEST(test_the_way_is_counted_again_after_a_silence) {
   drive d;
   for (int i = 0; i <= 50; i++) count(&d, 0.02 * i, 0.02 * i);
   d.advance(3.0);
@@ -286,7 +286,7 @@ void test_the_way_is_counted_again_after_a_silence(void) {
 
 // A count after 0.7 periods has a speed of its own; one after 0.4 is one of a burst, whose speed is that since the
 // count before the last one.
-void test_the_speed_of_an_early_count(void) {
+TEST(test_the_speed_of_an_early_count) {
   for (const double share : {0.7, 0.4}) {
     drive d(WM_MOTION_TICKS);
     for (int i = 0; i <= 50; i++) count(&d, 0.02 * i, 0.02 * i);
@@ -299,7 +299,7 @@ void test_the_speed_of_an_early_count(void) {
 
 // GIVEN wheels whose speed was refused and that then fall silent WHEN another speed goes on THEN the refusal is over
 // after hold_max_s: the way is as sure as without it.
-void test_a_refusal_ends_with_its_sensor(void) {
+TEST(test_a_refusal_ends_with_its_sensor) {
   double grown_m2[2];
   for (const bool refused : {false, true}) {
     wm_motion_params params;
@@ -332,25 +332,3 @@ void test_a_refusal_ends_with_its_sensor(void) {
 }
 
 }  // namespace
-
-void setUp(void) {}
-void tearDown(void) {}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_what_a_model_lacks);
-  RUN_TEST(test_ticks_and_a_gyro_are_both_used);
-  RUN_TEST(test_a_silent_gyro_yields_to_the_ticks);
-  RUN_TEST(test_a_stuck_gyro_yields_to_the_ticks);
-  RUN_TEST(test_a_slow_robots_stuck_gyro_is_found);
-  RUN_TEST(test_repeated_numbers_that_are_right_are_no_fault);
-  RUN_TEST(test_what_may_have_moved_unseen);
-  RUN_TEST(test_a_known_way_in_an_unknown_direction);
-  RUN_TEST(test_factors_of_the_noise_keep_its_correlation);
-  RUN_TEST(test_a_count_that_comes_twice_counts_once);
-  RUN_TEST(test_counts_without_a_sign_take_it_from_the_gear);
-  RUN_TEST(test_the_way_is_counted_again_after_a_silence);
-  RUN_TEST(test_the_speed_of_an_early_count);
-  RUN_TEST(test_a_refusal_ends_with_its_sensor);
-  return UNITY_END();
-}

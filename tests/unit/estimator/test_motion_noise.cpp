@@ -4,10 +4,10 @@
 #include <cmath>
 #include <string>
 
+#include "common/suite.h"
 #include "events.hpp"
 #include "motion/front_end.hpp"
 #include "motion/motion_kind.hpp"
-#include "unity.h"
 
 namespace {
 
@@ -136,7 +136,7 @@ void check_noise(const wm::motion_input &input, int doubt, const wm_motion_param
 const double kMotions[][3] = {
     {1.3, 0.6, 0.2}, {-0.8, -0.2, -0.9}, {0.02, 0.01, 0.4}, {0.02, 0.03, 0.01}, {0.04, 0.04, 0.01}};
 
-void test_each_term_of_the_noise_is_its_formula(void) {
+TEST(test_each_term_of_the_noise_is_its_formula) {
   const int models[] = {WM_MOTION_TICKS, WM_MOTION_SPEED_YAW_RATE, WM_MOTION_ACKERMANN, WM_MOTION_TWIST,
                         WM_MOTION_INCREMENTS};
   const wm::stated_noise stated = {0.04, 0.02, 0.03}, turn_stated = {NAN, NAN, 0.03};
@@ -162,7 +162,7 @@ void test_each_term_of_the_noise_is_its_formula(void) {
 }
 
 // Parameters below 0 have the noise of the source's kind; above, their own, whatever the kind.
-void test_noise_by_the_kind_of_the_source(void) {
+TEST(test_noise_by_the_kind_of_the_source) {
   const struct {
     wm::motion_kind kind;
     double speed_rel, rate, rate_rel;
@@ -186,7 +186,7 @@ void test_noise_by_the_kind_of_the_source(void) {
 
 // GIVEN the defaults THEN a way by counts beside a yaw rate is known to 6 mm after 1 m at walking pace, and to 22 cm
 // after 100 m at 10 m/s; that of a speedometer to 3 and 64 cm. An impossible speed counts as 30 m/s.
-void test_noise_of_a_counted_way(void) {
+TEST(test_noise_of_a_counted_way) {
   wm_motion_params p;
   wm_params_defaults(&wm_motion_params_table, &p);
   const auto sigma_m = [&](double speed, double way_m, bool by_counts) {
@@ -206,7 +206,7 @@ void test_noise_of_a_counted_way(void) {
 }
 
 // An increment's own covariance, as a rate, is that of the segment's time; without one, or in doubt, it is the model's.
-void test_increments_have_their_own_covariance(void) {
+TEST(test_increments_have_their_own_covariance) {
   wm::motion_input input = input_of(WM_MOTION_INCREMENTS, 1.0, 0.3, 0.5, kNone);
   for (int i = 0; i < 6; i++) input.increment_noise[i] = 0.125f * static_cast<float>(i + 1);
   const wm_motion_params p = only(nullptr, 0.0);
@@ -223,7 +223,7 @@ void test_increments_have_their_own_covariance(void) {
 }
 
 // A speed that is the artefact of two stamps: sideways it counts by its distance, as 30 m/s.
-void test_sideways_noise_of_an_impossible_speed_is_by_distance(void) {
+TEST(test_sideways_noise_of_an_impossible_speed_is_by_distance) {
   const wm_motion_params p = only(&kTerms[5], 0.05);
   for (const double speed : {29.0, 31.0, 900.0}) {
     const wm::motion_input input = input_of(WM_MOTION_TICKS, speed, 0.0, speed, kNone);
@@ -235,7 +235,7 @@ void test_sideways_noise_of_an_impossible_speed_is_by_distance(void) {
 }
 
 // A velocity that walks: the integral of its walk, q t^3 / 3 on each axis, whatever the input is.
-void test_noise_of_a_velocity_that_walks(void) {
+TEST(test_noise_of_a_velocity_that_walks) {
   wm_motion_params p = only(nullptr, 0.0);
   p.velocity_speed_walk = 0.5, p.velocity_turn_walk = 0.3;
   const wm::motion_input input = input_of(WM_MOTION_CONSTANT_VELOCITY, 0.0, 0.0, 0.0, kNone);
@@ -250,7 +250,7 @@ void test_noise_of_a_velocity_that_walks(void) {
 }
 
 // Along and across the way, turned to base_link's axes: R diag(along, across) R'.
-void test_noise_on_the_axes_of_a_sideways_drive(void) {
+TEST(test_noise_on_the_axes_of_a_sideways_drive) {
   for (int i = 0; i < 16; i++) {
     const double angle = 0.4 * i, c = std::cos(angle), s = std::sin(angle);
     wm::motion_noise n{};
@@ -267,7 +267,7 @@ void test_noise_on_the_axes_of_a_sideways_drive(void) {
 }
 
 // A turn about a centre x ahead of base_link: J Q J' with the sideways way less x times the turn.
-void test_noise_of_a_turn_about_a_centre(void) {
+TEST(test_noise_of_a_turn_about_a_centre) {
   const double x = 0.4, q[3][3] = {{0.05, 0.01, -0.007}, {0.01, 0.04, 0.006}, {-0.007, 0.006, 0.03}};
   const double j[3][3] = {{1, 0, 0}, {0, 1, -x}, {0, 0, 1}};
   wm::motion_noise n{};
@@ -288,7 +288,7 @@ void test_noise_of_a_turn_about_a_centre(void) {
     }
 }
 
-void test_noise_of_changes_between_samples(void) {
+TEST(test_noise_of_changes_between_samples) {
   for (const bool holonomic : {false, true})
     for (const bool doubtful : {false, true}) {
       wm::motion_input input = input_of(WM_MOTION_TWIST, 1, 0, 0, doubtful ? kDoubtful : kNone);
@@ -307,7 +307,7 @@ double fourth(double t) { return t * t * t * t; }
 
 // sigma = a t^2 / 2 from when a sample was overdue until it has held for two seconds; then a turn walks by 0.3 rad per
 // sqrt(s). By counts the way is known, by those of both wheels the turn, too.
-void test_noise_of_an_overdue_sample(void) {
+TEST(test_noise_of_an_overdue_sample) {
   wm_motion_params p = only(nullptr, 0.0);
   p.hold_max_s = 2.0, p.noise_hold_mps2 = 0.6, p.noise_hold_radps2 = 0.4;
   const double overdue[] = {-1.0, -0.3, 0.0, 0.7, 1.8, 3.0};
@@ -344,7 +344,7 @@ void test_noise_of_an_overdue_sample(void) {
 
 // A robot that is silent for too long may have gone on in any direction, at its last speed or at what it may have begun
 // to drive since; from when its place was last known, however the time is cut.
-void test_noise_of_a_motion_that_is_not_known(void) {
+TEST(test_noise_of_a_motion_that_is_not_known) {
   wm_motion_params p = only(nullptr, 0.0);
   p.hold_max_s = 2.0, p.noise_hold_mps2 = 0.6;
   for (const int model : {WM_MOTION_TICKS, WM_MOTION_SPEED_YAW_RATE, WM_MOTION_TWIST})
@@ -370,7 +370,7 @@ void test_noise_of_a_motion_that_is_not_known(void) {
 
 // While samples are refused: a change by up to the limits, evenly distributed, sigma = a t^2 / (2 sqrt 3), until two
 // seconds.
-void test_noise_of_refused_samples(void) {
+TEST(test_noise_of_refused_samples) {
   wm_motion_params p = only(nullptr, 0.0);
   p.hold_max_s = 2.0, p.limits_mps2 = 15.0, p.limits_radps2 = 30.0;
   for (int refused = 0; refused < 4; refused++)
@@ -398,7 +398,7 @@ const struct {
                {wm::kKindTwist, "syb.........dc"},    {wm::kKindMeasured, "syb.........dc"},
                {wm::kKindCommands, "syb....lSoOgdc"}, {wm::kKindCalibrated, ".............."}};
 
-void test_terms_that_are_states_by_the_kind(void) {
+TEST(test_terms_that_are_states_by_the_kind) {
   for (const auto &row : kStates)
     for (int term = 0; term < wm::kCalibrationCount; term++) {
       const bool acts = row.terms[term] != '.' && row.terms[term] != '\0';
@@ -410,7 +410,7 @@ void test_terms_that_are_states_by_the_kind(void) {
 
 // What may become a state: with a model, of its most general kind; a side's scale on a holonomic base alone and a
 // centre with skid steer alone, unless their sigma is stated. Without a model anything that is not 0.
-void test_terms_that_may_become_states(void) {
+TEST(test_terms_that_may_become_states) {
   const struct {
     int model;
     const char *terms;
@@ -436,7 +436,7 @@ void test_terms_that_may_become_states(void) {
 
 // Priors: the sigma without its sign; of skid steer the track's and the turn rate's, where the configuration states
 // none.
-void test_priors_of_the_terms(void) {
+TEST(test_priors_of_the_terms) {
   for (const int drive : {WM_DRIVE_ROLLING, WM_DRIVE_HOLONOMIC, WM_DRIVE_SKID_STEER})
     for (int term = 0; term < wm::kCalibrationCount; term++)
       for (const double sigma : {-0.07, 0.0, 0.07}) {
@@ -454,7 +454,7 @@ void test_priors_of_the_terms(void) {
 }
 
 // By default each term is a state where the motion has it, and nowhere else: no model gets one that it does not use.
-void test_by_default_the_kind_decides(void) {
+TEST(test_by_default_the_kind_decides) {
   wm_motion_params p;
   wm_params_defaults(&wm_motion_params_table, &p);
   for (const auto &row : kStates)
@@ -467,7 +467,7 @@ void test_by_default_the_kind_decides(void) {
 
 // Commands repeat until they change: more than a fifth of the moving rows equal the one before. A decision comes each
 // 64 moving rows; of a run only the first eight repetitions count.
-void test_commands_are_told_by_their_repetitions(void) {
+TEST(test_commands_are_told_by_their_repetitions) {
   const auto kind_of = [](int rows, int repeats_of_ten, bool moving) {
     wm::command_detector detector{};
     double v = 0.0, w = 0.0;
@@ -514,28 +514,3 @@ void test_commands_are_told_by_their_repetitions(void) {
 }
 
 }  // namespace
-
-void setUp(void) {}
-void tearDown(void) {}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_each_term_of_the_noise_is_its_formula);
-  RUN_TEST(test_noise_by_the_kind_of_the_source);
-  RUN_TEST(test_noise_of_a_counted_way);
-  RUN_TEST(test_increments_have_their_own_covariance);
-  RUN_TEST(test_sideways_noise_of_an_impossible_speed_is_by_distance);
-  RUN_TEST(test_noise_of_a_velocity_that_walks);
-  RUN_TEST(test_noise_on_the_axes_of_a_sideways_drive);
-  RUN_TEST(test_noise_of_a_turn_about_a_centre);
-  RUN_TEST(test_noise_of_changes_between_samples);
-  RUN_TEST(test_noise_of_an_overdue_sample);
-  RUN_TEST(test_noise_of_a_motion_that_is_not_known);
-  RUN_TEST(test_noise_of_refused_samples);
-  RUN_TEST(test_terms_that_are_states_by_the_kind);
-  RUN_TEST(test_terms_that_may_become_states);
-  RUN_TEST(test_priors_of_the_terms);
-  RUN_TEST(test_by_default_the_kind_decides);
-  RUN_TEST(test_commands_are_told_by_their_repetitions);
-  return UNITY_END();
-}

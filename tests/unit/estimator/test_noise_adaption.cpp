@@ -5,12 +5,12 @@
 #include <cstdlib>
 #include <cstring>
 
+#include "common/suite.h"
 #include "events.hpp"
 #include "filters/core/noise_adaption.hpp"
 #include "math/cholesky.hpp"
 #include "math/elementary.hpp"
 #include "motion/motion_params.h"
-#include "unity.h"
 #include "waymark/estimator.h"
 #include "waymark/random.h"
 
@@ -314,7 +314,7 @@ struct learned_once {
 // GIVEN a drive WHEN an innovation is off by more than its sigma THEN each factor takes its share of it, by the
 // derivatives of the filter's covariance and of its mean: those of a filter whose noise has a little more of the
 // factor.
-void test_each_factor_takes_its_share_of_an_innovation(void) {
+TEST(test_each_factor_takes_its_share_of_an_innovation) {
   using adaption = wm::noise_adaption;
   const double log_sigma = 0.5;
   for (int kind = 0; kind < adaption::kFactors; kind++)
@@ -341,7 +341,7 @@ void test_each_factor_takes_its_share_of_an_innovation(void) {
 
 // GIVEN positions that are off by four stated sigmas WHEN nothing comes for three time constants of 1000 s THEN what
 // was found of their noise is forgotten by exp(-3).
-void test_what_was_found_is_forgotten(void) {
+TEST(test_what_was_found_is_forgotten) {
   wm::noise_adaption adaption;
   adaption.init(1.0);
   adaption.forget(make::at(0.0));
@@ -359,7 +359,7 @@ void test_what_was_found_is_forgotten(void) {
 }
 
 // GIVEN factors that were found WHEN they are dropped THEN the next ones begin at 1, as of a filter that begins.
-void test_dropped_factors_begin_anew(void) {
+TEST(test_dropped_factors_begin_anew) {
   using adaption = wm::noise_adaption;
   adaption used, fresh;
   used.init(1.0);
@@ -377,49 +377,33 @@ void test_dropped_factors_begin_anew(void) {
   TEST_ASSERT_EQUAL_DOUBLE(fresh.scale(adaption::kPlace), used.scale(adaption::kPlace));
 }
 
-void test_right_noise_stays_consistent() {
+TEST(test_right_noise_stays_consistent) {
   expect_consistent({}, true);
   expect_consistent({}, false);
   expect_consistent({}, true, true);
 }
 
-void test_noise_of_the_motion_stated_four_times_too_small() {
+TEST(test_noise_of_the_motion_stated_four_times_too_small) {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.6, mean_inside({.motion = 0.25}, true, 0.0));
   expect_consistent({.motion = 0.25}, true);
   expect_consistent({.motion = 0.25}, true, true);
 }
 
-void test_noise_of_the_motion_stated_four_times_too_large() {
+TEST(test_noise_of_the_motion_stated_four_times_too_large) {
   expect_consistent({.motion = 4.0}, true);
   expect_consistent({.motion = 4.0}, false);
 }
 
-void test_noise_of_the_sensor_stated_wrong() {
+TEST(test_noise_of_the_sensor_stated_wrong) {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.87, mean_inside({.sensor = 0.25}, true, 0.0));
   expect_consistent({.sensor = 0.25}, true);
   expect_consistent({.sensor = 4.0}, true);
 }
 
-void test_noise_of_the_receiver_stated_wrong() {
+TEST(test_noise_of_the_receiver_stated_wrong) {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.6, mean_inside({.receiver = 0.25}, false, 0.0));
   expect_consistent({.receiver = 0.25}, false);
   expect_consistent({.receiver = 4.0}, false);
 }
 
 }  // namespace
-
-void setUp(void) {}
-void tearDown(void) {}
-
-int main() {
-  UNITY_BEGIN();
-  RUN_TEST(test_each_factor_takes_its_share_of_an_innovation);
-  RUN_TEST(test_what_was_found_is_forgotten);
-  RUN_TEST(test_dropped_factors_begin_anew);
-  RUN_TEST(test_right_noise_stays_consistent);
-  RUN_TEST(test_noise_of_the_motion_stated_four_times_too_small);
-  RUN_TEST(test_noise_of_the_motion_stated_four_times_too_large);
-  RUN_TEST(test_noise_of_the_sensor_stated_wrong);
-  RUN_TEST(test_noise_of_the_receiver_stated_wrong);
-  return UNITY_END();
-}

@@ -3,12 +3,12 @@
 #include <cstdlib>
 #include <cstring>
 
+#include "common/suite.h"
 #include "events.hpp"
 #include "math/arc.hpp"
 #include "math/se2.hpp"
 #include "math/se3.hpp"
 #include "motion/motion_params.h"
-#include "unity.h"
 #include "waymark/motion.h"
 #include "waymark/random.h"
 
@@ -38,7 +38,7 @@ void assert_pose(double x, double y, double heading, wm_pose2 p) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-6, heading, p.heading_rad);
 }
 
-void test_half_a_circle_by_twists(void) {
+TEST(test_half_a_circle_by_twists) {
   start(make::no_wheels());
   for (int i = 0; i <= 100; i++) feed(make::twist(0.01 * i, 1.0, M_PI));
   assert_pose(0.0, 2.0 / M_PI, M_PI, pose_at(1.0));
@@ -47,7 +47,7 @@ void test_half_a_circle_by_twists(void) {
               pose_at(0.333));  // between points
 }
 
-void test_extrapolates_with_the_held_twist_but_not_for_ever(void) {
+TEST(test_extrapolates_with_the_held_twist_but_not_for_ever) {
   start(make::no_wheels());
   feed(make::twist(0, 1.0, 0.0));
   feed(make::twist(1, 1.0, 0.0));
@@ -55,7 +55,7 @@ void test_extrapolates_with_the_held_twist_but_not_for_ever(void) {
   assert_pose(1.0 + params.hold_max_s, 0, 0, pose_at(60));
 }
 
-void test_an_estimate_without_a_time_is_carried_nowhere(void) {
+TEST(test_an_estimate_without_a_time_is_carried_nowhere) {
   wm_estimate fused{}, out;
   fused.t_ns = WM_TIME_NONE;
   fused.dof = 3;
@@ -68,7 +68,7 @@ void test_an_estimate_without_a_time_is_carried_nowhere(void) {
 
 // Each pose of the last second is the one that was the newest at its time, at the stamps of the twists and between
 // them, though each twist is another one; so are its twist and its noise.
-void test_poses_of_the_past_are_what_they_were(void) {
+TEST(test_poses_of_the_past_are_what_they_were) {
   start(make::no_wheels());
   wm_odom_point was[201], between[201];
   for (int i = 0; i <= 200; i++) {
@@ -99,7 +99,7 @@ void test_poses_of_the_past_are_what_they_were(void) {
 
 // Of a fast bus a second is remembered, too: a point each 4 ms, and the newest event. Each point is found from its own
 // time on.
-void test_a_second_of_a_fast_bus_is_remembered(void) {
+TEST(test_a_second_of_a_fast_bus_is_remembered) {
   start(make::no_wheels());
   wm_pose2 was{};
   for (int i = 0; i <= 400; i++) {
@@ -152,7 +152,7 @@ wm_estimate somewhere(double t_s) {
 
 // GIVEN no motion data WHEN a pose is carried on THEN it goes by its own velocity, which walks; a pose of the future
 // goes back by it, and is no less sure than it was. Odom stays.
-void test_a_pose_is_carried_by_its_own_velocity(void) {
+TEST(test_a_pose_is_carried_by_its_own_velocity) {
   start(make::no_wheels());
   params.model = WM_MOTION_CONSTANT_VELOCITY;
   TEST_ASSERT_EQUAL(WM_OK, wm_odometry_init(odom, &params, &wheels));
@@ -183,7 +183,7 @@ void test_a_pose_is_carried_by_its_own_velocity(void) {
 
 // GIVEN twists of a base that drives sideways WHEN a pose is carried between, at and behind them THEN mean, covariance
 // and twist are those of the motion's accumulated noise at both ends.
-void test_a_carried_pose_has_the_noise_between_its_times(void) {
+TEST(test_a_carried_pose_has_the_noise_between_its_times) {
   start(make::no_wheels());
   params.noise_hold_mps2 = params.noise_hold_radps2 = 0.0;
   TEST_ASSERT_EQUAL(WM_OK, wm_odometry_init(odom, &params, &wheels));
@@ -211,7 +211,7 @@ void test_a_carried_pose_has_the_noise_between_its_times(void) {
   }
 }
 
-void test_a_time_too_old_or_before_any_motion_is_not_found(void) {
+TEST(test_a_time_too_old_or_before_any_motion_is_not_found) {
   start(make::no_wheels());
   wm_odom_point p;
   TEST_ASSERT_EQUAL(WM_NOT_FOUND, wm_odometry_at(odom, 0, &p));
@@ -225,7 +225,7 @@ void test_a_time_too_old_or_before_any_motion_is_not_found(void) {
   TEST_ASSERT_EQUAL_INT64(make::at(10.0), wm_odometry_newest_ns(odom));
 }
 
-void test_calibration_holds_from_now_on_and_nothing_jumps(void) {
+TEST(test_calibration_holds_from_now_on_and_nothing_jumps) {
   start(make::no_wheels());
   for (int i = 0; i <= 100; i++) feed(make::twist(0.01 * i, 1.0, 0.0));
   wm_motion_calibration c = {1.1, 1, -0.1, 1, 1, 1, 0, 0, 0};
@@ -236,7 +236,7 @@ void test_calibration_holds_from_now_on_and_nothing_jumps(void) {
 }
 
 // An estimator took the twists as commands for a while, and then as measured: these have no response.
-void test_twists_are_commands_as_long_as_the_estimator_takes_them_so(void) {
+TEST(test_twists_are_commands_as_long_as_the_estimator_takes_them_so) {
   start(make::no_wheels());
   for (int i = 0; i <= 100; i++) feed(make::twist(0.01 * i, 0.0, 0.0));
   wm_motion_calibration c = {1, 1, 0, 1, 1, 1, 0, 0, 0.1};
@@ -248,7 +248,7 @@ void test_twists_are_commands_as_long_as_the_estimator_takes_them_so(void) {
 }
 
 // The carried covariance against the spread of many noisy drives, and the carried mean against the drive itself.
-void test_carry_moves_mean_and_covariance(void) {
+TEST(test_carry_moves_mean_and_covariance) {
   start(make::no_wheels());
   for (int i = 0; i <= 60; i++) feed(make::twist(0.01 * i, 2.0, 0.8));
   wm_estimate fused{}, now;
@@ -300,7 +300,7 @@ void test_carry_moves_mean_and_covariance(void) {
 
 // A bus that is silent for a minute: what the robot may have driven since the fused pose, 0.25 s ago, is added to it;
 // not what it may have driven in a quarter of a second more of the whole silence, 11.6 m.
-void test_unknown_motion_begins_at_the_fused_pose(void) {
+TEST(test_unknown_motion_begins_at_the_fused_pose) {
   start(make::no_wheels());
   for (int i = 0; i <= 100; i++) feed(make::twist(0.01 * i, 1.5, 0.0));
   for (double sigma_m : {0.01, 2.0}) {
@@ -317,7 +317,7 @@ void test_unknown_motion_begins_at_the_fused_pose(void) {
 
 // A bus delays some counts: the last two stamps, 14.7 ms apart, would make a speed 36 % too high. A silence of 0.3 s
 // goes on by the steady one. The own speed of 80 ms, a third off, is left.
-void test_delayed_counts_begin_a_silence_with_a_steady_speed(void) {
+TEST(test_delayed_counts_begin_a_silence_with_a_steady_speed) {
   const double late_s[] = {0.0, 0.0006, -0.0004, 0.003, -0.0023};
   for (const bool has_gyro : {false, true}) {
     start(make::two_wheels());
@@ -333,7 +333,7 @@ void test_delayed_counts_begin_a_silence_with_a_steady_speed(void) {
   }
 }
 
-void test_a_copy_continues_identically(void) {
+TEST(test_a_copy_continues_identically) {
   start(make::two_wheels());
   for (int i = 0; i <= 50; i++)
     feed(make::quantities(0.02 * i, {{WM_Q_WHEEL_TICKS_LEFT, 30.0 * i}, {WM_Q_WHEEL_TICKS_RIGHT, 35.0 * i}}));
@@ -352,7 +352,7 @@ void setUp(void) { odom = (wm_odometry *)malloc(wm_odometry_bytes()); }
 void tearDown(void) { free(odom); }
 
 // In space the newest fused pose goes on by the twists that came since; roll and pitch stay what they are.
-void test_a_pose_in_space_is_carried_in_space(void) {
+TEST(test_a_pose_in_space_is_carried_in_space) {
   start({NAN, NAN, NAN, NAN, NAN, NAN, 0, {}, {}});
   for (int i = 0; i <= 10; i++) {
     wm_event e = make::empty(0.1 * i, WM_EVENT_TWIST6);
@@ -397,7 +397,7 @@ wm_estimate carried_in_space(double from_s, double to_s) {
 }
 
 // Of twists that come in time each second of a carried pose adds the white noise of the speed and of the turn rate.
-void test_in_space_a_carried_pose_has_the_noise_of_its_twists(void) {
+TEST(test_in_space_a_carried_pose_has_the_noise_of_its_twists) {
   start(make::no_wheels());
   for (int i = 0; i <= 10; i++) feed_six(0.1 * i, 1.0, 0.0);
   const wm_estimate out = carried_in_space(0.5, 1.0);
@@ -410,7 +410,7 @@ void test_in_space_a_carried_pose_has_the_noise_of_its_twists(void) {
 }
 
 // GIVEN twists in space WHEN they stop THEN the last one holds for hold_max_s, more and more unsure, and no longer.
-void test_a_twist_in_space_does_not_hold_for_ever(void) {
+TEST(test_a_twist_in_space_does_not_hold_for_ever) {
   start(make::no_wheels());
   for (int i = 0; i <= 10; i++) feed_six(0.1 * i, 1.0, 0.0);
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.7, carried_in_space(0.5, 1.2).pose_map_base.p_m[0]);
@@ -422,7 +422,7 @@ void test_a_twist_in_space_does_not_hold_for_ever(void) {
 
 // GIVEN twists in space that are silent WHEN an observation corrects the pose meanwhile THEN what is added to it until
 // the next one depends on the time since it, not on that since the begin of the silence.
-void test_in_space_a_silence_adds_by_the_time_since_the_correction(void) {
+TEST(test_in_space_a_silence_adds_by_the_time_since_the_correction) {
   start(make::no_wheels());
   for (int i = 0; i <= 10; i++) feed_six(0.1 * i, 1.0, 0.0);
   const double after_s[] = {4.0, 10.0, 61.0, 601.0};
@@ -434,13 +434,13 @@ void test_in_space_a_silence_adds_by_the_time_since_the_correction(void) {
 }
 
 // GIVEN 1 m/s in space WHEN 138 m/s come for 0.2 s THEN the speed holds.
-void test_a_twist_in_space_that_nothing_reaches_is_refused(void) {
+TEST(test_a_twist_in_space_that_nothing_reaches_is_refused) {
   start(make::no_wheels());
   for (int i = 0; i <= 100; i++) feed_six(0.02 * i, i > 50 && i <= 60 ? 138.0 : 1.0, 0.0);
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1.5, carried_in_space(0.5, 2.0).pose_map_base.p_m[0]);
 }
 
-void test_derivatives_of_compositions(void) {
+TEST(test_derivatives_of_compositions) {
   const wm_pose2 a = {1.0, -2.0, 0.7}, b = {0.4, 0.3, -1.1};
   const double h = 1e-6;
   for (bool inverse : {false, true}) {
@@ -483,29 +483,4 @@ void test_derivatives_of_compositions(void) {
     }
   }
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0, wm::length(wm::between(p, c).p - q.p));
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_half_a_circle_by_twists);
-  RUN_TEST(test_extrapolates_with_the_held_twist_but_not_for_ever);
-  RUN_TEST(test_an_estimate_without_a_time_is_carried_nowhere);
-  RUN_TEST(test_poses_of_the_past_are_what_they_were);
-  RUN_TEST(test_a_second_of_a_fast_bus_is_remembered);
-  RUN_TEST(test_a_pose_is_carried_by_its_own_velocity);
-  RUN_TEST(test_a_carried_pose_has_the_noise_between_its_times);
-  RUN_TEST(test_a_time_too_old_or_before_any_motion_is_not_found);
-  RUN_TEST(test_calibration_holds_from_now_on_and_nothing_jumps);
-  RUN_TEST(test_twists_are_commands_as_long_as_the_estimator_takes_them_so);
-  RUN_TEST(test_carry_moves_mean_and_covariance);
-  RUN_TEST(test_unknown_motion_begins_at_the_fused_pose);
-  RUN_TEST(test_delayed_counts_begin_a_silence_with_a_steady_speed);
-  RUN_TEST(test_a_copy_continues_identically);
-  RUN_TEST(test_a_pose_in_space_is_carried_in_space);
-  RUN_TEST(test_in_space_a_carried_pose_has_the_noise_of_its_twists);
-  RUN_TEST(test_a_twist_in_space_does_not_hold_for_ever);
-  RUN_TEST(test_in_space_a_silence_adds_by_the_time_since_the_correction);
-  RUN_TEST(test_a_twist_in_space_that_nothing_reaches_is_refused);
-  RUN_TEST(test_derivatives_of_compositions);
-  return UNITY_END();
 }

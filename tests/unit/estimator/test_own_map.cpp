@@ -5,8 +5,8 @@
 #include <cstring>
 #include <vector>
 
+#include "common/suite.h"
 #include "filters/stereo_ekf/map_search.hpp"
-#include "unity.h"
 #include "waymark/random.h"
 
 namespace {
@@ -40,10 +40,7 @@ struct memory {
 
 }  // namespace
 
-void setUp() {}
-void tearDown() {}
-
-static void coordinates_give_the_place_back_and_their_derivatives() {
+TEST(coordinates_give_the_place_back_and_their_derivatives) {
   for (const vec3 &place : {vec3{1.5, 2.2, 1.4}, vec3{-3.0, 4.0, -2.0}, vec3{1.0, 2.0, 0.5}}) {
     const vec3 at = in_triangle(kTriangle, place), again = out_of_triangle(kTriangle, at);
     TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.0, length(again - place));
@@ -59,7 +56,7 @@ static void coordinates_give_the_place_back_and_their_derivatives() {
   }
 }
 
-static void a_point_is_found_by_its_looks_within_reach() {
+TEST(a_point_is_found_by_its_looks_within_reach) {
   memory m(2);
   m.map.begin(1, 5);
   m.add(1, 11, {0.1, 0.1, 0.0});
@@ -88,7 +85,7 @@ static void a_point_is_found_by_its_looks_within_reach() {
 }
 
 // Frames that are out of reach are left out as a whole: what is found is what comparing all points finds.
-static void near_points_are_those_of_all_frames() {
+TEST(near_points_are_those_of_all_frames) {
   constexpr int kFrames = 12, kPoints = 8;
   memory m(kFrames);
   const auto draw = [](uint64_t stream, uint64_t i) { return 10.0 * wm_random_uniform(5, stream, i) - 5.0; };
@@ -118,7 +115,7 @@ static void near_points_are_those_of_all_frames() {
 
 // A search of the whole map ends with the pose at which its points were seen, and no cycle of it compares more pairs
 // than those of a frame beyond the bound.
-static void a_search_is_spread_over_cycles() {
+TEST(a_search_is_spread_over_cycles) {
   constexpr int kFrames = 20;
   memory m(kFrames);
   uint64_t next = 0;
@@ -162,7 +159,7 @@ static void a_search_is_spread_over_cycles() {
   TEST_ASSERT_EQUAL(0, some.count);
 }
 
-static void the_ring_gives_up_what_was_not_seen_for_longest() {
+TEST(the_ring_gives_up_what_was_not_seen_for_longest) {
   memory m(3);
   TEST_ASSERT_EQUAL(0, m.map.frames());
   for (int f = 0; f < 3; f++) {
@@ -180,7 +177,7 @@ static void the_ring_gives_up_what_was_not_seen_for_longest() {
 }
 
 // Chernoff's bound is above the binomial tail, and not by far.
-static void agreement_by_chance_is_bounded() {
+TEST(agreement_by_chance_is_bounded) {
   for (const int count : {12, 40, 110})
     for (int agreeing = 4; agreeing <= count; agreeing++) {
       const double share = 0.1;
@@ -195,15 +192,4 @@ static void agreement_by_chance_is_bounded() {
       if (agreeing - 3 > 0.3 * others) TEST_ASSERT_LESS_THAN_DOUBLE(exact + 4.0, bound);
     }
   TEST_ASSERT_EQUAL_DOUBLE(0.0, log_by_chance(3, 3, 0.1));
-}
-
-int main() {
-  UNITY_BEGIN();
-  RUN_TEST(coordinates_give_the_place_back_and_their_derivatives);
-  RUN_TEST(a_point_is_found_by_its_looks_within_reach);
-  RUN_TEST(near_points_are_those_of_all_frames);
-  RUN_TEST(a_search_is_spread_over_cycles);
-  RUN_TEST(the_ring_gives_up_what_was_not_seen_for_longest);
-  RUN_TEST(agreement_by_chance_is_bounded);
-  return UNITY_END();
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // pf_edges in a small drawn building: the particle filter's step, its published moments, a start that is not known.
+#include "common/suite.h"
 #include "edge_building.hpp"
 #include "filters/pf_edges/params.h"
 
@@ -11,7 +12,7 @@ constexpr int kCount = 200;
 
 wm_pf_edges_params &own() { return *reinterpret_cast<wm_pf_edges_params *>(params.data()); }
 
-void forwards_and_backwards_it_stays_on_the_way(void) {
+TEST(forwards_and_backwards_it_stays_on_the_way) {
   for (const int weight : {PF_EDGES_PRODUCT, PF_EDGES_SUM}) {
     own().weight = weight;
     filter f;
@@ -24,7 +25,7 @@ void forwards_and_backwards_it_stays_on_the_way(void) {
 
 // GIVEN a drive THEN the published pose and covariance are the particles' moments, the heading's on the circle, and the
 // weights sum up to 1.
-void its_pose_is_its_particles_mean(void) {
+TEST(its_pose_is_its_particles_mean) {
   filter f;
   drive d;
   d.go(f, 8, 1.0, 0.0);
@@ -54,7 +55,7 @@ void its_pose_is_its_particles_mean(void) {
 
 // GIVEN a start that is not known THEN the particles stand all over the drivable floor, and the state is searching;
 // GIVEN 5000 of them WHEN the robot drives THEN they come together.
-void without_a_start_the_particles_stand_everywhere(void) {
+TEST(without_a_start_the_particles_stand_everywhere) {
   setup.start.p_m[0] = setup.start.p_m[1] = setup.start.heading_rad = NAN;
   own().particles = 5000;
   filter f;
@@ -75,7 +76,7 @@ void without_a_start_the_particles_stand_everywhere(void) {
 }
 
 // GIVEN a robot that stands THEN no motion noise moves its particles apart.
-void at_rest_it_gets_no_less_sure(void) {
+TEST(at_rest_it_gets_no_less_sure) {
   filter f;
   drive d;
   d.go(f, 3, 0.5, 0.0);
@@ -84,7 +85,7 @@ void at_rest_it_gets_no_less_sure(void) {
   TEST_ASSERT_LESS_OR_EQUAL_DOUBLE(1.01 * before, f.estimate().covariance[0]);
 }
 
-void a_missing_map_is_said(void) {
+TEST(a_missing_map_is_said) {
   const char *why = nullptr;
   setup.map = nullptr;
   TEST_ASSERT_EQUAL(0, ops->state_bytes(params.data(), &setup, &why));
@@ -94,14 +95,3 @@ void a_missing_map_is_said(void) {
 }  // namespace
 
 void setUp(void) { draw("pf_edges"); }
-void tearDown(void) {}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(forwards_and_backwards_it_stays_on_the_way);
-  RUN_TEST(its_pose_is_its_particles_mean);
-  RUN_TEST(without_a_start_the_particles_stand_everywhere);
-  RUN_TEST(at_rest_it_gets_no_less_sure);
-  RUN_TEST(a_missing_map_is_said);
-  return UNITY_END();
-}

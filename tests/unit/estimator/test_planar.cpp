@@ -5,12 +5,12 @@
 #include <cstdlib>
 #include <cstring>
 
+#include "common/suite.h"
 #include "events.hpp"
 #include "filters/planar/planar_filter.hpp"
 #include "math/arc.hpp"
 #include "math/elementary.hpp"
 #include "motion/motion_params.h"
-#include "unity.h"
 #include "waymark/random.h"
 
 namespace {
@@ -66,7 +66,7 @@ wm_pose2 drive(const double x0[3], const wm_motion_calibration &c, const wm_whee
 
 // With a diagonal start and no noise, the covariance of (pose, state) after the drive is derivative times variance:
 // every calibration column, the lag's too, against differences.
-void test_prediction_carries_the_right_derivatives(void) {
+TEST(test_prediction_carries_the_right_derivatives) {
   wm_wheels wheels = make::no_wheels();
   wheels.track_m = 0.5;
   make_setup(wheels);
@@ -102,7 +102,7 @@ void test_prediction_carries_the_right_derivatives(void) {
 
 // What the noise's adaption takes of a row: its derivatives by the pose, and by a position's lasting error where that
 // is a state.
-void test_a_row_s_part_of_the_pose(void) {
+TEST(test_a_row_s_part_of_the_pose) {
   make_busy_filter();
   wm::planar_row row;
   row.add(0, 0.3), row.add(2, -1.1), row.add(3, 0.7), row.add(4, 0.2);
@@ -112,7 +112,7 @@ void test_a_row_s_part_of_the_pose(void) {
   for (int i = 0; i < wm::noise_adaption::kBlock; i++) TEST_ASSERT_EQUAL_DOUBLE(expected[i], by[i]);
 }
 
-void test_josephs_form_is_the_plain_one_at_the_best_gain(void) {
+TEST(test_josephs_form_is_the_plain_one_at_the_best_gain) {
   make_busy_filter();
   const int n = filter->states();
   double p[kMax][kMax];
@@ -146,7 +146,7 @@ void test_josephs_form_is_the_plain_one_at_the_best_gain(void) {
 // What a state that is considered contributes to the innovation counts in its covariance; it stays, and so does its own
 // covariance with others that stay. By the whole matrices: Joseph's form for the best gain without the rows of such
 // states.
-void test_considered_states_stay(void) {
+TEST(test_considered_states_stay) {
   for (const int kept_to : {3, 6, 7}) {
     make_busy_filter();
     const int n = filter->states();
@@ -190,7 +190,7 @@ void test_considered_states_stay(void) {
 }
 
 // Two rows at once, by the whole matrices. Premise, asserted: the prior couples the two rows.
-void test_two_numbers_at_once(void) {
+TEST(test_two_numbers_at_once) {
   make_busy_filter();
   const int n = filter->states();
   double p[kMax][kMax], x[kMax];
@@ -235,7 +235,7 @@ void test_two_numbers_at_once(void) {
 }
 
 // GIVEN a car that stands WHEN its gyro says 0.015 rad/s THEN that is its bias.
-void test_standing_still_teaches_the_gyros_bias(void) {
+TEST(test_standing_still_teaches_the_gyros_bias) {
   make_setup(make::car());
   states.sigma[2] = 0.02;
   filter->init(setup, states, wm::kPoseStates + wm::planar_filter::count_motion_states(states));
@@ -246,7 +246,7 @@ void test_standing_still_teaches_the_gyros_bias(void) {
   TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.4, filter->pose().heading_rad);
 }
 
-void test_fading_and_forgetting_keep_the_rest(void) {
+TEST(test_fading_and_forgetting_keep_the_rest) {
   make_busy_filter();
   const double other = filter->covariance(0, 1), own = filter->variance(4), with = filter->covariance(0, 4);
   filter->fade(4, 0.5, 0.1);
@@ -274,7 +274,7 @@ void expect_row_of_f(int state, const double (&row)[kMax], double added, const d
 
 // A copied state has the covariances of the original, and the variance that copying adds. A carried one is moved by the
 // states that it depends on.
-void test_a_copied_and_a_carried_state(void) {
+TEST(test_a_copied_and_a_carried_state) {
   make_busy_filter();
   double p[kMax][kMax] = {}, copied[kMax] = {}, carried[kMax] = {};
   copy_covariance(p);
@@ -293,7 +293,7 @@ void test_a_copied_and_a_carried_state(void) {
   TEST_ASSERT_EQUAL_DOUBLE(before + 0.25, filter->value(4));
 }
 
-void test_the_estimate_of_a_drive_has_its_twist(void) {
+TEST(test_the_estimate_of_a_drive_has_its_twist) {
   make_setup(make::no_wheels());
   filter->init(setup, states, wm::kPoseStates + wm::planar_filter::count_motion_states(states));
   for (int i = 0; i <= 10; i++) filter->move(make::twist(0.1 * i, 1.5, i < 5 ? 0.0 : 0.2));
@@ -307,7 +307,7 @@ void test_the_estimate_of_a_drive_has_its_twist(void) {
 }
 
 // After months without data: 5.9e15 m2, then positions of 0.1 m sigma on each axis.
-void test_an_update_of_a_vast_variance_leaves_some(void) {
+TEST(test_an_update_of_a_vast_variance_leaves_some) {
   make_busy_filter();
   filter->inflate_pose(5.9e15, 0.0);
   for (int round = 0; round < 3; round++)
@@ -327,18 +327,3 @@ void setUp(void) {
       static_cast<wm::planar_filter_of<64> *>(aligned_alloc(16, (sizeof(wm::planar_filter_of<64>) + 15) / 16 * 16));
 }
 void tearDown(void) { free(filter); }
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_prediction_carries_the_right_derivatives);
-  RUN_TEST(test_a_row_s_part_of_the_pose);
-  RUN_TEST(test_josephs_form_is_the_plain_one_at_the_best_gain);
-  RUN_TEST(test_considered_states_stay);
-  RUN_TEST(test_two_numbers_at_once);
-  RUN_TEST(test_standing_still_teaches_the_gyros_bias);
-  RUN_TEST(test_the_estimate_of_a_drive_has_its_twist);
-  RUN_TEST(test_a_copied_and_a_carried_state);
-  RUN_TEST(test_fading_and_forgetting_keep_the_rest);
-  RUN_TEST(test_an_update_of_a_vast_variance_leaves_some);
-  return UNITY_END();
-}

@@ -4,13 +4,13 @@
 #include <cmath>
 #include <memory>
 
+#include "common/suite.h"
 #include "events.hpp"
 #include "filters/planar/past_pose.hpp"
 #include "filters/planar/planar_filter.hpp"
 #include "filters/planar/set_pose.hpp"
 #include "math/se3.hpp"
 #include "motion/motion_params.h"
-#include "unity.h"
 #include "waymark/random.h"
 
 namespace {
@@ -55,7 +55,7 @@ struct kept {
 // ── poses from outside ──────────────────────────────────────────────────────────────────────────────────────────────
 
 // The heading of a pose in space is that of the body's x axis seen from above, however it rolls and pitches.
-void test_a_pose_in_space_has_the_heading_of_its_x_axis(void) {
+TEST(test_a_pose_in_space_has_the_heading_of_its_x_axis) {
   wm_random random = {4, 1, 0};
   for (int i = 0; i < 200; i++) {
     double q[4], norm = 0.0;
@@ -88,7 +88,7 @@ void expect_pose(double x, double y, double heading, double sigma_xy, double sig
 
 // A pose that is set has its own sigmas and nothing in common with the states; the calibration stays. One in the past
 // is refused and changes nothing.
-void test_a_set_pose_replaces_pose_and_covariance(void) {
+TEST(test_a_set_pose_replaces_pose_and_covariance) {
   begin_busy();
   const kept before;
   TEST_ASSERT_EQUAL(WM_TIME_RAN_BACK, wm::set_pose(*filter, make::set_pose(1.9, 5.0, 6.0, -2.0, 0.3, 0.2)));
@@ -103,7 +103,7 @@ void test_a_set_pose_replaces_pose_and_covariance(void) {
 }
 
 // Of a start each part that is not known has the sigma of any; a sigma that is not stated is that of a mark by hand.
-void test_a_reset_pose_is_the_starts(void) {
+TEST(test_a_reset_pose_is_the_starts) {
   const double none = NAN;
   const struct {
     wm_start start;
@@ -122,7 +122,7 @@ void test_a_reset_pose_is_the_starts(void) {
 }
 
 // The first pose: the start's, with the same defaults; a place that is not known is 0.
-void test_the_start_of_the_filter(void) {
+TEST(test_the_start_of_the_filter) {
   begin(make::no_wheels());
   expect_pose(1.0, 2.0, 0.4, 0.1, 0.1);
   setup.start = {WM_TIME_NONE, {NAN, NAN, 0}, {0, 0, 0, 1}, NAN, NAN, NAN};
@@ -134,7 +134,7 @@ void test_the_start_of_the_filter(void) {
 }
 
 // A covariance that is set may be given by its upper half alone.
-void test_a_given_covariance_is_its_upper_half(void) {
+TEST(test_a_given_covariance_is_its_upper_half) {
   begin_busy();
   const double upper[3][3] = {{0.04, 0.01, -0.005}, {9, 0.03, 0.004}, {9, 9, 0.01}};
   filter->set_pose({1.0, 2.0, 7.0}, upper);
@@ -145,7 +145,7 @@ void test_a_given_covariance_is_its_upper_half(void) {
 
 // ── covariances ─────────────────────────────────────────────────────────────────────────────────────────────────────
 
-void test_inflated_mixed_and_scaled_covariances(void) {
+TEST(test_inflated_mixed_and_scaled_covariances) {
   begin_busy();
   const kept a;
   const int n = filter->states();
@@ -169,7 +169,7 @@ void test_inflated_mixed_and_scaled_covariances(void) {
 }
 
 // Each state in turn: its row and column by the whole matrix, P' = F P F' + Q, and nothing else.
-void test_fading_and_forgetting_touch_one_row_and_column(void) {
+TEST(test_fading_and_forgetting_touch_one_row_and_column) {
   begin_busy();
   const int n = filter->states();
   for (int state = 0; state < n; state++)
@@ -193,7 +193,7 @@ void test_fading_and_forgetting_touch_one_row_and_column(void) {
 }
 
 // A row without states has no effect. An innovation without a positive variance, or that is not finite, is refused.
-void test_updates_that_are_refused(void) {
+TEST(test_updates_that_are_refused) {
   begin_busy();
   wm::planar_row nothing, row;
   row.add(0, 1.0);
@@ -208,7 +208,7 @@ void test_updates_that_are_refused(void) {
 }
 
 // H P H' of two rows, by all states.
-void test_the_covariance_of_two_rows(void) {
+TEST(test_the_covariance_of_two_rows) {
   begin_busy();
   wm::planar_row a, b;
   a.add(0, 0.4), a.add(3, -1.2), a.add(5, 0.3);
@@ -224,7 +224,7 @@ void test_the_covariance_of_two_rows(void) {
 }
 
 // What the noise's adaption takes of a row beside the pose: its derivatives by a position's lasting error, each axis.
-void test_a_row_s_part_of_a_lasting_error(void) {
+TEST(test_a_row_s_part_of_a_lasting_error) {
   begin_busy();
   const int error = filter->add_state(0.0, 0.3), other = filter->add_state(0.0, 0.3),
             behind = filter->add_state(0.0, 0.3);
@@ -239,7 +239,7 @@ void test_a_row_s_part_of_a_lasting_error(void) {
 
 // GIVEN twists whose turn has the wrong sign WHEN headings are seen THEN the factor -1 explains them; of a right turn,
 // and of a velocity that is a state, none is listed.
-void test_the_turn_is_tested_by_what_is_seen(void) {
+TEST(test_the_turn_is_tested_by_what_is_seen) {
   for (int how = 0; how < 3; how++) {
     const int models[] = {WM_MOTION_TWIST, WM_MOTION_TWIST, WM_MOTION_CONSTANT_VELOCITY};
     begin(make::no_wheels(), models[how]);
@@ -269,7 +269,7 @@ void test_the_turn_is_tested_by_what_is_seen(void) {
 
 // GIVEN an update that takes a state beyond its limit THEN it stays at it, and what is correlated with it moves along:
 // the projection by the covariance.
-void test_a_state_beyond_its_limit_takes_the_others_along(void) {
+TEST(test_a_state_beyond_its_limit_takes_the_others_along) {
   begin_busy();
   const kept before;
   const int scale = filter->motion_state(wm::kSpeedScale);
@@ -289,7 +289,7 @@ void test_a_state_beyond_its_limit_takes_the_others_along(void) {
 }
 
 // Errors of sensors are cut at their own limits, and walk.
-void test_states_of_sensors_have_limits_and_walk(void) {
+TEST(test_states_of_sensors_have_limits_and_walk) {
   begin(make::no_wheels());
   const int error = filter->add_sensor_state(0.1, 0.5, 0.2, -0.3, 0.4),
             still = filter->add_sensor_state(0.0, 0.5, 0.0, -1, 1);
@@ -308,7 +308,7 @@ void test_states_of_sensors_have_limits_and_walk(void) {
 // ── motion ──────────────────────────────────────────────────────────────────────────────────────────────────────────
 
 // By-default states come with the motion's kind and go with it: the lag of commands is none of measured twists.
-void test_states_come_and_go_with_the_kind_of_the_motion(void) {
+TEST(test_states_come_and_go_with_the_kind_of_the_motion) {
   for (double &sigma : states.sigma) sigma = -0.05;
   params.twist = WM_TWIST_AUTO;
   begin(make::no_wheels());
@@ -334,7 +334,7 @@ void test_states_come_and_go_with_the_kind_of_the_motion(void) {
 
 // More lag moves the pose back by the twist, on the axes on which it was predicted. Corrections of the heading since do
 // not change that: else the lag and a sensor's time offset would not be observed as their sum alone.
-void test_corrections_of_the_heading_tell_nothing_of_the_lag(void) {
+TEST(test_corrections_of_the_heading_tell_nothing_of_the_lag) {
   for (double &sigma : states.sigma) sigma = 0.0;
   states.sigma[WM_LAG] = 0.2;
   params.twist = WM_TWIST_COMMANDS;
@@ -363,7 +363,7 @@ void test_corrections_of_the_heading_tell_nothing_of_the_lag(void) {
 
 // Twists without the steps of counts, of a robot by counts with and without a gyro: the low-pass of 0.1 s, of 0.3 s for
 // turns, and with a dead band of a count's noise. Where counts give neither speed nor turn the twist is as it is.
-void test_rates_without_the_steps_of_counts(void) {
+TEST(test_rates_without_the_steps_of_counts) {
   constexpr double kTick_m = 2 * M_PI * 0.1 / 1000, kEach_s = 0.02;
   for (const int model : {WM_MOTION_TICKS, WM_MOTION_SPEED_YAW_RATE, WM_MOTION_TWIST}) {
     begin(make::two_wheels(), model);
@@ -403,7 +403,7 @@ void test_rates_without_the_steps_of_counts(void) {
 }
 
 // A measurement ahead of the newest count has the errors of two: e1 + u (e1 - e0) after u periods.
-void test_the_variance_of_a_measurement_by_counts(void) {
+TEST(test_the_variance_of_a_measurement_by_counts) {
   constexpr double kTick_m = 2 * M_PI * 0.1 / 1000, kEach_s = 0.02;
   begin(make::two_wheels(), WM_MOTION_TICKS);
   for (int i = 0; i <= 60; i++)
@@ -427,7 +427,7 @@ void test_the_variance_of_a_measurement_by_counts(void) {
 
 // GIVEN a velocity that is a state WHEN nothing is seen for long THEN the heading is as unsure as any heading, pi^2 /
 // 3, and no more; below that its variance is what was added.
-void test_an_unseen_heading_is_as_unsure_as_any(void) {
+TEST(test_an_unseen_heading_is_as_unsure_as_any) {
   for (const double added : {0.5, 100.0}) {
     begin(make::no_wheels(), WM_MOTION_CONSTANT_VELOCITY);
     filter->move_to(0);
@@ -443,7 +443,7 @@ void test_an_unseen_heading_is_as_unsure_as_any(void) {
 }
 
 // Odometry by the motion alone: the way with its sideways part, the turns of either sense, odom from its own origin.
-void test_odometry_counts_ways_and_turns(void) {
+TEST(test_odometry_counts_ways_and_turns) {
   begin(make::no_wheels(), WM_MOTION_TWIST);
   wm_pose2 odom = {};
   for (int i = 0; i <= 40; i++) {
@@ -467,7 +467,7 @@ void test_odometry_counts_ways_and_turns(void) {
 
 // A motion that has been silent for a minute may have gone anywhere since the pose was last corrected, not since the
 // silence began.
-void test_a_silence_adds_by_the_time_since_a_correction(void) {
+TEST(test_a_silence_adds_by_the_time_since_a_correction) {
   begin(make::no_wheels(), WM_MOTION_TWIST);
   for (int i = 0; i <= 10; i++) filter->move(make::twist(0.1 * i, 1.5, 0.0));
   double grown_m2[2];
@@ -483,7 +483,7 @@ void test_a_silence_adds_by_the_time_since_a_correction(void) {
 }
 
 // Used memory is as good as new: a filter that is begun again is the same.
-void test_a_filter_that_is_begun_again_is_the_same(void) {
+TEST(test_a_filter_that_is_begun_again_is_the_same) {
   begin_busy();
   const kept first;
   const double travelled = filter->travelled_m(), turned = filter->turned_rad();
@@ -500,7 +500,7 @@ void test_a_filter_that_is_begun_again_is_the_same(void) {
 }
 
 // The path between two times in the past is that of the poses then.
-void test_a_past_path_is_that_between_the_poses(void) {
+TEST(test_a_past_path_is_that_between_the_poses) {
   begin(make::no_wheels(), WM_MOTION_TWIST);
   wm_pose2 pose[41];
   for (int i = 0; i <= 40; i++) {
@@ -527,30 +527,3 @@ void setUp(void) {
   states = {};
 }
 void tearDown(void) { filter.reset(); }
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_a_pose_in_space_has_the_heading_of_its_x_axis);
-  RUN_TEST(test_a_set_pose_replaces_pose_and_covariance);
-  RUN_TEST(test_a_reset_pose_is_the_starts);
-  RUN_TEST(test_the_start_of_the_filter);
-  RUN_TEST(test_a_given_covariance_is_its_upper_half);
-  RUN_TEST(test_inflated_mixed_and_scaled_covariances);
-  RUN_TEST(test_fading_and_forgetting_touch_one_row_and_column);
-  RUN_TEST(test_updates_that_are_refused);
-  RUN_TEST(test_the_covariance_of_two_rows);
-  RUN_TEST(test_a_row_s_part_of_a_lasting_error);
-  RUN_TEST(test_the_turn_is_tested_by_what_is_seen);
-  RUN_TEST(test_a_state_beyond_its_limit_takes_the_others_along);
-  RUN_TEST(test_states_of_sensors_have_limits_and_walk);
-  RUN_TEST(test_states_come_and_go_with_the_kind_of_the_motion);
-  RUN_TEST(test_corrections_of_the_heading_tell_nothing_of_the_lag);
-  RUN_TEST(test_rates_without_the_steps_of_counts);
-  RUN_TEST(test_the_variance_of_a_measurement_by_counts);
-  RUN_TEST(test_an_unseen_heading_is_as_unsure_as_any);
-  RUN_TEST(test_odometry_counts_ways_and_turns);
-  RUN_TEST(test_a_silence_adds_by_the_time_since_a_correction);
-  RUN_TEST(test_a_filter_that_is_begun_again_is_the_same);
-  RUN_TEST(test_a_past_path_is_that_between_the_poses);
-  return UNITY_END();
-}

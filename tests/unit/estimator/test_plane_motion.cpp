@@ -3,6 +3,7 @@
 // leave the plane.
 #include <cmath>
 
+#include "common/suite.h"
 #include "events.hpp"
 #include "filters/planar/past_pose.hpp"
 #include "filters/planar/planar_filter.hpp"
@@ -10,7 +11,6 @@
 #include "math/eigen.hpp"
 #include "math/se2.hpp"
 #include "motion/motion_params.h"
-#include "unity.h"
 #include "waymark/random.h"
 
 namespace {
@@ -34,7 +34,7 @@ void begin(const wm_rig *known = nullptr, double speed_scale_sigma = 0.0) {
 }
 
 // Heading to the centre: a circle sideways of 2 m radius, a radian of it.
-void test_a_circle_sideways(void) {
+TEST(test_a_circle_sideways) {
   begin();
   for (int i = 0; i <= 40; i++) filter.move(make::twist6(0.1 * i, 0.0, 0.5, 0.25));
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, -2.0 * (1.0 - cos(1.0)), filter.pose().x_m);
@@ -47,7 +47,7 @@ void test_a_circle_sideways(void) {
 }
 
 // Variance is added along the way, wherever the robot's front is: sideways is no more exact than forwards.
-void test_sideways_is_as_uncertain_as_forwards(void) {
+TEST(test_sideways_is_as_uncertain_as_forwards) {
   double along[2], across[2];
   for (int sideways : {0, 1}) {
     begin();
@@ -65,7 +65,7 @@ void drive_askew(int from) {
   for (int i = from; i <= 20; i++) filter.move(make::twist6(0.1 * i, 0.4, -0.6 + 0.02 * i, 0.5));
 }
 
-void test_derivatives_of_a_sideways_drive(void) {
+TEST(test_derivatives_of_a_sideways_drive) {
   constexpr double kStep = 1e-5, kSigma = 0.1;
   wm_pose2 end[2];
   for (int up : {0, 1}) {
@@ -89,7 +89,7 @@ void test_derivatives_of_a_sideways_drive(void) {
 }
 
 // A recording's own sigmas of its twist take the place of motion.noise.
-void test_stated_sigmas_replace_the_configured_noise(void) {
+TEST(test_stated_sigmas_replace_the_configured_noise) {
   double variance[2];
   for (int stated : {0, 1}) {
     wm_rig_init(&rig);
@@ -114,7 +114,7 @@ void compose_with(wm_pose2 *pose, wm::matrix<3> *p, const wm_pose2 &step, const 
 }
 
 // An increment is composed as a pose, with all of its covariance, however observations cut its time.
-void test_increments_are_poses(void) {
+TEST(test_increments_are_poses) {
   for (int cuts : {0, 1, 5}) {
     begin();
     wm_pose2 pose{};
@@ -135,14 +135,14 @@ void test_increments_are_poses(void) {
 }
 
 // Two that overlap by half count the common half once.
-void test_increments_that_overlap(void) {
+TEST(test_increments_that_overlap) {
   begin();
   filter.move(make::increment(0.0, 1.0, {1.0, 0.0, 0.0}, kCovariance));
   filter.move(make::increment(0.5, 1.5, {1.0, 0.0, 0.0}, kCovariance));
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1.5, filter.pose().x_m);
 }
 
-void test_impossible_increments_are_refused(void) {
+TEST(test_impossible_increments_are_refused) {
   begin();
   TEST_ASSERT_EQUAL(WM_OUT_OF_RANGE, filter.check_motion(make::increment(1.0, 1.0, {1, 0, 0}, kCovariance)));
   TEST_ASSERT_EQUAL(WM_OUT_OF_RANGE, filter.check_motion(make::increment(0.0, 1.0, {500, 0, 0}, kCovariance)));
@@ -169,7 +169,7 @@ void test_impossible_increments_are_refused(void) {
 }
 
 // A bump and a steady slope are of the plane, a dive is not.
-void test_motion_that_leaves_the_plane(void) {
+TEST(test_motion_that_leaves_the_plane) {
   const struct {
     double rise_mps, pitch_radps, for_s;
     bool leaves;
@@ -187,7 +187,7 @@ void test_motion_that_leaves_the_plane(void) {
 
 // GIVEN no motion data WHEN a robot whose velocity walks is seen each 0.5 s THEN pose and velocity are found, and their
 // errors are as large as their sigmas say: NEES over 40 drives.
-void test_a_velocity_of_its_own(void) {
+TEST(test_a_velocity_of_its_own) {
   double nees = 0.0, speed_errors = 0.0;
   const int drives = 40, steps = 60, fine = 50;
   for (uint64_t drive = 0; drive < drives; drive++) {
@@ -235,7 +235,7 @@ void test_a_velocity_of_its_own(void) {
 
 // GIVEN a velocity on the map's axes of a robot that turns WHEN its path from a time in the past is asked for THEN it
 // is seen from base_link as it was turned then.
-void test_a_past_path_of_a_velocity_of_its_own(void) {
+TEST(test_a_past_path_of_a_velocity_of_its_own) {
   wm_params_defaults(&wm_motion_params_table, &params);
   params.model = WM_MOTION_CONSTANT_VELOCITY;
   setup = {};
@@ -260,21 +260,3 @@ void test_a_past_path_of_a_velocity_of_its_own(void) {
 }
 
 }  // namespace
-
-void setUp(void) {}
-void tearDown(void) {}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_a_circle_sideways);
-  RUN_TEST(test_sideways_is_as_uncertain_as_forwards);
-  RUN_TEST(test_derivatives_of_a_sideways_drive);
-  RUN_TEST(test_stated_sigmas_replace_the_configured_noise);
-  RUN_TEST(test_increments_are_poses);
-  RUN_TEST(test_increments_that_overlap);
-  RUN_TEST(test_impossible_increments_are_refused);
-  RUN_TEST(test_motion_that_leaves_the_plane);
-  RUN_TEST(test_a_velocity_of_its_own);
-  RUN_TEST(test_a_past_path_of_a_velocity_of_its_own);
-  return UNITY_END();
-}

@@ -3,8 +3,8 @@
 // the lag, and each term of the noise, with all covariances of a segment.
 #include <cmath>
 
+#include "common/suite.h"
 #include "filters/planar/pose_step.hpp"
-#include "unity.h"
 
 namespace {
 
@@ -61,7 +61,7 @@ void check_column(const vec3 &expected, const wm::pose_step &step, int column, d
   for (int i = 0; i < 3; i++) TEST_ASSERT_DOUBLE_WITHIN(within, expected.at[i], step.by[column][i]);
 }
 
-void test_columns_by_heading_and_states(void) {
+TEST(test_columns_by_heading_and_states) {
   for (const auto &t : kTwists) {
     at_work work(t[0], t[1], t[2]);
     work.twist.add(wm::kSpeedScale, 0.7, 0.2, -0.4);
@@ -102,7 +102,7 @@ vec3 with_lag(const at_work &work, double more, bool first, bool last) {
   return {{a.x_m + b.x_m, a.y_m + b.y_m, a.turn_rad + b.turn_rad}};
 }
 
-void test_column_by_the_lag(void) {
+TEST(test_column_by_the_lag) {
   for (const auto &t : kTwists)
     for (int ends = 1; ends < 4; ends++) {
       at_work work(t[0], t[1], t[2]);
@@ -123,7 +123,7 @@ void test_column_by_the_lag(void) {
 }
 
 // Of a command the drive is elsewhere at the end of the segment than on the mean.
-void test_lag_of_a_command_takes_the_twist_at_the_end(void) {
+TEST(test_lag_of_a_command_takes_the_twist_at_the_end) {
   at_work work(1.0, 0, 0.5);
   work.motion_state[wm::kLag] = 4;
   work.segment.last = true;
@@ -134,7 +134,7 @@ void test_lag_of_a_command_takes_the_twist_at_the_end(void) {
   check_column(by_end, step, 1);
 }
 
-void test_noise_is_that_of_distance_side_and_rotation(void) {
+TEST(test_noise_is_that_of_distance_side_and_rotation) {
   // Covariance of distance, side and rotation: each entry another number.
   const double q[3][3] = {{4e-4, 1e-4, -0.7e-4}, {1e-4, 3e-4, 0.5e-4}, {-0.7e-4, 0.5e-4, 2e-4}};
   wm::motion_noise noise{};
@@ -160,7 +160,7 @@ void test_noise_is_that_of_distance_side_and_rotation(void) {
   }
 }
 
-void test_velocity_as_states(void) {
+TEST(test_velocity_as_states) {
   at_work work(0.8, -0.3, 0.6);
   work.segment.input.model = WM_MOTION_CONSTANT_VELOCITY;
   for (int k = 0; k < wm::kVelocityStates; k++) work.motion_state[wm::kVelocityX + k] = 3 + k;
@@ -182,7 +182,7 @@ void test_velocity_as_states(void) {
   }
 }
 
-void test_limits_of_states(void) {
+TEST(test_limits_of_states) {
   const struct {
     int state;
     double lowest, highest;
@@ -204,17 +204,3 @@ void test_limits_of_states(void) {
 }
 
 }  // namespace
-
-void setUp(void) {}
-void tearDown(void) {}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_columns_by_heading_and_states);
-  RUN_TEST(test_column_by_the_lag);
-  RUN_TEST(test_lag_of_a_command_takes_the_twist_at_the_end);
-  RUN_TEST(test_noise_is_that_of_distance_side_and_rotation);
-  RUN_TEST(test_velocity_as_states);
-  RUN_TEST(test_limits_of_states);
-  return UNITY_END();
-}

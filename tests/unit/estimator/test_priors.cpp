@@ -5,12 +5,12 @@
 #include <string>
 #include <vector>
 
+#include "common/suite.h"
 #include "events.hpp"
 #include "filters/core/sensor_slots.hpp"
 #include "math/arc.hpp"
 #include "motion/motion_kind.hpp"
 #include "motion/step.hpp"
-#include "unity.h"
 #include "waymark/random.h"
 
 namespace {
@@ -56,7 +56,7 @@ wm_event driven(int i, bool commands) {
   return make::twist(0.05 * i, commands ? v : v + noise(1), commands ? w : w + noise(2));
 }
 
-void test_commands_are_told_by_rows_that_repeat() {
+TEST(test_commands_are_told_by_rows_that_repeat) {
   for (const bool commands : {false, true}) {
     begin();
     TEST_ASSERT_DOUBLE_IS_NAN(sigma_of("motion.lag_s"));
@@ -68,7 +68,7 @@ void test_commands_are_told_by_rows_that_repeat() {
 }
 
 // Wheels that stand measure the same speed, too, if not quite zero.
-void test_a_measurement_that_stands_is_no_command() {
+TEST(test_a_measurement_that_stands_is_no_command) {
   begin();
   for (int i = 0; i < 1000; i++) {
     wm_event e = driven(i, false);
@@ -78,7 +78,7 @@ void test_a_measurement_that_stands_is_no_command() {
   TEST_ASSERT_DOUBLE_IS_NAN(sigma_of("motion.lag_s"));
 }
 
-void test_a_stated_kind_decides() {
+TEST(test_a_stated_kind_decides) {
   for (const bool commands : {false, true}) {
     motion.twist = commands ? WM_TWIST_COMMANDS : WM_TWIST_MEASURED;
     begin();
@@ -88,7 +88,7 @@ void test_a_stated_kind_decides() {
 }
 
 // Until the kind is known, the larger noise holds.
-void test_the_kind_gives_the_noise() {
+TEST(test_the_kind_gives_the_noise) {
   double variance[2];
   for (const bool commands : {false, true}) {
     motion.twist = commands ? WM_TWIST_COMMANDS : WM_TWIST_MEASURED;
@@ -102,7 +102,7 @@ void test_the_kind_gives_the_noise() {
   TEST_ASSERT_GREATER_THAN_DOUBLE(3.0 * variance[0], variance[1]);
 }
 
-void test_a_prior_is_a_multiple_of_the_sensors_own_sigma() {
+TEST(test_a_prior_is_a_multiple_of_the_sensors_own_sigma) {
   for (const double sigma_m : {0.03, 0.5}) {
     sensor.range_sigma_m = sigma_m;
     begin();
@@ -119,7 +119,7 @@ void test_a_prior_is_a_multiple_of_the_sensors_own_sigma() {
 
 // All states of both tables are on. A robot that stands and sees bearings alone cannot observe any scale, delay or
 // range; one that sees nothing cannot observe anything.
-void test_a_state_that_nothing_observes_keeps_its_prior() {
+TEST(test_a_state_that_nothing_observes_keeps_its_prior) {
   for (double &sigma : make::sightings.states.sigma) sigma = sigma == 0.0 ? 0.02 : sigma;
   make::sightings.states.sigma[WM_SENSOR_ROW_kDepthAxis] = 0.02;
   for (double &sigma : motion.states.sigma) sigma = sigma < 0.0 ? -sigma : sigma;
@@ -151,7 +151,7 @@ void test_a_state_that_nothing_observes_keeps_its_prior() {
 }
 
 // The axis of depths is open where a sensor measures depths, and no state of a sensor of distances.
-void test_a_sensor_of_depths_has_an_axis() {
+TEST(test_a_sensor_of_depths_has_an_axis) {
   for (const int depth : {0, 1}) {
     sensor.range_is_depth = depth;
     begin();
@@ -162,7 +162,7 @@ void test_a_sensor_of_depths_has_an_axis() {
 
 // A sigma is the noise of a sighting, in the sensor's calibration or in each sighting. Mounting, clock and scale are
 // states either way.
-void test_sightings_with_sigmas_are_as_those_of_a_sensor_with_them() {
+TEST(test_sightings_with_sigmas_are_as_those_of_a_sensor_with_them) {
   std::vector<wm_calibration_value> by[2];
   wm_estimate end[2];
   for (const bool stated : {false, true}) {
@@ -189,7 +189,7 @@ void test_sightings_with_sigmas_are_as_those_of_a_sensor_with_them() {
 }
 
 // The limit of a found place follows the positions that find it: a receiver of 10 m finds what one of 1 m does.
-void test_a_vague_receiver_finds_the_robot_too() {
+TEST(test_a_vague_receiver_finds_the_robot_too) {
   for (const double sigma_m : {1.0, 10.0}) {
     setup.start.p_m[0] = setup.start.p_m[1] = setup.start.heading_rad = NAN;
     begin();
@@ -207,7 +207,7 @@ void test_a_vague_receiver_finds_the_robot_too() {
 }
 
 // A gyro's data sheet states its scale better than a tape measure states a track; a stated sigma holds.
-void test_a_gyros_scale_is_known_from_its_data_sheet() {
+TEST(test_a_gyros_scale_is_known_from_its_data_sheet) {
   for (const bool stated : {false, true}) {
     motion.states.sigma[wm::kYawRateScale] = stated ? 0.08 : -0.04;
     begin();
@@ -220,7 +220,7 @@ void test_a_gyros_scale_is_known_from_its_data_sheet() {
 }
 
 // A receiver's first positions are 40 m off, as it states; soon it states 1 m. The error does not outlast its sigma.
-void test_a_receivers_lasting_error_falls_with_its_sigma() {
+TEST(test_a_receivers_lasting_error_falls_with_its_sigma) {
   setup.start.sigma_xy_m = 30.0;
   begin();
   for (int i = 0; i < 600; i++) {
@@ -234,7 +234,7 @@ void test_a_receivers_lasting_error_falls_with_its_sigma() {
 }
 
 // A compass is off by 4 degrees. Positions show it; without them it stays open, and so does the heading.
-void test_a_compass_deviation_is_found_or_stays_open() {
+TEST(test_a_compass_deviation_is_found_or_stays_open) {
   for (const bool has_positions : {true, false}) {
     setup.start.sigma_heading_rad = 0.5;
     begin();
@@ -263,7 +263,7 @@ void test_a_compass_deviation_is_found_or_stays_open() {
 }
 
 // An antenna 0.4 m ahead and 0.2 m to the left, whose mounting is stated or not: turns to both sides show it.
-void test_the_antennas_place_is_found_by_turns() {
+TEST(test_the_antennas_place_is_found_by_turns) {
   wm_rig rig;
   wm_rig_init(&rig);
   setup.rig = &rig;
@@ -305,7 +305,7 @@ void begin_known() {
 }
 
 // The first one fits the yaw's prior, and decides the yaw; the good ones agree with each other.
-void test_an_outlier_among_the_first_sightings_does_not_keep_the_yaw() {
+TEST(test_an_outlier_among_the_first_sightings_does_not_keep_the_yaw) {
   for (const double off_rad : {-0.12, 0.12}) {
     begin_known();
     see(0.0, 0, off_rad);
@@ -322,7 +322,7 @@ void test_an_outlier_among_the_first_sightings_does_not_keep_the_yaw() {
 }
 
 // With one landmark alone, that landmark has moved as well; outliers that scatter agree with nothing.
-void test_what_agrees_by_one_landmark_or_not_at_all_leaves_the_yaw() {
+TEST(test_what_agrees_by_one_landmark_or_not_at_all_leaves_the_yaw) {
   for (const bool scatter : {false, true}) {
     begin_known();
     see(0.0, 1, 0.0);
@@ -333,7 +333,7 @@ void test_what_agrees_by_one_landmark_or_not_at_all_leaves_the_yaw() {
 }
 
 // What many sightings have shown is not forgotten for a few.
-void test_a_yaw_that_many_sightings_confirm_is_kept() {
+TEST(test_a_yaw_that_many_sightings_confirm_is_kept) {
   begin_known();
   for (int i = 0; i < 40; i++) see(0.1 * i, i % 2, 0.0);
   for (int i = 40; i < 60; i++) {
@@ -358,24 +358,3 @@ void setUp() {
   setup.start = {WM_TIME_NONE, {0, 0, 0}, {0, 0, 0, 1}, 0.0, 0.05, 0.05};
 }
 void tearDown() { state.reset(); }
-
-int main() {
-  UNITY_BEGIN();
-  RUN_TEST(test_commands_are_told_by_rows_that_repeat);
-  RUN_TEST(test_a_measurement_that_stands_is_no_command);
-  RUN_TEST(test_a_stated_kind_decides);
-  RUN_TEST(test_the_kind_gives_the_noise);
-  RUN_TEST(test_a_prior_is_a_multiple_of_the_sensors_own_sigma);
-  RUN_TEST(test_a_state_that_nothing_observes_keeps_its_prior);
-  RUN_TEST(test_a_sensor_of_depths_has_an_axis);
-  RUN_TEST(test_sightings_with_sigmas_are_as_those_of_a_sensor_with_them);
-  RUN_TEST(test_a_vague_receiver_finds_the_robot_too);
-  RUN_TEST(test_a_gyros_scale_is_known_from_its_data_sheet);
-  RUN_TEST(test_a_receivers_lasting_error_falls_with_its_sigma);
-  RUN_TEST(test_a_compass_deviation_is_found_or_stays_open);
-  RUN_TEST(test_the_antennas_place_is_found_by_turns);
-  RUN_TEST(test_an_outlier_among_the_first_sightings_does_not_keep_the_yaw);
-  RUN_TEST(test_what_agrees_by_one_landmark_or_not_at_all_leaves_the_yaw);
-  RUN_TEST(test_a_yaw_that_many_sightings_confirm_is_kept);
-  return UNITY_END();
-}

@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // A sensor of the motion that is silent while others go on: what stands in for it, how unsure what holds becomes, and
 // what health states.
+#include "common/suite.h"
 #include "motion_fixture.hpp"
-
-void setUp(void) {}
-void tearDown(void) {}
 
 namespace {
 
@@ -48,7 +46,7 @@ void turn_without_gyro(car has) {
 
 // GIVEN rear wheels, a gyro and steering WHEN the gyro falls silent THEN the steering gives the turn, and the gyro does
 // again when it is back.
-void test_steering_stands_in_for_a_silent_gyro(void) {
+TEST(test_steering_stands_in_for_a_silent_gyro) {
   turn_without_gyro({false, true, true, true});
   TEST_ASSERT_EQUAL(WM_MOTION_ACKERMANN, front.model());
   TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.5, pose.heading_rad);
@@ -58,7 +56,7 @@ void test_steering_stands_in_for_a_silent_gyro(void) {
 }
 
 // Without steering, or where it is silent, too, the difference of the rear wheels' speeds does, with its own errors.
-void test_the_rear_wheels_stand_in_for_a_silent_gyro(void) {
+TEST(test_the_rear_wheels_stand_in_for_a_silent_gyro) {
   turn_without_gyro({false, true, true, false});
   TEST_ASSERT_EQUAL(WM_MOTION_SPEED_YAW_RATE, front.model());
   TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.5, pose.heading_rad);
@@ -72,7 +70,7 @@ void test_the_rear_wheels_stand_in_for_a_silent_gyro(void) {
 }
 
 // In reverse the wheels' speeds may have no sign: the gear turns their difference, too.
-void test_the_rear_wheels_stand_in_backwards(void) {
+TEST(test_the_rear_wheels_stand_in_backwards) {
   begin({false, true, true, false});
   feed(make::quantities(2, {{WM_Q_GEAR, -1}}));
   drive(2.02, 2.3, 0, {false, true, false, false});
@@ -83,7 +81,7 @@ void test_the_rear_wheels_stand_in_backwards(void) {
 
 // GIVEN no other measure of the turn WHEN the gyro falls silent THEN the last rate holds with growing noise, and no
 // longer than hold_max.
-void test_a_turn_that_nothing_measures_is_doubted(void) {
+TEST(test_a_turn_that_nothing_measures_is_doubted) {
   begin({true, false, true, false});
   drive(2, 3, 0.2, {true, false, true, false});
   const double before = pose.heading_rad, way = way_var;
@@ -98,7 +96,7 @@ void test_a_turn_that_nothing_measures_is_doubted(void) {
 }
 
 // GIVEN a speed and a gyro WHEN the speed falls silent THEN its way is doubted as after a silence of both.
-void test_a_speed_that_falls_silent_is_doubted(void) {
+TEST(test_a_speed_that_falls_silent_is_doubted) {
   begin({true, false, true, false});
   const double x = pose.x_m;
   drive(2, 3.24, 0, {false, false, true, false});
@@ -113,7 +111,7 @@ void test_a_speed_that_falls_silent_is_doubted(void) {
 }
 
 // GIVEN a robot that stands WHEN its speed falls silent THEN the gyro's rate is no measure of its bias.
-void test_a_silent_speed_shows_no_standstill(void) {
+TEST(test_a_silent_speed_shows_no_standstill) {
   start(make::car());
   double rate;
   for (int i = 0; i < 100; i++) {
@@ -128,7 +126,7 @@ void test_a_silent_speed_shows_no_standstill(void) {
 
 // GIVEN ticks and a gyro WHEN the counts are silent for 1 s and a half THEN the way is doubted meanwhile, and is the
 // counted one afterwards, unless observations have corrected the pose meanwhile.
-void test_counts_that_fall_silent(void) {
+TEST(test_counts_that_fall_silent) {
   constexpr double kTick_m = 2 * M_PI * 0.1 / 1000;  // of make::two_wheels()
   for (bool observed : {false, true}) {
     start(make::two_wheels());
@@ -152,7 +150,7 @@ void test_counts_that_fall_silent(void) {
 }
 
 // Steering that its sender gives when it changes is no silent sensor before hold_max.
-void test_steering_may_come_when_it_changes(void) {
+TEST(test_steering_may_come_when_it_changes) {
   start(make::car());
   for (int i = 0; i < 50; i++) feed(make::quantities(0.02 * i, {{WM_Q_VEHICLE_SPEED, 1.0}, {WM_Q_ROAD_WHEEL, 0.1}}));
   const double before = turn_var;
@@ -165,16 +163,3 @@ void test_steering_may_come_when_it_changes(void) {
 }
 
 }  // namespace
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_steering_stands_in_for_a_silent_gyro);
-  RUN_TEST(test_the_rear_wheels_stand_in_for_a_silent_gyro);
-  RUN_TEST(test_the_rear_wheels_stand_in_backwards);
-  RUN_TEST(test_a_turn_that_nothing_measures_is_doubted);
-  RUN_TEST(test_a_speed_that_falls_silent_is_doubted);
-  RUN_TEST(test_a_silent_speed_shows_no_standstill);
-  RUN_TEST(test_counts_that_fall_silent);
-  RUN_TEST(test_steering_may_come_when_it_changes);
-  return UNITY_END();
-}

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // SLAM in a simulated room whose landmarks nobody measured: it finds them, and absurd input is told, counted and
 // survived. Scenarios are GIVEN / WHEN / THEN; all noise is drawn from fixed seeds.
+#include "common/suite.h"
 #include "filters/slam/bearing_tracks.hpp"
 #include "slam_room.hpp"
 
@@ -8,7 +9,7 @@ namespace {
 
 using namespace room;
 
-void test_landmarks_are_found_by_bearing_and_range(void) {
+TEST(test_landmarks_are_found_by_bearing_and_range) {
   begin();
   drive(40);
   size_t found;
@@ -17,7 +18,7 @@ void test_landmarks_are_found_by_bearing_and_range(void) {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.1, off());
 }
 
-void test_landmarks_are_found_by_bearings_alone_whatever_the_method(void) {
+TEST(test_landmarks_are_found_by_bearings_alone_whatever_the_method) {
   for (int method : {WM_SLAM_LINE_UNSCENTED, WM_SLAM_LINE_LINEAR, WM_SLAM_LINE_INVERSE_DISTANCE}) {
     make_room();
     params.line_method = method;
@@ -31,7 +32,7 @@ void test_landmarks_are_found_by_bearings_alone_whatever_the_method(void) {
 }
 
 // Two identities that were out of sight for 5 s and fit again: no tracker's numbers. Then they are evidence for a pose.
-void test_identities_of_bearings_that_come_back_are_landmarks_own(void) {
+TEST(test_identities_of_bearings_that_come_back_are_landmarks_own) {
   begin();
   drive(10, false);
   TEST_ASSERT_GREATER_OR_EQUAL_DOUBLE(0.0, counted(WM_COUNTER_LANDMARKS_MERGED));  // listed: they may be a tracker's
@@ -40,7 +41,7 @@ void test_identities_of_bearings_that_come_back_are_landmarks_own(void) {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.3, off());
 }
 
-void test_the_first_marker_widens_a_map_of_points(void) {
+TEST(test_the_first_marker_widens_a_map_of_points) {
   begin();
   drive(20);
   size_t found;
@@ -57,7 +58,7 @@ void test_the_first_marker_widens_a_map_of_points(void) {
 }
 
 // A rate that is measured while the robot stands is the gyro's bias; one of exactly 0 was set.
-void test_a_measured_twist_at_standstill_gives_the_bias(void) {
+TEST(test_a_measured_twist_at_standstill_gives_the_bias) {
   for (const double rate : {0.0015, 0.0}) {
     make_room();
     motion.states.sigma[wm::kYawRateBias] = 0.02;
@@ -72,7 +73,7 @@ void test_a_measured_twist_at_standstill_gives_the_bias(void) {
   }
 }
 
-void test_coded_markers_give_place_and_heading_at_once(void) {
+TEST(test_coded_markers_give_place_and_heading_at_once) {
   coded = true;
   params.markers.heading_sigma_rad = 0.01;
   begin();
@@ -90,7 +91,7 @@ void test_coded_markers_give_place_and_heading_at_once(void) {
   }
 }
 
-void test_absurd_markers_are_refused_and_change_nothing(void) {
+TEST(test_absurd_markers_are_refused_and_change_nothing) {
   begin();
   drive(1);
   wm_innovation out[WM_INNOVATIONS_PER_EVENT_MAX];
@@ -110,7 +111,7 @@ void test_absurd_markers_are_refused_and_change_nothing(void) {
   TEST_ASSERT_EQUAL(WM_REJECTED_NO_ASSOCIATION, see(e));
 }
 
-void test_of_two_poses_the_one_is_taken_that_fits_the_map(void) {
+TEST(test_of_two_poses_the_one_is_taken_that_fits_the_map) {
   coded = true;
   params.markers.heading_sigma_rad = 0.01;
   begin();
@@ -126,7 +127,7 @@ void test_of_two_poses_the_one_is_taken_that_fits_the_map(void) {
   for (const wm_landmark &m : l) TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.0, wm::wrap(m.yaw_rad - 0.5 * (m.id - 10)));
 }
 
-void test_markers_with_two_poses_from_the_start_have_a_place_and_no_heading(void) {
+TEST(test_markers_with_two_poses_from_the_start_have_a_place_and_no_heading) {
   coded = two_poses = true;
   begin();
   drive(40);
@@ -139,7 +140,7 @@ void test_markers_with_two_poses_from_the_start_have_a_place_and_no_heading(void
   for (const auto &c : covariance) TEST_ASSERT_GREATER_THAN_DOUBLE(1.0, c[3]);
 }
 
-void test_landmarks_without_identity_are_told_apart(void) {
+TEST(test_landmarks_without_identity_are_told_apart) {
   nameless = true;
   params.associate_near_m = 2.0;
   begin();
@@ -150,7 +151,7 @@ void test_landmarks_without_identity_are_told_apart(void) {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.1, off());
 }
 
-void test_a_landmark_seen_twice_in_a_frame_without_identity_is_fused_once(void) {
+TEST(test_a_landmark_seen_twice_in_a_frame_without_identity_is_fused_once) {
   nameless = twice = true;
   params.associate_near_m = 2.0;
   begin();
@@ -161,7 +162,7 @@ void test_a_landmark_seen_twice_in_a_frame_without_identity_is_fused_once(void) 
   TEST_ASSERT_GREATER_THAN(fused / 2, rejected);
 }
 
-void test_the_same_identity_twice_in_a_frame_at_two_places_keeps_one(void) {
+TEST(test_the_same_identity_twice_in_a_frame_at_two_places_keeps_one) {
   begin();
   drive(30);
   const double before = off();
@@ -173,7 +174,7 @@ void test_the_same_identity_twice_in_a_frame_at_two_places_keeps_one(void) {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.1, before);
 }
 
-void test_a_marker_seen_twice_in_a_picture_is_fused_once_and_told(void) {
+TEST(test_a_marker_seen_twice_in_a_picture_is_fused_once_and_told) {
   coded = twice = true;
   begin();
   drive(40);
@@ -186,7 +187,7 @@ void test_a_marker_seen_twice_in_a_picture_is_fused_once_and_told(void) {
   TEST_ASSERT_EQUAL(WM_STATE_TRACKING, published_state());
 }
 
-void test_two_markers_of_one_identity_are_told_and_left_alone(void) {
+TEST(test_two_markers_of_one_identity_are_told_and_left_alone) {
   coded = true;
   begin();
   drive(30);
@@ -204,7 +205,7 @@ void test_two_markers_of_one_identity_are_told_and_left_alone(void) {
   TEST_ASSERT_EQUAL(kCount - 1, found);
 }
 
-void test_two_markers_of_one_identity_on_opposite_sides_spoil_nothing(void) {
+TEST(test_two_markers_of_one_identity_on_opposite_sides_spoil_nothing) {
   coded = true;
   twin = 6;  // opposite
   begin();
@@ -219,7 +220,7 @@ void test_two_markers_of_one_identity_on_opposite_sides_spoil_nothing(void) {
   TEST_ASSERT_EQUAL(kCount - 1, found);
 }
 
-void test_half_a_minute_without_markers_is_said_and_mended(void) {
+TEST(test_half_a_minute_without_markers_is_said_and_mended) {
   coded = true;
   begin();
   drive(30);
@@ -235,7 +236,7 @@ void test_half_a_minute_without_markers_is_said_and_mended(void) {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.05, off());
 }
 
-void test_a_landmark_that_moved_leaves_is_counted_and_joins_anew(void) {
+TEST(test_a_landmark_that_moved_leaves_is_counted_and_joins_anew) {
   begin();
   drive(30);
   TEST_ASSERT_EQUAL_DOUBLE(0, counted(WM_COUNTER_LANDMARKS_MOVED));
@@ -247,7 +248,7 @@ void test_a_landmark_that_moved_leaves_is_counted_and_joins_anew(void) {
   TEST_ASSERT_EQUAL(kCount, found);
 }
 
-void test_a_marker_that_moved_is_told_and_pulls_nothing(void) {
+TEST(test_a_marker_that_moved_is_told_and_pulls_nothing) {
   coded = true;
   begin();
   drive(30);
@@ -265,7 +266,7 @@ void test_a_marker_that_moved_is_told_and_pulls_nothing(void) {
 
 // A robot that is turned while it drives, by a wheel that slips or by hand, sees all its markers elsewhere: they hang
 // where they hung, and it finds back to them. No wheel and no gyro tells.
-void test_a_robot_that_was_turned_does_not_turn_its_map(void) {
+TEST(test_a_robot_that_was_turned_does_not_turn_its_map) {
   for (double turn_rad : {0.1, -0.4}) {
     leave_room();
     make_room();
@@ -288,7 +289,7 @@ void test_a_robot_that_was_turned_does_not_turn_its_map(void) {
 
 // Two markers are rejected by the same angle: the robot was turned. A bearing of the same stamp, which comes last, is
 // one of another kind and needs others like it.
-void test_bearings_beside_markers_do_not_hide_that_the_robot_was_turned(void) {
+TEST(test_bearings_beside_markers_do_not_hide_that_the_robot_was_turned) {
   for (const bool with_bearing : {false, true}) {
     leave_room();
     make_room();
@@ -320,7 +321,7 @@ void test_bearings_beside_markers_do_not_hide_that_the_robot_was_turned(void) {
 }
 
 // Two markers of five or six in view are turned by somebody, alike: the others say that it wasn't the robot.
-void test_markers_that_were_turned_do_not_turn_the_robot(void) {
+TEST(test_markers_that_were_turned_do_not_turn_the_robot) {
   coded = true;
   params.markers.heading_sigma_rad = 0.01;
   begin();
@@ -331,7 +332,7 @@ void test_markers_that_were_turned_do_not_turn_the_robot(void) {
   TEST_ASSERT_EQUAL_DOUBLE(0, counted(WM_COUNTER_ROTATION_OUTLIERS));
 }
 
-void test_most_markers_seen_where_none_are_is_survived(void) {
+TEST(test_most_markers_seen_where_none_are_is_survived) {
   coded = true;
   begin();
   drive(30);
@@ -344,7 +345,7 @@ void test_most_markers_seen_where_none_are_is_survived(void) {
   TEST_ASSERT_GREATER_THAN(100, rejected);
 }
 
-void test_most_sightings_false_are_survived(void) {
+TEST(test_most_sightings_false_are_survived) {
   begin();
   drive(30);
   false_share = 0.6;
@@ -353,7 +354,7 @@ void test_most_sightings_false_are_survived(void) {
   TEST_ASSERT_GREATER_THAN(100, rejected);
 }
 
-void test_half_a_minute_without_landmarks_is_said_and_mended(void) {
+TEST(test_half_a_minute_without_landmarks_is_said_and_mended) {
   begin();
   drive(30);
   const double sure = sigma();
@@ -369,7 +370,7 @@ void test_half_a_minute_without_landmarks_is_said_and_mended(void) {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.1, off());
 }
 
-void test_a_misread_code_after_a_while_without_landmarks_waits_for_a_second_one(void) {
+TEST(test_a_misread_code_after_a_while_without_landmarks_waits_for_a_second_one) {
   begin();
   drive(30);
   hidden = true;
@@ -384,7 +385,7 @@ void test_a_misread_code_after_a_while_without_landmarks_waits_for_a_second_one(
   TEST_ASSERT_LESS_THAN_DOUBLE(0.1, off());
 }
 
-void test_a_misread_code_does_not_keep_its_landmark_away(void) {
+TEST(test_a_misread_code_does_not_keep_its_landmark_away) {
   begin();
   see(make::sighting(now_s, 10, 2.5, 1.0));  // the first that is seen of it
   drive(30);
@@ -394,7 +395,7 @@ void test_a_misread_code_does_not_keep_its_landmark_away(void) {
   TEST_ASSERT_EQUAL_DOUBLE(0, counted(WM_COUNTER_LANDMARKS_MOVED));
 }
 
-void test_landmarks_that_are_never_seen_again_leave(void) {
+TEST(test_landmarks_that_are_never_seen_again_leave) {
   begin();
   drive(20);
   for (int i = 0; i < 30; i++) see(make::sighting(now_s, 1000 + i, 0.02 * i, 3.0));
@@ -407,7 +408,7 @@ void test_landmarks_that_are_never_seen_again_leave(void) {
   TEST_ASSERT_GREATER_OR_EQUAL(30, counted(WM_COUNTER_LANDMARKS_REMOVED));
 }
 
-void test_a_full_map_goes_on_with_what_it_has(void) {
+TEST(test_a_full_map_goes_on_with_what_it_has) {
   params.landmark_capacity = 6;
   begin();
   drive(40);
@@ -417,7 +418,7 @@ void test_a_full_map_goes_on_with_what_it_has(void) {
 }
 
 // Lines from a row of poses to one place: found, with the true derivative by each pose.
-void test_a_line_is_found_and_keeps_its_ties_to_every_pose(void) {
+TEST(test_a_line_is_found_and_keeps_its_ties_to_every_pose) {
   const double want[2] = {4.0, 3.0};
   for (bool unscented : {false, true}) {
     wm::line_bundle b{};
@@ -449,37 +450,3 @@ void test_a_line_is_found_and_keeps_its_ties_to_every_pose(void) {
 
 void setUp(void) { make_room(); }
 void tearDown(void) { leave_room(); }
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_landmarks_are_found_by_bearing_and_range);
-  RUN_TEST(test_landmarks_are_found_by_bearings_alone_whatever_the_method);
-  RUN_TEST(test_identities_of_bearings_that_come_back_are_landmarks_own);
-  RUN_TEST(test_the_first_marker_widens_a_map_of_points);
-  RUN_TEST(test_a_measured_twist_at_standstill_gives_the_bias);
-  RUN_TEST(test_coded_markers_give_place_and_heading_at_once);
-  RUN_TEST(test_absurd_markers_are_refused_and_change_nothing);
-  RUN_TEST(test_of_two_poses_the_one_is_taken_that_fits_the_map);
-  RUN_TEST(test_markers_with_two_poses_from_the_start_have_a_place_and_no_heading);
-  RUN_TEST(test_landmarks_without_identity_are_told_apart);
-  RUN_TEST(test_a_landmark_seen_twice_in_a_frame_without_identity_is_fused_once);
-  RUN_TEST(test_the_same_identity_twice_in_a_frame_at_two_places_keeps_one);
-  RUN_TEST(test_a_marker_seen_twice_in_a_picture_is_fused_once_and_told);
-  RUN_TEST(test_two_markers_of_one_identity_are_told_and_left_alone);
-  RUN_TEST(test_two_markers_of_one_identity_on_opposite_sides_spoil_nothing);
-  RUN_TEST(test_half_a_minute_without_markers_is_said_and_mended);
-  RUN_TEST(test_a_landmark_that_moved_leaves_is_counted_and_joins_anew);
-  RUN_TEST(test_a_marker_that_moved_is_told_and_pulls_nothing);
-  RUN_TEST(test_a_robot_that_was_turned_does_not_turn_its_map);
-  RUN_TEST(test_bearings_beside_markers_do_not_hide_that_the_robot_was_turned);
-  RUN_TEST(test_markers_that_were_turned_do_not_turn_the_robot);
-  RUN_TEST(test_most_markers_seen_where_none_are_is_survived);
-  RUN_TEST(test_most_sightings_false_are_survived);
-  RUN_TEST(test_half_a_minute_without_landmarks_is_said_and_mended);
-  RUN_TEST(test_a_misread_code_after_a_while_without_landmarks_waits_for_a_second_one);
-  RUN_TEST(test_a_misread_code_does_not_keep_its_landmark_away);
-  RUN_TEST(test_landmarks_that_are_never_seen_again_leave);
-  RUN_TEST(test_a_full_map_goes_on_with_what_it_has);
-  RUN_TEST(test_a_line_is_found_and_keeps_its_ties_to_every_pose);
-  return UNITY_END();
-}

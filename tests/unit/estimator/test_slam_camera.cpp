@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A camera that sees coded markers and is not quite what calibration.yaml says.
+#include "common/suite.h"
 #include "slam_room.hpp"
 
 using namespace room;
@@ -20,13 +21,13 @@ double worst_of_leaning(double sigma_rad) {
   return worst;
 }
 
-void test_a_camera_that_leans_is_found_by_how_high_markers_seem_to_hang(void) {
+TEST(test_a_camera_that_leans_is_found_by_how_high_markers_seem_to_hang) {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.05, worst_of_leaning(0.05));
   TEST_ASSERT_DOUBLE_WITHIN(0.004, leans[0], calibrated("camera.roll_rad"));
   TEST_ASSERT_DOUBLE_WITHIN(0.004, leans[1], calibrated("camera.pitch_rad"));
 }
 
-void test_a_second_camera_that_sees_the_same_markers_has_its_own_tilt(void) {
+TEST(test_a_second_camera_that_sees_the_same_markers_has_its_own_tilt) {
   wm_sensor both[2] = {sensor, sensor};
   std::strcpy(both[1].name, "other");
   both[1].mounting.xyz_m[2] += 1.0;
@@ -39,7 +40,7 @@ void test_a_second_camera_that_sees_the_same_markers_has_its_own_tilt(void) {
 }
 
 // A rotating laser whose angle encoder sits beside its axis: found while the map is built.
-void test_an_eccentric_turntable_is_found(void) {
+TEST(test_an_eccentric_turntable_is_found) {
   make::sightings.states.sigma[WM_SENSOR_ROW_kEccentricX] = 0.05;
   eccentric[0] = 0.04;
   eccentric[1] = -0.03;
@@ -54,7 +55,7 @@ void test_an_eccentric_turntable_is_found(void) {
   }
 }
 
-void test_taken_for_level_it_bends_the_map(void) { TEST_ASSERT_GREATER_THAN_DOUBLE(0.06, worst_of_leaning(0)); }
+TEST(test_taken_for_level_it_bends_the_map) { TEST_ASSERT_GREATER_THAN_DOUBLE(0.06, worst_of_leaning(0)); }
 
 // Motion, bearings and ranges with sigmas of their own, by a camera that is turned by so much. States by default.
 void drive_calibrated(double seconds, double camera_rad) {
@@ -84,7 +85,7 @@ void drive_calibrated(double seconds, double camera_rad) {
 
 // Who states all sigmas has calibrated the mounting to 0.3 degrees and the clock to 20 ms: states of these sigmas. A
 // yaw that is wrong by ten of them is found nevertheless.
-void test_a_calibrated_sensor_is_nearly_as_stated(void) {
+TEST(test_a_calibrated_sensor_is_nearly_as_stated) {
   double yaw_sigma_rad, offset_sigma_s;
   drive_calibrated(0.1, 0.0);
   calibrated("camera.yaw_rad", &yaw_sigma_rad);
@@ -103,7 +104,7 @@ void test_a_calibrated_sensor_is_nearly_as_stated(void) {
 }
 
 // A turn of 0.25 rad/s and a stamp that is off by 0.2 s: 0.05 rad.
-void test_stamps_that_scatter_matter_where_it_turns(void) {
+TEST(test_stamps_that_scatter_matter_where_it_turns) {
   double variance[2];
   for (int i = 0; i < 2; i++) {
     make_room();
@@ -119,7 +120,7 @@ void test_stamps_that_scatter_matter_where_it_turns(void) {
 
 // GIVEN a look whose stamp is 0.1 s late in a turn of 0.25 rad/s THEN with its stamp error as a state the heading
 // stays.
-void test_a_late_stamp_turns_all_bearings_alike(void) {
+TEST(test_a_late_stamp_turns_all_bearings_alike) {
   double turned_rad[2];
   for (int i = 0; i < 2; i++) {
     make_room();
@@ -142,7 +143,7 @@ void test_a_late_stamp_turns_all_bearings_alike(void) {
 }
 
 // Each error of the mounting alone, on a map whose landmarks are known: a wrong sign in a Jacobian would drive it away.
-void test_each_error_of_the_mounting_is_found(void) {
+TEST(test_each_error_of_the_mounting_is_found) {
   const struct {
     int row;
     const char *name;
@@ -171,16 +172,3 @@ void test_each_error_of_the_mounting_is_found(void) {
 
 void setUp(void) { make_room(); }
 void tearDown(void) { leave_room(); }
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_a_camera_that_leans_is_found_by_how_high_markers_seem_to_hang);
-  RUN_TEST(test_a_second_camera_that_sees_the_same_markers_has_its_own_tilt);
-  RUN_TEST(test_an_eccentric_turntable_is_found);
-  RUN_TEST(test_a_calibrated_sensor_is_nearly_as_stated);
-  RUN_TEST(test_taken_for_level_it_bends_the_map);
-  RUN_TEST(test_stamps_that_scatter_matter_where_it_turns);
-  RUN_TEST(test_a_late_stamp_turns_all_bearings_alike);
-  RUN_TEST(test_each_error_of_the_mounting_is_found);
-  return UNITY_END();
-}

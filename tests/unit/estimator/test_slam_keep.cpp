@@ -3,6 +3,7 @@
 // wrong.
 #include <cstdio>
 #include <vector>
+#include "common/suite.h"
 
 #include "slam_room.hpp"
 #include "waymark/keeper.h"
@@ -39,7 +40,7 @@ void learn() {
 
 // GIVEN a map that was learnt WHEN the program begins anew where the robot stands THEN the map is the same at once, the
 // pose is as unsure as the start, and both are right again after the first sightings.
-void test_map_and_calibration_are_taken_up_with_their_covariances() {
+TEST(test_map_and_calibration_are_taken_up_with_their_covariances) {
   for (const bool with_codes : {false, true}) {
     make_room();
     coded = with_codes;
@@ -76,7 +77,7 @@ void test_map_and_calibration_are_taken_up_with_their_covariances() {
 }
 
 // GIVEN a map that was taken up WHEN the pose is proven again THEN the map is kept again.
-void test_a_map_that_was_taken_up_is_kept_again() {
+TEST(test_a_map_that_was_taken_up_is_kept_again) {
   learn();
   const size_t bytes = image.size();
   restart(truth.x_m, truth.y_m, truth.heading_rad);
@@ -91,7 +92,7 @@ void test_a_map_that_was_taken_up_is_kept_again() {
 }
 
 // GIVEN a kept map WHEN the robot was carried away while it was off THEN it is found in the map.
-void test_a_robot_that_was_moved_while_off_is_found_in_its_map() {
+TEST(test_a_robot_that_was_moved_while_off_is_found_in_its_map) {
   coded = true;
   learn();
   restart(truth.x_m - 2.5, truth.y_m + 1.5, truth.heading_rad + 1.0);
@@ -105,7 +106,7 @@ void test_a_robot_that_was_moved_while_off_is_found_in_its_map() {
 
 // GIVEN a kept map WHEN the robot drove on and turned while it was off, within the start's sigmas THEN no pose is
 // further off than its sigma: at such angles a correction is far from linear.
-void test_a_robot_that_turned_while_off_is_never_surely_wrong() {
+TEST(test_a_robot_that_turned_while_off_is_never_surely_wrong) {
   for (const bool with_codes : {false, true}) {
     double worst = 0.0, late_m = 0.0;
     make_room();
@@ -131,7 +132,7 @@ void test_a_robot_that_turned_while_off_is_never_surely_wrong() {
 
 // GIVEN a kept map WHEN the place is vague, as after a minute without motion, and the heading is known THEN the first
 // markers give the place: it is linear in it.
-void test_a_vague_place_alone_is_found_by_the_first_markers() {
+TEST(test_a_vague_place_alone_is_found_by_the_first_markers) {
   coded = true;
   learn();
   restart(truth.x_m - 1.0, truth.y_m + 0.5, truth.heading_rad, 80.0, 0.005);
@@ -142,7 +143,7 @@ void test_a_vague_place_alone_is_found_by_the_first_markers() {
   TEST_ASSERT_LESS_THAN_DOUBLE(4.0, off() / sigma());
 }
 
-void test_without_a_pose_it_is_searched_in_the_map() {
+TEST(test_without_a_pose_it_is_searched_in_the_map) {
   coded = true;
   learn();
   restart(kAbsent, kAbsent, kAbsent);
@@ -152,7 +153,7 @@ void test_without_a_pose_it_is_searched_in_the_map() {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.1, off());
 }
 
-void test_an_image_that_is_wrong_is_refused_with_the_reason() {
+TEST(test_an_image_that_is_wrong_is_refused_with_the_reason) {
   learn();
   const std::vector<char> good = image;
   for (size_t bytes = 0; bytes < good.size(); bytes += 97) {
@@ -188,7 +189,7 @@ void test_an_image_that_is_wrong_is_refused_with_the_reason() {
 }
 
 // The run's slot has bytes_max: a map that has grown to its capacity is kept as any other.
-void test_a_map_at_its_capacity_is_kept() {
+TEST(test_a_map_at_its_capacity_is_kept) {
   for (const bool with_codes : {false, true}) {
     make_room();
     coded = with_codes;
@@ -201,14 +202,14 @@ void test_a_map_at_its_capacity_is_kept() {
   }
 }
 
-void test_an_image_with_too_little_room_is_not_written() {
+TEST(test_an_image_with_too_little_room_is_not_written) {
   learn();
   std::vector<char> small(image.size() - 1, 0x5a);
   TEST_ASSERT_EQUAL(0, keeper->keep(state, small.data(), small.size()));
   for (const char c : small) TEST_ASSERT_EQUAL(0x5a, c);
 }
 
-void test_estimators_without_a_map_of_their_own_keep_nothing() {
+TEST(test_estimators_without_a_map_of_their_own_keep_nothing) {
   TEST_ASSERT_NULL(wm_keeper_of(wm_estimator_find("landmark_ekf")));
   TEST_ASSERT_NOT_NULL(wm_keeper_of(wm_estimator_find("slam")));
 }
@@ -220,18 +221,3 @@ void setUp(void) {
   keeper = wm_keeper_of(slam);
 }
 void tearDown(void) { leave_room(); }
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_map_and_calibration_are_taken_up_with_their_covariances);
-  RUN_TEST(test_a_map_that_was_taken_up_is_kept_again);
-  RUN_TEST(test_a_robot_that_was_moved_while_off_is_found_in_its_map);
-  RUN_TEST(test_a_robot_that_turned_while_off_is_never_surely_wrong);
-  RUN_TEST(test_a_vague_place_alone_is_found_by_the_first_markers);
-  RUN_TEST(test_without_a_pose_it_is_searched_in_the_map);
-  RUN_TEST(test_an_image_that_is_wrong_is_refused_with_the_reason);
-  RUN_TEST(test_a_map_at_its_capacity_is_kept);
-  RUN_TEST(test_an_image_with_too_little_room_is_not_written);
-  RUN_TEST(test_estimators_without_a_map_of_their_own_keep_nothing);
-  return UNITY_END();
-}

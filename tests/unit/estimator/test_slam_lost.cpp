@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // SLAM and the kidnapped robot: the state LOST, the map held meanwhile, the pose found on it.
+#include "common/suite.h"
 #include "filters/relocalize/line_search.hpp"
 #include "slam_room.hpp"
 
@@ -57,10 +58,10 @@ void check_found(bool of_markers, bool is_lost) {
 
 }  // namespace
 
-void test_kidnapped_among_landmarks(void) { check_found(false, false); }
-void test_kidnapped_among_markers(void) { check_found(true, true); }
+TEST(test_kidnapped_among_landmarks) { check_found(false, false); }
+TEST(test_kidnapped_among_markers) { check_found(true, true); }
 
-void test_undisturbed_is_never_lost(void) {
+TEST(test_undisturbed_is_never_lost) {
   for (const double share : {0.0, 0.1}) {
     make_room();
     false_share = share;
@@ -70,7 +71,7 @@ void test_undisturbed_is_never_lost(void) {
 }
 
 // GIVEN one landmark that was moved THEN it is the landmark that is wrong.
-void test_a_moved_landmark_is_not_a_lost_robot(void) {
+TEST(test_a_moved_landmark_is_not_a_lost_robot) {
   begin();
   drive(60);
   place[3][0] += 1.0;
@@ -78,7 +79,7 @@ void test_a_moved_landmark_is_not_a_lost_robot(void) {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.3, off());
 }
 
-void test_starts_without_a_pose_on_a_given_map(void) {
+TEST(test_starts_without_a_pose_on_a_given_map) {
   for (const int32_t map : {WM_SLAM_MAP_EXTEND, WM_SLAM_MAP_FROZEN}) {
     make_room();
     params.map = map;
@@ -92,7 +93,7 @@ void test_starts_without_a_pose_on_a_given_map(void) {
 }
 
 // GIVEN recovery switched off THEN the state is never LOST.
-void test_recovery_can_be_switched_off(void) {
+TEST(test_recovery_can_be_switched_off) {
   params.recover = 0;
   begin();
   drive(60);
@@ -101,7 +102,7 @@ void test_recovery_can_be_switched_off(void) {
 }
 
 // Identities up to 2^31 - 1 have lasting errors of their own.
-void test_large_identities_keep_their_slots(void) {
+TEST(test_large_identities_keep_their_slots) {
   make::sightings.correlated_slots = 4;
   make::sightings.correlated_bearing_rad = 0.02;
   for (int i = 0; i < kCount; i++) known[i].id = INT32_MAX - i;
@@ -113,7 +114,7 @@ void test_large_identities_keep_their_slots(void) {
 
 // GIVEN twenty lines of which nobody knows which is which THEN one look's pattern gives the pose; bearings of nothing
 // give none.
-void test_a_pattern_of_lines_gives_the_pose(void) {
+TEST(test_a_pattern_of_lines_gives_the_pose) {
   double line[20][2];
   for (auto &l : line)
     for (double &at : l) at = 10.0 * wm_random_next_uniform(&noise) - 5.0;
@@ -138,17 +139,4 @@ void test_a_pattern_of_lines_gives_the_pose(void) {
     TEST_ASSERT_GREATER_THAN_DOUBLE(0.0, found.covariance[0][0]);
     TEST_ASSERT_LESS_THAN_DOUBLE(0.01, found.covariance[0][0]);
   }
-}
-
-int main() {
-  UNITY_BEGIN();
-  RUN_TEST(test_kidnapped_among_landmarks);
-  RUN_TEST(test_kidnapped_among_markers);
-  RUN_TEST(test_undisturbed_is_never_lost);
-  RUN_TEST(test_a_moved_landmark_is_not_a_lost_robot);
-  RUN_TEST(test_starts_without_a_pose_on_a_given_map);
-  RUN_TEST(test_recovery_can_be_switched_off);
-  RUN_TEST(test_a_pattern_of_lines_gives_the_pose);
-  RUN_TEST(test_large_identities_keep_their_slots);
-  return UNITY_END();
 }

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // SLAM on a map that is already there: frozen or extended, with gaps, wrong in a place, and begun without a pose.
+#include "common/suite.h"
 #include "slam_room.hpp"
 
 namespace {
 
 using namespace room;
 
-void test_a_marker_that_moved_is_told_on_a_frozen_map_too(void) {
+TEST(test_a_marker_that_moved_is_told_on_a_frozen_map_too) {
   coded = true;
   params.map = WM_SLAM_MAP_FROZEN;
   for (int i = 0; i < kCount; i++) known[i].yaw_rad = wm::wrap(0.5 * i);
@@ -19,7 +20,7 @@ void test_a_marker_that_moved_is_told_on_a_frozen_map_too(void) {
   TEST_ASSERT_EQUAL(WM_STATE_TRACKING, published_state());
 }
 
-void test_a_saved_map_frozen_or_extended_needs_no_first_lap(void) {
+TEST(test_a_saved_map_frozen_or_extended_needs_no_first_lap) {
   for (int map : {WM_SLAM_MAP_FROZEN, WM_SLAM_MAP_EXTEND}) {
     make_room();
     params.map = map;
@@ -39,7 +40,7 @@ void test_a_saved_map_frozen_or_extended_needs_no_first_lap(void) {
   }
 }
 
-void test_started_lost_on_a_map_of_markers_it_finds_itself(void) {
+TEST(test_started_lost_on_a_map_of_markers_it_finds_itself) {
   coded = true;
   params.map = WM_SLAM_MAP_FROZEN;
   for (int i = 0; i < kCount; i++) known[i].yaw_rad = wm::wrap(0.5 * i);
@@ -78,7 +79,7 @@ void start_lost_before_markers(int map = WM_SLAM_MAP_FROZEN) {
 }
 
 // How small prints are turned is hardly seen, where they are is.
-void test_started_lost_it_finds_itself_by_the_places_of_two_markers_whose_turns_disagree(void) {
+TEST(test_started_lost_it_finds_itself_by_the_places_of_two_markers_whose_turns_disagree) {
   start_lost_before_markers();
   TEST_ASSERT_EQUAL(WM_REJECTED_SEARCHING, see_from_start(1, 0, 0.2));
   TEST_ASSERT_EQUAL(WM_REJECTED_SEARCHING, see_from_start(3, 0, -0.2));
@@ -92,7 +93,7 @@ void test_started_lost_it_finds_itself_by_the_places_of_two_markers_whose_turns_
 }
 
 // The pose that was just found is vague enough for it to pass the gate.
-void test_an_outlier_just_after_the_pose_was_found_is_refused_by_the_marker_s_place_before(void) {
+TEST(test_an_outlier_just_after_the_pose_was_found_is_refused_by_the_marker_s_place_before) {
   start_lost_before_markers();
   see_from_start(1, 0, 0.2);
   see_from_start(3, 0, -0.2);
@@ -106,7 +107,7 @@ void test_an_outlier_just_after_the_pose_was_found_is_refused_by_the_marker_s_pl
   TEST_ASSERT_LESS_THAN_DOUBLE(0.05, off());
 }
 
-void test_started_lost_two_markers_are_not_believed_that_are_not_as_far_apart_as_on_the_map(void) {
+TEST(test_started_lost_two_markers_are_not_believed_that_are_not_as_far_apart_as_on_the_map) {
   start_lost_before_markers();
   for (int i = 0; i < 8; i++, now_s += 0.3) {
     TEST_ASSERT_EQUAL(WM_REJECTED_SEARCHING, see_from_start(1, 0, 0));
@@ -140,7 +141,7 @@ void pass_by(int i, double speed_mps, double seconds, double yaw_sigma_rad, bool
   TEST_ASSERT_EQUAL(WM_OK, slam->predict(state, &e));
 }
 
-void test_started_lost_it_finds_itself_by_one_marker_that_it_drives_past(void) {
+TEST(test_started_lost_it_finds_itself_by_one_marker_that_it_drives_past) {
   start_lost_before_markers();
   pass_by(1, 0.5, 0.05, 0.01, false);
   TEST_ASSERT_EQUAL(WM_STATE_SEARCHING, published_state());
@@ -150,7 +151,7 @@ void test_started_lost_it_finds_itself_by_one_marker_that_it_drives_past(void) {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.1, sigma());
 }
 
-void test_started_lost_a_mirror_image_of_one_marker_is_not_believed(void) {
+TEST(test_started_lost_a_mirror_image_of_one_marker_is_not_believed) {
   start_lost_before_markers();
   for (int i = 0; i < 20; i++) {
     pass_by(1, 0.5, 0.1, 0.01, true);
@@ -158,14 +159,14 @@ void test_started_lost_a_mirror_image_of_one_marker_is_not_believed(void) {
   }
 }
 
-void test_started_lost_one_marker_whose_turn_is_hardly_seen_does_not_do(void) {
+TEST(test_started_lost_one_marker_whose_turn_is_hardly_seen_does_not_do) {
   start_lost_before_markers();
   pass_by(1, 0.5, 2, 0.15, false);
   TEST_ASSERT_EQUAL(WM_STATE_SEARCHING, published_state());
 }
 
 // A marker that was moved would spoil the map.
-void test_started_lost_on_a_map_that_grows_it_takes_two_markers(void) {
+TEST(test_started_lost_on_a_map_that_grows_it_takes_two_markers) {
   start_lost_before_markers(WM_SLAM_MAP_EXTEND);
   pass_by(1, 0.5, 2, 0.01, false);
   TEST_ASSERT_EQUAL(WM_STATE_SEARCHING, published_state());
@@ -175,7 +176,7 @@ void test_started_lost_on_a_map_that_grows_it_takes_two_markers(void) {
 }
 
 // An upright marker that is seen from one place may be the mirror image of what it seems. A level one is not.
-void test_started_lost_and_standing_it_finds_itself_by_one_marker_that_is_level(void) {
+TEST(test_started_lost_and_standing_it_finds_itself_by_one_marker_that_is_level) {
   for (double yaw_sigma_rad : {0.01, static_cast<double>(NAN)}) {
     make_room();
     start_lost_before_markers();
@@ -185,7 +186,7 @@ void test_started_lost_and_standing_it_finds_itself_by_one_marker_that_is_level(
   TEST_ASSERT_LESS_THAN_DOUBLE(0.03, off());
 }
 
-void test_a_start_by_one_marker_that_was_moved_is_taken_back_when_others_are_seen(void) {
+TEST(test_a_start_by_one_marker_that_was_moved_is_taken_back_when_others_are_seen) {
   start_lost_before_markers();
   place[1][0] += 0.5;
   place[1][1] -= 1.5;
@@ -203,7 +204,7 @@ void test_a_start_by_one_marker_that_was_moved_is_taken_back_when_others_are_see
   TEST_ASSERT_LESS_THAN_DOUBLE(0.05, off());
 }
 
-void test_a_map_with_nan_loses_those_landmarks_alone(void) {
+TEST(test_a_map_with_nan_loses_those_landmarks_alone) {
   params.map = WM_SLAM_MAP_EXTEND;
   known[3].p_m[1] = kAbsent;
   known[5].sigma_m = kAbsent;
@@ -215,7 +216,7 @@ void test_a_map_with_nan_loses_those_landmarks_alone(void) {
 }
 
 // A map of markers with NaN for a place, for a heading and for a sigma.
-void test_a_frozen_map_of_markers_with_nan_locates_by_the_others(void) {
+TEST(test_a_frozen_map_of_markers_with_nan_locates_by_the_others) {
   coded = true;
   params.map = WM_SLAM_MAP_FROZEN;
   for (int i = 0; i < kCount; i++) known[i].yaw_rad = wm::wrap(0.5 * i);
@@ -235,22 +236,3 @@ void test_a_frozen_map_of_markers_with_nan_locates_by_the_others(void) {
 
 void setUp(void) { make_room(); }
 void tearDown(void) { leave_room(); }
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_a_marker_that_moved_is_told_on_a_frozen_map_too);
-  RUN_TEST(test_a_saved_map_frozen_or_extended_needs_no_first_lap);
-  RUN_TEST(test_started_lost_on_a_map_of_markers_it_finds_itself);
-  RUN_TEST(test_started_lost_it_finds_itself_by_the_places_of_two_markers_whose_turns_disagree);
-  RUN_TEST(test_an_outlier_just_after_the_pose_was_found_is_refused_by_the_marker_s_place_before);
-  RUN_TEST(test_started_lost_two_markers_are_not_believed_that_are_not_as_far_apart_as_on_the_map);
-  RUN_TEST(test_started_lost_it_finds_itself_by_one_marker_that_it_drives_past);
-  RUN_TEST(test_started_lost_a_mirror_image_of_one_marker_is_not_believed);
-  RUN_TEST(test_started_lost_one_marker_whose_turn_is_hardly_seen_does_not_do);
-  RUN_TEST(test_started_lost_on_a_map_that_grows_it_takes_two_markers);
-  RUN_TEST(test_started_lost_and_standing_it_finds_itself_by_one_marker_that_is_level);
-  RUN_TEST(test_a_start_by_one_marker_that_was_moved_is_taken_back_when_others_are_seen);
-  RUN_TEST(test_a_map_with_nan_loses_those_landmarks_alone);
-  RUN_TEST(test_a_frozen_map_of_markers_with_nan_locates_by_the_others);
-  return UNITY_END();
-}

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // SLAM with positions and headings: a map that began in a frame of its own is put where they say, and stays true.
+#include "common/suite.h"
 #include "slam_room.hpp"
 
 namespace {
@@ -58,7 +59,7 @@ void drive_with_positions(int seconds, double sigma_m, double jump_m = 0.0) {
   }
 }
 
-void test_a_map_of_its_own_is_put_where_positions_say(void) {
+TEST(test_a_map_of_its_own_is_put_where_positions_say) {
   without_a_start();
   drive(5);
   TEST_ASSERT_EQUAL(WM_STATE_TRACKING, published_state());
@@ -74,7 +75,7 @@ void test_a_map_of_its_own_is_put_where_positions_say(void) {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.15, worst_landmark_there());
 }
 
-void test_its_covariance_is_as_large_as_its_error(void) {
+TEST(test_its_covariance_is_as_large_as_its_error) {
   double sum = 0.0;
   const int drives = 20;
   for (int seed = 0; seed < drives; seed++) {
@@ -92,7 +93,7 @@ void test_its_covariance_is_as_large_as_its_error(void) {
   TEST_ASSERT_GREATER_THAN_DOUBLE(20.7, sum);
 }
 
-void test_a_compass_turns_the_map_and_a_position_shifts_it(void) {
+TEST(test_a_compass_turns_the_map_and_a_position_shifts_it) {
   without_a_start();
   drive(10);
   see(make::heading(now_s, there().heading_rad, 0.01));
@@ -106,7 +107,7 @@ void test_a_compass_turns_the_map_and_a_position_shifts_it(void) {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.15, worst_landmark_there());
 }
 
-void test_from_a_stated_start_positions_hold_the_map(void) {
+TEST(test_from_a_stated_start_positions_hold_the_map) {
   const wm_pose2 at = there();
   setup.start = {WM_TIME_NONE, {at.x_m, at.y_m, 0}, {0, 0, 0, 1}, at.heading_rad, 0.05, 0.02};
   begin();
@@ -116,7 +117,7 @@ void test_from_a_stated_start_positions_hold_the_map(void) {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.1, worst_landmark_there());
 }
 
-void test_a_standing_robot_waits_for_its_frame(void) {
+TEST(test_a_standing_robot_waits_for_its_frame) {
   without_a_start();
   for (int i = 0; i < 50; i++) {
     now_s += 0.1;
@@ -129,7 +130,7 @@ void test_a_standing_robot_waits_for_its_frame(void) {
   TEST_ASSERT_EQUAL(WM_REJECTED_SEARCHING, last.verdict);
 }
 
-void test_a_receiver_that_jumps_moves_neither_pose_nor_map(void) {
+TEST(test_a_receiver_that_jumps_moves_neither_pose_nor_map) {
   without_a_start();
   drive_with_positions(40, 0.02);
   const double before_m = worst_landmark_there();
@@ -140,7 +141,7 @@ void test_a_receiver_that_jumps_moves_neither_pose_nor_map(void) {
   TEST_ASSERT_LESS_THAN_DOUBLE(before_m + 0.03, worst_landmark_there());
 }
 
-void test_a_position_that_is_no_number_or_not_wanted_is_refused(void) {
+TEST(test_a_position_that_is_no_number_or_not_wanted_is_refused) {
   begin();
   wm_event bad = make::position(now_s, NAN, 0.0, 0.02);
   wm_innovation out[WM_INNOVATIONS_PER_EVENT_MAX];
@@ -153,7 +154,7 @@ void test_a_position_that_is_no_number_or_not_wanted_is_refused(void) {
 }
 
 // A robot that starts where positions are and drives into a hall without them keeps the map in their frame.
-void test_a_new_start_forgets_the_frame(void) {
+TEST(test_a_new_start_forgets_the_frame) {
   without_a_start();
   drive_with_positions(30, 0.02);
   wm_event reset = make::empty(now_s, WM_EVENT_RESET);
@@ -170,16 +171,3 @@ void test_a_new_start_forgets_the_frame(void) {
 
 void setUp(void) { make_room(); }
 void tearDown(void) { leave_room(); }
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_a_map_of_its_own_is_put_where_positions_say);
-  RUN_TEST(test_its_covariance_is_as_large_as_its_error);
-  RUN_TEST(test_a_compass_turns_the_map_and_a_position_shifts_it);
-  RUN_TEST(test_from_a_stated_start_positions_hold_the_map);
-  RUN_TEST(test_a_standing_robot_waits_for_its_frame);
-  RUN_TEST(test_a_receiver_that_jumps_moves_neither_pose_nor_map);
-  RUN_TEST(test_a_position_that_is_no_number_or_not_wanted_is_refused);
-  RUN_TEST(test_a_new_start_forgets_the_frame);
-  return UNITY_END();
-}

@@ -3,11 +3,11 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "common/suite.h"
 #include "events.hpp"
 #include "filters/slam/params.h"
 #include "math/arc.hpp"
 #include "motion/motion_params.h"
-#include "unity.h"
 #include "waymark/estimator.h"
 #include "waymark/random.h"
 
@@ -107,7 +107,7 @@ double squared_error(double *nees) {
 }
 
 // A way along a line sees a beacon and its mirror image alike; the first curve decides.
-void test_a_mirror_image_is_left_open_on_a_line_and_decided_by_the_first_curve(void) {
+TEST(test_a_mirror_image_is_left_open_on_a_line_and_decided_by_the_first_curve) {
   for (const double spacing_m : {10.0, 60.0}) {
     begin(spacing_m, 0.01 * spacing_m, 3);
     int right;
@@ -120,7 +120,7 @@ void test_a_mirror_image_is_left_open_on_a_line_and_decided_by_the_first_curve(v
 }
 
 // Beacons at other distances with other noise: the pose's error fits its covariance, and the map is right.
-void test_the_pose_among_beacons_is_as_sure_as_it_states(void) {
+TEST(test_the_pose_among_beacons_is_as_sure_as_it_states) {
   const double kinds[][2] = {{5.0, 0.05}, {15.0, 0.1}, {40.0, 0.5}, {100.0, 1.0}};
   for (const auto &kind : kinds) {
     double sum = 0.0, worst = 0.0;
@@ -148,7 +148,7 @@ void test_the_pose_among_beacons_is_as_sure_as_it_states(void) {
 }
 
 // Ranges are no standard of length; times of flight are twice as uncertain.
-void test_the_scale_of_ranges_is_a_state_by_default(void) {
+TEST(test_the_scale_of_ranges_is_a_state_by_default) {
   for (const double bearing_sigma_rad : {(double)NAN, 0.01}) {
     begin(10.0, 0.1, 1);
     make::sightings.states.sigma[WM_SENSOR_ROW_kRangeScale] = -0.05;
@@ -164,16 +164,7 @@ void test_the_scale_of_ranges_is_a_state_by_default(void) {
 
 }  // namespace
 
-void setUp(void) {}
 void tearDown(void) {
   std::free(state);
   state = nullptr;
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_a_mirror_image_is_left_open_on_a_line_and_decided_by_the_first_curve);
-  RUN_TEST(test_the_scale_of_ranges_is_a_state_by_default);
-  RUN_TEST(test_the_pose_among_beacons_is_as_sure_as_it_states);
-  return UNITY_END();
 }

@@ -6,12 +6,12 @@
 #include <cstdlib>
 #include <cstring>
 
+#include "common/suite.h"
 #include "events.hpp"
 #include "filters/slam/params.h"
 #include "math/arc.hpp"
 #include "motion/motion_params.h"
 #include "motion/step.hpp"
-#include "unity.h"
 #include "waymark/estimator.h"
 #include "waymark/random.h"
 
@@ -104,7 +104,7 @@ found drive(uint64_t seed, double axis_rad) {
 // GIVEN a speed and ranges whose scales are known to 5 % each WHEN the map is driven through for minutes THEN only
 // their product is learnt: each stays as unsure as the mean of two such, and lies as near to 1 as that says. The
 // textbook's filter believes to have learnt more.
-void test_a_scale_that_nothing_measures_is_not_learnt(void) {
+TEST(test_a_scale_that_nothing_measures_is_not_learnt) {
   const double honest = kPrior / std::sqrt(2.0);
   double squares = 0.0, plain_sigma = 0.0;
   for (uint64_t seed = 1; seed <= 6; seed++) {
@@ -122,7 +122,7 @@ void test_a_scale_that_nothing_measures_is_not_learnt(void) {
 // GIVEN the default and ranges that are 5 % short WHEN the map is driven through THEN the speed's scale, which is
 // right, lies within its sigma: the ranges are no better a standard of length than the wheels, also where sightings
 // state their sigmas. Where the motion has covariances, too, both are calibrated.
-void test_by_default_ranges_do_not_measure_the_scale(void) {
+TEST(test_by_default_ranges_do_not_measure_the_scale) {
   make::sightings.states.sigma[WM_SENSOR_ROW_kRangeScale] = -kPrior;
   range_factor = 0.95;
   const found f = drive(3, 0.0);
@@ -194,7 +194,7 @@ worn drive_under_prints() {
 
 // GIVEN wheels known to 2 % and prints to 0.3 %, and sightings worse than they are told WHEN it is driven round and
 // round THEN the map is as large as both together say, the prints above all: it doesn't grow or shrink with the rounds.
-void test_a_map_under_prints_is_as_large_as_they_say(void) {
+TEST(test_a_map_under_prints_is_as_large_as_they_say) {
   motion.states.sigma[0] = 0.0;
   for (int i = 0; i < 3; i++) motion.states.sigma[wm::kLeftScale + i] = 0.02;  // left, right, track
   make::sightings.states.sigma[WM_SENSOR_ROW_kRangeScale] = 0.003;
@@ -210,7 +210,7 @@ void test_a_map_under_prints_is_as_large_as_they_say(void) {
 }
 
 // GIVEN a camera whose bearings are 0 beside its lens's axis WHEN it is driven THEN the angle between is found.
-void test_the_axis_of_depth_is_found(void) {
+TEST(test_the_axis_of_depth_is_found) {
   make::sightings.states.sigma[WM_SENSOR_ROW_kDepthAxis] = 0.05;
   for (double axis : {-0.04, 0.03}) {
     const found f = drive(7, axis);
@@ -225,13 +225,4 @@ void setUp(void) { make_room(); }
 void tearDown(void) {
   std::free(state);
   state = nullptr;
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_a_scale_that_nothing_measures_is_not_learnt);
-  RUN_TEST(test_by_default_ranges_do_not_measure_the_scale);
-  RUN_TEST(test_a_map_under_prints_is_as_large_as_they_say);
-  RUN_TEST(test_the_axis_of_depth_is_found);
-  return UNITY_END();
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // SLAM with few landmarks in view: slips of the odometry in gaps without sightings, and identities that are misread in
 // bursts.
+#include "common/suite.h"
 #include "slam_room.hpp"
 
 using namespace room;
@@ -69,7 +70,7 @@ bool is_in_view(int i) {
 
 // GIVEN a turn in a gap that the odometry alone shows WHEN two landmarks are seen after it THEN the state is LOST with
 // the first look, and within seconds the pose is right again and honest, and no landmark has moved.
-void test_a_slip_in_a_gap_is_found_with_two_landmarks_in_view(void) {
+TEST(test_a_slip_in_a_gap_is_found_with_two_landmarks_in_view) {
   for (const double turn_rad : {0.7, -0.7, 1.2, -1.2}) {
     make_room();
     begin();
@@ -98,7 +99,7 @@ void test_a_slip_in_a_gap_is_found_with_two_landmarks_in_view(void) {
 }
 
 // GIVEN looks that are seconds apart after such a slip THEN a few of them do.
-void test_a_slip_is_found_by_few_looks(void) {
+TEST(test_a_slip_is_found_by_few_looks) {
   for (const double turn_rad : {0.7, -1.2}) {
     make_room();
     look_every = 10;
@@ -115,7 +116,7 @@ void test_a_slip_is_found_by_few_looks(void) {
 
 // GIVEN one landmark at a time after such a slip THEN sightings of different stamps, related by odometry, do as well:
 // the state is LOST as soon as a second landmark misfits.
-void test_a_slip_is_found_with_one_landmark_in_view(void) {
+TEST(test_a_slip_is_found_with_one_landmark_in_view) {
   begin();
   drive(60);
   go(2, 0, 0.5);
@@ -130,7 +131,7 @@ void test_a_slip_is_found_with_one_landmark_in_view(void) {
 }
 
 // GIVEN a landmark on the map whose identity is misread in a burst THEN the unknown identity becomes no landmark.
-void test_a_burst_of_an_unknown_identity_is_no_landmark(void) {
+TEST(test_a_burst_of_an_unknown_identity_is_no_landmark) {
   begin();
   drive(60);
   while (!is_in_view(3)) go(0.2, kCount);
@@ -145,7 +146,7 @@ void test_a_burst_of_an_unknown_identity_is_no_landmark(void) {
 
 // GIVEN a landmark whose identity is misread from its first sighting on, and read right as often afterwards THEN the
 // one seen last is the landmark: the other would keep its own landmark away, wherever that stands.
-void test_of_two_identities_seen_alike_at_one_place_the_last_one_is_right(void) {
+TEST(test_of_two_identities_seen_alike_at_one_place_the_last_one_is_right) {
   begin();
   while (!is_in_view(3)) go(0.2, 0);
   go(1.2, kCount, 0.0, 3, 99);
@@ -160,7 +161,7 @@ void test_of_two_identities_seen_alike_at_one_place_the_last_one_is_right(void) 
 
 // GIVEN an unknown identity that a standing robot reads many times THEN it is no landmark until it is seen from a
 // second place: what is misread once is misread again while nothing moves.
-void test_a_burst_from_one_view_is_no_landmark(void) {
+TEST(test_a_burst_from_one_view_is_no_landmark) {
   begin();
   int seen = 0;
   while (!is_in_view(seen)) seen++;
@@ -174,7 +175,7 @@ void test_a_burst_from_one_view_is_no_landmark(void) {
 
 // GIVEN an identity that was misread for seconds at the other end of the room, and its landmark, seen only while the
 // camera turns its back to that end WHEN the range is a depth THEN it contradicts like any other that misfits.
-void test_a_landmark_expected_behind_the_camera_contradicts(void) {
+TEST(test_a_landmark_expected_behind_the_camera_contradicts) {
   sensor.range_is_depth = 1;
   begin();
   const int behind = kCount - 1;
@@ -203,16 +204,4 @@ void test_a_landmark_expected_behind_the_camera_contradicts(void) {
   size_t found;
   TEST_ASSERT_LESS_THAN_DOUBLE(0.15, worst_landmark(&found));
   TEST_ASSERT_EQUAL(kCount, found);
-}
-
-int main() {
-  UNITY_BEGIN();
-  RUN_TEST(test_a_slip_in_a_gap_is_found_with_two_landmarks_in_view);
-  RUN_TEST(test_a_slip_is_found_by_few_looks);
-  RUN_TEST(test_a_slip_is_found_with_one_landmark_in_view);
-  RUN_TEST(test_a_burst_of_an_unknown_identity_is_no_landmark);
-  RUN_TEST(test_of_two_identities_seen_alike_at_one_place_the_last_one_is_right);
-  RUN_TEST(test_a_burst_from_one_view_is_no_landmark);
-  RUN_TEST(test_a_landmark_expected_behind_the_camera_contradicts);
-  return UNITY_END();
 }

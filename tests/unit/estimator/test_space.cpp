@@ -6,10 +6,10 @@
 #include <memory>
 #include <vector>
 
+#include "common/suite.h"
 #include "filters/relocalize/pose_consensus.hpp"
 #include "filters/stereo_ekf/space_filter.hpp"
 #include "motion/spatial.hpp"
-#include "unity.h"
 #include "waymark/random.h"
 
 using namespace wm;
@@ -44,10 +44,7 @@ const head_model kNone[kHeadStates] = {};
 
 }  // namespace
 
-void setUp(void) {}
-void tearDown(void) {}
-
-void test_turns_there_and_back(void) {
+TEST(test_turns_there_and_back) {
   for (int i = 0; i < 200; i++) {
     vec3 r = (i % 2 ? 1e-5 : 0.8) * random_vec(i);
     if (length(r) > 3.1) r = (3.1 / length(r)) * r;
@@ -64,7 +61,7 @@ void test_turns_there_and_back(void) {
 }
 
 // The mean rotation against the sum of many small ones; and across the seam between series and closed form.
-void test_the_mean_turn_is_the_mean(void) {
+TEST(test_the_mean_turn_is_the_mean) {
   for (int i = 0; i < 40; i++) {
     vec3 r = random_vec(i);
     r = ((i % 2 ? 0.0999 : 0.1001) * (i < 20 ? 1.0 : 20.0) / length(r)) * r;
@@ -77,7 +74,7 @@ void test_the_mean_turn_is_the_mean(void) {
 }
 
 // A small error in pose or sensor states, carried by the motion itself, against its covariance carried by the filter.
-void test_propagation_carries_errors_as_the_motion_does(void) {
+TEST(test_propagation_carries_errors_as_the_motion_does) {
   head_model models[kHeadStates] = {};
   models[kRateBias] = {0.01, 0, 0};
   models[kVelocityScale] = {0.02, 0, 0};
@@ -121,7 +118,7 @@ void test_propagation_carries_errors_as_the_motion_does(void) {
   }
 }
 
-void test_sensor_states_swing_the_way_as_they_should(void) {
+TEST(test_sensor_states_swing_the_way_as_they_should) {
   head_model models[kHeadStates] = {};
   models[kRateBias] = {1e-4, 0, 0};
   models[kVelocityScale] = {1e-4, 0, 0};
@@ -168,7 +165,7 @@ void test_sensor_states_swing_the_way_as_they_should(void) {
 
 // The error of the motion since a picture is the pose's own, in that picture's axes, where the pose was exact then.
 // Considered states keep their covariance while what they correlate with is learnt.
-void test_motion_since_a_picture_and_considered_states(void) {
+TEST(test_motion_since_a_picture_and_considered_states) {
   head_model models[kHeadStates] = {};
   for (const int which : {kMovedPlace, kMovedTurn}) models[which] = {1, 0, 0};
   for (const int which : {kRateBias, kTwistAxes, kPictureDirection}) models[which] = {0.02, 0, 0};
@@ -218,7 +215,7 @@ void test_motion_since_a_picture_and_considered_states(void) {
 }
 
 // One block of rows against the textbook's dense update; then points added, removed and their correlations.
-void test_an_update_is_kalmans(void) {
+TEST(test_an_update_is_kalmans) {
   machine m(kNone, 8);
   double covariance[6][6];
   for (int i = 0; i < 6; i++)
@@ -291,7 +288,7 @@ void test_an_update_is_kalmans(void) {
 }
 
 // A block has room for kColumns columns: more are counted and the block is refused, and nothing beyond is written.
-void test_a_block_with_too_many_columns_is_refused(void) {
+TEST(test_a_block_with_too_many_columns_is_refused) {
   machine m(kNone, 8);
   double covariance[6][6] = {};
   for (int i = 0; i < 6; i++) covariance[i][i] = 0.01;
@@ -312,7 +309,7 @@ void test_a_block_with_too_many_columns_is_refused(void) {
 
 // A scene turned and moved as a whole looks the same: no update may make the filter surer of such a motion. With points
 // seen again and again from a moving vehicle, the information about it must stay zero.
-void test_what_cannot_be_seen_is_not_learnt(void) {
+TEST(test_what_cannot_be_seen_is_not_learnt) {
   machine m(kNone, 4);
   double covariance[6][6] = {};
   for (int i = 0; i < 6; i++) covariance[i][i] = i < 3 ? 1e-2 : 1e-3;
@@ -357,7 +354,7 @@ void test_what_cannot_be_seen_is_not_learnt(void) {
 // Nor how the camera is mounted, or when it looks, from pictures alone: the vehicle's pose makes up for either. With
 // points that move by many corrections and a motion that says next to nothing, their variances must stay what they
 // were.
-void test_pictures_alone_do_not_tell_the_mounting_or_the_time(void) {
+TEST(test_pictures_alone_do_not_tell_the_mounting_or_the_time) {
   for (const head_state which : {kCameraRotation, kTimeOffset}) {
     const double sigma = which == kCameraRotation ? 0.02 : 0.05;
     head_model models[kHeadStates] = {};
@@ -418,7 +415,7 @@ void test_pictures_alone_do_not_tell_the_mounting_or_the_time(void) {
   }
 }
 
-void test_orientation_is_found_with_a_third_wrong(void) {
+TEST(test_orientation_is_found_with_a_third_wrong) {
   for (int trial = 0; trial < 50; trial++) {
     auto consensus = std::make_unique<pose_consensus>();
     consensus->clear();
@@ -438,7 +435,7 @@ void test_orientation_is_found_with_a_third_wrong(void) {
   }
 }
 
-void test_no_orientation_of_a_line_or_of_contradictions(void) {
+TEST(test_no_orientation_of_a_line_or_of_contradictions) {
   auto consensus = std::make_unique<pose_consensus>();
   consensus->clear();
   for (int i = 0; i < 12; i++) consensus->add({i, i, {1.0 * i, 0, 0}, {0, 1.0 * i, 0}, 0.02, 0, 0});
@@ -449,7 +446,7 @@ void test_no_orientation_of_a_line_or_of_contradictions(void) {
 }
 
 // A leap that no body makes is refused where a limit is stated; 0 states none.
-void test_leaps_of_a_twist_are_refused_by_their_limit(void) {
+TEST(test_leaps_of_a_twist_are_refused_by_their_limit) {
   static wm::spatial_history history;
   for (const double mps2 : {0.0, 20.0})
     for (const double radps2 : {0.0, 30.0}) {
@@ -468,7 +465,7 @@ void test_leaps_of_a_twist_are_refused_by_their_limit(void) {
 }
 
 // What was in the memory before is of no effect: the same events give the same bytes.
-void test_motion_in_space_begins_the_same_in_any_memory(void) {
+TEST(test_motion_in_space_begins_the_same_in_any_memory) {
   wm_motion_params params;
   wm_wheels wheels{};
   wm_params_defaults(&wm_motion_params_table, &params);
@@ -479,22 +476,4 @@ void test_motion_in_space_begins_the_same_in_any_memory(void) {
     motion->init(&params, &wheels, {{0.1, 0.1, 0.1}, {0.01, 0.01, 0.01}, 0.05, 0.05});
   }
   TEST_ASSERT_EQUAL_MEMORY(memory[0], memory[1], sizeof memory[0]);
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_turns_there_and_back);
-  RUN_TEST(test_the_mean_turn_is_the_mean);
-  RUN_TEST(test_propagation_carries_errors_as_the_motion_does);
-  RUN_TEST(test_sensor_states_swing_the_way_as_they_should);
-  RUN_TEST(test_motion_since_a_picture_and_considered_states);
-  RUN_TEST(test_an_update_is_kalmans);
-  RUN_TEST(test_a_block_with_too_many_columns_is_refused);
-  RUN_TEST(test_what_cannot_be_seen_is_not_learnt);
-  RUN_TEST(test_pictures_alone_do_not_tell_the_mounting_or_the_time);
-  RUN_TEST(test_orientation_is_found_with_a_third_wrong);
-  RUN_TEST(test_no_orientation_of_a_line_or_of_contradictions);
-  RUN_TEST(test_leaps_of_a_twist_are_refused_by_their_limit);
-  RUN_TEST(test_motion_in_space_begins_the_same_in_any_memory);
-  return UNITY_END();
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // An IMU with three axes in space: its rates beside a velocity log, an axis that sticks, silence; gravity for roll and
 // pitch, with vibration and bumps.
+#include "common/suite.h"
 #include "motion/spatial_source.hpp"
 #include "stereo_scene.hpp"
 #include "waymark/health.h"
@@ -71,7 +72,7 @@ struct vehicle : scene {
 
 vec3 at_rest(int) { return {0, 0, kG}; }
 
-void test_the_rates_are_the_imus_and_the_velocity_the_logs(void) {
+TEST(test_the_rates_are_the_imus_and_the_velocity_the_logs) {
   vehicle v(0);
   v.go(
       2, {0.5, 0, 0}, {0, 0, 0},
@@ -85,7 +86,7 @@ void test_the_rates_are_the_imus_and_the_velocity_the_logs(void) {
   TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.5 / 0.2 * (1 - std::cos(0.398)), e.pose_map_base.p_m[1]);
 }
 
-void test_a_silent_imu_yields_to_the_logs_rates(void) {
+TEST(test_a_silent_imu_yields_to_the_logs_rates) {
   vehicle v(0);
   v.go(
       1, {0, 0, 0}, {0, 0, 0.1},
@@ -105,7 +106,7 @@ void test_a_silent_imu_yields_to_the_logs_rates(void) {
 
 // A velocity that holds while the gyro goes on is not certain for ever.
 // Beside an IMU the log's velocity holds for hold_max_s, and no longer.
-void test_a_velocity_holds_for_its_time_and_no_longer(void) {
+TEST(test_a_velocity_holds_for_its_time_and_no_longer) {
   spatial_source source;
   source.init(2.0, {0.05, 0.02});
   spatial_twist now = {{0.5, 0.1, 0.0}, {0.0, 0.0, 0.0}};
@@ -123,7 +124,7 @@ void test_a_velocity_holds_for_its_time_and_no_longer(void) {
 }
 
 // A value that repeats for 0.2 s is chance or a coarse step; one of a moving body that repeats for longer is stuck.
-void test_an_axis_that_repeats_for_a_moment_is_not_stuck(void) {
+TEST(test_an_axis_that_repeats_for_a_moment_is_not_stuck) {
   spatial_source source;
   source.init(2.0, {0.05, 0.02});
   const auto go = [&](int from, int to, bool repeats) {
@@ -143,7 +144,7 @@ void test_an_axis_that_repeats_for_a_moment_is_not_stuck(void) {
   TEST_ASSERT_EQUAL_HEX32(0, source.stuck_rates());
 }
 
-void test_a_silent_log_beside_an_imu_makes_the_place_uncertain(void) {
+TEST(test_a_silent_log_beside_an_imu_makes_the_place_uncertain) {
   vehicle v(0);
   const auto turning = [](int i) { return vec3{jitter(i), jitter(i), 0.1}; };
   v.go(2, {0.5, 0, 0}, {0, 0, 0}, turning, at_rest);
@@ -153,7 +154,7 @@ void test_a_silent_log_beside_an_imu_makes_the_place_uncertain(void) {
   TEST_ASSERT_GREATER_THAN_DOUBLE(1.0, std::sqrt(v.now().covariance[0]));
 }
 
-void test_a_stuck_axis_is_found(void) {
+TEST(test_a_stuck_axis_is_found) {
   spatial_source source;
   source.init(2, {0.05, 0.015});
   bool stuck = false;
@@ -175,7 +176,7 @@ void test_a_stuck_axis_is_found(void) {
   TEST_ASSERT_EQUAL_DOUBLE(0.19, now.w.x);
 }
 
-void test_the_filter_reports_a_stuck_axis(void) {
+TEST(test_the_filter_reports_a_stuck_axis) {
   vehicle v(0);
   v.go(
       12, {0, 0, 0}, {0, 0, 0},
@@ -192,7 +193,7 @@ vec3 tilted(int) {
 }
 vec3 still(int i) { return {jitter(i), jitter(i), jitter(i)}; }
 
-void test_gravity_levels(void) {
+TEST(test_gravity_levels) {
   vehicle v(0.01);
   v.go(20, {0, 0, 0}, {0, 0, 0}, still, tilted);
   double roll, pitch;
@@ -204,7 +205,7 @@ void test_gravity_levels(void) {
   TEST_ASSERT_GREATER_THAN_DOUBLE(0.08, v.sigma_about({0, 0, 1}));  // gravity shows no heading
 }
 
-void test_without_the_state_gravity_is_not_used(void) {
+TEST(test_without_the_state_gravity_is_not_used) {
   vehicle v(0);
   v.go(5, {0, 0, 0}, {0, 0, 0}, still, tilted);
   double roll, pitch;
@@ -214,7 +215,7 @@ void test_without_the_state_gravity_is_not_used(void) {
 }
 
 // 3 m/s2 at 23 Hz, and a bump of 30 m/s2 every two seconds: the tilt stays within its sigma.
-void test_vibration_and_bumps_tilt_nothing(void) {
+TEST(test_vibration_and_bumps_tilt_nothing) {
   vehicle v(0.01);
   v.go(20, {0, 0, 0}, {0, 0, 0}, still, [](int i) {
     const double shaken = 3 * std::sin(2 * M_PI * 23 * 0.01 * i), bump = i % 200 < 5 ? 30.0 : 0.0;
@@ -229,7 +230,7 @@ void test_vibration_and_bumps_tilt_nothing(void) {
 }
 
 // The log's change of velocity is no tilt: 1 m/s2 forwards for 2 s.
-void test_an_acceleration_that_the_log_measures_is_no_tilt(void) {
+TEST(test_an_acceleration_that_the_log_measures_is_no_tilt) {
   vehicle v(0.01);
   v.go(2, {0, 0, 0}, {0, 0, 0}, still, at_rest);
   for (int i = 0; i < 200; i++, v.step_++) {
@@ -244,22 +245,3 @@ void test_an_acceleration_that_the_log_measures_is_no_tilt(void) {
 }
 
 }  // namespace
-
-void setUp(void) {}
-void tearDown(void) {}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_the_rates_are_the_imus_and_the_velocity_the_logs);
-  RUN_TEST(test_a_silent_imu_yields_to_the_logs_rates);
-  RUN_TEST(test_a_velocity_holds_for_its_time_and_no_longer);
-  RUN_TEST(test_an_axis_that_repeats_for_a_moment_is_not_stuck);
-  RUN_TEST(test_a_silent_log_beside_an_imu_makes_the_place_uncertain);
-  RUN_TEST(test_a_stuck_axis_is_found);
-  RUN_TEST(test_the_filter_reports_a_stuck_axis);
-  RUN_TEST(test_gravity_levels);
-  RUN_TEST(test_without_the_state_gravity_is_not_used);
-  RUN_TEST(test_vibration_and_bumps_tilt_nothing);
-  RUN_TEST(test_an_acceleration_that_the_log_measures_is_no_tilt);
-  return UNITY_END();
-}

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Positions in space: a receiver with an error that lasts, a delay, and solutions of other kinds.
+#include "common/suite.h"
 #include "stereo_scene.hpp"
 
 namespace {
@@ -64,7 +65,7 @@ struct boat : scene {
   std::vector<pose3> way_;
 };
 
-void test_an_error_that_lasts_is_not_averaged_away(void) {
+TEST(test_an_error_that_lasts_is_not_averaged_away) {
   boat b;
   b.sail(150, 0.5, 1.0);
   TEST_ASSERT_GREATER_OR_EQUAL(90, 100 * b.inside_ / b.judged_);
@@ -72,7 +73,7 @@ void test_an_error_that_lasts_is_not_averaged_away(void) {
   TEST_ASSERT_EQUAL(WM_STATE_TRACKING, b.estimated().state);
 }
 
-void test_the_receivers_delay_is_found(void) {
+TEST(test_the_receivers_delay_is_found) {
   boat b;
   b.delay_s = 0.2;
   b.sail(100, 0.1, 0.2);
@@ -83,7 +84,7 @@ void test_the_receivers_delay_is_found(void) {
 }
 
 // RTK is lost for ten seconds: the receiver falls back to a solution that is half a metre off, and states it.
-void test_another_solution_has_an_error_of_its_own(void) {
+TEST(test_another_solution_has_an_error_of_its_own) {
   boat b;
   b.sail(20, 0.02, 0.02);
   b.sail(10, 0.3, 0, 0.5);
@@ -92,7 +93,7 @@ void test_another_solution_has_an_error_of_its_own(void) {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.05, b.off());
 }
 
-void test_the_antennas_place_is_found_by_turns(void) {
+TEST(test_the_antennas_place_is_found_by_turns) {
   boat b({0.5, -0.3, 0});
   b.sail(100, 0.05, 0.05);
   double sigma;
@@ -101,7 +102,7 @@ void test_the_antennas_place_is_found_by_turns(void) {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.15, b.off());
 }
 
-void test_a_stated_mounting_is_taken(void) {
+TEST(test_a_stated_mounting_is_taken) {
   boat b({0.5, -0.3, 1.2}, true);
   double sigma;
   b.sail(1, 0.05, 0.05);
@@ -110,7 +111,7 @@ void test_a_stated_mounting_is_taken(void) {
 }
 
 // Nothing of a receiver stands in the calibration of a vehicle without one.
-void test_a_vehicle_without_a_receiver(void) {
+TEST(test_a_vehicle_without_a_receiver) {
   boat b;
   wm_calibration_value values[64];
   const size_t count = b.ekf->calibration(b.state, values, 64);
@@ -118,17 +119,3 @@ void test_a_vehicle_without_a_receiver(void) {
 }
 
 }  // namespace
-
-void setUp(void) {}
-void tearDown(void) {}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_an_error_that_lasts_is_not_averaged_away);
-  RUN_TEST(test_the_receivers_delay_is_found);
-  RUN_TEST(test_another_solution_has_an_error_of_its_own);
-  RUN_TEST(test_the_antennas_place_is_found_by_turns);
-  RUN_TEST(test_a_stated_mounting_is_taken);
-  RUN_TEST(test_a_vehicle_without_a_receiver);
-  return UNITY_END();
-}

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <vector>
 
+#include "common/suite.h"
 #include "events.hpp"
 #include "motion/spatial.hpp"
-#include "unity.h"
 
 namespace {
 
@@ -24,7 +24,7 @@ spatial_twist with(const spatial_twist &twist, int axis, double more) {
 
 // Each axis is held against its own values before: a speed may change by 3 m/s and 15 m/s2, a rate by 6 rad/s and 30
 // rad/s2. Refused samples are counted, shown for five seconds, and the newest good one holds.
-void test_each_axis_is_held_against_its_own(void) {
+TEST(test_each_axis_is_held_against_its_own) {
   const spatial_twist base = {{0, 30, -30}, {0, 20, -20}};
   for (int axis = 0; axis < 6; axis++)
     for (const double sign : {-1.0, 1.0})
@@ -67,7 +67,7 @@ walked walk(const spatial_history &history, double from_s, double to_s) {
 }
 
 // A twist holds for gap_after_s, then walks until hold_max_s, then the body stands, unsure.
-void test_how_long_a_twist_holds(void) {
+TEST(test_how_long_a_twist_holds) {
   for (const bool bridges : {false, true}) {
     spatial_history history;
     history.init({0.2, 2.0, bridges, 15.0, 30.0});
@@ -95,7 +95,7 @@ void test_how_long_a_twist_holds(void) {
 
 // The first sample has no period; each further one that is no gap gives it. Three are kept, the newest first; one of
 // the same stamp replaces the newest.
-void test_the_samples_that_are_kept(void) {
+TEST(test_the_samples_that_are_kept) {
   spatial_history history;
   history.init({0.2, 2.0, 1, 0.0, 0.0});
   const double stamps[] = {0.1, 0.15, 0.25, 0.25, 0.6, 0.7};
@@ -112,7 +112,7 @@ void test_the_samples_that_are_kept(void) {
 
 // Over a gap the mean of both ends, whose walk is known at both: T^3 / 12; after a gap for which nothing holds, half of
 // the newer one. Where a gap is not bridged the first has held.
-void test_what_is_assumed_over_a_gap(void) {
+TEST(test_what_is_assumed_over_a_gap) {
   for (const bool bridges : {false, true})
     for (const double gap_s : {0.1, 0.21, 1.5, 3.0}) {
       spatial_history history;
@@ -137,7 +137,7 @@ void test_what_is_assumed_over_a_gap(void) {
 }
 
 // While samples are refused: a quarter of the square of the way at 1 m/s2, (t^4 - t0^4) / 4, until hold_max_s.
-void test_what_refused_samples_leave_open(void) {
+TEST(test_what_refused_samples_leave_open) {
   spatial_history history;
   history.init({0.2, 2.0, 1, 15.0, 30.0});
   (void)history.feed(make::at(1.0), {});
@@ -154,7 +154,7 @@ void test_what_refused_samples_leave_open(void) {
 
 // The pose some time ago is the one that was there, with its twist; ahead the newest twist goes on. A
 // pose that is older than the memory is reported.
-void test_the_motion_since_some_time_ago(void) {
+TEST(test_the_motion_since_some_time_ago) {
   spatial_history history;
   history.init({0.2, 2.0, 1, 0.0, 0.0});
   std::vector<pose3> poses = {kNoMotion};
@@ -208,7 +208,7 @@ wm_event twist6(double t_s, const spatial_twist &t) {
 
 // A sample's error, and a third of the square of a change beyond the noise of two samples, held for a period: on each
 // axis its own.
-void test_noise_of_a_step_on_each_axis(void) {
+TEST(test_noise_of_a_step_on_each_axis) {
   const wm_motion_params p = parameters();
   const wm_wheels wheels = make::no_wheels();
   const spatial_noise noise = {{0.01, 0.02, 0.03}, {0.004, 0.005, 0.006}, 0.05, 0.07};
@@ -253,7 +253,7 @@ void test_noise_of_a_step_on_each_axis(void) {
 
 // While samples are refused the body may have changed by up to the limits, evenly distributed: a t^2 / (2 sqrt 3) since
 // the last good one, of place and rotation alike.
-void test_noise_of_refused_samples_in_space(void) {
+TEST(test_noise_of_refused_samples_in_space) {
   const wm_motion_params p = parameters();
   const wm_wheels wheels = make::no_wheels();
   spatial_motion motion;
@@ -274,7 +274,7 @@ void test_noise_of_refused_samples_in_space(void) {
 }
 
 // A planar twist, and what wheels and a gyro give, are motion in space without other components.
-void test_planar_motion_in_space(void) {
+TEST(test_planar_motion_in_space) {
   const wm_motion_params p = parameters();
   const wm_wheels wheels = make::no_wheels();
   for (const bool twists : {false, true}) {
@@ -292,7 +292,7 @@ void test_planar_motion_in_space(void) {
 }
 
 // Over a silence velocity and rates walk by 0.3 per sqrt(s).
-void test_noise_of_a_silence_in_space(void) {
+TEST(test_noise_of_a_silence_in_space) {
   const wm_motion_params p = parameters();
   const wm_wheels wheels = make::no_wheels();
   spatial_motion motion;
@@ -329,7 +329,7 @@ double noise_of(int i, int axis) {
 
 // What an axis missed since its last value until it was found stuck: the turn by the twist less its own, and what a
 // twist at rest may hide; without a twist's rates a turn of 0.1 rad per sqrt(s). Once.
-void test_what_a_stuck_axis_has_missed(void) {
+TEST(test_what_a_stuck_axis_has_missed) {
   constexpr double kStep_s = 0.01, kRest_radps = 0.015;
   for (int axis = 0; axis < 3; axis++)
     for (const bool has_rates : {false, true}) {
@@ -363,7 +363,7 @@ void test_what_a_stuck_axis_has_missed(void) {
 }
 
 // A turn that was missed evenly over a way bends it to the sides: a third of its square times the way's.
-void test_a_missed_turn_bends_the_way(void) {
+TEST(test_a_missed_turn_bends_the_way) {
   const wm_motion_params p = parameters();
   const wm_wheels wheels = make::no_wheels();
   for (int axis = 0; axis < 3; axis++) {
@@ -402,7 +402,7 @@ void test_a_missed_turn_bends_the_way(void) {
 
 // GIVEN a gyro that has fallen silent WHEN the log has no rates THEN each axis turns by 0.1 rad per sqrt(s) that
 // nothing measures; with the log's rates nothing is unmeasured.
-void test_turns_that_nothing_measures(void) {
+TEST(test_turns_that_nothing_measures) {
   const wm_motion_params p = parameters();
   const wm_wheels wheels = make::no_wheels();
   for (const bool has_rates : {false, true}) {
@@ -422,7 +422,7 @@ void test_turns_that_nothing_measures(void) {
 
 // A log whose rates jitter about none stands by its mean: a coarse gyro that shows one value then is alive. A log that
 // turns steadily does not stand.
-void test_a_body_stands_by_the_mean_of_its_log(void) {
+TEST(test_a_body_stands_by_the_mean_of_its_log) {
   for (const bool turns : {false, true}) {
     spatial_source source;
     source.init(2.0, {0.05, 0.015});
@@ -440,7 +440,7 @@ void test_a_body_stands_by_the_mean_of_its_log(void) {
 
 // A velocity that is held beside a gyro walks from when the next twist is overdue, after 0.2 s or one of its own
 // periods, until hold_max_s: the integral of the square of its age, by small steps.
-void test_the_walk_of_a_held_velocity(void) {
+TEST(test_the_walk_of_a_held_velocity) {
   for (const double period_s : {0.1, 0.5}) {
     spatial_source source;
     source.init(2.0, {0.05, 0.015});
@@ -471,7 +471,7 @@ void test_the_walk_of_a_held_velocity(void) {
 
 // The period of the twists is their mean one, with a gain of a sixteenth; after a silence longer than hold_max_s
 // neither a period nor a change of velocity is taken from it.
-void test_the_period_and_the_change_of_twists(void) {
+TEST(test_the_period_and_the_change_of_twists) {
   spatial_source source;
   source.init(2.0, {0.05, 0.015});
   double t_s = 0.0, period_s = 0.0;
@@ -495,7 +495,7 @@ void test_the_period_and_the_change_of_twists(void) {
 }
 
 // Rates are fresh for a quarter of a second after an IMU with three axes sent them, and so is the force.
-void test_which_values_are_fresh(void) {
+TEST(test_which_values_are_fresh) {
   const wm_quantity axes[6] = {WM_Q_ROLL_RATE,      WM_Q_PITCH_RATE,     WM_Q_YAW_RATE,
                                WM_Q_ACCELERATION_X, WM_Q_ACCELERATION_Y, WM_Q_ACCELERATION_Z};
   for (int missing = 0; missing < 7; missing++)
@@ -524,28 +524,3 @@ void test_which_values_are_fresh(void) {
 }
 
 }  // namespace
-
-void setUp(void) {}
-void tearDown(void) {}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_each_axis_is_held_against_its_own);
-  RUN_TEST(test_how_long_a_twist_holds);
-  RUN_TEST(test_the_samples_that_are_kept);
-  RUN_TEST(test_what_is_assumed_over_a_gap);
-  RUN_TEST(test_what_refused_samples_leave_open);
-  RUN_TEST(test_the_motion_since_some_time_ago);
-  RUN_TEST(test_noise_of_a_step_on_each_axis);
-  RUN_TEST(test_noise_of_refused_samples_in_space);
-  RUN_TEST(test_planar_motion_in_space);
-  RUN_TEST(test_noise_of_a_silence_in_space);
-  RUN_TEST(test_what_a_stuck_axis_has_missed);
-  RUN_TEST(test_a_missed_turn_bends_the_way);
-  RUN_TEST(test_turns_that_nothing_measures);
-  RUN_TEST(test_a_body_stands_by_the_mean_of_its_log);
-  RUN_TEST(test_the_walk_of_a_held_velocity);
-  RUN_TEST(test_the_period_and_the_change_of_twists);
-  RUN_TEST(test_which_values_are_fresh);
-  return UNITY_END();
-}

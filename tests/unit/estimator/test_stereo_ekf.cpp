@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <vector>
+#include "common/suite.h"
 
 #include "filters/stereo_ekf/params.h"
 #include "stereo_scene.hpp"
@@ -41,10 +42,7 @@ void begin_slam(scene *s) {
 
 }  // namespace
 
-void setUp(void) {}
-void tearDown(void) {}
-
-void test_a_start_that_is_wrong_by_20_m_or_unknown_is_found(void) {
+TEST(test_a_start_that_is_wrong_by_20_m_or_unknown_is_found) {
   for (int kind = 0; kind < 3; kind++) {
     scene s;
     s.setup.start.p_m[0] = 12;
@@ -68,7 +66,7 @@ void test_a_start_that_is_wrong_by_20_m_or_unknown_is_found(void) {
 }
 
 // Full rolls, loops over the nose, upside down: about each axis and about odd ones.
-void test_no_attitude_is_singular(void) {
+TEST(test_no_attitude_is_singular) {
   const vec3 turns[] = {{1.5, 0, 0}, {0, 1.5, 0}, {0, 0, 1.5}, {0.9, -0.7, 0.5}};
   for (const vec3 &w : turns)
     for (const double known : {1.0, 0.0}) {
@@ -88,7 +86,7 @@ void test_no_attitude_is_singular(void) {
     }
 }
 
-void test_a_day_without_drift_of_norm_or_symmetry(void) {
+TEST(test_a_day_without_drift_of_norm_or_symmetry) {
   scene s(60);
   s.set("slam.points", 20);
   s.map.resize(30);
@@ -102,7 +100,7 @@ void test_a_day_without_drift_of_norm_or_symmetry(void) {
   }
 }
 
-void test_points_leave_when_unseen_and_are_found_again(void) {
+TEST(test_points_leave_when_unseen_and_are_found_again) {
   scene s;
   s.set("slam.points", 100);
   s.set("slam.keep_unseen_steps", 3);
@@ -147,7 +145,7 @@ void test_points_leave_when_unseen_and_are_found_again(void) {
 
 // A point begun by a wrong match stands anywhere, and all that is seen of it does not fit. It must not keep its number
 // only because the wrong place is out of view.
-void test_a_point_begun_by_a_wrong_match_begins_again(void) {
+TEST(test_a_point_begun_by_a_wrong_match_begins_again) {
   scene s;
   begin_slam(&s);
   const wm_landmark point = one_to_mistake(s);
@@ -169,7 +167,7 @@ void test_a_point_begun_by_a_wrong_match_begins_again(void) {
 
 // What several pictures agree about is not given up for one that doesn't; for more than keep_unseen_steps it is, be the
 // place where it was thought in view or not.
-void test_a_point_that_does_not_fit_any_more_leaves(void) {
+TEST(test_a_point_that_does_not_fit_any_more_leaves) {
   scene s;
   begin_slam(&s);
   wm_landmark point = one_to_mistake(s);
@@ -197,7 +195,7 @@ void test_a_point_that_does_not_fit_any_more_leaves(void) {
 
 // With everything else known exactly, a row's variance is the square of its derivative by the pictures' time offset:
 // against pixels of the pose a little earlier. Then pictures that are late are found to be.
-void test_pictures_that_are_late(void) {
+TEST(test_pictures_that_are_late) {
   const double sigma_s = 0.02;
   const vec3 twists[][2] = {{{0.5, 0, 0}, {0, 0, 0}},
                             {{0, 0.5, 0}, {0, 0, 0}},
@@ -285,7 +283,7 @@ offset_found find_offset(double late_s, double swing_radps) {
 
 // A twist that swings tells when the pictures were taken, to a millisecond. One that is even does not: a lag is a pose
 // that is off. Then the offset must stay what was known of it.
-void test_the_time_of_pictures_is_told_by_a_twist_that_swings_alone(void) {
+TEST(test_the_time_of_pictures_is_told_by_a_twist_that_swings_alone) {
   for (const double late_s : {0.0, 0.02, -0.02}) {
     const offset_found swinging = find_offset(late_s, 0.3);
     TEST_ASSERT_DOUBLE_WITHIN(0.001, 0.0, swinging.mean_error_s);
@@ -297,7 +295,7 @@ void test_the_time_of_pictures_is_told_by_a_twist_that_swings_alone(void) {
 }
 
 // A log that reads too little and gyros with a bias are calibrated whether the twist is an input or an observation.
-void test_scale_and_bias_of_the_twist_are_found_in_both_predictions(void) {
+TEST(test_scale_and_bias_of_the_twist_are_found_in_both_predictions) {
   for (const int prediction : {WM_PREDICT_TWIST, WM_PREDICT_CONSTANT_VELOCITY}) {
     scene s;
     s.set("prediction", prediction);
@@ -329,7 +327,7 @@ void test_scale_and_bias_of_the_twist_are_found_in_both_predictions(void) {
   }
 }
 
-void test_ranges_depth_and_heading_are_rows_too(void) {
+TEST(test_ranges_depth_and_heading_are_rows_too) {
   scene s;
   s.map = {{1, {10, 0, -2}, 0.001, kAbsent, {}, 0},
            {2, {-3, 9, 1}, 0.001, kAbsent, {}, 0},
@@ -364,7 +362,7 @@ void test_ranges_depth_and_heading_are_rows_too(void) {
 }
 
 // A vehicle without cameras among four anchors, each 10 cm off on the map: the ranges' errors go on alike.
-void test_a_beacons_error_on_the_map_is_not_averaged_away(void) {
+TEST(test_a_beacons_error_on_the_map_is_not_averaged_away) {
   scene s;
   s.set("slam.points", 250);
   s.rig.stereo.left = s.rig.stereo.right = -1;
@@ -392,7 +390,7 @@ void test_a_beacons_error_on_the_map_is_not_averaged_away(void) {
   TEST_ASSERT_LESS_THAN_DOUBLE(2.5, worst);
 }
 
-void test_a_copy_with_points_goes_on_alike(void) {
+TEST(test_a_copy_with_points_goes_on_alike) {
   scene s;
   s.set("slam.points", 60);
   s.map.resize(200);
@@ -417,21 +415,4 @@ void test_a_copy_with_points_goes_on_alike(void) {
   }
   TEST_ASSERT_EQUAL_MEMORY(s.state, copy, s.bytes);
   free(copy);
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_a_start_that_is_wrong_by_20_m_or_unknown_is_found);
-  RUN_TEST(test_no_attitude_is_singular);
-  RUN_TEST(test_a_day_without_drift_of_norm_or_symmetry);
-  RUN_TEST(test_points_leave_when_unseen_and_are_found_again);
-  RUN_TEST(test_a_point_begun_by_a_wrong_match_begins_again);
-  RUN_TEST(test_a_point_that_does_not_fit_any_more_leaves);
-  RUN_TEST(test_pictures_that_are_late);
-  RUN_TEST(test_the_time_of_pictures_is_told_by_a_twist_that_swings_alone);
-  RUN_TEST(test_scale_and_bias_of_the_twist_are_found_in_both_predictions);
-  RUN_TEST(test_ranges_depth_and_heading_are_rows_too);
-  RUN_TEST(test_a_beacons_error_on_the_map_is_not_averaged_away);
-  RUN_TEST(test_a_copy_with_points_goes_on_alike);
-  return UNITY_END();
 }

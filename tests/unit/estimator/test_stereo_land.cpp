@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // stereo_ekf on a street: far tracks that drift, others that move by themselves, a camera that repeats a picture.
 #include <cmath>
+#include "common/suite.h"
 
 #include "filters/stereo_ekf/picture_motion.hpp"
 #include "stereo_scene.hpp"
-
-void setUp(void) {}
-void tearDown(void) {}
 
 namespace {
 
@@ -101,7 +99,7 @@ struct street {
 
 // 40 % of the tracks move by themselves and all of them drift: the drive by pictures is several times better than that
 // by the log alone, the covariance holds, and the scale is not fooled.
-void test_far_and_moving_tracks_improve_a_drive(void) {
+TEST(test_far_and_moving_tracks_improve_a_drive) {
   double with = 0, without = 0, nees = 0;
   const int drives = 8;
   for (uint64_t i = 0; i < drives; i++) {
@@ -120,7 +118,7 @@ void test_far_and_moving_tracks_improve_a_drive(void) {
 }
 
 // Without a log velocity and rates are states: 2 % of the 144 m, and the covariance holds.
-void test_a_drive_by_pictures_alone_is_honest(void) {
+TEST(test_a_drive_by_pictures_alone_is_honest) {
   double off_m2 = 0, nees = 0;
   const int drives = 8;
   for (uint64_t i = 0; i < drives; i++) {
@@ -137,7 +135,7 @@ void test_a_drive_by_pictures_alone_is_honest(void) {
 }
 
 // Gyros that measure 5 % too much: the pictures show it, and it costs the drive little.
-void test_a_scale_of_the_rates_is_found(void) {
+TEST(test_a_scale_of_the_rates_is_found) {
   double exact = 0, scaled = 0;
   const int drives = 4;
   for (uint64_t i = 0; i < drives; i++) {
@@ -156,7 +154,7 @@ void test_a_scale_of_the_rates_is_found(void) {
 
 // No track of a street becomes a point of the state: it is far, or its patch grows and it drifts. So it is where the
 // detector's sigma is stated as a quarter of a pixel.
-void test_tracks_of_a_street_are_no_landmarks(void) {
+TEST(test_tracks_of_a_street_are_no_landmarks) {
   for (const double stated_px : {1.0, 0.25}) {
     street s(3);
     for (double &sigma : s.s.rig.stereo.sigma_px) sigma = stated_px;
@@ -167,7 +165,7 @@ void test_tracks_of_a_street_are_no_landmarks(void) {
 }
 
 // The camera repeats a picture: all tracks agree that nothing moved. The motion of the log stays.
-void test_a_repeated_picture_moves_nothing(void) {
+TEST(test_a_repeated_picture_moves_nothing) {
   street s(5);
   s.moving = 0;
   s.s.begin();
@@ -186,7 +184,7 @@ void test_a_repeated_picture_moves_nothing(void) {
 }
 
 // The fit itself: an error of the prediction is found, and a track that was cut twice is used no more.
-void test_a_fit_finds_the_motion_and_bans_what_moves(void) {
+TEST(test_a_fit_finds_the_motion_and_bans_what_moves) {
   static picture_motion tracks;
   tracks.clear();
   pair_view pair = {420, 420, 320, 240, 0.5, 0.5, {{{0, 0, 1}, {-1, 0, 0}, {0, -1, 0}}}, {0.2, 0.1, 0}};
@@ -217,15 +215,4 @@ void test_a_fit_finds_the_motion_and_bans_what_moves(void) {
     tracks.close(pair, moved);
     at = {at.p + matrix_of(at.q) * moved.p, normalized(at.q * moved.q)};
   }
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_far_and_moving_tracks_improve_a_drive);
-  RUN_TEST(test_a_drive_by_pictures_alone_is_honest);
-  RUN_TEST(test_a_scale_of_the_rates_is_found);
-  RUN_TEST(test_tracks_of_a_street_are_no_landmarks);
-  RUN_TEST(test_a_repeated_picture_moves_nothing);
-  RUN_TEST(test_a_fit_finds_the_motion_and_bans_what_moves);
-  return UNITY_END();
 }

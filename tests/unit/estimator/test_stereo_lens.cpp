@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstring>
 #include <vector>
+#include "common/suite.h"
 
 #include "stereo_scene.hpp"
 
@@ -74,10 +75,7 @@ void assert_found(const outcome &at, const double most_sigma[kValues]) {
 
 }  // namespace
 
-void setUp(void) {}
-void tearDown(void) {}
-
-void test_known_points_calibrate_the_lens(void) {
+TEST(test_known_points_calibrate_the_lens) {
   scene s;
   calibrate_wrongly(&s);
   use_lens_states(&s);
@@ -89,7 +87,7 @@ void test_known_points_calibrate_the_lens(void) {
 
 // Points found on the way turn with what the focal length is wrong by: 0.4 % of a turn and a half is 38 mrad. With
 // exact gyros the difference shows the focal length.
-void test_points_on_the_way_calibrate_the_lens(void) {
+TEST(test_points_on_the_way_calibrate_the_lens) {
   scene s;
   calibrate_wrongly(&s);
   use_lens_states(&s);
@@ -108,7 +106,7 @@ void test_points_on_the_way_calibrate_the_lens(void) {
 
 // A new point's place has the error of the lens. The same picture again has that error, too: its innovation has the
 // pixels' noise alone, once by the point and once by the picture.
-void test_a_new_point_errs_as_the_lens_does(void) {
+TEST(test_a_new_point_errs_as_the_lens_does) {
   scene s;
   s.set("states.camera_focal_sigma", 0.05);
   s.set("states.camera_centre_sigma_px", 20.0);
@@ -137,12 +135,4 @@ void test_a_new_point_errs_as_the_lens_does(void) {
     std::memcpy(s.state, copy.data(), s.bytes);
   }
   TEST_ASSERT_GREATER_THAN(5, seen);
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_known_points_calibrate_the_lens);
-  RUN_TEST(test_points_on_the_way_calibrate_the_lens);
-  RUN_TEST(test_a_new_point_errs_as_the_lens_does);
-  return UNITY_END();
 }

@@ -3,6 +3,7 @@
 // map outlives a restart.
 #include <map>
 #include <vector>
+#include "common/suite.h"
 
 #include "stereo_scene.hpp"
 #include "waymark/keeper.h"
@@ -58,7 +59,7 @@ struct mapping : scene {
   }
 };
 
-void test_what_is_no_map_is_refused(void) {
+TEST(test_what_is_no_map_is_refused) {
   mapping s;
   s.begin();
   s.turn_round(1.2);
@@ -79,12 +80,3 @@ void test_what_is_no_map_is_refused(void) {
 }
 
 }  // namespace
-
-void setUp(void) {}
-void tearDown(void) {}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_what_is_no_map_is_refused);
-  return UNITY_END();
-}

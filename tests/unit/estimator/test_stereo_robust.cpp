@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // stereo_ekf under bad inputs: pauses, wrong matches, data that no sensor can mean.
+#include "common/suite.h"
 #include "filters/stereo_ekf/params.h"
 #include "stereo_scene.hpp"
 
-void setUp(void) {}
-void tearDown(void) {}
-
 // Sensors off for minutes to weeks: the covariance stays positive and bounded, and known points find the pose again.
-void test_long_pauses_leave_a_sound_covariance(void) {
+TEST(test_long_pauses_leave_a_sound_covariance) {
   struct {
     int prediction;
     double tau_s;
@@ -42,7 +40,7 @@ void test_long_pauses_leave_a_sound_covariance(void) {
     }
 }
 
-void test_a_wrong_match_is_refused_and_one_picture_is_enough(void) {
+TEST(test_a_wrong_match_is_refused_and_one_picture_is_enough) {
   scene s;
   s.begin();
   for (int i = 0; i < 5; i++) {
@@ -79,7 +77,7 @@ void test_a_wrong_match_is_refused_and_one_picture_is_enough(void) {
 }
 
 // Whatever is refused leaves one record with the reason; nothing else changes.
-void test_each_refused_datum_leaves_a_record(void) {
+TEST(test_each_refused_datum_leaves_a_record) {
   scene s;
   s.begin();
   s.swim(0.1, {0, 0, 0}, {0, 0, 0});
@@ -130,7 +128,7 @@ void test_each_refused_datum_leaves_a_record(void) {
   TEST_ASSERT_EQUAL_MEMORY(&before, &after, sizeof before);
 }
 
-void test_nonsense_in_pixels_is_refused(void) {
+TEST(test_nonsense_in_pixels_is_refused) {
   scene s;
   s.set("slam.points", 10);
   s.begin();
@@ -156,7 +154,7 @@ void test_nonsense_in_pixels_is_refused(void) {
 
 // Carried off while its velocity log reads 10 % too much: the filter notices within 1 s, finds itself, and keeps the
 // scale that it had learnt before. Undisturbed it stays sure.
-void test_a_kidnapped_vehicle_is_found_and_keeps_its_calibration(void) {
+TEST(test_a_kidnapped_vehicle_is_found_and_keeps_its_calibration) {
   for (const bool kidnapped : {false, true}) {
     scene s;
     s.set("states.velocity_scale_sigma", 0.2);
@@ -197,7 +195,7 @@ void test_a_kidnapped_vehicle_is_found_and_keeps_its_calibration(void) {
 
 // A car whose inertial sensor is mounted 2 degrees off and whose wheels slip sideways a little, with the default
 // parameters: dead reckoning stays within its covariance. Without the rotations as states its NEES is 4.2.
-void test_dead_reckoning_by_a_tilted_log_is_honest(void) {
+TEST(test_dead_reckoning_by_a_tilted_log_is_honest) {
   double nees = 0;
   const int drives = 10;
   for (uint64_t drive = 0; drive < drives; drive++) {
@@ -229,7 +227,7 @@ void test_dead_reckoning_by_a_tilted_log_is_honest(void) {
 }
 
 // Neither the configuration nor the calibration has the pixels' sigma: there is a default.
-void test_a_pair_without_sigma_px_starts(void) {
+TEST(test_a_pair_without_sigma_px_starts) {
   scene s;
   s.set("noise.pixel_px", 0);
   for (double &sigma : s.rig.stereo.sigma_px) sigma = 0;
@@ -240,7 +238,7 @@ void test_a_pair_without_sigma_px_starts(void) {
 
 // Points without any motion, with the default parameters: velocity and rates are states. A time offset of the pictures
 // would be a velocity by the same pictures (NEES 3 and more), and is left out.
-void test_points_without_motion_are_enough(void) {
+TEST(test_points_without_motion_are_enough) {
   double nees = 0, error_m2 = 0;
   const int drives = 5, steps = 300;
   for (uint64_t drive = 0; drive < drives; drive++) {
@@ -270,7 +268,7 @@ void test_points_without_motion_are_enough(void) {
 
 // A sigma of 8 px is of no detector: shutters and calibration, by which all points of a picture are off alike for a
 // second or two. The covariance holds; it would not with errors that are new in each picture.
-void test_pixel_errors_that_last_are_expected_of_a_large_sigma(void) {
+TEST(test_pixel_errors_that_last_are_expected_of_a_large_sigma) {
   double nees = 0;
   const int drives = 5, steps = 300;
   const double left = std::exp(-0.1 / 2.0);
@@ -297,7 +295,7 @@ void test_pixel_errors_that_last_are_expected_of_a_large_sigma(void) {
 }
 
 // GIVEN a mounting that is off by 0.2 degrees about each axis WHEN no key is set THEN the covariance holds.
-void test_a_mounting_that_is_off_is_expected_by_default(void) {
+TEST(test_a_mounting_that_is_off_is_expected_by_default) {
   double nees = 0;  // of the rotation: its square over the sum of the variances
   const int drives = 8, steps = 200;
   for (uint64_t drive = 0; drive < drives; drive++) {
@@ -319,19 +317,4 @@ void test_a_mounting_that_is_off_is_expected_by_default(void) {
     }
   }
   TEST_ASSERT_LESS_THAN_DOUBLE(1.5, nees);
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_dead_reckoning_by_a_tilted_log_is_honest);
-  RUN_TEST(test_a_pair_without_sigma_px_starts);
-  RUN_TEST(test_points_without_motion_are_enough);
-  RUN_TEST(test_pixel_errors_that_last_are_expected_of_a_large_sigma);
-  RUN_TEST(test_a_mounting_that_is_off_is_expected_by_default);
-  RUN_TEST(test_long_pauses_leave_a_sound_covariance);
-  RUN_TEST(test_a_wrong_match_is_refused_and_one_picture_is_enough);
-  RUN_TEST(test_each_refused_datum_leaves_a_record);
-  RUN_TEST(test_nonsense_in_pixels_is_refused);
-  RUN_TEST(test_a_kidnapped_vehicle_is_found_and_keeps_its_calibration);
-  return UNITY_END();
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // An IMU in space that repeats its values: which axis is found stuck, how soon, and that no coarse sensor of a body
 // that stands is taken for one; what the filter makes of it until the values move again.
+#include "common/suite.h"
 #include "motion/spatial_source.hpp"
 #include "stereo_scene.hpp"
 #include "waymark/health.h"
@@ -61,7 +62,7 @@ struct sensors {
 
 imu_row moving(int i) { return live(i, {0, 0, 0.08}); }
 
-void test_all_axes_that_stick_are_found_within_half_a_second(void) {
+TEST(test_all_axes_that_stick_are_found_within_half_a_second) {
   sensors s;
   s.go(10, {0.3, 0, 0}, moving);
   TEST_ASSERT_EQUAL(0, s.source.stuck_rates());
@@ -74,7 +75,7 @@ void test_all_axes_that_stick_are_found_within_half_a_second(void) {
   TEST_ASSERT_EQUAL(0, s.source.lost_rates());
 }
 
-void test_one_axis_is_found_and_named(void) {
+TEST(test_one_axis_is_found_and_named) {
   for (int axis = 0; axis < 6; axis++) {
     sensors s;
     s.go(10, {0.3, 0, 0}, moving);
@@ -97,7 +98,7 @@ void test_one_axis_is_found_and_named(void) {
 double coarse(double value, double step) { return step * std::round(value / step); }
 
 // Steps as large as the noise, and a body that stands for a minute with the same value: alive.
-void test_a_coarse_gyro_that_stands_is_alive(void) {
+TEST(test_a_coarse_gyro_that_stands_is_alive) {
   sensors s;
   const auto steps = [](int i) {
     imu_row r = moving(i);
@@ -113,7 +114,7 @@ void test_a_coarse_gyro_that_stands_is_alive(void) {
 }
 
 // A gyro that shows zero below a threshold: alive at rest, and in the straight drive after it.
-void test_a_gyro_with_a_dead_band_is_alive(void) {
+TEST(test_a_gyro_with_a_dead_band_is_alive) {
   sensors s;
   s.go(20, {0.3, 0, 0}, moving);
   const auto zero = [](int i) { return imu_row{{0, 0, 0}, live(i).f}; };
@@ -125,7 +126,7 @@ void test_a_gyro_with_a_dead_band_is_alive(void) {
 }
 
 // A stuck value that shows a turn is found although the log stands; so is one that is stuck when the body leaves.
-void test_a_gyro_that_sticks_at_rest(void) {
+TEST(test_a_gyro_that_sticks_at_rest) {
   sensors turns;
   turns.go(10, {0, 0, 0}, moving);
   turns.go(0.5, {0, 0, 0}, [](int i) { return imu_row{{0.03, 0.04, 0.08}, live(i).f}; });
@@ -166,7 +167,7 @@ struct vehicle : scene {
 };
 
 // A turn of 0.2 rad/s for 10 s of which the stuck gyro shows nothing.
-void test_a_stuck_gyro_makes_the_turn_uncertain(void) {
+TEST(test_a_stuck_gyro_makes_the_turn_uncertain) {
   vehicle v;
   v.go(10, [](int i) { return live(i); });
   TEST_ASSERT_LESS_THAN_DOUBLE(0.06, v.sigma(5));
@@ -181,7 +182,7 @@ void test_a_stuck_gyro_makes_the_turn_uncertain(void) {
   TEST_ASSERT_EQUAL(0, v.ekf->motion_health(v.state));
 }
 
-void test_a_stuck_gyro_yields_to_the_logs_rates(void) {
+TEST(test_a_stuck_gyro_yields_to_the_logs_rates) {
   vehicle v;
   const vec3 turn = {0, 0, 0.2};
   v.go(
@@ -198,7 +199,7 @@ void test_a_stuck_gyro_yields_to_the_logs_rates(void) {
 }
 
 // The rates' bias is the gyro's: what is learnt of another source is not kept for it.
-void test_the_gyros_bias_comes_back_with_it(void) {
+TEST(test_the_gyros_bias_comes_back_with_it) {
   vehicle v;
   v.go(10, [](int i) { return live(i); });
   const auto bias_sigma = [&v] {
@@ -217,7 +218,7 @@ void test_the_gyros_bias_comes_back_with_it(void) {
 }
 
 // Specific force that stays as it was while the body tilts levels nothing.
-void test_a_stuck_accelerometer_is_not_used(void) {
+TEST(test_a_stuck_accelerometer_is_not_used) {
   vehicle v;
   v.go(10, [](int i) { return live(i); });
   v.go(10, [](int i) { return imu_row{live(i, {0.02, 0, 0}).w, live(999).f}; });
@@ -228,7 +229,7 @@ void test_a_stuck_accelerometer_is_not_used(void) {
 }
 
 // A gyro that falls silent beside a log without rates: the turn is as uncertain.
-void test_a_silent_gyro_makes_the_turn_uncertain(void) {
+TEST(test_a_silent_gyro_makes_the_turn_uncertain) {
   vehicle v;
   v.go(10, [](int i) { return live(i); });
   for (const int end = v.i + 1000; v.i < end; v.i += 10) v.take(velocity_log(kStep_s * v.i, {0.3, 0, 0}));
@@ -236,21 +237,3 @@ void test_a_silent_gyro_makes_the_turn_uncertain(void) {
 }
 
 }  // namespace
-
-void setUp(void) {}
-void tearDown(void) {}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_all_axes_that_stick_are_found_within_half_a_second);
-  RUN_TEST(test_one_axis_is_found_and_named);
-  RUN_TEST(test_a_coarse_gyro_that_stands_is_alive);
-  RUN_TEST(test_a_gyro_with_a_dead_band_is_alive);
-  RUN_TEST(test_a_gyro_that_sticks_at_rest);
-  RUN_TEST(test_a_stuck_gyro_makes_the_turn_uncertain);
-  RUN_TEST(test_a_stuck_gyro_yields_to_the_logs_rates);
-  RUN_TEST(test_the_gyros_bias_comes_back_with_it);
-  RUN_TEST(test_a_stuck_accelerometer_is_not_used);
-  RUN_TEST(test_a_silent_gyro_makes_the_turn_uncertain);
-  return UNITY_END();
-}

@@ -2,11 +2,11 @@
 // A twist's speeds with a gyro's turn rate: of any drive, sideways, too; a gyro that is silent or stuck; standstill.
 #include <cmath>
 
+#include "common/suite.h"
 #include "events.hpp"
 #include "math/arc.hpp"
 #include "motion/front_end.hpp"
 #include "motion/motion_params.h"
-#include "unity.h"
 #include "waymark/random.h"
 
 namespace {
@@ -55,7 +55,7 @@ void drive(double from_s, double to_s, double v, double u, double w, Rate gyro_r
 double noise(int i) { return i % 2 ? 1e-6 : -1e-6; }
 constexpr double kNone = NAN;
 
-void test_the_turn_is_the_gyros_and_the_way_the_twists(void) {
+TEST(test_the_turn_is_the_gyros_and_the_way_the_twists) {
   begin();
   drive(0, 2, 0.0, 0.5, 0.1, [](int i) { return 0.25 + noise(i); });
   TEST_ASSERT_EQUAL(WM_MOTION_SPEED_YAW_RATE, front.model());
@@ -66,7 +66,7 @@ void test_the_turn_is_the_gyros_and_the_way_the_twists(void) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-3, 2.0 * std::sin(turned), pose.y_m);
 }
 
-void test_a_twist_alone_is_as_ever(void) {
+TEST(test_a_twist_alone_is_as_ever) {
   begin();
   drive(0, 1, 0.5, 0.0, 0.1, [](int) { return kNone; });
   TEST_ASSERT_EQUAL(WM_MOTION_TWIST, front.model());
@@ -75,7 +75,7 @@ void test_a_twist_alone_is_as_ever(void) {
 
 // 138 m/s are refused beside a gyro, too: the speed before holds with the noise of what the robot may have done, and
 // the health has it for five seconds.
-void test_a_speed_that_no_robot_reaches_is_refused_beside_a_gyro(void) {
+TEST(test_a_speed_that_no_robot_reaches_is_refused_beside_a_gyro) {
   const auto rate = [](int i) { return noise(i); };
   begin();
   drive(0, 1, 0.5, 0.0, 0.0, rate);
@@ -92,7 +92,7 @@ void test_a_speed_that_no_robot_reaches_is_refused_beside_a_gyro(void) {
 }
 
 // A gyro of 5 Hz is overdue after three of its periods, not after the 0.25 s of quick ones.
-void test_a_slow_gyro_is_overdue_by_its_own_period(void) {
+TEST(test_a_slow_gyro_is_overdue_by_its_own_period) {
   begin();
   const auto slow = [](int i) { return i % 20 == 0 ? 0.25 + noise(i / 20) : kNone; };
   drive(0, 2, 0.5, 0.0, 0.1, slow);
@@ -103,7 +103,7 @@ void test_a_slow_gyro_is_overdue_by_its_own_period(void) {
 }
 
 // The learnt bias is the gyro's: the twist's turn rate has none.
-void test_a_silent_gyro_is_replaced_and_taken_up_again(void) {
+TEST(test_a_silent_gyro_is_replaced_and_taken_up_again) {
   begin();
   calibration.value[WM_YAW_RATE_BIAS] = 0.05;
   drive(0, 1, 0.5, 0.0, 0.1, [](int i) { return 0.25 + noise(i); });
@@ -119,7 +119,7 @@ void test_a_silent_gyro_is_replaced_and_taken_up_again(void) {
 
 // GIVEN a twist that drives alone, at first or while the gyro is silent WHEN the gyro comes THEN the newest twist is no
 // silent speed.
-void test_the_twist_is_no_silent_speed_when_a_gyro_comes(void) {
+TEST(test_the_twist_is_no_silent_speed_when_a_gyro_comes) {
   for (const bool had_gyro : {false, true}) {
     begin();
     drive(0, 1, 0.5, 0.0, 0.1, [had_gyro](int i) { return had_gyro ? 0.1 + noise(i) : kNone; });
@@ -131,7 +131,7 @@ void test_the_twist_is_no_silent_speed_when_a_gyro_comes(void) {
   }
 }
 
-void test_a_stuck_gyro_is_replaced(void) {
+TEST(test_a_stuck_gyro_is_replaced) {
   begin();
   drive(0, 1, 0.3, 0.0, 0.0, [](int i) { return noise(i); });
   drive(1, 5, 0.3, 0.0, 0.2, [](int) { return 0.01; });  // the robot turns, the gyro's number stands
@@ -143,7 +143,7 @@ void test_a_stuck_gyro_is_replaced(void) {
 }
 
 // The same bits after a stop are still those of a stuck gyro.
-void test_a_stop_does_not_mend_a_stuck_gyro(void) {
+TEST(test_a_stop_does_not_mend_a_stuck_gyro) {
   begin();
   drive(0, 1, 0.3, 0.0, 0.0, [](int i) { return noise(i); });
   drive(1, 5, 0.3, 0.0, 0.2, [](int) { return 0.01; });
@@ -154,7 +154,7 @@ void test_a_stop_does_not_mend_a_stuck_gyro(void) {
 }
 
 // The twist turned by 0.3 rad more than the gyro until that was found.
-void test_what_a_stuck_gyro_missed_is_uncertain(void) {
+TEST(test_what_a_stuck_gyro_missed_is_uncertain) {
   begin();
   drive(0, 1, 0.3, 0.0, 0.0, [](int i) { return noise(i); });
   const double before = noise_sum.rotation_rad2;
@@ -163,7 +163,7 @@ void test_what_a_stuck_gyro_missed_is_uncertain(void) {
 }
 
 // Samples with the noise that the parameters state: what is integrated has that noise and hardly more.
-void test_noise_of_a_holonomic_twist_is_counted_once(void) {
+TEST(test_noise_of_a_holonomic_twist_is_counted_once) {
   begin();
   params.states.drive = WM_DRIVE_HOLONOMIC;
   params.noise_speed_rel = params.noise_sideways_rel = params.noise_side_rel = params.noise_yaw_rate_rel = 0;
@@ -181,7 +181,7 @@ void test_noise_of_a_holonomic_twist_is_counted_once(void) {
 
 // GIVEN exact samples of a holonomic drive WHEN one axis changes by 0.4 each 0.1 s THEN the change, whose moment
 // between two samples is unknown, is noise of that axis alone: its square times dt^2 / 12.
-void test_a_change_of_one_axis_is_noise_of_that_axis(void) {
+TEST(test_a_change_of_one_axis_is_noise_of_that_axis) {
   for (int axis = 0; axis < 3; axis++) {
     begin();
     params.states.drive = WM_DRIVE_HOLONOMIC;
@@ -200,7 +200,7 @@ void test_a_change_of_one_axis_is_noise_of_that_axis(void) {
   }
 }
 
-void test_a_turn_on_the_spot_is_no_standstill(void) {
+TEST(test_a_turn_on_the_spot_is_no_standstill) {
   double rate = 0;
   begin();
   drive(0, 2, 0.0, 0.0, 0.3, [](int i) { return 0.3 + noise(i); });
@@ -212,31 +212,10 @@ void test_a_turn_on_the_spot_is_no_standstill(void) {
   TEST_ASSERT_EQUAL_DOUBLE(0.02, rate);
 }
 
-void test_commands_keep_their_own_turn_rate(void) {
+TEST(test_commands_keep_their_own_turn_rate) {
   begin(WM_TWIST_COMMANDS);
   drive(0, 1, 0.5, 0.0, 0.1, [](int i) { return 0.25 + noise(i); });
   TEST_ASSERT_EQUAL(WM_MOTION_TWIST, front.model());
 }
 
 }  // namespace
-
-void setUp(void) {}
-void tearDown(void) {}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_the_turn_is_the_gyros_and_the_way_the_twists);
-  RUN_TEST(test_a_twist_alone_is_as_ever);
-  RUN_TEST(test_a_speed_that_no_robot_reaches_is_refused_beside_a_gyro);
-  RUN_TEST(test_a_slow_gyro_is_overdue_by_its_own_period);
-  RUN_TEST(test_a_silent_gyro_is_replaced_and_taken_up_again);
-  RUN_TEST(test_the_twist_is_no_silent_speed_when_a_gyro_comes);
-  RUN_TEST(test_a_stuck_gyro_is_replaced);
-  RUN_TEST(test_a_stop_does_not_mend_a_stuck_gyro);
-  RUN_TEST(test_what_a_stuck_gyro_missed_is_uncertain);
-  RUN_TEST(test_noise_of_a_holonomic_twist_is_counted_once);
-  RUN_TEST(test_a_change_of_one_axis_is_noise_of_that_axis);
-  RUN_TEST(test_a_turn_on_the_spot_is_no_standstill);
-  RUN_TEST(test_commands_keep_their_own_turn_rate);
-  return UNITY_END();
-}

@@ -9,9 +9,9 @@
 #include <memory>
 #include <vector>
 
+#include "common/suite.h"
 #include "filters/pf_edges/particles.hpp"
 #include "math/lanes.hpp"
-#include "unity.h"
 #include "waymark/estimator.h"
 #include "waymark/random.h"
 
@@ -81,7 +81,7 @@ WM_WIDE void four_wide(const double *in, double *sine, double *cosine, double *p
 }
 #endif
 
-void elementary_functions_of_four(void) {
+TEST(elementary_functions_of_four) {
   for (uint64_t i = 0; i < 100000; i++) {
     double in[4], s[4], c[4], e[4];
     for (uint64_t k = 0; k < 4; k++) in[k] = (i % 2 ? 7 : 690) * (2 * wm_random_uniform(1, k, i) - 1);
@@ -104,7 +104,7 @@ void elementary_functions_of_four(void) {
 
 // Against the look-up of single points by double arithmetic, which may fall into the next pixel; near the border and
 // beyond it, too.
-void the_field_says_what_the_table_says(void) {
+TEST(the_field_says_what_the_table_says) {
   for (bool sum : {false, true}) {
     const ready_map m(sum);
     wm::scan_points points;
@@ -145,7 +145,7 @@ void the_field_says_what_the_table_says(void) {
   }
 }
 
-void what_lies_beyond_the_map_or_far_away_counts_nothing(void) {
+TEST(what_lies_beyond_the_map_or_far_away_counts_nothing) {
   const ready_map m(false);
   wm::scan_points points;
   points_about(&points, 2);
@@ -225,24 +225,15 @@ void same_state(const char *estimator) {
   TEST_ASSERT_EQUAL_MEMORY(states[0].get(), states[1].get(), bytes);
 }
 
-void edge_mcl_has_the_same_state(void) { same_state("edge_mcl"); }
-void pf_edges_has_the_same_particles(void) { same_state("pf_edges"); }
+TEST(edge_mcl_has_the_same_state) { same_state("edge_mcl"); }
+TEST(pf_edges_has_the_same_particles) { same_state("pf_edges"); }
 
 }  // namespace
 
-void setUp(void) {}
-void tearDown(void) {}
-
-int main(void) {
+int suite_begin(int, char **) {
   draw(30, 30, 470, 60);
   draw(470, 60, 440, 380);
   draw(30, 30, 60, 370);
   draw(100, 200, 300, 250);
-  UNITY_BEGIN();
-  RUN_TEST(elementary_functions_of_four);
-  RUN_TEST(the_field_says_what_the_table_says);
-  RUN_TEST(what_lies_beyond_the_map_or_far_away_counts_nothing);
-  RUN_TEST(edge_mcl_has_the_same_state);
-  RUN_TEST(pf_edges_has_the_same_particles);
-  return UNITY_END();
+  return SUITE_RUNS;
 }

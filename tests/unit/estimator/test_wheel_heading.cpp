@@ -5,10 +5,10 @@
 #include <memory>
 #include <string>
 
+#include "common/suite.h"
 #include "events.hpp"
 #include "filters/planar/planar_filter.hpp"
 #include "math/elementary.hpp"
-#include "unity.h"
 #include "waymark/random.h"
 
 namespace {
@@ -71,7 +71,7 @@ wm_calibration_value named(const Car &car, const char *name) {
   return {};
 }
 
-void test_the_gyro_tells_the_wheels_and_the_wheels_hold_the_heading(void) {
+TEST(test_the_gyro_tells_the_wheels_and_the_wheels_hold_the_heading) {
   Car with(true), without(false);
   double heading = 0;
   for (int i = 0; i < 12000; i++) {  // two minutes with an S now and then; bias and radii differ in how speed acts
@@ -100,7 +100,7 @@ void test_the_gyro_tells_the_wheels_and_the_wheels_hold_the_heading(void) {
 
 // The heading by the counts begins at the filter's, with the rounding of both counts to a tick: a twelfth of its square
 // each, over the track.
-void test_the_heading_by_the_counts_begins_with_their_rounding(void) {
+TEST(test_the_heading_by_the_counts_begins_with_their_rounding) {
   Car car(true);
   const int heading = car.filter->states() - 1;
   while (car.t_s < 5.0 && car.filter->variance(heading) == 0.0) car.step(2.0, 0, 0.0, 0.0);
@@ -111,7 +111,7 @@ void test_the_heading_by_the_counts_begins_with_their_rounding(void) {
 }
 
 // Its variance grows by walk^2 a metre of the way, here without a gyro of use.
-void test_the_difference_of_the_wheels_walks_with_the_way(void) {
+TEST(test_the_difference_of_the_wheels_walks_with_the_way) {
   Car car(true);
   car.motion.noise_yaw_rate_radps = 1e3;
   car.states.wheel_difference_walk = 0.001;
@@ -121,7 +121,7 @@ void test_the_difference_of_the_wheels_walks_with_the_way(void) {
   TEST_ASSERT_DOUBLE_WITHIN(2e-6, 0.0141 * 0.0141 + 1e-6 * 100.0, sigma * sigma);
 }
 
-void test_a_slip_is_not_believed(void) {
+TEST(test_a_slip_is_not_believed) {
   Car slipping(true), holding(true);
   for (int i = 0; i < 6000; i++) {
     holding.step(2.0, 0, 0.0, 0.01);
@@ -134,7 +134,7 @@ void test_a_slip_is_not_believed(void) {
 // Slip of one wheel by 1 %, Gauss-Markov over 5 s, as of tyres in bends: twenty times the walk of the difference that
 // is stated. The track keeps what the gyro knows of it, within 2.9 sigma; it is 8.8 sigma off with the stated walk
 // alone.
-void test_slip_that_lasts_is_no_calibration(void) {
+TEST(test_slip_that_lasts_is_no_calibration) {
   Car car(true);
   double heading = 0, slip = 0;
   for (int i = 0; i < 20000; i++) {
@@ -151,7 +151,7 @@ void test_slip_that_lasts_is_no_calibration(void) {
 
 // GIVEN counts of 0.09 m WHEN the robot drives straight THEN the turn rate by the counts jumps by 3 rad/s, and the one
 // for a time offset's derivative stays 0. In a turn that is faster than the dead band it follows.
-void test_steps_of_the_counts_are_no_turn(void) {
+TEST(test_steps_of_the_counts_are_no_turn) {
   Car car(false);
   car.motion.model = WM_MOTION_TICKS;
   car.setup.wheels.ticks_per_turn = 20;
@@ -179,7 +179,7 @@ void test_steps_of_the_counts_are_no_turn(void) {
   TEST_ASSERT_GREATER_THAN_DOUBLE(0.5, car.filter->steady({}).w);
 }
 
-void test_a_pose_given_from_outside_is_kept(void) {
+TEST(test_a_pose_given_from_outside_is_kept) {
   Car car(true);
   for (int i = 0; i < 2000; i++) car.step(2.0, 0, 0.0, 0.0);
   const double exact[3][3] = {{1e-6, 0, 0}, {0, 1e-6, 0}, {0, 0, 1e-8}};
@@ -189,7 +189,7 @@ void test_a_pose_given_from_outside_is_kept(void) {
 }
 
 // A day, with stops and turns: covariances stay covariances.
-void test_a_day_leaves_the_covariance_sound(void) {
+TEST(test_a_day_leaves_the_covariance_sound) {
   Car car(true);
   for (int i = 0; i < 24 * 3600 * 4; i++) {
     const double v = i % 4000 < 300 ? 0.0 : i % 4000 < 2000 ? 0.5 : -0.4;
@@ -206,7 +206,7 @@ void test_a_day_leaves_the_covariance_sound(void) {
   TEST_ASSERT_DOUBLE_WITHIN(5 * difference.sigma, -0.008, difference.value);
 }
 
-void test_wheels_of_unknown_track_are_left_alone(void) {
+TEST(test_wheels_of_unknown_track_are_left_alone) {
   Car car(true);
   car.setup.wheels.track_m = NAN;
   car.filter->init(car.setup, car.states, wm::kPoseStates + wm::planar_filter::count_motion_states(car.states));
@@ -217,22 +217,3 @@ void test_wheels_of_unknown_track_are_left_alone(void) {
 }
 
 }  // namespace
-
-extern "C" {
-void setUp(void) {}
-void tearDown(void) {}
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_the_gyro_tells_the_wheels_and_the_wheels_hold_the_heading);
-  RUN_TEST(test_the_heading_by_the_counts_begins_with_their_rounding);
-  RUN_TEST(test_the_difference_of_the_wheels_walks_with_the_way);
-  RUN_TEST(test_a_slip_is_not_believed);
-  RUN_TEST(test_slip_that_lasts_is_no_calibration);
-  RUN_TEST(test_steps_of_the_counts_are_no_turn);
-  RUN_TEST(test_a_pose_given_from_outside_is_kept);
-  RUN_TEST(test_a_day_leaves_the_covariance_sound);
-  RUN_TEST(test_wheels_of_unknown_track_are_left_alone);
-  return UNITY_END();
-}

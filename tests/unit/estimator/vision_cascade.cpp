@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "common/fisheye_rig.hpp"
-#include "unity.h"
+#include "common/suite.h"
 #include "vision/cascade/params.h"
 #include "waymark/cascade_file.h"
 #include "waymark/detector.h"
@@ -94,7 +94,7 @@ struct Machine {
   }
 };
 
-void squares_are_found() {
+TEST(squares_are_found) {
   wm::mounted_camera camera;
   TEST_ASSERT_NULL(wm::mounted_camera_init(&camera, rig.cameras[0]));
   const std::vector<Square> squares = {{1.3, 0.9, 4}, {0.7, 1.1, 6}, {0.2, 0.8, 3}};
@@ -128,7 +128,7 @@ void squares_are_found() {
   TEST_ASSERT_EQUAL(0, machine.look(draw(camera, {{0.7, -1.5, 4}})));
 }
 
-void what_is_missing_is_told() {
+TEST(what_is_missing_is_told) {
   const char *why = nullptr;
   view.cascade_count = 0;
   TEST_ASSERT_EQUAL(0, detector->state_bytes(&params, &view, &why));
@@ -228,7 +228,7 @@ void compare_with_opencv(const std::string &text, int *hits) {
   TEST_ASSERT_TRUE(seen == expected);
 }
 
-void as_opencv_judges() {
+TEST(as_opencv_judges) {
   for (const bool lbp : {true, false}) {
     int hits = 0;
     for (uint64_t seed = 1; seed <= 12; seed++) compare_with_opencv(chance_cascade(seed, lbp), &hits);
@@ -238,12 +238,12 @@ void as_opencv_judges() {
 
 #else
 
-void as_opencv_judges() { TEST_IGNORE_MESSAGE("libopencv-objdetect-dev wasn't there when this was built"); }
+TEST(as_opencv_judges) { TEST_IGNORE_MESSAGE("libopencv-objdetect-dev wasn't there when this was built"); }
 
 #endif
 
 // The cascades that Debian's opencv-data has: all are read, but those with tilted features and of OpenCV 1.
-void files_of_opencv() {
+TEST(files_of_opencv) {
   int read = 0, refused = 0;
   for (const char *name :
        {"lbpcascades/lbpcascade_frontalface.xml", "lbpcascades/lbpcascade_profileface.xml",
@@ -275,12 +275,3 @@ void setUp() {
   wm_params_defaults(&detector->params, &params);
 }
 void tearDown() { wm_cascade_free(&cascade); }
-
-int main() {
-  UNITY_BEGIN();
-  RUN_TEST(squares_are_found);
-  RUN_TEST(what_is_missing_is_told);
-  RUN_TEST(as_opencv_judges);
-  RUN_TEST(files_of_opencv);
-  return UNITY_END();
-}

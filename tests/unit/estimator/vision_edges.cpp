@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "common/fisheye_rig.hpp"
-#include "unity.h"
+#include "common/suite.h"
 #include "waymark/detector.h"
 #include "waymark/internal/sensors/lens.hpp"
 #include "waymark/random.h"
@@ -95,23 +95,23 @@ void expect_wall(double share) {
 
 double plain_floor(double, double) { return 130; }
 
-void a_plain_floor() {
+TEST(a_plain_floor) {
   draw(plain_floor, 0);
   expect_wall(1);
 }
 
-void lamps_in_the_floor() {
+TEST(lamps_in_the_floor) {
   draw([](double x, double y) { return std::fabs(y) < 0.4 && std::fmod(x, 1.2) < 0.3 ? 220.0 : 130.0; }, 0);
   expect_wall(0.97);
 }
 
-void joints_of_tiles() {
+TEST(joints_of_tiles) {
   draw([](double x, double y) { return std::fmod(x, 0.6) < 0.01 || std::fmod(y + 9, 0.6) < 0.01 ? 60.0 : 130.0; }, 0);
   expect_wall(0.9);
 }
 
 // Tape of 6 cm along the way and a threshold of 8 cm across it: wider than any joint, floor on both sides.
-void bands_on_the_floor() {
+TEST(bands_on_the_floor) {
   const auto floor = [](double x, double y) {
     return std::fabs(y - 0.5) < 0.03 || std::fabs(x - 2.2) < 0.04 ? 60.0 : 130.0;
   };
@@ -119,13 +119,13 @@ void bands_on_the_floor() {
   expect_wall(0.9);
 }
 
-void a_floor_that_mirrors() {
+TEST(a_floor_that_mirrors) {
   draw(plain_floor, 0.35);
   expect_wall(0.9);
 }
 
 // The paper's way finds the foot of the wall, but the board's upper edge as well.
-void by_windows() {
+TEST(by_windows) {
   draw(plain_floor, 0);
   set("mode", 1);
   const wm_points &p = look();
@@ -138,7 +138,7 @@ void by_windows() {
   TEST_ASSERT_DOUBLE_IS_DETERMINATE(static_cast<double>(p.sigma_m[0]));
 }
 
-void a_lone_point_is_left_out() {
+TEST(a_lone_point_is_left_out) {
   // A dark spot on the floor, two rays wide.
   draw([](double x, double y) { return std::fabs(y) < 0.02 && x > 1.8 && x < 2.2 ? 40.0 : 130.0; }, 0);
   expect_wall(1);
@@ -152,17 +152,4 @@ void setUp() {
   const wm_param_table &table = wm_detector_find("edges")->params;
   params.assign(table.bytes + 1, 0);
   wm_params_defaults(&table, params.data());
-}
-void tearDown() {}
-
-int main() {
-  UNITY_BEGIN();
-  RUN_TEST(a_plain_floor);
-  RUN_TEST(lamps_in_the_floor);
-  RUN_TEST(joints_of_tiles);
-  RUN_TEST(bands_on_the_floor);
-  RUN_TEST(a_floor_that_mirrors);
-  RUN_TEST(by_windows);
-  RUN_TEST(a_lone_point_is_left_out);
-  return UNITY_END();
 }

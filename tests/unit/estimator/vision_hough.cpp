@@ -4,7 +4,7 @@
 #include <cstring>
 #include <memory>
 
-#include "unity.h"
+#include "common/suite.h"
 #include "vision/edges_hough/hough.hpp"
 #include "waymark/random.h"
 #include "waymark/vectors.h"
@@ -17,7 +17,7 @@ void fill(uint64_t seed, int side) {
   for (int i = 0; i < side * side; i++) window[i] = static_cast<uint8_t>(256 * wm_random_uniform(seed, 1, i));
 }
 
-void sums_along_dyadic_lines() {
+TEST(sums_along_dyadic_lines) {
   for (int side : {2, 3, 5, 32, 50, 63, 64}) {
     const auto work = std::make_unique<wm::hough_work>();
     fill(static_cast<uint64_t>(side), side);
@@ -39,7 +39,7 @@ void sums_along_dyadic_lines() {
 }
 
 // A dyadic line leaves the straight one by less than a sixth of a pixel for each halving.
-void lines_are_nearly_straight() {
+TEST(lines_are_nearly_straight) {
   for (int side : {32, 50, 64})
     for (int t = 0; t < side; t++) {
       TEST_ASSERT_EQUAL(0, wm::hough_line(side, t, 0));
@@ -49,7 +49,7 @@ void lines_are_nearly_straight() {
     }
 }
 
-void vectors_and_scalars_agree() {
+TEST(vectors_and_scalars_agree) {
   const auto a = std::make_unique<wm::hough_work>(), b = std::make_unique<wm::hough_work>();
   for (uint64_t seed = 0; seed < 20; seed++) {
     fill(seed, 50);
@@ -70,7 +70,7 @@ void vectors_and_scalars_agree() {
   }
 }
 
-void a_line_is_found() {
+TEST(a_line_is_found) {
   const auto work = std::make_unique<wm::hough_work>();
   std::memset(window, 3, sizeof window);
   for (int y = 0; y < 50; y++) window[y * 50 + 12 + wm::hough_line(50, 17, y)] = 200;
@@ -81,15 +81,3 @@ void a_line_is_found() {
 }
 
 }  // namespace
-
-void setUp() {}
-void tearDown() {}
-
-int main() {
-  UNITY_BEGIN();
-  RUN_TEST(sums_along_dyadic_lines);
-  RUN_TEST(lines_are_nearly_straight);
-  RUN_TEST(vectors_and_scalars_agree);
-  RUN_TEST(a_line_is_found);
-  return UNITY_END();
-}

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "common/fisheye_rig.hpp"
-#include "unity.h"
+#include "common/suite.h"
 #include "vision/landmarks/params.h"
 #include "waymark/detector.h"
 #include "waymark/internal/sensors/lens.hpp"
@@ -173,7 +173,7 @@ double true_elevation(const Place &at) {
   return std::atan2(-r.y, std::hypot(r.x, r.z));
 }
 
-void found_where_it_is_with_the_sigma_that_it_has() {
+TEST(found_where_it_is_with_the_sigma_that_it_has) {
   const Eyes eyes;
   double squares = 0, up_squares = 0, largest = 0;
   int count = 0;
@@ -204,7 +204,7 @@ void found_where_it_is_with_the_sigma_that_it_has() {
   TEST_ASSERT_LESS_THAN_DOUBLE(1.3, std::sqrt(up_squares / count));
 }
 
-void a_landmark_without_sigma_is_found() {
+TEST(a_landmark_without_sigma_is_found) {
   landmark.sigma_m = NAN;
   const Eyes eyes;
   const Place at = {1.5, 0.2, 0.1};
@@ -213,7 +213,7 @@ void a_landmark_without_sigma_is_found() {
   TEST_ASSERT_GREATER_THAN_DOUBLE(0.0, events[0].as.sighting.bearing_sigma_rad);
 }
 
-void what_is_not_there_is_not_found_and_said_why() {
+TEST(what_is_not_there_is_not_found_and_said_why) {
   const Eyes eyes;
   const Place at = {1, 0.3, 0.1};
   const wm_estimate guess = pose_of(at, 0.03, 0.01);
@@ -236,7 +236,7 @@ void what_is_not_there_is_not_found_and_said_why() {
   TEST_ASSERT_EQUAL(WM_LOOK_FOUND, eyes.why());
 }
 
-void found_anywhere_without_a_pose() {
+TEST(found_anywhere_without_a_pose) {
   const Eyes eyes;
   int found = 0;
   double largest = 0, squares = 0;
@@ -286,20 +286,20 @@ int found_from_afar() {
   return found;
 }
 
-void found_without_a_pose_where_it_has_thirteen_pixels() {
+TEST(found_without_a_pose_where_it_has_thirteen_pixels) {
   params.likeness_alone = 0.85;  // so few are never very much alike, and no others are there to agree
   const int found = found_from_afar();
   std::printf("without a pose, 12 m away: found %d of 8\n", found);
   TEST_ASSERT_GREATER_OR_EQUAL(3, found);
 }
 
-void what_is_too_small_is_not_recognised() {
+TEST(what_is_too_small_is_not_recognised) {
   params.likeness_alone = 0.85;
   params.search_area_px2 = 300;
   TEST_ASSERT_EQUAL(0, found_from_afar());
 }
 
-void a_wide_board_is_found_without_a_pose() {
+TEST(a_wide_board_is_found_without_a_pose) {
   is_board = true;
   std::vector<uint8_t> board(kSignSide * 432);
   for (int y = 0; y < kSignSide; y++)
@@ -313,7 +313,7 @@ void a_wide_board_is_found_without_a_pose() {
 }
 
 // Recognised once, it is found from picture to picture by how the robot moves, although nobody knows where that is.
-void what_was_recognised_is_followed() {
+TEST(what_was_recognised_is_followed) {
   params.search_places = 1;  // the landmarks have their turn one by one, a picture each
   const wm_landmark first = landmark;
   std::vector<uint8_t> other(sign.rbegin(), sign.rend());
@@ -356,7 +356,7 @@ void what_was_recognised_is_followed() {
 }
 
 // Nobody knows where the robot is, and its twist or stamp is nonsense: it is looked for from scratch.
-void a_motion_that_is_no_number_misleads_nothing() {
+TEST(a_motion_that_is_no_number_misleads_nothing) {
   const Eyes eyes;
   const Place at = {2, 0.4, 0.2};
   const auto picture = draw(at, Scene{});
@@ -372,7 +372,7 @@ void a_motion_that_is_no_number_misleads_nothing() {
 }
 
 // A pose that leads to nothing is doubted after a while.
-void carried_off_it_is_found_where_it_is() {
+TEST(carried_off_it_is_found_where_it_is) {
   const Eyes eyes;
   const auto picture = draw({2, 0.4, 0.2}, Scene{});
   wm_estimate wrong = pose_of({1, -3, -0.6}, 0.03, 0.01);
@@ -387,7 +387,7 @@ void carried_off_it_is_found_where_it_is() {
   TEST_ASSERT_EQUAL(4, looks);
 }
 
-void a_pose_that_says_nothing_guides_nowhere() {
+TEST(a_pose_that_says_nothing_guides_nowhere) {
   params.search_places = 0;
   const Eyes eyes;
   const Place at = {1, 0, 0};
@@ -410,7 +410,7 @@ void a_pose_that_says_nothing_guides_nowhere() {
   TEST_ASSERT_EQUAL(WM_LOOK_TOO_SMALL, eyes.why());
 }
 
-void a_moving_robot_is_expected_where_it_was() {
+TEST(a_moving_robot_is_expected_where_it_was) {
   const Eyes eyes;
   const Place at = {1, 0, 0};
   wm_estimate guess = pose_of({1.3, 0, 0.06}, 0.02, 0.005);  // 0.1 s later, at 3 m/s and 0.6 rad/s
@@ -421,7 +421,7 @@ void a_moving_robot_is_expected_where_it_was() {
   TEST_ASSERT_DOUBLE_WITHIN(0.001, true_bearing(at), events[0].as.sighting.bearing_rad);
 }
 
-void rows_have_their_own_times() {
+TEST(rows_have_their_own_times) {
   rig.cameras[0].readout_ns = 20000000;
   const Eyes eyes;
   const Place at = {1, 0, 0};
@@ -433,7 +433,7 @@ void rows_have_their_own_times() {
   TEST_ASSERT_INT64_WITHIN(2, 5000 + std::llround(row * 20e6), events[0].t_ns);
 }
 
-void pictures_of_another_maps_landmarks_are_refused() {
+TEST(pictures_of_another_maps_landmarks_are_refused) {
   landmark.id = 8;
   const char *why = "";
   TEST_ASSERT_EQUAL(0, detector->state_bytes(&params, &view, &why));
@@ -456,24 +456,8 @@ void setUp() {
   view = {&rig, &kCamera, &landmark, 1, &appearance, 1, nullptr, 0};
   wm_params_defaults(&wm_landmarks_params_table, &params);
 }
-void tearDown() {}
 
-int main() {
+int suite_begin(int, char **) {
   detector = wm_detector_find("landmarks");
-  UNITY_BEGIN();
-  RUN_TEST(found_where_it_is_with_the_sigma_that_it_has);
-  RUN_TEST(a_landmark_without_sigma_is_found);
-  RUN_TEST(what_is_not_there_is_not_found_and_said_why);
-  RUN_TEST(found_anywhere_without_a_pose);
-  RUN_TEST(found_without_a_pose_where_it_has_thirteen_pixels);
-  RUN_TEST(what_is_too_small_is_not_recognised);
-  RUN_TEST(a_wide_board_is_found_without_a_pose);
-  RUN_TEST(what_was_recognised_is_followed);
-  RUN_TEST(a_motion_that_is_no_number_misleads_nothing);
-  RUN_TEST(carried_off_it_is_found_where_it_is);
-  RUN_TEST(a_pose_that_says_nothing_guides_nowhere);
-  RUN_TEST(a_moving_robot_is_expected_where_it_was);
-  RUN_TEST(rows_have_their_own_times);
-  RUN_TEST(pictures_of_another_maps_landmarks_are_refused);
-  return UNITY_END();
+  return SUITE_RUNS;
 }

@@ -2,7 +2,7 @@
 // Camera models: there and back, and where a model has no pixel or no ray.
 #include <cmath>
 
-#include "unity.h"
+#include "common/suite.h"
 #include "waymark/internal/sensors/lens.hpp"
 
 namespace {
@@ -43,7 +43,7 @@ wm_camera camera_of(wm_camera_model model) {
 const wm_camera_model kModels[] = {WM_CAMERA_EQUIDISTANT, WM_CAMERA_PINHOLE_RADTAN, WM_CAMERA_OMNI,
                                    WM_CAMERA_DOUBLE_SPHERE};
 
-void there_and_back() {
+TEST(there_and_back) {
   for (wm_camera_model model : kModels) {
     wm::lens lens;
     TEST_ASSERT_NULL(wm::lens_init(&lens, camera_of(model)));
@@ -64,7 +64,7 @@ void there_and_back() {
 }
 
 // Formulas written out once more, for one ray each.
-void by_hand() {
+TEST(by_hand) {
   wm::lens lens;
   wm::pixel at;
   const wm::vec3 ray = {0.3, -0.2, 0.8};
@@ -81,7 +81,7 @@ void by_hand() {
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 360 * 0.3 / (0.59 * d2 + 0.41 * z2) + 639, at.u);
 }
 
-void no_pixel_no_ray() {
+TEST(no_pixel_no_ray) {
   wm::lens lens;
   wm::pixel at;
   wm::vec3 ray;
@@ -99,7 +99,7 @@ void no_pixel_no_ray() {
   TEST_ASSERT_NOT_NULL(wm::lens_init(&lens, ocam));
 }
 
-void on_the_robot() {
+TEST(on_the_robot) {
   wm_camera c = camera_of(WM_CAMERA_EQUIDISTANT);
   c.mounting = {{0.5, 0.1, 0.4}, {0.02, 22 * M_PI / 180, -0.3}};
   wm::mounted_camera camera;
@@ -116,15 +116,3 @@ void on_the_robot() {
 }
 
 }  // namespace
-
-void setUp() {}
-void tearDown() {}
-
-int main() {
-  UNITY_BEGIN();
-  RUN_TEST(there_and_back);
-  RUN_TEST(by_hand);
-  RUN_TEST(no_pixel_no_ray);
-  RUN_TEST(on_the_robot);
-  return UNITY_END();
-}

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "unity.h"
+#include "common/suite.h"
 #include "vision/lines/line_tracks.hpp"
 #include "vision/lines/votes.hpp"
 #include "waymark/detector.h"
@@ -137,7 +137,7 @@ double error_of(const stripes &wall, double azimuth, size_t *which) {
   return least;
 }
 
-void sub_pixel_and_honest() {
+TEST(sub_pixel_and_honest) {
   set("sigma_px", 0);
   set("tilt_sigma_rad", 0);
   double squares = 0, normalised = 0, sum = 0;
@@ -175,7 +175,7 @@ void sub_pixel_and_honest() {
 }
 
 // The robot turns by five degrees a picture, then back: each line keeps its number.
-void numbers_stay_through_turns() {
+TEST(numbers_stay_through_turns) {
   const stripes wall = make_stripes(30, 9);
   start();
   std::map<int32_t, size_t> line_of;
@@ -196,7 +196,7 @@ void numbers_stay_through_turns() {
 }
 
 // The mounting is off by half a degree: the lines' lean tells, and azimuths are right again.
-void leaning_lines_tell_the_zenith() {
+TEST(leaning_lines_tell_the_zenith) {
   const stripes wall = make_stripes(36, 4);
   wm_camera truth = rig.cameras[0];
   truth.mounting.rpy_rad[1] += 0.5 * kDeg;
@@ -219,7 +219,7 @@ void leaning_lines_tell_the_zenith() {
 }
 
 // A mounting that is turned says azimuths about its own yaw, and a camera that looks ahead directions in its own axes.
-void bearings_are_the_sensors_own() {
+TEST(bearings_are_the_sensors_own) {
   const stripes wall = make_stripes(30, 2);
   rig.cameras[0] = up_camera(30);
   start();
@@ -234,7 +234,7 @@ void bearings_are_the_sensors_own() {
   }
 }
 
-void the_scalar_twin_votes_alike() {
+TEST(the_scalar_twin_votes_alike) {
   constexpr int kColumns = 256, kRows = 40;
   std::vector<int16_t> grey(kRows * (kColumns + 2 * wm::kPolarPad));
   for (size_t i = 0; i < grey.size(); i++)
@@ -263,7 +263,7 @@ void the_scalar_twin_votes_alike() {
   TEST_ASSERT_EQUAL_MEMORY(a.numbers, b.numbers, sizeof a.numbers);
 }
 
-void absurd_pictures_show_nothing() {
+TEST(absurd_pictures_show_nothing) {
   start();
   wm_time_ns t_ns = 0;
   for (int level : {0, 255, 128}) {
@@ -290,7 +290,7 @@ void absurd_pictures_show_nothing() {
 }
 
 // An identity has 27 bits: the one behind the largest is the first again.
-void identities_of_tracks_begin_anew() {
+TEST(identities_of_tracks_begin_anew) {
   static wm::line_tracks tracks;
   wm::radial_edge edges[3] = {};
   for (int i = 0; i < 3; i++) edges[i] = {-1.0 + i, 0.001, 0, 0.1, 60.0 + 50 * i, 200.0 - 50 * i, 0, 100, 1000};
@@ -309,7 +309,7 @@ void identities_of_tracks_begin_anew() {
   TEST_ASSERT_EQUAL_INT32(2, tracks.next_id);
 }
 
-void what_does_not_fit_is_told() {
+TEST(what_does_not_fit_is_told) {
   const char *why = nullptr;
   rig.cameras[0].width_px = rig.cameras[0].height_px = 3;
   TEST_ASSERT_EQUAL(0, lines->state_bytes(params.data(), &view, &why));
@@ -333,18 +333,4 @@ void setUp() {
   rig.camera_count = 1;
   rig.cameras[0] = up_camera(0);
   view = {&rig, &kCamera, nullptr, 0, nullptr, 0, nullptr, 0};
-}
-void tearDown() {}
-
-int main() {
-  UNITY_BEGIN();
-  RUN_TEST(sub_pixel_and_honest);
-  RUN_TEST(numbers_stay_through_turns);
-  RUN_TEST(leaning_lines_tell_the_zenith);
-  RUN_TEST(bearings_are_the_sensors_own);
-  RUN_TEST(the_scalar_twin_votes_alike);
-  RUN_TEST(absurd_pictures_show_nothing);
-  RUN_TEST(identities_of_tracks_begin_anew);
-  RUN_TEST(what_does_not_fit_is_told);
-  return UNITY_END();
 }

@@ -8,7 +8,7 @@
 #include <memory>
 
 #include "common/marker_views.hpp"
-#include "unity.h"
+#include "common/suite.h"
 #include "waymark/detector.h"
 #include "waymark/marker_fit.h"
 #include "waymark/mr_code.h"
@@ -49,7 +49,7 @@ struct Machine {
 };
 
 // The camera looks along its body's x axis, the print stands upright before it.
-void place_and_turn_are_right() {
+TEST(place_and_turn_are_right) {
   for (const double tilt : {0.0, 0.6, -0.9}) {
     View view = plain_view(1.5, tilt, 0.27);
     view.response = 0.6;  // white grows
@@ -71,7 +71,7 @@ void place_and_turn_are_right() {
 
 // A detector's corners are good to a pixel or so, and lie inwards where white grows: what is measured doesn't lean
 // there.
-void rough_corners_do_not_matter() {
+TEST(rough_corners_do_not_matter) {
   const wm_marker_print print = {0.2, 4, {{-0.5, -0.5}, {0.5, -0.5}, {0.5, 0.5}, {-0.5, 0.5}, {}}, 0, 0.75, 1.0};
   const Ink ring = [](double x, double y) {
     const double reach = std::max(std::fabs(x), std::fabs(y));
@@ -108,7 +108,7 @@ void rough_corners_do_not_matter() {
 }
 
 // How narrow it looks says little of the turn of an upright print seen nearly face on from afar: its sigma says so.
-void nearly_face_on_the_turn_is_as_unsure_as_it_says() {
+TEST(nearly_face_on_the_turn_is_as_unsure_as_it_says) {
   double nees = 0, sigma = 0;
   int seen = 0;
   for (const double tilt : {0.0, 0.04, 0.08, 0.12})
@@ -133,7 +133,7 @@ void nearly_face_on_the_turn_is_as_unsure_as_it_says() {
 }
 
 // Two prints of one identity, or one seen twice in a mirror's place: both are given, each where it is.
-void a_marker_twice_in_a_picture_is_given_twice() {
+TEST(a_marker_twice_in_a_picture_is_given_twice) {
   View view = plain_view(2.0, 0.0, 0.27);
   view.centre_m.x = -0.5;
   std::vector<uint8_t> left = take_picture(view, mr_ink(9));
@@ -148,7 +148,7 @@ void a_marker_twice_in_a_picture_is_given_twice() {
   TEST_ASSERT_DOUBLE_WITHIN(0.02, 1.0, std::fabs(events[0].as.marker.p_m[1] - events[1].as.marker.p_m[1]));
 }
 
-void capacity_is_kept() {
+TEST(capacity_is_kept) {
   const View view = plain_view(1.0, 0.0, 0.27);
   Machine machine(view.camera);
   const std::vector<uint8_t> grey = take_picture(view, mr_ink(3));
@@ -158,7 +158,7 @@ void capacity_is_kept() {
   TEST_ASSERT_EQUAL(0, count);
 }
 
-void blank_and_noisy_pictures_have_none() {
+TEST(blank_and_noisy_pictures_have_none) {
   const View view = plain_view(1.0, 0.0, 0.27);
   Machine machine(view.camera);
   std::vector<uint8_t> grey(640 * 480);
@@ -176,7 +176,7 @@ void blank_and_noisy_pictures_have_none() {
 }
 
 // Prints cut by the picture's edge, and the smallest pictures.
-void parts_of_prints_and_tiny_pictures() {
+TEST(parts_of_prints_and_tiny_pictures) {
   View view = plain_view(0.6, 0.0, 0.27);
   Machine machine(view.camera);
   for (const double x : {-0.42, 0.42}) {
@@ -196,7 +196,7 @@ void parts_of_prints_and_tiny_pictures() {
 }
 
 // A print with so many modules painted over: up to six are read, more are none.
-void painted_modules_are_corrected_or_refused() {
+TEST(painted_modules_are_corrected_or_refused) {
   const View view = plain_view(1.0, 0.3, 0.27);
   for (int painted = 4; painted <= 9; painted++) {
     const uint64_t code = wm_mr_encode(200);
@@ -212,17 +212,3 @@ void painted_modules_are_corrected_or_refused() {
 }  // namespace
 
 void setUp() { mr = wm_detector_find("mr"); }
-void tearDown() {}
-
-int main() {
-  UNITY_BEGIN();
-  RUN_TEST(place_and_turn_are_right);
-  RUN_TEST(rough_corners_do_not_matter);
-  RUN_TEST(nearly_face_on_the_turn_is_as_unsure_as_it_says);
-  RUN_TEST(a_marker_twice_in_a_picture_is_given_twice);
-  RUN_TEST(capacity_is_kept);
-  RUN_TEST(blank_and_noisy_pictures_have_none);
-  RUN_TEST(parts_of_prints_and_tiny_pictures);
-  RUN_TEST(painted_modules_are_corrected_or_refused);
-  return UNITY_END();
-}

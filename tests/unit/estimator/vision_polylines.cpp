@@ -8,7 +8,7 @@
 #include <memory>
 #include <vector>
 
-#include "unity.h"
+#include "common/suite.h"
 #include "waymark/random.h"
 
 namespace {
@@ -47,7 +47,7 @@ void piece(double x0, double y0, double x1, double y1) {
 }
 
 // A row of windows sees a wall that jitters by a pixel.
-void a_straight_wall_is_one_line() {
+TEST(a_straight_wall_is_one_line) {
   for (int i = 0; i < 6; i++) piece(40 * i, 100 + i % 2, 40 * i + 49, 101 - i % 2);
   join();
   TEST_ASSERT_EQUAL(2, vertices.size());
@@ -56,7 +56,7 @@ void a_straight_wall_is_one_line() {
 }
 
 // Each piece turns by 15 degrees; in any order and direction.
-void an_arc_is_a_polyline_through_the_intersections() {
+TEST(an_arc_is_a_polyline_through_the_intersections) {
   double x = 0, y = 0;
   std::vector<double> at_x = {x}, at_y = {y};
   for (int i = 0; i < 8; i++) {
@@ -80,7 +80,7 @@ void an_arc_is_a_polyline_through_the_intersections() {
   for (size_t i = 0; i < 9; i++) expect(i, at_x[turned ? 8 - i : i], at_y[turned ? 8 - i : i], 0.01);
 }
 
-void a_corner_is_no_continuation() {
+TEST(a_corner_is_no_continuation) {
   piece(0, 0, 50, 0);
   piece(50, 1, 50, 50);
   join();
@@ -91,7 +91,7 @@ void a_corner_is_no_continuation() {
   TEST_ASSERT_EQUAL(1, lines);
 }
 
-void a_gap_parts() {
+TEST(a_gap_parts) {
   piece(0, 0, 50, 0);
   piece(59.9, 0, 100, 0);
   piece(110.1, 0, 150, 0);
@@ -102,7 +102,7 @@ void a_gap_parts() {
 }
 
 // A spur leaves a bend: the way goes along the longer arm.
-void a_branch_is_left_out() {
+TEST(a_branch_is_left_out) {
   double x = 0, y = 0;
   for (int i = 0; i < 9; i++) {
     const double angle = 18 * M_PI / 180 * i, to_x = x + 50 * std::cos(angle), to_y = y + 50 * std::sin(angle);
@@ -118,7 +118,7 @@ void a_branch_is_left_out() {
   expect(9, x, y, 0.01);
 }
 
-void nothing_and_nonsense() {
+TEST(nothing_and_nonsense) {
   join();
   TEST_ASSERT_EQUAL(0, vertices.size());
   for (uint64_t i = 0; i < 200; i++) {  // any heap of pieces gives finite lines
@@ -138,16 +138,4 @@ void setUp() {
   pieces.clear();
   vertices.clear();
   limits = {};
-}
-void tearDown() {}
-
-int main() {
-  UNITY_BEGIN();
-  RUN_TEST(a_straight_wall_is_one_line);
-  RUN_TEST(an_arc_is_a_polyline_through_the_intersections);
-  RUN_TEST(a_corner_is_no_continuation);
-  RUN_TEST(a_gap_parts);
-  RUN_TEST(a_branch_is_left_out);
-  RUN_TEST(nothing_and_nonsense);
-  return UNITY_END();
 }

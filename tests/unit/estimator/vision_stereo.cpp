@@ -6,8 +6,8 @@
 #include <memory>
 #include <set>
 
+#include "common/suite.h"
 #include "sea_floor.hpp"
-#include "unity.h"
 #include "vision/stereo/corners.hpp"
 #include "vision/stereo/patch.hpp"
 #include "vision/stereo/rectify.hpp"
@@ -32,7 +32,7 @@ struct picture {
 
 double soft(double u, double v) { return 110 + 1.3 * kGrainOne.at(0.003 * u, 0.003 * v); }
 
-void a_patch_is_found_to_a_part_of_a_pixel() {
+TEST(a_patch_is_found_to_a_part_of_a_pixel) {
   const picture first(120, 90, [](double u, double v) { return soft(u, v); });
   for (const double du : {-0.5, -0.13, 0.0, 0.37, 1.8}) {
     const double dv = 0.3 - 0.4 * du;
@@ -49,7 +49,7 @@ void a_patch_is_found_to_a_part_of_a_pixel() {
   }
 }
 
-void a_bent_patch_is_found_by_its_warp() {
+TEST(a_bent_patch_is_found_by_its_warp) {
   const picture first(160, 120, [](double u, double v) { return soft(u, v); });
   // The second picture's offset (x, y) shows the first one's (1.2 x + 0.3 y, -0.25 x + 0.9 y).
   const wm::warp2 bend = {1.2, 0.3, -0.25, 0.9};
@@ -65,7 +65,7 @@ void a_bent_patch_is_found_by_its_warp() {
   TEST_ASSERT_DOUBLE_WITHIN(0.06, 59.7, found.at.v);
 }
 
-void no_patch_where_there_is_no_contrast() {
+TEST(no_patch_where_there_is_no_contrast) {
   const picture flat(80, 80, [](double, double) { return 90.0; });
   const picture stripes(80, 80, [](double u, double) { return 90 + 40 * std::sin(0.5 * u); });
   wm::patch_template what;
@@ -75,7 +75,7 @@ void no_patch_where_there_is_no_contrast() {
   TEST_ASSERT_FALSE(wm::make_template(flat.plane, {1e12, 40}, wm::kNoWarp, &what));
 }
 
-void slopes_of_a_surface_are_seen() {
+TEST(slopes_of_a_surface_are_seen) {
   const picture left(160, 120, [](double u, double v) { return soft(u, v); });
   // Right: u - (20 + 0.04 (u - 80) + 0.09 (v - 60)); a pixel of it shows the left one's place by the inverse.
   const picture right(160, 120,
@@ -90,7 +90,7 @@ void slopes_of_a_surface_are_seen() {
   TEST_ASSERT_DOUBLE_WITHIN(0.03, -0.09, slope[1]);
 }
 
-void corners_are_spread_over_the_cells() {
+TEST(corners_are_spread_over_the_cells) {
   const picture half(320, 240, [](double u, double v) { return u < 160 ? 100.0 : soft(2 * u, 2 * v); });
   constexpr int32_t kCell = 20, kCells = 16 * 12;
   std::vector<uint8_t> taken(kCells, 0), work(wm::corners_bytes(320));
@@ -109,7 +109,7 @@ void corners_are_spread_over_the_cells() {
   TEST_ASSERT_GREATER_THAN(80, found);
 }
 
-void most_points_decide_how_the_cameras_moved() {
+TEST(most_points_decide_how_the_cameras_moved) {
   const wm::pair_geometry pair = {420, 420, 321, 238.5, 0.3};
   const wm::rigid truth = {wm::matrix_of(wm::turn_by({0.01, 0.02, -0.015})), {0.03, -0.05, -0.06}};
   std::vector<wm::seen_twice> points;
@@ -248,17 +248,17 @@ void check(const course &c, double disparity_px) {
   TEST_ASSERT_GREATER_THAN(12, c.longest);
 }
 
-void points_stay_where_they_are_in_the_world() {
+TEST(points_stay_where_they_are_in_the_world) {
   machine m;
   check(swim(&m, 16, 1.0), 0.08);
 }
 
-void a_fisheye_pair_gives_rectified_pixels() {
+TEST(a_fisheye_pair_gives_rectified_pixels) {
   machine m(true);
   check(swim(&m, 16, 1.0), 0.1);
 }
 
-void haze_costs_accuracy_not_truth() {
+TEST(haze_costs_accuracy_not_truth) {
   machine m;
   const course c = swim(&m, 16, 0.45);
   TEST_ASSERT_GREATER_THAN(40, c.told / c.pictures);
@@ -266,7 +266,7 @@ void haze_costs_accuracy_not_truth() {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.04, part(c.place_off_m, 0.95));
 }
 
-void particles_are_not_told() {
+TEST(particles_are_not_told) {
   machine m;
   std::vector<sea::particle> particles;
   for (uint64_t i = 0; i < 40; i++)
@@ -280,7 +280,7 @@ void particles_are_not_told() {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.6, part(c.disparity_off_px, 0.97));
 }
 
-void what_makes_no_sense_gives_nothing() {
+TEST(what_makes_no_sense_gives_nothing) {
   const std::vector<uint8_t> black(640 * 480, 0), white(640 * 480, 255);
   sea::view_of_floor seen(kGrainOne);
   std::vector<uint8_t> left, right, late_left, late_right;
@@ -307,7 +307,7 @@ void what_makes_no_sense_gives_nothing() {
   }
 }
 
-void it_bears_a_camera_that_is_stuck_and_a_clock_that_runs_back() {
+TEST(it_bears_a_camera_that_is_stuck_and_a_clock_that_runs_back) {
   machine m;
   std::vector<uint8_t> left, right;
   std::set<int32_t> before;
@@ -331,7 +331,7 @@ void it_bears_a_camera_that_is_stuck_and_a_clock_that_runs_back() {
   TEST_ASSERT_EQUAL(0, m.count);
 }
 
-void a_pair_that_is_mounted_the_wrong_way_round_is_told() {
+TEST(a_pair_that_is_mounted_the_wrong_way_round_is_told) {
   machine m;
   std::swap(m.rig.cameras[0].mounting, m.rig.cameras[1].mounting);
   const char *why = nullptr;
@@ -349,7 +349,7 @@ int differ(const wm_stereo &a, const wm_stereo &b) {
 
 // GIVEN another drive over the same floor, 8 cm beside, 10 % higher and turned by 20 degrees WHEN the most alike point
 // is taken where it is clearly the most alike THEN most of those are the same point of the floor.
-void a_point_looks_alike_from_another_pose() {
+TEST(a_point_looks_alike_from_another_pose) {
   machine before, again;
   std::vector<uint8_t> left, right;
   std::vector<wm_stereo> known;
@@ -401,26 +401,4 @@ void a_point_looks_alike_from_another_pose() {
   std::printf("of %zu points that are there %zu are found, of %zu taken %zu\n", there, right_ones, taken, right_ones);
   TEST_ASSERT_GREATER_THAN(12, right_ones);
   TEST_ASSERT_GREATER_THAN_DOUBLE(0.6 * static_cast<double>(taken), static_cast<double>(right_ones));
-}
-
-void setUp() {}
-void tearDown() {}
-
-int main() {
-  UNITY_BEGIN();
-  RUN_TEST(a_patch_is_found_to_a_part_of_a_pixel);
-  RUN_TEST(a_bent_patch_is_found_by_its_warp);
-  RUN_TEST(no_patch_where_there_is_no_contrast);
-  RUN_TEST(slopes_of_a_surface_are_seen);
-  RUN_TEST(corners_are_spread_over_the_cells);
-  RUN_TEST(most_points_decide_how_the_cameras_moved);
-  RUN_TEST(points_stay_where_they_are_in_the_world);
-  RUN_TEST(a_fisheye_pair_gives_rectified_pixels);
-  RUN_TEST(haze_costs_accuracy_not_truth);
-  RUN_TEST(particles_are_not_told);
-  RUN_TEST(a_point_looks_alike_from_another_pose);
-  RUN_TEST(what_makes_no_sense_gives_nothing);
-  RUN_TEST(it_bears_a_camera_that_is_stuck_and_a_clock_that_runs_back);
-  RUN_TEST(a_pair_that_is_mounted_the_wrong_way_round_is_told);
-  return UNITY_END();
 }

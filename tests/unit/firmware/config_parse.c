@@ -4,9 +4,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/suite.h"
 #include "config/config.h"
 #include "config_registry.h"
-#include "unity.h"
 
 static wm_config config;
 static wm_error err;
@@ -35,13 +35,13 @@ static void refused(const char *text, const char *message) {
 
 static const registry_params *params(void) { return config.estimator_params; }
 
-static void empty_sections(void) {
+TEST(empty_sections) {
   parse(HEAD "merge:\npole_filter:\n  states:\nmotion:\n  # noise: {speed_mps: 1}\nsources:\n");
   TEST_ASSERT_EQUAL(2, params()->slots);
   TEST_ASSERT_EQUAL(0, config.source_count);
 }
 
-static void defaults(void) {
+TEST(defaults) {
   parse(HEAD);
   TEST_ASSERT_EQUAL_STRING("pole_filter", config.estimator->name);
   TEST_ASSERT_EQUAL_DOUBLE(9.0, params()->gate);
@@ -58,7 +58,7 @@ static void defaults(void) {
   TEST_ASSERT_EQUAL(strlen(HEAD), config.text_length);
 }
 
-static void a_renamed_key_is_read_with_a_warning(void) {
+TEST(a_renamed_key_is_read_with_a_warning) {
   parse(HEAD "pole_filter: {gate_sigmas: 4, states: {places: 3}, walls.weight: robust}\n");
   TEST_ASSERT_EQUAL_DOUBLE(4, params()->gate);
   TEST_ASSERT_EQUAL(3, params()->slots);
@@ -75,7 +75,7 @@ static void a_renamed_key_is_read_with_a_warning(void) {
           "dir/x.yaml:4: pole_filter.gate_sigmas: '-4' is out of range; a number from 0 to 1000 is needed");
 }
 
-static void a_removed_key_is_ignored_with_a_warning(void) {
+TEST(a_removed_key_is_ignored_with_a_warning) {
   parse(HEAD "pole_filter:\n  walls: {image_share: any}\n");
   TEST_ASSERT_EQUAL_STRING(
       "dir/x.yaml:4: pole_filter.walls.image_share: is not a parameter any more and is ignored: images are found by "
@@ -84,7 +84,7 @@ static void a_removed_key_is_ignored_with_a_warning(void) {
       config.warnings);
 }
 
-static void a_key_by_old_and_new_name_is_refused(void) {
+TEST(a_key_by_old_and_new_name_is_refused) {
   refused(HEAD "pole_filter:\n  gate: 4\n  gate_sigmas: 4\n",
           "dir/x.yaml:5: pole_filter.gate_sigmas: 'pole_filter.gate' is given on line 4, too; keep one of them");
   refused(
@@ -96,7 +96,7 @@ static double motion_param(int i) { return ((const double *)(const void *)config
 static double sighting_param(int i) { return ((const double *)(const void *)config.sightings)[i]; }
 
 // A parameter that several estimators had is in a section of its own now.
-static void an_old_key_leads_to_another_section(void) {
+TEST(an_old_key_leads_to_another_section) {
   parse(HEAD "pole_filter: {states: {scale_sigma: 0.3, yaw_walk_rad: 0.4, slots: 3}, lasting.tau_s: 5}\n");
   TEST_ASSERT_EQUAL_DOUBLE(0.3, motion_param(2));
   TEST_ASSERT_EQUAL_DOUBLE(0.4, sighting_param(1));
@@ -114,7 +114,7 @@ static void an_old_key_leads_to_another_section(void) {
 }
 
 // In whichever order they stand.
-static void both_sections_together_are_refused(void) {
+TEST(both_sections_together_are_refused) {
   refused(HEAD "motion:\n  states: {scale_sigma: 0.1}\npole_filter:\n  states: {scale_sigma: 0.3}\n",
           "dir/x.yaml:6: pole_filter.states.scale_sigma: 'motion.states.scale_sigma' is given on line 4, too; keep one "
           "of them");
@@ -123,14 +123,14 @@ static void both_sections_together_are_refused(void) {
           "them");
 }
 
-static void a_shared_parameter_that_the_estimator_does_not_take_is_warned_of(void) {
+TEST(a_shared_parameter_that_the_estimator_does_not_take_is_warned_of) {
   parse(HEAD "motion: {states: {lag_sigma_s: 0.2, scale_sigma: 0.1}}\n");
   TEST_ASSERT_EQUAL_STRING("dir/x.yaml:3: motion.states.lag_sigma_s: estimator pole_filter does not take it\n",
                            config.warnings);
 }
 
 // The section of an estimator that isn't chosen changes nothing of what the chosen one reads.
-static void an_old_key_of_another_estimator_is_not_taken(void) {
+TEST(an_old_key_of_another_estimator_is_not_taken) {
   parse(
       "format: waymark-config/1\nestimator: cloud_filter\npole_filter: {states: {scale_sigma: 0.3}}\n"
       "motion: {states.scale_sigma: 0.1}\n");
@@ -144,7 +144,7 @@ static void an_old_key_of_another_estimator_is_not_taken(void) {
 
 static void keep_line(void *context, const char *line) { (void)snprintf(context, 100, "%s", line); }
 
-static void warnings_come_line_by_line(void) {
+TEST(warnings_come_line_by_line) {
   char last[100] = "";
   (void)snprintf(config.warnings, sizeof config.warnings, "one\ntwo\n");
   wm_config_each_warning(&config, keep_line, last);
@@ -152,7 +152,7 @@ static void warnings_come_line_by_line(void) {
 }
 
 // Thousands of them: what does not fit is cut, nothing else is written.
-static void many_warnings_are_cut(void) {
+TEST(many_warnings_are_cut) {
   static char text[40000] = HEAD "pole_filter:\n";
   for (size_t used = strlen(text); used + 60 < sizeof text; used = strlen(text))
     (void)snprintf(text + used, sizeof text - used, "  walls.image_share: %d\n", (int)used);
@@ -162,14 +162,14 @@ static void many_warnings_are_cut(void) {
 }
 
 // The text in an event log is read the same way.
-static void an_old_logs_configuration_is_read(void) {
+TEST(an_old_logs_configuration_is_read) {
   static const char kText[] = HEAD "map: gone.yaml\npole_filter: {gate_sigmas: 4}\n";
   start_anew();
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_config_parse_logged(kText, sizeof kText - 1, "x.yaml", &config, &err), err.text);
   TEST_ASSERT_EQUAL_DOUBLE(4, params()->gate);
 }
 
-static void everything(void) {
+TEST(everything) {
   parse(HEAD
         "sources:\n  - {name: gnss, until_s: 25, from_s: -1}\n  - {name: sightings, lateness_max_ms: 300}\n"
         "  - {name: 'sightings:laser', use: false, period_ms: 90}\n"
@@ -200,7 +200,7 @@ static void everything(void) {
   TEST_ASSERT_EQUAL_DOUBLE(0.05, config.initial_pose.sigma_heading_rad);
 }
 
-static void source_settings(void) {
+TEST(source_settings) {
   parse(HEAD
         "merge: {lateness_max_ms: 100}\n"
         "sources:\n  - {name: gnss, until_s: 25}\n  - {name: sightings, lateness_max_ms: 300}\n"
@@ -227,7 +227,7 @@ static void source_settings(void) {
   TEST_ASSERT_DOUBLE_IS_INF(s.until_s);
 }
 
-static void devices(void) {
+TEST(devices) {
   parse(HEAD
         "devices:\n  can:\n    - {interface: can0, dbc: car.dbc, can_signals: /etc/s.yaml}\n"
         "    - {interface: can1, dbc: b.dbc, can_signals: c.yaml}\n");
@@ -265,7 +265,7 @@ static void devices(void) {
           "dir/x.yaml:6: devices.can[1].interface: 'can0' appears twice (first in line 5)");
 }
 
-static void cameras_of_libcamera(void) {
+TEST(cameras_of_libcamera) {
   if (wm_camera_has_libcamera()) {
     parse(HEAD "devices: {cameras: [{name: front, libcamera: platform/vimc.0 Sensor B}]}\n");
     TEST_ASSERT_EQUAL_STRING("platform/vimc.0 Sensor B", config.devices.cameras[0].libcamera);
@@ -281,7 +281,7 @@ static void cameras_of_libcamera(void) {
           "libcamera:");
 }
 
-static void misspelt(void) {
+TEST(misspelt) {
   refused(HEAD "pole_filter:\n  gaet: 5\n",
           "dir/x.yaml:4: pole_filter.gaet: unknown key; did you mean 'pole_filter.gate'?");
   refused(HEAD "pole_filtr: {gate: 5}\n", "dir/x.yaml:3: pole_filtr: unknown key; did you mean 'pole_filter'?");
@@ -308,7 +308,7 @@ static void misspelt(void) {
           "dir/x.yaml:1: estimator: is missing; one of these is needed: pole_filter, cloud_filter");
 }
 
-static void wrong_values(void) {
+TEST(wrong_values) {
   refused(HEAD "pole_filter: {gate: abc}\n",
           "dir/x.yaml:3: pole_filter.gate: 'abc' is not a number; a number from 0 to 1000 is needed");
   refused(HEAD "pole_filter: {states: {slots: 17}}\n",
@@ -326,7 +326,7 @@ static void wrong_values(void) {
   refused("", "dir/x.yaml:1: a map that begins with 'format: waymark-config/1' is needed");
 }
 
-static void parameters_that_do_not_go_together(void) {
+TEST(parameters_that_do_not_go_together) {
   parse(HEAD "motion:\n  noise:\n    speed_mps: 6.6\n");
   refused(HEAD "motion:\n  noise:\n    speed_mps: 6.5\n",
           "dir/x.yaml:5: motion.noise.speed_mps: doesn't go with another");
@@ -335,7 +335,7 @@ static void parameters_that_do_not_go_together(void) {
           "dir/x.yaml:3: motion.noise.sped_mps: unknown key; did you mean 'motion.noise.speed_mps'?");
 }
 
-static void wrong_sources(void) {
+TEST(wrong_sources) {
   refused(HEAD "sources: [{name: gnss, lateness_max_ms: 500}]\n",
           "dir/x.yaml:3: sources[0].lateness_max_ms: 500 is above merge.horizon_ms (300); at most 300 is possible, or "
           "set merge.horizon_ms to 500");
@@ -361,7 +361,7 @@ static void wrong_sources(void) {
   refused(HEAD "sources: gnss\n", "dir/x.yaml:3: sources: a list of {name: NAME, ...} is needed");
 }
 
-static void files(void) {
+TEST(files) {
   refused(HEAD "dbc: car.dbc\n", "dir/x.yaml:3: dbc: 'car.dbc' cannot be read (looked for dir/car.dbc)");
   static const char kText[] = HEAD "dbc: ../LICENSE\ncalibration: LICENSE\n";
   TEST_ASSERT_EQUAL_MESSAGE(WM_BAD_CONFIG, wm_config_parse(kText, sizeof kText - 1, "docs/x.yaml", &config, &err),
@@ -375,7 +375,7 @@ static void files(void) {
   TEST_ASSERT_EQUAL_STRING("no/such.yaml: there is no such file", err.text);
 }
 
-static void reference_names_all(void) {
+TEST(reference_names_all) {
   char *text = NULL;
   size_t length;
   FILE *to = open_memstream(&text, &length);
@@ -392,31 +392,4 @@ static void reference_names_all(void) {
   for (size_t i = 0; i < sizeof kRows / sizeof *kRows; i++)
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, kRows[i]), kRows[i]);
   free(text);
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(empty_sections);
-  RUN_TEST(defaults);
-  RUN_TEST(a_renamed_key_is_read_with_a_warning);
-  RUN_TEST(a_removed_key_is_ignored_with_a_warning);
-  RUN_TEST(a_key_by_old_and_new_name_is_refused);
-  RUN_TEST(an_old_key_leads_to_another_section);
-  RUN_TEST(both_sections_together_are_refused);
-  RUN_TEST(a_shared_parameter_that_the_estimator_does_not_take_is_warned_of);
-  RUN_TEST(an_old_key_of_another_estimator_is_not_taken);
-  RUN_TEST(warnings_come_line_by_line);
-  RUN_TEST(many_warnings_are_cut);
-  RUN_TEST(an_old_logs_configuration_is_read);
-  RUN_TEST(everything);
-  RUN_TEST(source_settings);
-  RUN_TEST(devices);
-  RUN_TEST(cameras_of_libcamera);
-  RUN_TEST(misspelt);
-  RUN_TEST(wrong_values);
-  RUN_TEST(parameters_that_do_not_go_together);
-  RUN_TEST(wrong_sources);
-  RUN_TEST(files);
-  RUN_TEST(reference_names_all);
-  return UNITY_END();
 }

@@ -4,11 +4,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "common/suite.h"
 #include "config/config.h"
-#include "unity.h"
-
-void setUp(void) {}
-void tearDown(void) {}
 
 static void each_of(const char *folder) {
   DIR *dir = opendir(folder);
@@ -30,12 +27,12 @@ static void each_of(const char *folder) {
   TEST_ASSERT_GREATER_THAN(0, read);
 }
 
-static void each_is_read(void) {
+TEST(each_is_read) {
   each_of("config");
   each_of("config/datasets");
 }
 
-static void a_moved_one_is_read_where_it_is_and_said(void) {
+TEST(a_moved_one_is_read_where_it_is_and_said) {
   const char *old = "config/office-frozen.yaml", *none = "config/no-such.yaml";
   wm_config config;
   wm_error err = {0};
@@ -82,7 +79,7 @@ static void check_old(const wm_param_table *table) {
 }
 
 // An old key is no parameter; the new one is; what was removed has a reason.
-static void old_keys_lead_to_parameters(void) {
+TEST(old_keys_lead_to_parameters) {
   size_t count;
   const wm_estimator *const *estimators = wm_estimators(&count);
   for (size_t i = 0; i < count; i++) check_old(&estimators[i]->params);
@@ -91,12 +88,4 @@ static void old_keys_lead_to_parameters(void) {
   check_old(&wm_motion_params_table);
   check_old(&wm_sighting_params_table);
   check_old(&wm_runtime_params_table);
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(each_is_read);
-  RUN_TEST(a_moved_one_is_read_where_it_is_and_said);
-  RUN_TEST(old_keys_lead_to_parameters);
-  return UNITY_END();
 }

@@ -4,18 +4,15 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/suite.h"
 #include "rt/arena.h"
 #include "rt/histogram.h"
 #include "rt/memory.h"
-#include "unity.h"
-
-void setUp(void) {}
-void tearDown(void) {}
 
 static wm_arena arena;
 static wm_error err;
 
-static void parts_are_aligned_zeroed_and_apart(void) {
+TEST(parts_are_aligned_zeroed_and_apart) {
   void *a, *b;
   wm_arena_need needs[] = {{"a", 100, &a}, {"b", 1 << 20, &b}};
   TEST_ASSERT_EQUAL(WM_OK, wm_arena_fill(&arena, needs, 2, 0, &err));
@@ -27,7 +24,7 @@ static void parts_are_aligned_zeroed_and_apart(void) {
   wm_arena_close(&arena);
 }
 
-static void after_the_seal_nothing_is_given(void) {
+TEST(after_the_seal_nothing_is_given) {
   void *a;
   wm_arena_need needs[] = {{"a", 100, &a}};
   TEST_ASSERT_EQUAL(WM_OK, wm_arena_fill(&arena, needs, 1, 0, &err));
@@ -36,7 +33,7 @@ static void after_the_seal_nothing_is_given(void) {
   wm_arena_close(&arena);
 }
 
-static void what_does_not_fit_is_told_the_number_that_would(void) {
+TEST(what_does_not_fit_is_told_the_number_that_would) {
   void *a;
   TEST_ASSERT_EQUAL(WM_OK, wm_arena_open(&arena, 4096, &err));
   TEST_ASSERT_EQUAL(WM_OK, wm_arena_take(&arena, "a", 4000, &a, &err));
@@ -46,7 +43,7 @@ static void what_does_not_fit_is_told_the_number_that_would(void) {
   wm_arena_close(&arena);
 }
 
-static void touched_memory_faults_no_more(void) {
+TEST(touched_memory_faults_no_more) {
   void *a;
   wm_arena_need needs[] = {{"a", 8 << 20, &a}};
   TEST_ASSERT_EQUAL(WM_OK, wm_arena_fill(&arena, needs, 1, 0, &err));
@@ -72,7 +69,7 @@ static void *allocate_elsewhere(void *out) {
   return NULL;
 }
 
-static void allocations_are_counted_for_each_thread(void) {
+TEST(allocations_are_counted_for_each_thread) {
   if (wm_allocations_of_this_thread() < 0) TEST_IGNORE_MESSAGE("a sanitizer's malloc is in place");
   pthread_t thread;
   int64_t there = -1;
@@ -86,7 +83,7 @@ static void allocations_are_counted_for_each_thread(void) {
   free(p);
 }
 
-static void quantiles_are_within_six_per_cent(void) {
+TEST(quantiles_are_within_six_per_cent) {
   static wm_histogram h;
   for (wm_time_ns v = 1; v <= 100000; v++) wm_histogram_add(&h, v);
   TEST_ASSERT_EQUAL_UINT64(100000, h.count);
@@ -96,15 +93,4 @@ static void quantiles_are_within_six_per_cent(void) {
   wm_histogram_add(&h, INT64_MAX);
   wm_histogram_add(&h, -5);
   TEST_ASSERT_EQUAL_INT64(INT64_MAX, h.max_ns);
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(parts_are_aligned_zeroed_and_apart);
-  RUN_TEST(after_the_seal_nothing_is_given);
-  RUN_TEST(what_does_not_fit_is_told_the_number_that_would);
-  RUN_TEST(touched_memory_faults_no_more);
-  RUN_TEST(allocations_are_counted_for_each_thread);
-  RUN_TEST(quantiles_are_within_six_per_cent);
-  return UNITY_END();
 }

@@ -10,8 +10,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "common/suite.h"
 #include "output/black_box.h"
-#include "unity.h"
 
 static const char kConfig[] = "format: waymark-config/1\nestimator: odometry\n";
 static char folder[64], said[4096];
@@ -93,7 +93,7 @@ static int events_of(const char *name, double *begins_x_m) {
   return count;
 }
 
-static void a_loss_is_kept_with_what_was_before_and_after(void) {
+TEST(a_loss_is_kept_with_what_was_before_and_after) {
   double begins_x_m;
   open_box();
   drive(34, WM_STATE_TRACKING);
@@ -130,7 +130,7 @@ static void expect_kept(const char *name, const char *map, double begins_x_m) {
 
 // GIVEN a run that took a map up WHEN it is logged THEN the first log begins as the run did, with all events, and later
 // ones with the newest map.
-static void logs_have_the_map_that_they_begin_with(void) {
+TEST(logs_have_the_map_that_they_begin_with) {
   double begins_x_m;
   wm_event early = {.kind = WM_EVENT_TWIST2, .t_ns = now_ns, .arrival_ns = now_ns};
   assembly.kept = "a map of the run before";
@@ -150,7 +150,7 @@ static void logs_have_the_map_that_they_begin_with(void) {
 }
 
 // A robot that waits for hours for its first pose fills no disk.
-static void a_log_without_a_pose_begins_again(void) {
+TEST(a_log_without_a_pose_begins_again) {
   double begins_x_m;
   open_box();
   for (int i = 0; i < 1000; i++) {
@@ -163,7 +163,7 @@ static void a_log_without_a_pose_begins_again(void) {
   black_box_close(&box);
 }
 
-static void a_run_that_died_leaves_its_last_seconds(void) {
+TEST(a_run_that_died_leaves_its_last_seconds) {
   double begins_x_m;
   open_box();
   drive(15, WM_STATE_TRACKING);
@@ -175,7 +175,7 @@ static void a_run_that_died_leaves_its_last_seconds(void) {
   black_box_close(&box);
 }
 
-static void an_end_in_order_leaves_nothing_to_keep(void) {
+TEST(an_end_in_order_leaves_nothing_to_keep) {
   open_box();
   drive(15, WM_STATE_TRACKING);
   black_box_close(&box);
@@ -185,7 +185,7 @@ static void an_end_in_order_leaves_nothing_to_keep(void) {
   TEST_ASSERT_EQUAL(0, files("died-*") + files("lost-*"));
 }
 
-static void an_end_soon_after_a_loss_keeps_it(void) {
+TEST(an_end_soon_after_a_loss_keeps_it) {
   open_box();
   drive(5, WM_STATE_TRACKING);
   drive(1, WM_STATE_LOST);
@@ -193,7 +193,7 @@ static void an_end_soon_after_a_loss_keeps_it(void) {
   TEST_ASSERT_EQUAL(1, files("lost-0001-*"));
 }
 
-static void the_oldest_go(void) {
+TEST(the_oldest_go) {
   open_box();
   for (int i = 0; i < 25; i++) {
     drive(1, WM_STATE_TRACKING);
@@ -217,7 +217,7 @@ static void die(double at_s) {
 
 // GIVEN an old incident WHEN a run dies again and again THEN the incident stays, with the loop's first and newest
 // death.
-static void a_crash_loop_evicts_no_old_incident(void) {
+TEST(a_crash_loop_evicts_no_old_incident) {
   open_box();
   drive(5, WM_STATE_TRACKING);
   drive(1, WM_STATE_LOST);
@@ -234,7 +234,7 @@ static void a_crash_loop_evicts_no_old_incident(void) {
   TEST_ASSERT_EQUAL(1, files("lost-0001-now.wmlog"));
 }
 
-static void a_link_in_its_folder_is_not_followed(void) {
+TEST(a_link_in_its_folder_is_not_followed) {
   char path[128], other[128];
   (void)snprintf(path, sizeof path, "%s/now.wmlog", folder);
   (void)snprintf(other, sizeof other, "%s/other", folder);
@@ -267,11 +267,11 @@ static void numbers_follow(uint64_t number) {
 }
 
 // After 9999 incidents the newest are not taken for old ones.
-static void numbers_go_on_beyond_four_digits(void) { numbers_follow(10041); }
-static void numbers_go_on_beyond_32_bits(void) { numbers_follow(UINT32_MAX); }
+TEST(numbers_go_on_beyond_four_digits) { numbers_follow(10041); }
+TEST(numbers_go_on_beyond_32_bits) { numbers_follow(UINT32_MAX); }
 
 // A number that is none of a black box does not end its counting.
-static void a_number_without_end_is_no_number(void) {
+TEST(a_number_without_end_is_no_number) {
   char path[128];
   (void)snprintf(path, sizeof path, "%s/lost-99999999999999999999-now.wmlog", folder);
   FILE *f = fopen(path, "w");
@@ -350,7 +350,7 @@ static int lines_of(const char *name) {
   return lines;
 }
 
-static void pictures_are_kept_with_it(void) {
+TEST(pictures_are_kept_with_it) {
   open_box();
   open_camera();
   for (int i = 0; i < 7; i++) {  // of two seconds each: the videos take turns after ten
@@ -377,30 +377,11 @@ static void pictures_are_kept_with_it(void) {
   black_box_close(&box);
 }
 
-static void a_disk_that_takes_nothing_is_said_once(void) {
+TEST(a_disk_that_takes_nothing_is_said_once) {
   black_box_open(&box, "/proc/nowhere", 10, 2, &assembly, hear, NULL);
   drive(25, WM_STATE_TRACKING);
   black_box_close(&box);
   const char *first = strstr(said, "black box: can't be written");
   TEST_ASSERT_NOT_NULL_MESSAGE(first, said);
   TEST_ASSERT_NULL_MESSAGE(strstr(first + 1, "black box: can't be written"), said);
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(a_loss_is_kept_with_what_was_before_and_after);
-  RUN_TEST(logs_have_the_map_that_they_begin_with);
-  RUN_TEST(a_log_without_a_pose_begins_again);
-  RUN_TEST(a_run_that_died_leaves_its_last_seconds);
-  RUN_TEST(an_end_in_order_leaves_nothing_to_keep);
-  RUN_TEST(an_end_soon_after_a_loss_keeps_it);
-  RUN_TEST(the_oldest_go);
-  RUN_TEST(a_crash_loop_evicts_no_old_incident);
-  RUN_TEST(a_link_in_its_folder_is_not_followed);
-  RUN_TEST(numbers_go_on_beyond_four_digits);
-  RUN_TEST(numbers_go_on_beyond_32_bits);
-  RUN_TEST(a_number_without_end_is_no_number);
-  RUN_TEST(pictures_are_kept_with_it);
-  RUN_TEST(a_disk_that_takes_nothing_is_said_once);
-  return UNITY_END();
 }

@@ -7,11 +7,11 @@
 #include "../drivers/fake_camera.h"
 #include "../drivers/folder.h"
 #include "camera_device.h"
+#include "common/suite.h"
 #include "rt/arena.h"
 #include "rt/clock.h"
 #include "sources/frame_hub.h"
 #include "sources/vision.h"
-#include "unity.h"
 
 #define MS WM_NS_PER_MS
 #define AT(ms) (FAKE_BOOT_NS + (ms)*MS)
@@ -156,7 +156,7 @@ static void expect_pair(wm_time_ns left_ns, wm_time_ns right_ns) {
   TEST_ASSERT_EQUAL_INT64(right_ns, seen_ns[1]);
 }
 
-static void pictures_of_one_instant_are_given_together(void) {
+TEST(pictures_of_one_instant_are_given_together) {
   for (uint32_t i = 0; i < 3; i++) {
     add(0, FAKE_PICTURE, AT(100 + 100 * i), 4 + i);
     add(1, FAKE_PICTURE, AT(100 + 100 * i) + MS, 4 + i);
@@ -167,7 +167,7 @@ static void pictures_of_one_instant_are_given_together(void) {
   TEST_ASSERT_EQUAL_UINT64(0, wm_vision_source(vision, 0)->counts.lost);
 }
 
-static void a_picture_without_its_other_half_is_counted(void) {
+TEST(a_picture_without_its_other_half_is_counted) {
   for (uint32_t i = 0; i < 3; i++) {
     add(0, FAKE_PICTURE, AT(100 + 100 * i), 4 + i);
     if (i != 1) add(1, FAKE_PICTURE, AT(100 + 100 * i), 4 + i);
@@ -181,7 +181,7 @@ static void a_picture_without_its_other_half_is_counted(void) {
 }
 
 // Lateness is that of the observation: a detector's time counts.
-static void observations_arrive_when_they_are_ready(void) {
+TEST(observations_arrive_when_they_are_ready) {
   for (int i = 0; i < 2; i++) add(i, FAKE_PICTURE, AT(100), 4);
   make();
   expect_pair(AT(100), AT(100));
@@ -190,7 +190,7 @@ static void observations_arrive_when_they_are_ready(void) {
   TEST_ASSERT_LESS_OR_EQUAL_INT64(wm_monotonic_ns(), event.arrival_ns);
 }
 
-static void one_that_is_unplugged_is_said_and_comes_back(void) {
+TEST(one_that_is_unplugged_is_said_and_comes_back) {
   add(0, FAKE_PICTURE, AT(100), 4);
   add(1, FAKE_PICTURE, AT(100), 4);
   add(1, FAKE_FAILS, AT(150), 0);
@@ -202,13 +202,4 @@ static void one_that_is_unplugged_is_said_and_comes_back(void) {
   TEST_ASSERT_EQUAL(WM_AGAIN, next());
   const wm_source_counts counts = wm_vision_source(vision, 0)->counts;
   TEST_ASSERT_TRUE_MESSAGE(counts.device != WM_DEVICE_WORKS, counts.device_note);
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(pictures_of_one_instant_are_given_together);
-  RUN_TEST(a_picture_without_its_other_half_is_counted);
-  RUN_TEST(observations_arrive_when_they_are_ready);
-  RUN_TEST(one_that_is_unplugged_is_said_and_comes_back);
-  return UNITY_END();
 }

@@ -6,7 +6,7 @@
 #include <sys/stat.h>
 
 #include "cli/doctor/doctor.h"
-#include "unity.h"
+#include "common/suite.h"
 
 static char root[64];
 static wm_findings found;
@@ -70,7 +70,7 @@ static void expect(const char *what, wm_severity level, const char *text) {
   TEST_ASSERT_EQUAL_MESSAGE(level == WM_SEVERITY_GOOD, f->fix[0] == '\0', f->fix);
 }
 
-static void a_good_computer_is_found_good(void) {
+TEST(a_good_computer_is_found_good) {
   put("/sys/kernel/realtime", "1\n");
   put("/proc/sys/kernel/sched_rt_runtime_us", "950000\n");
   put("/sys/devices/system/clocksource/clocksource0/current_clocksource", "tsc\n");
@@ -86,7 +86,7 @@ static void a_good_computer_is_found_good(void) {
   expect("temperature", WM_SEVERITY_GOOD, "45 degrees");
 }
 
-static void what_is_broken_is_found(void) {
+TEST(what_is_broken_is_found) {
   put("/proc/sys/kernel/sched_rt_runtime_us", "-1\n");
   put("/sys/devices/system/clocksource/clocksource0/current_clocksource", "hpet\n");
   put("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor", "performance\n");
@@ -103,7 +103,7 @@ static void what_is_broken_is_found(void) {
   expect("temperature", WM_SEVERITY_BAD, "91 degrees");
 }
 
-static void can_interfaces_are_looked_at(void) {
+TEST(can_interfaces_are_looked_at) {
   static wm_config config;
   const char *const names[] = {"can0", "can1", "can2", "eth0"};
   for (size_t i = 0; i < 4; i++)
@@ -122,7 +122,7 @@ static void can_interfaces_are_looked_at(void) {
   expect("can eth0", WM_SEVERITY_BAD, "is not a CAN interface");
 }
 
-static void interrupts_below_the_estimator_are_found(void) {
+TEST(interrupts_below_the_estimator_are_found) {
   static wm_config config;
   config.devices.can_count = 1;
   (void)snprintf(config.devices.can[0].interface, sizeof config.devices.can[0].interface, "can0");
@@ -143,7 +143,7 @@ static void interrupts_below_the_estimator_are_found(void) {
   expect("interrupts", WM_SEVERITY_GOOD, "is above");
 }
 
-static void cameras_are_looked_at(void) {
+TEST(cameras_are_looked_at) {
   static wm_config config;
   config.devices.camera_count = 2;
   (void)snprintf(config.devices.cameras[0].name, WM_NAME_MAX, "front");
@@ -155,7 +155,7 @@ static void cameras_are_looked_at(void) {
   expect("camera rear", WM_SEVERITY_GOOD, "/dev/null is present");
 }
 
-static void no_way_for_messages_is_found(void) {
+TEST(no_way_for_messages_is_found) {
   doctor_lcm("udpm://239.255.76.67:7667?ttl=1", &found);
   const wm_finding *f = about("lcm");
   TEST_ASSERT_EQUAL(WM_FOUND_LCM_ROUTE, f->id);
@@ -164,7 +164,7 @@ static void no_way_for_messages_is_found(void) {
   TEST_ASSERT_TRUE(f->fix[0] != '\0');
 }
 
-static void latency_is_measured(void) {
+TEST(latency_is_measured) {
   static wm_histogram wake_ns;
   int is_realtime;
   doctor_latency(0.2, 0, &wake_ns, &is_realtime);
@@ -180,24 +180,11 @@ static void latency_is_measured(void) {
   expect("latency", WM_SEVERITY_BAD, "a real-time thread");
 }
 
-static void a_short_can_queue_is_found(void) {
+TEST(a_short_can_queue_is_found) {
   doctor_can_queue(1 << 20, 212992, &found);
   expect("can queue", WM_SEVERITY_NOTE, "holds 139 ms of a full bus (208 kB of the 1024 that are asked for)");
   TEST_ASSERT_NOT_NULL(strstr(about("can queue")->fix, "net.core.rmem_max=1048576"));
   memset(&found, 0, sizeof found);
   doctor_can_queue(1 << 20, 1 << 20, &found);
   expect("can queue", WM_SEVERITY_GOOD, "holds 683 ms");
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(a_good_computer_is_found_good);
-  RUN_TEST(what_is_broken_is_found);
-  RUN_TEST(can_interfaces_are_looked_at);
-  RUN_TEST(a_short_can_queue_is_found);
-  RUN_TEST(interrupts_below_the_estimator_are_found);
-  RUN_TEST(cameras_are_looked_at);
-  RUN_TEST(no_way_for_messages_is_found);
-  RUN_TEST(latency_is_measured);
-  return UNITY_END();
 }

@@ -3,12 +3,9 @@
 #include <sys/stat.h>
 
 #include <wm_version.h>
+#include "common/suite.h"
 #include "log_fixture.h"
 #include "output/run_folder.h"
-#include "unity.h"
-
-void setUp(void) {}
-void tearDown(void) {}
 
 static wm_error err;
 
@@ -18,7 +15,7 @@ static wm_status open_bytes(uint8_t *bytes, size_t length, wm_log_reader **out) 
   return wm_log_open_file(file, "log", out, &err);
 }
 
-static void what_was_written_is_read(void) {
+TEST(what_was_written_is_read) {
   size_t length;
   uint8_t *bytes = fixture_log(100, 0, &length);
   wm_log_reader *log;
@@ -54,7 +51,7 @@ static void what_was_written_is_read(void) {
   free(bytes);
 }
 
-static void a_gap_is_told(void) {
+TEST(a_gap_is_told) {
   size_t length;
   uint8_t *bytes = fixture_log(10, 4, &length);
   wm_log_reader *log;
@@ -83,7 +80,7 @@ static int count_events(uint8_t *bytes, size_t length, wm_status *status, int *c
   return events;
 }
 
-static void a_log_that_was_cut_anywhere_gives_what_stands_before(void) {
+TEST(a_log_that_was_cut_anywhere_gives_what_stands_before) {
   size_t length;
   uint8_t *bytes = fixture_log(20, 0, &length);
   int last = -1, cut;
@@ -106,7 +103,7 @@ static void a_log_that_was_cut_anywhere_gives_what_stands_before(void) {
   free(bytes);
 }
 
-static void zeros_that_a_power_cut_left_are_a_cut(void) {
+TEST(zeros_that_a_power_cut_left_are_a_cut) {
   size_t length;
   uint8_t *bytes = fixture_log(20, 0, &length), *longer = calloc(1, length + 4096);
   wm_status status;
@@ -119,7 +116,7 @@ static void zeros_that_a_power_cut_left_are_a_cut(void) {
   free(bytes);
 }
 
-static void a_flipped_bit_is_found_wherever_it_is(void) {
+TEST(a_flipped_bit_is_found_wherever_it_is) {
   size_t length;
   uint8_t *bytes = fixture_log(6, 0, &length);
   wm_status status;
@@ -135,7 +132,7 @@ static void a_flipped_bit_is_found_wherever_it_is(void) {
   free(bytes);
 }
 
-static void what_is_no_log_is_said_to_be_none(void) {
+TEST(what_is_no_log_is_said_to_be_none) {
   wm_log_reader *log;
   uint8_t text[] = "t_ns,v_mps,w_radps\n0,1,2\n";
   TEST_ASSERT_EQUAL(WM_BAD_DATA, open_bytes(text, sizeof text - 1, &log));
@@ -144,7 +141,7 @@ static void what_is_no_log_is_said_to_be_none(void) {
   TEST_ASSERT_EQUAL(WM_IO, wm_log_open("/nowhere/events.wmlog", &log, &err));
 }
 
-static void a_full_disk_is_told_at_the_end(void) {
+TEST(a_full_disk_is_told_at_the_end) {
   static wm_log_writer writer;
   wm_config config;
   static wm_assembly assembly;
@@ -159,7 +156,7 @@ static void a_full_disk_is_told_at_the_end(void) {
 
 // A fuzzer whose seeds are refused at the door finds nothing: after a change of the format they must be made anew
 // (`waymark replay --until 0.4` of a simulated crossing, loops with markers, points under water).
-static void the_fuzzers_seeds_are_read_to_their_ends(void) {
+TEST(the_fuzzers_seeds_are_read_to_their_ends) {
   const char *const names[] = {"crossing", "slam", "seabed"};
   for (int i = 0; i < 3; i++) {
     char path[1024];
@@ -196,7 +193,7 @@ static void first_line(const char *dir, const char *name, char out[200]) {
 
 // GIVEN a limit of 400 kB WHEN a run writes for long THEN tables and log rotate, and the log goes on from the newest
 // pose.
-static void tables_and_log_rotate_by_their_size(void) {
+TEST(tables_and_log_rotate_by_their_size) {
   char dir[] = "/tmp/wm_rotate_XXXXXX", command[64], head[200], again[200], path[200];
   static wm_config config;
   static wm_assembly assembly;
@@ -240,18 +237,4 @@ static void tables_and_log_rotate_by_their_size(void) {
   }
   (void)snprintf(command, sizeof command, "rm -rf %s", dir);
   TEST_ASSERT_EQUAL(0, system(command));
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(what_was_written_is_read);
-  RUN_TEST(a_gap_is_told);
-  RUN_TEST(a_log_that_was_cut_anywhere_gives_what_stands_before);
-  RUN_TEST(zeros_that_a_power_cut_left_are_a_cut);
-  RUN_TEST(a_flipped_bit_is_found_wherever_it_is);
-  RUN_TEST(what_is_no_log_is_said_to_be_none);
-  RUN_TEST(a_full_disk_is_told_at_the_end);
-  RUN_TEST(the_fuzzers_seeds_are_read_to_their_ends);
-  RUN_TEST(tables_and_log_rotate_by_their_size);
-  return UNITY_END();
 }

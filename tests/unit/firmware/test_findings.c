@@ -5,8 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/suite.h"
 #include "output/drive_evidence.h"
-#include "unity.h"
 
 static wm_health health;
 static wm_findings found;
@@ -29,7 +29,6 @@ void setUp(void) {
   s->lateness_p99_ns = 20 * WM_NS_PER_MS;
   s->lateness_worst_ns = 30 * WM_NS_PER_MS;
 }
-void tearDown(void) {}
 
 #define EYE (&health.sources[0])
 static void late(void) { EYE->late = 5; }
@@ -94,12 +93,12 @@ static const struct {
                {slow_disk, WM_FOUND_OUTPUTS_LOST, "outputs"},
                {slow_computer, WM_FOUND_DEADLINES_MISSED, "computer"}};
 
-static void a_health_in_order_makes_no_finding(void) {
+TEST(a_health_in_order_makes_no_finding) {
   wm_health_findings(&health, &found);
   TEST_ASSERT_EQUAL_MESSAGE(0, found.count, found.at[0].text);
 }
 
-static void each_broken_health_makes_its_finding_alone(void) {
+TEST(each_broken_health_makes_its_finding_alone) {
   for (size_t i = 0; i < sizeof kBroken / sizeof kBroken[0]; i++) {
     setUp();
     kBroken[i].breaks();
@@ -135,7 +134,7 @@ static void drive_with_mean(double sigmas, double mean_sigmas, wm_verdict verdic
 
 static void drive_with(double sigmas, wm_verdict verdict) { drive_with_mean(sigmas, 0, verdict); }
 
-static void innovations_with_a_mean_are_found(void) {
+TEST(innovations_with_a_mean_are_found) {
   drive_with_mean(0.8, 0.2, WM_FUSED);
   TEST_ASSERT_EQUAL(0, found.count);
   drive_with_mean(0.8, 0.9, WM_FUSED);
@@ -144,7 +143,7 @@ static void innovations_with_a_mean_are_found(void) {
 }
 
 // Ranges that are 7 % too long, whether they were fused or refused.
-static void ranges_that_are_too_long_are_found_with_their_factor(void) {
+TEST(ranges_that_are_too_long_are_found_with_their_factor) {
   drive_with_mean(0.5, 7, WM_REJECTED_GATE);
   TEST_ASSERT_TRUE(wm_findings_has(&found, WM_FOUND_OBSERVATIONS_BIASED, "eye"));
   TEST_ASSERT_EQUAL_STRING("its ranges are 7.0 % longer than the map has them, on average",
@@ -152,7 +151,7 @@ static void ranges_that_are_too_long_are_found_with_their_factor(void) {
   TEST_ASSERT_NOT_NULL(strstr(found.at[found.count - 1].fix, "multiply range_m by 0.935"));
 }
 
-static void innovations_of_their_sigma_are_good_and_larger_ones_are_found(void) {
+TEST(innovations_of_their_sigma_are_good_and_larger_ones_are_found) {
   drive_with(1, WM_FUSED);
   TEST_ASSERT_EQUAL(0, found.count);
   drive_with(2.5, WM_FUSED);
@@ -180,7 +179,7 @@ static void drive_in(wm_state state, wm_cause cause, int source, uint64_t fused)
   evidence_judge(&evidence, &assembly, &health, 100, &found);
 }
 
-static void the_cause_of_a_lost_or_degraded_drive_is_named(void) {
+TEST(the_cause_of_a_lost_or_degraded_drive_is_named) {
   static const struct {
     wm_state state;
     wm_cause cause;
@@ -207,7 +206,7 @@ static void the_cause_of_a_lost_or_degraded_drive_is_named(void) {
 }
 
 // A camera that never sees a marker, and one that saw some.
-static void a_drive_that_no_observation_reaches_is_not_good(void) {
+TEST(a_drive_that_no_observation_reaches_is_not_good) {
   drive_in(WM_STATE_DEAD_RECKONING, WM_CAUSE_NONE, -1, 0);
   TEST_ASSERT_TRUE(wm_findings_has(&found, WM_FOUND_POSE_DOUBTFUL, "observations"));
   TEST_ASSERT_EQUAL(WM_SEVERITY_BAD, found.at[0].severity);
@@ -225,7 +224,7 @@ static void a_drive_that_no_observation_reaches_is_not_good(void) {
   TEST_ASSERT_EQUAL(0, found.count);
 }
 
-static void innovations_of_a_tenth_of_their_sigma_are_not_good(void) {
+TEST(innovations_of_a_tenth_of_their_sigma_are_not_good) {
   drive_with(0.2, WM_FUSED);
   TEST_ASSERT_EQUAL(0, found.count);
   drive_with(0.05, WM_FUSED);
@@ -235,7 +234,7 @@ static void innovations_of_a_tenth_of_their_sigma_are_not_good(void) {
 }
 
 // A tenth of a per cent of the motion's data, and 2 %.
-static void motion_that_no_robot_can_do_is_found(void) {
+TEST(motion_that_no_robot_can_do_is_found) {
   static const struct {
     uint64_t count;
     size_t findings;
@@ -258,7 +257,7 @@ static void motion_that_no_robot_can_do_is_found(void) {
 }
 
 // A number is advised where a transport can be so late; of a clock none.
-static void no_lateness_is_advised_that_no_transport_has(void) {
+TEST(no_lateness_is_advised_that_no_transport_has) {
   EYE->late = 5;
   EYE->lateness_p99_ns = EYE->lateness_worst_ns = 400 * WM_NS_PER_MS;
   wm_health_findings(&health, &found);
@@ -271,7 +270,7 @@ static void no_lateness_is_advised_that_no_transport_has(void) {
 }
 
 // A start that is given is not asked for.
-static void a_start_that_is_given_is_not_asked_for(void) {
+TEST(a_start_that_is_given_is_not_asked_for) {
   static drive_evidence evidence;
   static wm_config config;
   static wm_assembly assembly;
@@ -282,7 +281,7 @@ static void a_start_that_is_given_is_not_asked_for(void) {
 }
 
 // An hour without a datum, which a replay skips, is no time without a pose.
-static void a_silence_that_is_skipped_is_not_due(void) {
+TEST(a_silence_that_is_skipped_is_not_due) {
   static drive_evidence evidence;
   for (int i = 0; i <= 200; i++) {
     const wm_event event = {.t_ns = i * 100 * WM_NS_PER_MS + (i > 100 ? 3600 * WM_NS_PER_S : 0)};
@@ -292,7 +291,7 @@ static void a_silence_that_is_skipped_is_not_due(void) {
 }
 
 // A scale within 1.8 is a note, unless the estimator has an alarm about it: also one behind the first values.
-static void a_scale_with_an_alarm_is_bad(void) {
+TEST(a_scale_with_an_alarm_is_bad) {
   static drive_evidence evidence;
   static wm_config config;
   static const wm_estimator kAny = {.name = "landmark_ekf"};
@@ -316,7 +315,7 @@ static void a_scale_with_an_alarm_is_bad(void) {
 }
 
 // A map that the configuration names and does not use, one that it uses, and a recording's own.
-static void a_map_that_is_named_and_not_read_is_found(void) {
+TEST(a_map_that_is_named_and_not_read_is_found) {
   static const char *const kUses[] = {"none", "extend", NULL};
   static const wm_param kMap = {.key = "landmarks.map", .type = WM_PARAM_ENUM, .names = kUses};
   static const wm_estimator kMapping = {.name = "slam", .params = {&kMap, 1, sizeof(int32_t), NULL}};
@@ -340,7 +339,7 @@ static void a_map_that_is_named_and_not_read_is_found(void) {
   }
 }
 
-static void a_finding_of_the_drive_is_not_repeated_by_the_health(void) {
+TEST(a_finding_of_the_drive_is_not_repeated_by_the_health) {
   drive_with(5, WM_REJECTED_GATE);
   TEST_ASSERT_TRUE(wm_findings_has(&found, WM_FOUND_OBSERVATIONS_REFUSED, "eye"));
   refused();
@@ -355,7 +354,7 @@ static void write_log(void *context, const char *line) {
   (void)strncat(log_text, line, sizeof log_text - strlen(log_text) - 1);
 }
 
-static void a_log_has_each_finding_once_in_ten_minutes(void) {
+TEST(a_log_has_each_finding_once_in_ten_minutes) {
   moved();
   wm_health_findings(&health, &found);
   for (int s = 0; s < 599; s++) wm_said_take(&said, &found, s * WM_NS_PER_S, write_log, NULL);
@@ -368,7 +367,7 @@ static void a_log_has_each_finding_once_in_ten_minutes(void) {
   TEST_ASSERT_TRUE(log_text[0] != '\0');
 }
 
-static void a_full_list_counts_what_it_drops(void) {
+TEST(a_full_list_counts_what_it_drops) {
   for (int i = 0; i < WM_FINDINGS_MAX + 3; i++)
     wm_find(&found, WM_FOUND_FILE_NOTE, WM_SEVERITY_NOTE, "files", NULL, "%d", i)->size = i;
   TEST_ASSERT_EQUAL(WM_FINDINGS_MAX, found.count);
@@ -376,7 +375,7 @@ static void a_full_list_counts_what_it_drops(void) {
   TEST_ASSERT_EQUAL_STRING("63", found.at[63].text);
 }
 
-static void every_kind_has_its_words(void) {
+TEST(every_kind_has_its_words) {
   for (size_t i = 0; i < WM_FOUND_COUNT; i++) {
     const wm_finding_kind *kind = &kFindingKinds[i];
     TEST_ASSERT_TRUE(kind->identifier && kind->identifier[0] && kind->cause[0] && kind->fix[0]);
@@ -394,31 +393,7 @@ static double score_of(double off_m) {
   evidence_put(&evidence, WM_OUTPUT_INNOVATION, &in);
   return evidence_score(&evidence);
 }
-static void positions_with_a_large_sigma_tell_good_poses_from_wrong_ones(void) {
+TEST(positions_with_a_large_sigma_tell_good_poses_from_wrong_ones) {
   TEST_ASSERT_GREATER_THAN_DOUBLE(score_of(30) + 0.4, score_of(0));
   TEST_ASSERT_TRUE(score_of(30) > score_of(60) + 1);
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(a_health_in_order_makes_no_finding);
-  RUN_TEST(each_broken_health_makes_its_finding_alone);
-  RUN_TEST(innovations_with_a_mean_are_found);
-  RUN_TEST(ranges_that_are_too_long_are_found_with_their_factor);
-  RUN_TEST(innovations_of_their_sigma_are_good_and_larger_ones_are_found);
-  RUN_TEST(the_cause_of_a_lost_or_degraded_drive_is_named);
-  RUN_TEST(a_drive_that_no_observation_reaches_is_not_good);
-  RUN_TEST(innovations_of_a_tenth_of_their_sigma_are_not_good);
-  RUN_TEST(motion_that_no_robot_can_do_is_found);
-  RUN_TEST(no_lateness_is_advised_that_no_transport_has);
-  RUN_TEST(a_start_that_is_given_is_not_asked_for);
-  RUN_TEST(a_silence_that_is_skipped_is_not_due);
-  RUN_TEST(a_scale_with_an_alarm_is_bad);
-  RUN_TEST(a_map_that_is_named_and_not_read_is_found);
-  RUN_TEST(a_finding_of_the_drive_is_not_repeated_by_the_health);
-  RUN_TEST(a_log_has_each_finding_once_in_ten_minutes);
-  RUN_TEST(a_full_list_counts_what_it_drops);
-  RUN_TEST(every_kind_has_its_words);
-  RUN_TEST(positions_with_a_large_sigma_tell_good_poses_from_wrong_ones);
-  return UNITY_END();
 }

@@ -5,8 +5,8 @@
 #include <stdlib.h>
 #include <unistd.h>
 
+#include "common/suite.h"
 #include "rt/forked.h"
-#include "unity.h"
 
 #define JOBS 5
 #define LONGEST_MS 20000  // then the first job gives up, and the test fails
@@ -34,14 +34,14 @@ static void square(void *context, size_t index, void *result) {
   *(uint64_t *)result = 100 + index * index;
 }
 
-static void results_at_the_places_of_their_jobs(void) {
+TEST(results_at_the_places_of_their_jobs) {
   uint64_t results[JOBS];
   wm_forked_run(&(wm_forked){NULL, square, sizeof *results, one_done}, JOBS, results);
   for (size_t i = 0; i < JOBS; i++) TEST_ASSERT_EQUAL(i == 3 ? 0 : 100 + i * i, results[i]);
   TEST_ASSERT_EQUAL(JOBS, done_count);
 }
 
-static void no_jobs_need_no_results(void) {
+TEST(no_jobs_need_no_results) {
   wm_forked_run(&(wm_forked){NULL, square, sizeof(uint64_t), one_done}, 0, NULL);
   TEST_ASSERT_EQUAL(0, done_count);
 }
@@ -56,17 +56,9 @@ static void wait_for_last(void *context, size_t index, void *result) {
   if (index == JOBS - 1) (void)!write(ends[1], &byte, 1);
 }
 
-static void a_long_job_holds_no_other_back(void) {
+TEST(a_long_job_holds_no_other_back) {
   uint64_t results[JOBS];
   if (sysconf(_SC_NPROCESSORS_ONLN) < 2) TEST_IGNORE_MESSAGE("one processor");
   wm_forked_run(&(wm_forked){NULL, wait_for_last, sizeof *results, NULL}, JOBS, results);
   for (size_t i = 0; i < JOBS; i++) TEST_ASSERT_EQUAL(i + 1, results[i]);
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(results_at_the_places_of_their_jobs);
-  RUN_TEST(no_jobs_need_no_results);
-  RUN_TEST(a_long_job_holds_no_other_back);
-  return UNITY_END();
 }

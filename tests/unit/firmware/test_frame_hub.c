@@ -9,9 +9,9 @@
 #include <string.h>
 #include <sys/stat.h>
 
+#include "common/suite.h"
 #include "output/avi_writer.h"
 #include "sources/frame_hub.h"
-#include "unity.h"
 #include "waymark/devices.h"
 #include "waymark/video.h"
 
@@ -85,7 +85,7 @@ static uint64_t overflows(const wm_frame_source *reader) {
   return counts.overflows;
 }
 
-static void a_picture_is_decoded_once_for_all(void) {
+TEST(a_picture_is_decoded_once_for_all) {
   wm_frame_source *a = subscribe(1, 0), *b = subscribe(1, 0);
   for (int i = 0; i < 5; i++) {
     TEST_ASSERT_EQUAL(WM_OK, frame_hub_take(hub, &err));
@@ -104,7 +104,7 @@ static void a_picture_is_decoded_once_for_all(void) {
   b->ops->close(b);
 }
 
-static void a_slow_reader_holds_nobody_up_and_its_losses_are_counted(void) {
+TEST(a_slow_reader_holds_nobody_up_and_its_losses_are_counted) {
   wm_frame_source *slow = subscribe(1, 0), *quick = subscribe(1, 0), *queue = subscribe(3, 0);
   TEST_ASSERT_EQUAL(WM_OK, frame_hub_take(hub, &err));
   const wm_frame held = next(slow);  // and keeps it
@@ -124,7 +124,7 @@ static void a_slow_reader_holds_nobody_up_and_its_losses_are_counted(void) {
   queue->ops->close(queue);
 }
 
-static void what_waits_is_read_before_the_end_is_told(void) {
+TEST(what_waits_is_read_before_the_end_is_told) {
   wm_frame_source *reader = subscribe(16, WM_DEVICE_WAIT_MS);
   wm_frame frame;
   int taken = 0;
@@ -137,7 +137,7 @@ static void what_waits_is_read_before_the_end_is_told(void) {
 }
 
 // A pair's half without the other one is counted as lost.
-static void what_is_passed_over_is_counted(void) {
+TEST(what_is_passed_over_is_counted) {
   wm_frame_source *reader = subscribe(2, 0);
   wm_source_counts counts;
   for (int i = 0; i < 2; i++) TEST_ASSERT_EQUAL(WM_OK, frame_hub_take(hub, &err));
@@ -148,7 +148,7 @@ static void what_is_passed_over_is_counted(void) {
   reader->ops->close(reader);
 }
 
-static void readers_come_and_go_without_growth(void) {
+TEST(readers_come_and_go_without_growth) {
   wm_frame_source *stays = subscribe(1, 0);
   size_t before = 0;
   for (int i = 0; i < 1000; i++) {
@@ -163,7 +163,7 @@ static void readers_come_and_go_without_growth(void) {
   stays->ops->close(stays);
 }
 
-static void no_more_readers_than_there_is_room_for(void) {
+TEST(no_more_readers_than_there_is_room_for) {
   wm_frame_source *readers[FRAME_HUB_SUBSCRIBERS_MAX], *more;
   const wm_frame_wishes wishes = {.waiting_max = 1};
   for (int i = 0; i < FRAME_HUB_SUBSCRIBERS_MAX; i++) readers[i] = subscribe(1, 0);
@@ -205,7 +205,7 @@ static void *read_all(void *argument) {
   }
 }
 
-static void threads_of_their_own(void) {
+TEST(threads_of_their_own) {
   reading readings[3] = {{subscribe(1, 50), 0, 0}, {subscribe(4, 50), 0, 0}, {subscribe(16, 50), 0, 0}};
   pthread_t hub_thread, threads[3];
   TEST_ASSERT_EQUAL(0, pthread_create(&hub_thread, NULL, take_all, NULL));
@@ -224,16 +224,4 @@ static void threads_of_their_own(void) {
     TEST_ASSERT_EQUAL_UINT64(PICTURES, readings[i].frames + overflows(readings[i].reader));
     readings[i].reader->ops->close(readings[i].reader);
   }
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(a_picture_is_decoded_once_for_all);
-  RUN_TEST(a_slow_reader_holds_nobody_up_and_its_losses_are_counted);
-  RUN_TEST(what_waits_is_read_before_the_end_is_told);
-  RUN_TEST(what_is_passed_over_is_counted);
-  RUN_TEST(readers_come_and_go_without_growth);
-  RUN_TEST(no_more_readers_than_there_is_room_for);
-  RUN_TEST(threads_of_their_own);
-  return UNITY_END();
 }

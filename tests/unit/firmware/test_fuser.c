@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <stdio.h>
 
+#include "common/suite.h"
 #include "fusion/fuser.h"
 #include "tiny_estimator.h"
-#include "unity.h"
 
 #define MS WM_NS_PER_MS
 
@@ -31,7 +31,6 @@ void setUp(void) {
   (void)tiny_init(&state, NULL, NULL);
   wm_fuser_init(&fuser, &kTiny, &state, wm_driving_choose(WM_EVENT_BIT(WM_EVENT_TWIST2), 0), (wm_output){put, NULL});
 }
-void tearDown(void) {}
 
 static void twist(wm_time_ns ms, double v) {
   wm_event e = {.t_ns = ms * MS, .arrival_ns = ms * MS, .kind = WM_EVENT_TWIST2};
@@ -45,7 +44,7 @@ static void sighting(wm_time_ns ms, double bearing) {
   wm_fuser_feed(&fuser, &e);
 }
 
-static void a_row_holds_the_state_after_all_events_up_to_its_stamp(void) {
+TEST(a_row_holds_the_state_after_all_events_up_to_its_stamp) {
   twist(0, 1);
   sighting(0, 0.5);  // at the row's stamp: in the row
   sighting(50, 0.5);
@@ -55,7 +54,7 @@ static void a_row_holds_the_state_after_all_events_up_to_its_stamp(void) {
   TEST_ASSERT_EQUAL_UINT64(2, fuser.poses);
 }
 
-static void refused_motion_makes_no_row(void) {
+TEST(refused_motion_makes_no_row) {
   twist(0, 1);
   twist(100, NAN);
   twist(50, 1);
@@ -67,7 +66,7 @@ static void refused_motion_makes_no_row(void) {
   TEST_ASSERT_EQUAL_UINT64(2, fuser.counts[0].fused);
 }
 
-static void observations_are_counted_by_their_verdict(void) {
+TEST(observations_are_counted_by_their_verdict) {
   twist(0, 1);
   sighting(1, 0.5);
   sighting(2, 2);
@@ -76,7 +75,7 @@ static void observations_are_counted_by_their_verdict(void) {
   TEST_ASSERT_EQUAL_UINT64(2, fuser.counts[1].rejected[WM_REJECTED_GATE]);
 }
 
-static void without_a_pose_there_is_no_row(void) {
+TEST(without_a_pose_there_is_no_row) {
   state.state = WM_STATE_SEARCHING;
   twist(0, 1);
   twist(10, 1);
@@ -86,7 +85,7 @@ static void without_a_pose_there_is_no_row(void) {
   TEST_ASSERT_EQUAL_STRING("E0 E10 P10:0.01,0 E20 P20:0.02,0 ", said);
 }
 
-static void ticks_drive_before_yaw_rate_before_speed_before_twists(void) {
+TEST(ticks_drive_before_yaw_rate_before_speed_before_twists) {
   uint32_t q = WM_EVENT_BIT(WM_EVENT_QUANTITIES), t = WM_EVENT_BIT(WM_EVENT_TWIST2);
   uint32_t ticks = 1u << WM_Q_WHEEL_TICKS_LEFT, yaw = 1u << WM_Q_YAW_RATE, speed = 1u << WM_Q_VEHICLE_SPEED;
   TEST_ASSERT_TRUE(wm_driving_choose(q | t, ticks | yaw | speed).quantities & ticks);
@@ -125,7 +124,7 @@ static size_t many_alarms(const void *self, wm_alarm *out, size_t capacity) {
   return 1000;
 }
 
-static void health_holds_no_more_values_than_it_has_room_for(void) {
+TEST(health_holds_no_more_values_than_it_has_room_for) {
   static wm_health health;
   wm_estimator generous = kTiny;
   generous.calibration = many_values;
@@ -154,7 +153,7 @@ static void doubtful(const void *self, wm_estimate *out) {
   out->resets = 3;
 }
 
-static void health_has_what_the_estimate_has(void) {
+TEST(health_has_what_the_estimate_has) {
   static wm_health health;
   wm_estimator doubting = kTiny;
   doubting.estimate = doubtful;
@@ -181,7 +180,7 @@ static const wm_health *health_after_a_minute(double bearing) {
   return &health;
 }
 
-static void a_pose_whose_observations_are_refused_is_lost(void) {
+TEST(a_pose_whose_observations_are_refused_is_lost) {
   TEST_ASSERT_EQUAL(WM_STATE_TRACKING, health_after_a_minute(0.5)->state);
   const wm_health *health = health_after_a_minute(2.0);
   TEST_ASSERT_EQUAL(WM_STATE_LOST, health->state);
@@ -234,7 +233,7 @@ static void points(wm_time_ns ms) {
   wm_fuser_feed(&fuser, &e);
 }
 
-static void clouds_are_written_once_a_second(void) {
+TEST(clouds_are_written_once_a_second) {
   wm_estimator clouds = kTiny;
   clouds.correct = take_points;
   clouds.particles = some_particles;
@@ -256,7 +255,7 @@ static void clouds_are_written_once_a_second(void) {
   TEST_ASSERT_EQUAL_UINT64(3, fuser.counts[1].fused);
 }
 
-static void hypotheses_come_in_sets(void) {
+TEST(hypotheses_come_in_sets) {
   wm_estimator clouds = kTiny;
   clouds.correct = take_points;
   clouds.particles = some_particles;
@@ -282,7 +281,7 @@ static void hypotheses_come_in_sets(void) {
   TEST_ASSERT_EQUAL_STRING(expected, said);
 }
 
-static void records_have_room_for_points_where_there_are_some(void) {
+TEST(records_have_room_for_points_where_there_are_some) {
   TEST_ASSERT_EQUAL(sizeof(wm_event), wm_output_bytes(WM_EVENT_BIT(WM_EVENT_POINTS) | WM_EVENT_BIT(WM_EVENT_TWIST2)));
   const size_t small = wm_output_bytes(WM_EVENT_BIT(WM_EVENT_TWIST2));
   TEST_ASSERT_GREATER_OR_EQUAL(sizeof(wm_published), small);
@@ -290,7 +289,7 @@ static void records_have_room_for_points_where_there_are_some(void) {
   TEST_ASSERT_LESS_THAN(sizeof(wm_event), small);
 }
 
-static void increments_drive_and_twists_before_a_gyro(void) {
+TEST(increments_drive_and_twists_before_a_gyro) {
   const uint32_t q = WM_EVENT_BIT(WM_EVENT_QUANTITIES), t = WM_EVENT_BIT(WM_EVENT_TWIST2),
                  i = WM_EVENT_BIT(WM_EVENT_INCREMENT);
   const uint32_t yaw = 1u << WM_Q_YAW_RATE;
@@ -300,21 +299,4 @@ static void increments_drive_and_twists_before_a_gyro(void) {
   TEST_ASSERT_EQUAL_HEX32(q, wm_driving_choose(q, yaw).kinds);
   TEST_ASSERT_EQUAL_HEX32(yaw, wm_driving_choose(q, yaw).quantities);
   TEST_ASSERT_EQUAL_HEX32(WM_EVENT_BIT(WM_EVENT_SIGHTING), wm_driving_choose(WM_EVENT_BIT(WM_EVENT_SIGHTING), 0).kinds);
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(a_row_holds_the_state_after_all_events_up_to_its_stamp);
-  RUN_TEST(refused_motion_makes_no_row);
-  RUN_TEST(observations_are_counted_by_their_verdict);
-  RUN_TEST(without_a_pose_there_is_no_row);
-  RUN_TEST(health_holds_no_more_values_than_it_has_room_for);
-  RUN_TEST(health_has_what_the_estimate_has);
-  RUN_TEST(a_pose_whose_observations_are_refused_is_lost);
-  RUN_TEST(clouds_are_written_once_a_second);
-  RUN_TEST(hypotheses_come_in_sets);
-  RUN_TEST(records_have_room_for_points_where_there_are_some);
-  RUN_TEST(increments_drive_and_twists_before_a_gyro);
-  RUN_TEST(ticks_drive_before_yaw_rate_before_speed_before_twists);
-  return UNITY_END();
 }

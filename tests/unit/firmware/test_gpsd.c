@@ -11,9 +11,9 @@
 #include <unistd.h>
 
 #include "cli/doctor/doctor.h"
+#include "common/suite.h"
 #include "live/row_source.h"
 #include "rt/clock.h"
-#include "unity.h"
 
 #define MS WM_NS_PER_MS
 #define ORIGIN_DEG 48.0, 11.0
@@ -126,7 +126,7 @@ static void wait_for(unsigned state) {
   TEST_ASSERT_EQUAL_MESSAGE(state, source->counts.device, source->counts.device_note);
 }
 
-static void a_position_is_in_the_map(void) {
+TEST(a_position_is_in_the_map) {
   begin_connected();
   say("{\"class\":\"VERSION\",\"release\":\"3.22\"}\r\n{\"class\":\"DEVICES\",\"devices\":[{\"class\":\"DEVICE\"}]}"
       "\r\n");
@@ -142,7 +142,7 @@ static void a_position_is_in_the_map(void) {
   expect_state(WM_DEVICE_WORKS, "fix without corrections");
 }
 
-static void sigmas_follow_the_fix(void) {
+TEST(sigmas_follow_the_fix) {
   static const struct {
     const char *members;
     double sigma_m;
@@ -175,7 +175,7 @@ static void deviations(const char *lat_m) {
 }
 
 // The receiver's own sigmas, and not beyond a change of the fix: the first position without corrections leaps.
-static void a_receivers_deviations_are_of_its_fix(void) {
+TEST(a_receivers_deviations_are_of_its_fix) {
   config.accuracy_scale = 0.2;  // of gpsd's estimates alone
   begin_connected();
   report(utc_ns(), "\"mode\":3,\"status\":3," PLACE);
@@ -191,7 +191,7 @@ static void a_receivers_deviations_are_of_its_fix(void) {
 }
 
 // Of a burst of sentences those come before the position.
-static void deviations_before_the_first_fix_are_of_it(void) {
+TEST(deviations_before_the_first_fix_are_of_it) {
   begin_connected();
   deviations("0.02");
   report(utc_ns(), "\"mode\":3,\"status\":3," PLACE);
@@ -204,7 +204,7 @@ static void deviations_before_the_first_fix_are_of_it(void) {
   TEST_ASSERT_EQUAL_DOUBLE(5, event.as.position.sigma_xy_m);
 }
 
-static void a_course_is_a_heading(void) {
+TEST(a_course_is_a_heading) {
   config.from = WM_GPSD_COURSE;
   begin_connected();
   report(utc_ns(), FIX ",\"speed\":0.5,\"track\":90");  // too slow
@@ -220,7 +220,7 @@ static void a_course_is_a_heading(void) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 5 * M_PI / 180, event.as.heading.sigma_rad);
 }
 
-static void antennas_give_a_heading(void) {
+TEST(antennas_give_a_heading) {
   config.from = WM_GPSD_ANTENNAS;
   begin_connected();
   report(utc_ns(), FIX ",\"speed\":2,\"track\":90");
@@ -231,7 +231,7 @@ static void antennas_give_a_heading(void) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, M_PI / 180, event.as.heading.sigma_rad);
 }
 
-static void without_a_fix_nothing_is_fused(void) {
+TEST(without_a_fix_nothing_is_fused) {
   static const char *const kNone[] = {"\"mode\":1",
                                       ("\"mode\":0," PLACE),
                                       "\"mode\":3,\"lat\":0.0,\"lon\":0.0",
@@ -250,7 +250,7 @@ static void without_a_fix_nothing_is_fused(void) {
 }
 
 // A receiver for time sends its stored place with status 7, and again without a status.
-static void a_stored_place_is_no_fix(void) {
+TEST(a_stored_place_is_no_fix) {
   begin_connected();
   report(utc_ns(), "\"mode\":3,\"status\":7," PLACE);
   expect(WM_AGAIN);
@@ -261,7 +261,7 @@ static void a_stored_place_is_no_fix(void) {
   expect(WM_OK);
 }
 
-static void reports_of_one_epoch_are_one_row(void) {
+TEST(reports_of_one_epoch_are_one_row) {
   begin_connected();
   const wm_time_ns t_ns = utc_ns();
   report(t_ns, FIX);
@@ -273,7 +273,7 @@ static void reports_of_one_epoch_are_one_row(void) {
   expect(WM_OK);
 }
 
-static void rubbish_is_counted(void) {
+TEST(rubbish_is_counted) {
   begin_connected();
   say("$GPGGA,1,2,3\r\n{\"class\":\"TPV\",\r\n");
   char flood[1000];
@@ -292,7 +292,7 @@ static void rubbish_is_counted(void) {
   TEST_ASSERT_NOT_NULL(strstr(source->counts.first_problem, "is not a JSON object"));
 }
 
-static void an_accuracy_that_cannot_be_is_refused(void) {
+TEST(an_accuracy_that_cannot_be_is_refused) {
   begin_connected();
   report(utc_ns(), "\"mode\":3,\"lat\":48,\"lon\":11,\"eph\":1e9");
   expect(WM_AGAIN);
@@ -300,7 +300,7 @@ static void an_accuracy_that_cannot_be_is_refused(void) {
 }
 
 // gpsd may report a fix once for each of the receiver's sentences.
-static void doubled_and_older_reports_are_counted(void) {
+TEST(doubled_and_older_reports_are_counted) {
   begin_connected();
   const wm_time_ns t_ns = utc_ns();
   for (int i = 0; i < 3; i++) report(t_ns, FIX);
@@ -313,7 +313,7 @@ static void doubled_and_older_reports_are_counted(void) {
 }
 
 // A clock of the receiver that is 19.6 years off (its week number has overflown) and leaps.
-static void a_receivers_clock_is_followed(void) {
+TEST(a_receivers_clock_is_followed) {
   config.latency_ms = 80;
   begin_connected();
   const wm_time_ns off_ns = -INT64_C(1024) * 7 * 86400 * WM_NS_PER_S;
@@ -327,7 +327,7 @@ static void a_receivers_clock_is_followed(void) {
   TEST_ASSERT_GREATER_OR_EQUAL_INT64(50 * MS, source->counts.stamp_uncertainty_ns);
 }
 
-static void by_utc_the_clocks_must_agree(void) {
+TEST(by_utc_the_clocks_must_agree) {
   config.clock = WM_GPSD_CLOCK_UTC;
   begin_connected();
   report(utc_ns() - 300 * MS, FIX);  // late, and fused at its stamp
@@ -341,7 +341,7 @@ static void by_utc_the_clocks_must_agree(void) {
   TEST_ASSERT_NOT_NULL(strstr(source->counts.first_problem, "this computer's clock are apart"));
 }
 
-static void absent_and_back(void) {
+TEST(absent_and_back) {
   hang_up();
   begin();
   expect(WM_AGAIN);
@@ -360,7 +360,7 @@ static void absent_and_back(void) {
   expect_state(WM_DEVICE_WORKS, "fix");
 }
 
-static void unplugged_silent_and_back(void) {
+TEST(unplugged_silent_and_back) {
   begin_connected();
   report(utc_ns(), FIX);
   expect(WM_OK);
@@ -377,14 +377,14 @@ static void unplugged_silent_and_back(void) {
   expect_state(WM_DEVICE_DOWN, "no such device");
 }
 
-static void the_maps_origin_is_needed(void) {
+TEST(the_maps_origin_is_needed) {
   static const double kNone[3] = {NAN, NAN, NAN};
   wm_row_device *device;
   TEST_ASSERT_EQUAL(WM_BAD_CONFIG, wm_gpsd_open(&config, kNone, &device, &err));
   TEST_ASSERT_NOT_NULL(strstr(err.text, "calibration.yaml has no `gnss: {origin:"));
 }
 
-static void the_doctor_finds_it_absent(void) {
+TEST(the_doctor_finds_it_absent) {
   static wm_findings found;
   wm_config whole = {.devices = {.gpsd = {config}, .gpsd_count = 1}};
   hang_up();
@@ -393,27 +393,4 @@ static void the_doctor_finds_it_absent(void) {
   TEST_ASSERT_EQUAL(WM_FOUND_GNSS_RECEIVER, found.at[0].id);
   TEST_ASSERT_EQUAL(WM_SEVERITY_BAD, found.at[0].severity);
   TEST_ASSERT_NOT_NULL_MESSAGE(strstr(found.at[0].text, "no gpsd answers"), found.at[0].text);
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(a_position_is_in_the_map);
-  RUN_TEST(sigmas_follow_the_fix);
-  RUN_TEST(a_receivers_deviations_are_of_its_fix);
-  RUN_TEST(deviations_before_the_first_fix_are_of_it);
-  RUN_TEST(a_course_is_a_heading);
-  RUN_TEST(antennas_give_a_heading);
-  RUN_TEST(without_a_fix_nothing_is_fused);
-  RUN_TEST(a_stored_place_is_no_fix);
-  RUN_TEST(reports_of_one_epoch_are_one_row);
-  RUN_TEST(rubbish_is_counted);
-  RUN_TEST(an_accuracy_that_cannot_be_is_refused);
-  RUN_TEST(doubled_and_older_reports_are_counted);
-  RUN_TEST(a_receivers_clock_is_followed);
-  RUN_TEST(by_utc_the_clocks_must_agree);
-  RUN_TEST(absent_and_back);
-  RUN_TEST(unplugged_silent_and_back);
-  RUN_TEST(the_maps_origin_is_needed);
-  RUN_TEST(the_doctor_finds_it_absent);
-  return UNITY_END();
 }

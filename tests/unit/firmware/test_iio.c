@@ -11,9 +11,9 @@
 #include <unistd.h>
 
 #include "cli/doctor/doctor.h"
+#include "common/suite.h"
 #include "live/row_source.h"
 #include "rt/clock.h"
-#include "unity.h"
 
 #define MS WM_NS_PER_MS
 
@@ -142,7 +142,7 @@ void tearDown(void) {
   run("rm -rf %s%s", "");
 }
 
-static void a_buffer_is_set_up_and_read(void) {
+TEST(a_buffer_is_set_up_and_read) {
   config.rate_hz = 200;
   begin_capture();
   expect_attribute("scan_elements/in_anglvel_z_en", "1");
@@ -170,7 +170,7 @@ static void a_buffer_is_set_up_and_read(void) {
   TEST_ASSERT_EQUAL_UINT64(2, source->counts.received);
 }
 
-static void a_scan_may_come_in_parts(void) {
+TEST(a_scan_may_come_in_parts) {
   begin_capture();
   uint8_t bytes[24];
   (void)scan(bytes, wm_monotonic_ns() - MS, 0, 500, 0);
@@ -197,31 +197,31 @@ static void expect_down(const char *why, unsigned state) {
   TEST_ASSERT_NOT_NULL_MESSAGE(strstr(found.at[0].text, why), found.at[0].text);
 }
 
-static void another_device_is_named(void) {
+TEST(another_device_is_named) {
   plug_in();
   config = (wm_iio_device_config){.device = "mpu6050"};
   expect_down("there is no IIO device 'mpu6050' (there are: bmi160)", WM_DEVICE_ABSENT);
 }
 
-static void without_stamps_it_is_not_used(void) {
+TEST(without_stamps_it_is_not_used) {
   plug_in();
   run("rm %s/sys/bus/iio/devices/iio:device3/scan_elements/%s*", "in_timestamp");
   expect_down("no in_anglvel_x, _y, _z and in_timestamp", WM_DEVICE_DOWN);
 }
 
-static void a_mirror_is_no_mounting(void) {
+TEST(a_mirror_is_no_mounting) {
   plug_in();
   put("in_mount_matrix", "1, 0, 0; 0, 1, 0; 0, 0, -1");
   expect_down("in_mount_matrix is not a rotation", WM_DEVICE_DOWN);
 }
 
-static void a_trigger_is_needed(void) {
+TEST(a_trigger_is_needed) {
   plug_in();
   config.trigger[0] = 't';
   expect_down("no trigger 't' (there are: bmi160-dev3)", WM_DEVICE_DOWN);
 }
 
-static void without_a_buffer_it_is_not_used(void) {
+TEST(without_a_buffer_it_is_not_used) {
   plug_in();
   run("rm -r %s/sys/bus/iio/devices/iio:device3/%s", "buffer");
   begin();
@@ -231,7 +231,7 @@ static void without_a_buffer_it_is_not_used(void) {
                                source->counts.device_note);
 }
 
-static void stamps_of_the_wall_clock_are_moved(void) {
+TEST(stamps_of_the_wall_clock_are_moved) {
   plug_in();
   run("rm %s/sys/bus/iio/devices/iio:device3/%s", "current_timestamp_clock");
   begin();
@@ -246,7 +246,7 @@ static void stamps_of_the_wall_clock_are_moved(void) {
 }
 
 // A sensor's own clock that starts at 0 and leaps.
-static void stamps_of_another_clock_are_followed(void) {
+TEST(stamps_of_another_clock_are_followed) {
   begin_capture();
   for (int i = 1; i < 20; i++) {
     sample((i < 10 ? 0 : -5000) * MS * 100 + i * 10 * MS, 0, i, 0);
@@ -257,7 +257,7 @@ static void stamps_of_another_clock_are_followed(void) {
   TEST_ASSERT_GREATER_OR_EQUAL_UINT64(12, source->counts.received);
 }
 
-static void doubled_and_older_samples_are_counted(void) {
+TEST(doubled_and_older_samples_are_counted) {
   begin_capture();
   const wm_time_ns t_ns = wm_monotonic_ns() - 500 * MS;  // late: fused at its stamp
   const wm_time_ns stamps[] = {t_ns, t_ns, t_ns - 10 * MS, t_ns + MS};
@@ -267,7 +267,7 @@ static void doubled_and_older_samples_are_counted(void) {
   TEST_ASSERT_EQUAL_UINT64(1, source->counts.out_of_order);
 }
 
-static void a_scale_that_is_no_number_is_refused(void) {
+TEST(a_scale_that_is_no_number_is_refused) {
   plug_in();
   put("in_anglvel_scale", "nan");
   begin();
@@ -285,7 +285,7 @@ static void wait_for(unsigned state) {
   TEST_ASSERT_EQUAL_MESSAGE(state, source->counts.device, source->counts.device_note);
 }
 
-static void unplugged_and_back(void) {
+TEST(unplugged_and_back) {
   begin_capture();
   sample(wm_monotonic_ns(), 0, 1, 0);
   TEST_ASSERT_EQUAL(WM_OK, next());
@@ -301,7 +301,7 @@ static void unplugged_and_back(void) {
   TEST_ASSERT_EQUAL(WM_OK, next());
 }
 
-static void silence_is_reported(void) {
+TEST(silence_is_reported) {
   begin_capture();
   wait_for(WM_DEVICE_STALLED);
   TEST_ASSERT_NOT_NULL(strstr(source->counts.device_note, "does its trigger or its interrupt fire?"));
@@ -311,7 +311,7 @@ static void silence_is_reported(void) {
 }
 
 // A recorder beside a run takes the run's rows: the kernel has one reader.
-static void rows_are_copied_for_a_recorder(void) {
+TEST(rows_are_copied_for_a_recorder) {
   begin_capture();
   wm_stream_row row;
   uint64_t lost = 0;
@@ -326,23 +326,4 @@ static void rows_are_copied_for_a_recorder(void) {
   while (row_source_copy(source, &row, &lost)) TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.001 * count++, row.number[2]);
   TEST_ASSERT_EQUAL(256, count);
   TEST_ASSERT_EQUAL_UINT64(44, lost);
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(a_buffer_is_set_up_and_read);
-  RUN_TEST(a_scan_may_come_in_parts);
-  RUN_TEST(another_device_is_named);
-  RUN_TEST(without_stamps_it_is_not_used);
-  RUN_TEST(a_mirror_is_no_mounting);
-  RUN_TEST(a_trigger_is_needed);
-  RUN_TEST(without_a_buffer_it_is_not_used);
-  RUN_TEST(stamps_of_the_wall_clock_are_moved);
-  RUN_TEST(stamps_of_another_clock_are_followed);
-  RUN_TEST(doubled_and_older_samples_are_counted);
-  RUN_TEST(a_scale_that_is_no_number_is_refused);
-  RUN_TEST(unplugged_and_back);
-  RUN_TEST(silence_is_reported);
-  RUN_TEST(rows_are_copied_for_a_recorder);
-  return UNITY_END();
 }

@@ -6,10 +6,10 @@
 #include <stdlib.h>
 #include <time.h>
 
+#include "common/suite.h"
 #include "live/lcm_connect.h"
 #include "live/lcm_subscriber.h"
 #include "rt/clock.h"
-#include "unity.h"
 
 #define URL "udpm://239.255.76.67:7667?ttl=0"
 
@@ -62,7 +62,7 @@ void tearDown(void) {
   lcm_subscriber_close(&subscriber);
 }
 
-static void a_second_of_an_imu_waits(void) {
+TEST(a_second_of_an_imu_waits) {
   for (int round = 1; round <= 3; round++) {
     send(900);
     hear_all();
@@ -71,7 +71,7 @@ static void a_second_of_an_imu_waits(void) {
   TEST_ASSERT_EQUAL_UINT64(0, counts.overflows);
 }
 
-static void more_than_that_is_counted(void) {
+TEST(more_than_that_is_counted) {
   send(1500);
   hear_all();
   TEST_ASSERT_EQUAL(LCM_QUEUED + 1, heard);  // LCM keeps one more than the capacity
@@ -82,13 +82,11 @@ static void more_than_that_is_counted(void) {
   TEST_ASSERT_EQUAL_UINT64(1, counts.overflows);
 }
 
-int main(void) {
+int suite_begin(int argc, char **argv) {
+  (void)argc, (void)argv;
   if (unshare(CLONE_NEWNET) != 0 || system("ip link set lo up && ip route add 224.0.0.0/4 dev lo") != 0) {
     (void)printf("skipped: no right to a network of its own, or no ip\n");
     return 77;
   }
-  UNITY_BEGIN();
-  RUN_TEST(a_second_of_an_imu_waits);
-  RUN_TEST(more_than_that_is_counted);
-  return UNITY_END();
+  return SUITE_RUNS;
 }

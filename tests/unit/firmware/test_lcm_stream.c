@@ -5,10 +5,10 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "common/suite.h"
 #include "live/lcm_device.h"
 #include "live/row_source.h"
 #include "rt/clock.h"
-#include "unity.h"
 #include "waymark/lcm_streams.h"
 
 #define MS WM_NS_PER_MS
@@ -17,8 +17,6 @@ static lcm_t *lcm;
 static wm_source *source;
 static wm_event event;
 static wm_error err;
-
-void setUp(void) {}
 
 void tearDown(void) {
   if (source) source->ops->close(source);
@@ -57,7 +55,7 @@ static void assert_refused(const char *why) {
   TEST_ASSERT_NOT_NULL_MESSAGE(strstr(source->counts.first_problem, why), source->counts.first_problem);
 }
 
-static void a_twist_is_an_event_of_motion(void) {
+TEST(a_twist_is_an_event_of_motion) {
   begin_motion();
   TEST_ASSERT_TRUE(source->is_motion && source->is_live);
   const wm_time_ns now_ns = wm_monotonic_ns();
@@ -79,7 +77,7 @@ static void a_twist_is_an_event_of_motion(void) {
   TEST_ASSERT_EQUAL_UINT64(2, source->counts.received);
 }
 
-static void a_gyro_is_a_turn_rate_by_its_mounting(void) {
+TEST(a_gyro_is_a_turn_rate_by_its_mounting) {
   begin((wm_lcm_device_config){.stream = "imu", .channel = "GYRO"});
   wm_stream_row row = {.t_ns = wm_monotonic_ns(), .number = {0.5, -0.25, -0.125, 0, 0, -9.8}};
   send("imu", "T_GYRO", row);
@@ -119,14 +117,14 @@ static void begin_row(const char *stream, const double number[6]) {
   TEST_ASSERT_TRUE(source->kinds & WM_EVENT_BIT(event.kind));
 }
 
-static void a_twist_in_six_degrees(void) {
+TEST(a_twist_in_six_degrees) {
   begin_row("motion6", (const double[6]){1, 2, 3, 4, 5, 6});
   TEST_ASSERT_EQUAL(WM_EVENT_TWIST6, event.kind);
   TEST_ASSERT_EQUAL_DOUBLE(3, event.as.twist6.v_mps[2]);
   TEST_ASSERT_EQUAL_DOUBLE(6, event.as.twist6.w_radps[2]);
 }
 
-static void wheels_and_steering_are_quantities(void) {
+TEST(wheels_and_steering_are_quantities) {
   static const struct {
     const char *stream;
     wm_quantity first, second;
@@ -147,7 +145,7 @@ static void wheels_and_steering_are_quantities(void) {
   }
 }
 
-static void headings_depths_and_positions_are_observations(void) {
+TEST(headings_depths_and_positions_are_observations) {
   begin_row("heading", (const double[6]){3.5, 0.01});
   TEST_ASSERT_FALSE(source->is_motion);
   TEST_ASSERT_EQUAL_DOUBLE(3.5 - 2 * M_PI, event.as.heading.heading_rad);
@@ -165,14 +163,14 @@ static void headings_depths_and_positions_are_observations(void) {
   TEST_ASSERT_DOUBLE_IS_NAN(p->sigma_z_m);
 }
 
-static void an_absent_sender_is_said(void) {
+TEST(an_absent_sender_is_said) {
   begin_motion();
   TEST_ASSERT_EQUAL(WM_AGAIN, next());
   TEST_ASSERT_EQUAL(WM_DEVICE_ABSENT, source->counts.device);
   TEST_ASSERT_NOT_NULL(strstr(source->counts.device_note, "no usable motion_t on T_MOTION yet"));
 }
 
-static void a_silent_sender_is_said_and_its_return(void) {
+TEST(a_silent_sender_is_said_and_its_return) {
   begin_motion();
   send_motion(wm_monotonic_ns(), 1, 0, 0);
   TEST_ASSERT_EQUAL(WM_OK, next());
@@ -186,7 +184,7 @@ static void a_silent_sender_is_said_and_its_return(void) {
   TEST_ASSERT_EQUAL_STRING("motion_t comes on T_MOTION", source->counts.device_note);
 }
 
-static void the_same_and_older_stamps_are_counted(void) {
+TEST(the_same_and_older_stamps_are_counted) {
   begin_motion();
   const wm_time_ns t_ns = wm_monotonic_ns();
   const wm_time_ns stamps[] = {t_ns, t_ns, t_ns - 300 * MS};
@@ -199,7 +197,7 @@ static void the_same_and_older_stamps_are_counted(void) {
 }
 
 // A measurement that is sent again is ignored; a stamp that stands still for longer than a period of silence is frozen.
-static void a_stamp_that_stands_still_is_frozen(void) {
+TEST(a_stamp_that_stands_still_is_frozen) {
   begin_motion();
   const wm_time_ns t_ns = wm_monotonic_ns(), until_ns = t_ns + 10 * WM_NS_PER_S;
   send_motion(t_ns, 1, 0, 0);
@@ -212,7 +210,7 @@ static void a_stamp_that_stands_still_is_frozen(void) {
   TEST_ASSERT_GREATER_THAN_UINT64(0, source->counts.frozen);
 }
 
-static void numbers_that_cannot_be_are_refused(void) {
+TEST(numbers_that_cannot_be_are_refused) {
   const struct {
     double number[3];
     const char *why;
@@ -229,7 +227,7 @@ static void numbers_that_cannot_be_are_refused(void) {
   }
 }
 
-static void rubbish_and_other_types_are_refused(void) {
+TEST(rubbish_and_other_types_are_refused) {
   begin_motion();
   lcm_publish(lcm, "T_MOTION", "rubbish", 7);
   assert_refused("T_MOTION: does not match motion_t of this version");
@@ -238,7 +236,7 @@ static void rubbish_and_other_types_are_refused(void) {
   TEST_ASSERT_EQUAL_UINT64(2, source->counts.malformed);
 }
 
-static void stamps_of_another_clock_are_refused(void) {
+TEST(stamps_of_another_clock_are_refused) {
   static const struct {
     wm_time_ns off_ns;
     const char *why;
@@ -256,7 +254,7 @@ static void stamps_of_another_clock_are_refused(void) {
   assert_refused("t_ns is not above 0");
 }
 
-static void a_senders_clock_is_followed(void) {
+TEST(a_senders_clock_is_followed) {
   begin((wm_lcm_device_config){.stream = "motion", .channel = "MOTION", .clock = WM_LCM_CLOCK_SENDER});
   const wm_time_ns ahead_ns = 1000 * WM_NS_PER_S;
   for (int i = 0; i < 20; i++) {
@@ -272,7 +270,7 @@ static void a_senders_clock_is_followed(void) {
   TEST_ASSERT_GREATER_OR_EQUAL_UINT64(12, source->counts.received);
 }
 
-static void a_flood_is_bounded(void) {
+TEST(a_flood_is_bounded) {
   begin((wm_lcm_device_config){.stream = "motion", .channel = "MOTION", .rate_max_hz = 2});
   const wm_time_ns t_ns = wm_monotonic_ns() - WM_NS_PER_S;
   for (int i = 0; i < 20; i++) {
@@ -281,23 +279,4 @@ static void a_flood_is_bounded(void) {
   }
   TEST_ASSERT_GREATER_OR_EQUAL_UINT64(15, source->counts.overflows);
   TEST_ASSERT_EQUAL_UINT64(20, source->counts.overflows + source->counts.received);
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(a_twist_is_an_event_of_motion);
-  RUN_TEST(a_gyro_is_a_turn_rate_by_its_mounting);
-  RUN_TEST(a_twist_in_six_degrees);
-  RUN_TEST(wheels_and_steering_are_quantities);
-  RUN_TEST(headings_depths_and_positions_are_observations);
-  RUN_TEST(an_absent_sender_is_said);
-  RUN_TEST(a_silent_sender_is_said_and_its_return);
-  RUN_TEST(the_same_and_older_stamps_are_counted);
-  RUN_TEST(a_stamp_that_stands_still_is_frozen);
-  RUN_TEST(numbers_that_cannot_be_are_refused);
-  RUN_TEST(rubbish_and_other_types_are_refused);
-  RUN_TEST(stamps_of_another_clock_are_refused);
-  RUN_TEST(a_senders_clock_is_followed);
-  RUN_TEST(a_flood_is_bounded);
-  return UNITY_END();
 }

@@ -10,8 +10,8 @@
 #include <unistd.h>
 
 #include "../drivers/folder.h"
+#include "common/suite.h"
 #include "rt/memory.h"
-#include "unity.h"
 #include "waymark/codec.h"
 #include "waymark/waymark.h"
 
@@ -163,7 +163,7 @@ static void push_rows(waymark_session *session) {
   TEST_ASSERT_EQUAL_INT64(allocations, wm_allocations_of_this_thread());
 }
 
-static void test_rows_and_events_give_the_replay_s_bits(void) {
+TEST(test_rows_and_events_give_the_replay_s_bits) {
   taken pushed, replayed;
   write_rows();
   waymark_session *session = open_session(&pushed, NULL, NULL);
@@ -181,7 +181,7 @@ static void test_rows_and_events_give_the_replay_s_bits(void) {
   TEST_ASSERT_GREATER_THAN_UINT64(STEPS - FIRST_POSE, pushed.count[WAYMARK_RECORD_PUBLISHED]);
 }
 
-static void test_files_of_a_session_are_a_run_and_its_log_gives_the_same_bits(void) {
+TEST(test_files_of_a_session_are_a_run_and_its_log_gives_the_same_bits) {
   taken pushed, again;
   char out[300], log[320];
   (void)snprintf(out, sizeof out, "%s/out", dir);
@@ -210,7 +210,7 @@ static void test_files_of_a_session_are_a_run_and_its_log_gives_the_same_bits(vo
   waymark_log_close(reader);
 }
 
-static void test_a_changed_value_changes_what_it_should(void) {
+TEST(test_a_changed_value_changes_what_it_should) {
   taken one, other, back;
   write_rows();
   replay(&one, dir, NULL, NULL);
@@ -228,7 +228,7 @@ static void can_data(int i, uint8_t data[8]) {
   for (int k = 0; k < 8; k++) data[k] = (uint8_t)(ticks >> (8 * (k % 4)));
 }
 
-static void test_can_frames_give_the_replay_s_bits(void) {
+TEST(test_can_frames_give_the_replay_s_bits) {
   static char log[STEPS * 60];
   taken pushed, replayed;
   size_t n = 0;
@@ -334,7 +334,7 @@ static void write_map(void) {
                "free_thresh: 0.2\nlayers: {edges: edges.pgm, drivable: free.pgm}\n");
 }
 
-static void test_pictures_give_the_replay_s_bits(void) {
+TEST(test_pictures_give_the_replay_s_bits) {
   static uint8_t pixels[W * H];
   static char motion[70 * 40];
   taken pushed, replayed;
@@ -373,7 +373,7 @@ static void test_pictures_give_the_replay_s_bits(void) {
 
 // ── what is refused ─────────────────────────────────────────────────────────────────────────────────────────────────
 
-static void test_sizes_are_checked(void) {
+TEST(test_sizes_are_checked) {
   taken into;
   waymark_session *session;
   struct {
@@ -417,7 +417,7 @@ static void test_sizes_are_checked(void) {
   ok(waymark_close(session, &err));
 }
 
-static void test_data_that_cannot_be_are_refused_and_change_nothing(void) {
+TEST(test_data_that_cannot_be_are_refused_and_change_nothing) {
   taken into;
   waymark_session *session = open_session(&into, NULL, NULL);
   uint32_t motion, eye;
@@ -451,7 +451,7 @@ static void test_data_that_cannot_be_are_refused_and_change_nothing(void) {
   ok(waymark_close(session, &err));
 }
 
-static void test_errors_have_a_place(void) {
+TEST(test_errors_have_a_place) {
   waymark_session *session;
   waymark_report report;
   waymark_options options = {.bytes = sizeof options, .config = "/nowhere/robot.yaml"};
@@ -472,17 +472,4 @@ static void test_errors_have_a_place(void) {
   TEST_ASSERT_EQUAL(WM_BAD_DATA, waymark_read_pose("abc", 3, &pose, sizeof pose, &err));
   ok(waymark_close(NULL, &err));
   TEST_ASSERT_EQUAL_STRING("?", waymark_name(WAYMARK_NAMES_VERDICT, 99));
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_rows_and_events_give_the_replay_s_bits);
-  RUN_TEST(test_files_of_a_session_are_a_run_and_its_log_gives_the_same_bits);
-  RUN_TEST(test_a_changed_value_changes_what_it_should);
-  RUN_TEST(test_can_frames_give_the_replay_s_bits);
-  RUN_TEST(test_pictures_give_the_replay_s_bits);
-  RUN_TEST(test_sizes_are_checked);
-  RUN_TEST(test_data_that_cannot_be_are_refused_and_change_nothing);
-  RUN_TEST(test_errors_have_a_place);
-  return UNITY_END();
 }

@@ -11,7 +11,7 @@
 
 extern "C" {
 #include "../drivers/folder.h"
-#include "unity.h"
+#include "common/suite.h"
 }
 
 using namespace std::chrono_literals;
@@ -41,7 +41,7 @@ extern "C" void setUp() {
 
 extern "C" void tearDown() { std::filesystem::remove_all(dir); }
 
-static void test_a_session_moves_and_its_sources_stay() {
+TEST(test_a_session_moves_and_its_sources_stay) {
   std::vector<wm_estimate> fused;
   waymark::options with = options();
   with.on.fused = [&](const wm_estimate &pose) { fused.push_back(pose); };
@@ -66,7 +66,7 @@ static void test_a_session_moves_and_its_sources_stay() {
   TEST_ASSERT_EQUAL(WM_BAD_USAGE, late.error().status);
 }
 
-static void test_errors_have_a_status_and_a_text() {
+TEST(test_errors_have_a_status_and_a_text) {
   waymark::options with = options();
   with.config = "/nowhere/robot.yaml";
   const auto none = waymark::session::open(with);
@@ -91,7 +91,7 @@ static void test_errors_have_a_status_and_a_text() {
   TEST_ASSERT_EQUAL(WM_NOT_FOUND, session.push_picture("front", wm_frame{}).error().status);
 }
 
-static void test_an_exception_of_a_callback_comes_out_of_the_call() {
+TEST(test_an_exception_of_a_callback_comes_out_of_the_call) {
   waymark::options with = options();
   with.on.event = [](const wm_event &) { throw std::logic_error("the program's own"); };
   auto session = waymark::session::open(with).value();
@@ -108,7 +108,7 @@ static void test_an_exception_of_a_callback_comes_out_of_the_call() {
   session.advance(2s).value();  // once
 }
 
-static void test_a_log_is_read_to_its_end_and_replayed() {
+TEST(test_a_log_is_read_to_its_end_and_replayed) {
   waymark::options with = options();
   with.out = dir / "run";
   {
@@ -131,13 +131,4 @@ static void test_a_log_is_read_to_its_end_and_replayed() {
   TEST_ASSERT_EQUAL_size_t(50, poses);
   how.until = 1s;  // an event log is replayed whole
   TEST_ASSERT_EQUAL(WM_BAD_USAGE, waymark::replay(how).error().status);
-}
-
-int main() {
-  UNITY_BEGIN();
-  RUN_TEST(test_a_session_moves_and_its_sources_stay);
-  RUN_TEST(test_errors_have_a_status_and_a_text);
-  RUN_TEST(test_an_exception_of_a_callback_comes_out_of_the_call);
-  RUN_TEST(test_a_log_is_read_to_its_end_and_replayed);
-  return UNITY_END();
 }

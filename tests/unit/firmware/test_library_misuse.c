@@ -11,7 +11,7 @@
 #include <sys/stat.h>
 
 #include "../drivers/folder.h"
-#include "unity.h"
+#include "common/suite.h"
 #include "waymark/waymark.h"
 
 #define NS(seconds) ((wm_time_ns)((seconds)*1e9))
@@ -471,7 +471,7 @@ void tearDown(void) {
   TEST_ASSERT_EQUAL(0, system(command));
 }
 
-static void test_each_misuse_has_a_status_and_a_text(void) {
+TEST(test_each_misuse_has_a_status_and_a_text) {
   row_count = 0;
   misuse_handles(), misuse_pointers(), misuse_order_and_sizes(), misuse_numbers(), misuse_times();
   size_t wrong = 0;
@@ -510,7 +510,7 @@ static void test_each_misuse_has_a_status_and_a_text(void) {
   ok(waymark_close(misused, &err));
 }
 
-static void test_one_stamp_far_ahead_makes_nothing_late(void) {
+TEST(test_one_stamp_far_ahead_makes_nothing_late) {
   for (int i = 51; i < 250; i++) {
     if (i % 10 == 0) TEST_ASSERT_EQUAL(WM_OUT_OF_RANGE, row(started, motion, i * 0.02 + 60, 0.5, NANV, 0));
     if (i % 10 == 5) TEST_ASSERT_EQUAL(WM_OUT_OF_RANGE, waymark_advance(started, NS(i * 0.02 + 3600), &err));
@@ -521,7 +521,7 @@ static void test_one_stamp_far_ahead_makes_nothing_late(void) {
   TEST_ASSERT_EQUAL_UINT64(19, health.sources[0].malformed);  // none is left out without a count
 }
 
-static void test_after_a_pause_data_are_taken_again(void) {
+TEST(test_after_a_pause_data_are_taken_again) {
   int refused = 0, taken = 0;
   for (int i = 0; i < 100; i++) {
     const wm_status status = row(started, motion, 600 + i * 0.02, 0.5, NANV, 0);
@@ -532,7 +532,7 @@ static void test_after_a_pause_data_are_taken_again(void) {
   TEST_ASSERT_EQUAL(50, taken);
 }
 
-static void test_many_handles(void) {
+TEST(test_many_handles) {
   waymark_session *sessions[1100] = {NULL};
   size_t open = 0;
   wm_status status = WM_OK;
@@ -555,7 +555,7 @@ static void *hammer(void *context) {
   return NULL;
 }
 
-static void test_two_threads_with_one_handle_are_told(void) {
+TEST(test_two_threads_with_one_handle_are_told) {
   size_t counts[2][3] = {{0}};
   pthread_t threads[2];
   for (int i = 0; i < 2; i++) TEST_ASSERT_EQUAL(0, pthread_create(&threads[i], NULL, hammer, counts[i]));
@@ -563,14 +563,4 @@ static void test_two_threads_with_one_handle_are_told(void) {
   TEST_ASSERT_EQUAL_size_t(0, counts[0][2] + counts[1][2]);
   TEST_ASSERT_EQUAL_size_t(40000, counts[0][0] + counts[0][1] + counts[1][0] + counts[1][1]);
   TEST_ASSERT_GREATER_THAN_size_t(0, counts[0][0] + counts[1][0]);
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_each_misuse_has_a_status_and_a_text);
-  RUN_TEST(test_one_stamp_far_ahead_makes_nothing_late);
-  RUN_TEST(test_after_a_pause_data_are_taken_again);
-  RUN_TEST(test_many_handles);
-  RUN_TEST(test_two_threads_with_one_handle_are_told);
-  return UNITY_END();
 }

@@ -8,7 +8,7 @@
 #include <string.h>
 
 #include "../drivers/folder.h"
-#include "unity.h"
+#include "common/suite.h"
 #include "waymark/waymark.h"
 
 #define STEPS 200  // of 20 ms
@@ -195,12 +195,5 @@ static void refused_or_absent(const char *estimator, const char *left_out) {
   }
 }
 
-static void test_landmark_ekf(void) { refused_or_absent("landmark_ekf", ""); }
-static void test_slam(void) { refused_or_absent("slam", "heading gnss"); }
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_landmark_ekf);
-  RUN_TEST(test_slam);
-  return UNITY_END();
-}
+TEST(test_landmark_ekf) { refused_or_absent("landmark_ekf", ""); }
+TEST(test_slam) { refused_or_absent("slam", "heading gnss"); }

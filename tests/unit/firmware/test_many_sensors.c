@@ -7,9 +7,9 @@
 #include <string.h>
 
 #include "../drivers/folder.h"
+#include "common/suite.h"
 #include "fusion/fuser.h"
 #include "output/json_files.h"
-#include "unity.h"
 #include "waymark/lcm_messages.h"
 
 #define SENSORS 16
@@ -106,7 +106,7 @@ static const wm_alarm *alarm_of(wm_alarm_kind kind) {
   return NULL;
 }
 
-static void health_has_each_state_of_each_sensor(void) {
+TEST(health_has_each_state_of_each_sensor) {
   drive(5, 1);
   TEST_ASSERT_EQUAL(WM_HEALTH_CALIBRATION_MAX, health.calibration_count);
   for (int s = 0; s < SENSORS; s++) {
@@ -132,7 +132,7 @@ static char *file_text(const char *name) {
 }
 
 // A turn with the wrong sign raises its noise to the limit; that factor stands behind some two hundred values.
-static void an_alarm_behind_the_values_of_all_sensors_is_noticed(void) {
+TEST(an_alarm_behind_the_values_of_all_sensors_is_noticed) {
   drive(20, -1);
   const wm_alarm *noise = alarm_of(WM_ALARM_NOISE);
   TEST_ASSERT_NOT_NULL(noise);
@@ -165,11 +165,4 @@ static void an_alarm_behind_the_values_of_all_sensors_is_noticed(void) {
   const wm_calibration_value *last = &read.calibration[read.calibration_count - 1];
   TEST_ASSERT_EQUAL_STRING(WM_LCM_CALIBRATION_LEFT, last->name);
   TEST_ASSERT_EQUAL_DOUBLE(wm_health_calibration_count(&health) - (WM_HEALTH_CALIBRATION_MAX - 1.0), last->value);
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(health_has_each_state_of_each_sensor);
-  RUN_TEST(an_alarm_behind_the_values_of_all_sensors_is_noticed);
-  return UNITY_END();
 }

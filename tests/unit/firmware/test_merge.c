@@ -4,8 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/suite.h"
 #include "fusion/merge.h"
-#include "unity.h"
 
 #define MS WM_NS_PER_MS
 #define QUEUE 512
@@ -15,7 +15,6 @@ static wm_merge *merge;
 static uint32_t next_seq;
 
 void setUp(void) { next_seq = 0; }
-void tearDown(void) {}
 
 static const wm_merge_source kMotion = {.rank = 0, .is_motion = 1, .in_order = 1, .lateness_max_ns = 150 * MS};
 static const wm_merge_source kCamera = {.rank = 1, .in_order = 1, .lateness_max_ns = 150 * MS};
@@ -51,7 +50,7 @@ static const char *final_ms(void) {
   return text;
 }
 
-static void nothing_is_handed_out_before_the_others_have_spoken_past_it(void) {
+TEST(nothing_is_handed_out_before_the_others_have_spoken_past_it) {
   open_merge((wm_merge_source[]){kMotion, kCamera}, 2);
   arrive(0, 0, 0);
   arrive(0, 10 * MS, 10 * MS);
@@ -65,7 +64,7 @@ static void nothing_is_handed_out_before_the_others_have_spoken_past_it(void) {
 }
 
 // A source that does not keep its order: the newest stamp is that of no later arrival, and a stamp counts once.
-static void newest_first_and_distinct_stamps_are_counted(void) {
+TEST(newest_first_and_distinct_stamps_are_counted) {
   wm_merge_source loose = kCamera;
   loose.in_order = 0;
   open_merge((wm_merge_source[]){kMotion, loose}, 2);
@@ -81,7 +80,7 @@ static void newest_first_and_distinct_stamps_are_counted(void) {
   TEST_ASSERT_EQUAL_UINT64(2, counts->stamps);
 }
 
-static void p99_of_the_lateness(void) {
+TEST(p99_of_the_lateness) {
   open_merge((wm_merge_source[]){kMotion, kCamera}, 2);
   for (int i = 0; i < 99; i++) arrive(1, i * 10 * MS, i * 10 * MS + 5 * MS);
   arrive(1, 990 * MS, 1040 * MS);
@@ -99,7 +98,7 @@ static void p99_of_the_lateness(void) {
   TEST_ASSERT_EQUAL_INT64(0, wm_merge_lateness_p99(merge, 1));
 }
 
-static void motion_comes_first_then_the_rank_then_the_file(void) {
+TEST(motion_comes_first_then_the_rank_then_the_file) {
   wm_merge_source second = kCamera;
   second.rank = 7;
   open_merge((wm_merge_source[]){second, kCamera, kMotion}, 3);
@@ -113,7 +112,7 @@ static void motion_comes_first_then_the_rank_then_the_file(void) {
 
 // The number of an event within its source has 32 bits: at 1 kHz it wraps after 50 days.
 // Two cameras of one rank whose rows have the same stamps and numbers, the one or the other first.
-static void of_equal_ranks_the_lower_source_comes_first(void) {
+TEST(of_equal_ranks_the_lower_source_comes_first) {
   for (int first = 1; first <= 2; first++) {
     open_merge((wm_merge_source[]){kMotion, kCamera, kCamera}, 3);
     for (int i = 0; i < 3; i++) {
@@ -127,7 +126,7 @@ static void of_equal_ranks_the_lower_source_comes_first(void) {
   }
 }
 
-static void the_numbers_of_events_wrap(void) {
+TEST(the_numbers_of_events_wrap) {
   open_merge((wm_merge_source[]){kMotion, kCamera}, 2);
   next_seq = UINT32_MAX - 3;
   for (int i = 0; i < 4; i++) TEST_ASSERT_EQUAL(WM_MERGE_TAKEN, arrive(i % 2, (10 + i) * MS, (10 + i) * MS));
@@ -138,7 +137,7 @@ static void the_numbers_of_events_wrap(void) {
 }
 
 // Events with one stamp stay as they were numbered, also where their numbers wrap between them.
-static void events_of_one_stamp_keep_their_order_where_numbers_wrap(void) {
+TEST(events_of_one_stamp_keep_their_order_where_numbers_wrap) {
   open_merge((wm_merge_source[]){kMotion, kCamera}, 2);
   next_seq = UINT32_MAX - 2;
   for (int i = 0; i < 6; i++) TEST_ASSERT_EQUAL(WM_MERGE_TAKEN, arrive(1, 10 * MS, 10 * MS));
@@ -151,7 +150,7 @@ static void events_of_one_stamp_keep_their_order_where_numbers_wrap(void) {
   }
 }
 
-static void a_silent_source_costs_its_lateness_and_its_first_datum_after_that_is_fused(void) {
+TEST(a_silent_source_costs_its_lateness_and_its_first_datum_after_that_is_fused) {
   open_merge((wm_merge_source[]){kMotion, kCamera}, 2);
   for (int i = 0; i <= 100; i++) arrive(0, i * 10 * MS, i * 10 * MS);
   TEST_ASSERT_EQUAL_INT64(850 * MS, wm_merge_watermark(merge));  // now - 150 ms
@@ -163,7 +162,7 @@ static void a_silent_source_costs_its_lateness_and_its_first_datum_after_that_is
   TEST_ASSERT_EQUAL_STRING("860/0", final_ms());
 }
 
-static void what_is_late_is_counted_and_dropped(void) {
+TEST(what_is_late_is_counted_and_dropped) {
   open_merge((wm_merge_source[]){kMotion, kCamera}, 2);
   for (int i = 0; i <= 100; i++) arrive(0, i * 10 * MS, i * 10 * MS);
   TEST_ASSERT_EQUAL(WM_MERGE_LATE, arrive(1, 849 * MS, 1000 * MS));
@@ -186,7 +185,7 @@ static uint64_t late_of_a_receiver(wm_time_ns lateness_most_ns, wm_time_ns late_
   return wm_merge_source_counts(merge, 1)->late;
 }
 
-static void the_bound_rises_with_a_source_that_is_usually_late(void) {
+TEST(the_bound_rises_with_a_source_that_is_usually_late) {
   TEST_ASSERT_EQUAL_UINT64(3, late_of_a_receiver(300 * MS, 200 * MS, 5000));
   TEST_ASSERT_EQUAL_INT64(220 * MS, wm_merge_lateness_max(merge, 1));  // a tenth more
   TEST_ASSERT_EQUAL_INT64(150 * MS, wm_merge_lateness_max(merge, 0));
@@ -194,14 +193,14 @@ static void the_bound_rises_with_a_source_that_is_usually_late(void) {
   TEST_ASSERT_EQUAL_INT64(205 * MS, wm_merge_lateness_max(merge, 1));  // no further than it may
 }
 
-static void a_stated_bound_and_a_later_source_keep_their_bound(void) {
+TEST(a_stated_bound_and_a_later_source_keep_their_bound) {
   TEST_ASSERT_EQUAL_UINT64(24, late_of_a_receiver(0, 200 * MS, 4800));
   TEST_ASSERT_EQUAL_INT64(150 * MS, wm_merge_lateness_max(merge, 1));
   TEST_ASSERT_EQUAL_UINT64(24, late_of_a_receiver(190 * MS, 200 * MS, 4800));
   TEST_ASSERT_EQUAL_INT64(150 * MS, wm_merge_lateness_max(merge, 1));
 }
 
-static void what_is_late_by_chance_raises_no_bound(void) {
+TEST(what_is_late_by_chance_raises_no_bound) {
   wm_merge_source receiver = kCamera;
   receiver.lateness_most_ns = 300 * MS;
   open_merge((wm_merge_source[]){kMotion, receiver}, 2);
@@ -214,7 +213,7 @@ static void what_is_late_by_chance_raises_no_bound(void) {
   TEST_ASSERT_EQUAL_INT64(150 * MS, wm_merge_lateness_max(merge, 1));
 }
 
-static void a_periodic_source_lets_time_pass_until_its_next_datum(void) {
+TEST(a_periodic_source_lets_time_pass_until_its_next_datum) {
   wm_merge_source periodic = kCamera;
   periodic.period_ns = 100 * MS;
   open_merge((wm_merge_source[]){kMotion, periodic}, 2);
@@ -226,7 +225,7 @@ static void a_periodic_source_lets_time_pass_until_its_next_datum(void) {
 
 // Rows of one frame arrive within 1 ms of each other: until then another one with this stamp, or one before the next
 // period, is taken; from then on there is none.
-static void rows_of_one_frame_arrive_within_a_millisecond(void) {
+TEST(rows_of_one_frame_arrive_within_a_millisecond) {
   wm_merge_source periodic = kCamera;
   periodic.period_ns = 100 * MS;
   open_merge((wm_merge_source[]){periodic}, 1);
@@ -239,7 +238,7 @@ static void rows_of_one_frame_arrive_within_a_millisecond(void) {
   TEST_ASSERT_EQUAL_STRING("0/0 0/0", final_ms());
 }
 
-static void a_datum_sent_twice_is_fused_once(void) {
+TEST(a_datum_sent_twice_is_fused_once) {
   open_merge(&kMotion, 1);
   wm_event e;
   memset(&e, 0, sizeof e);
@@ -254,7 +253,7 @@ static void a_datum_sent_twice_is_fused_once(void) {
   TEST_ASSERT_EQUAL_UINT64(1, wm_merge_source_counts(merge, 0)->duplicates);
 }
 
-static void a_full_queue_drops_the_newest_and_counts(void) {
+TEST(a_full_queue_drops_the_newest_and_counts) {
   open_merge(&kMotion, 1);
   for (int i = 0; i < QUEUE; i++) {
     wm_event e = {.t_ns = i, .arrival_ns = i, .seq = (uint32_t)i, .kind = WM_EVENT_LOOKED};
@@ -270,7 +269,7 @@ static void a_full_queue_drops_the_newest_and_counts(void) {
   TEST_ASSERT_EQUAL(QUEUE, count);
 }
 
-static void stamps_from_the_future_and_absurd_ones_are_refused(void) {
+TEST(stamps_from_the_future_and_absurd_ones_are_refused) {
   open_merge(&kMotion, 1);
   TEST_ASSERT_EQUAL(WM_MERGE_FUTURE, arrive(0, 2000 * MS, 1000 * MS));
   TEST_ASSERT_EQUAL(WM_MERGE_FUTURE, arrive(0, INT64_MAX, 1000 * MS));
@@ -279,7 +278,7 @@ static void stamps_from_the_future_and_absurd_ones_are_refused(void) {
   TEST_ASSERT_EQUAL_UINT64(2, wm_merge_source_counts(merge, 0)->future);
 }
 
-static void a_source_that_fell_silent_is_stale_against_its_own_rate(void) {
+TEST(a_source_that_fell_silent_is_stale_against_its_own_rate) {
   open_merge((wm_merge_source[]){kMotion, kCamera}, 2);
   for (int i = 0; i <= 100; i++) arrive(0, i * 10 * MS, i * 10 * MS);
   TEST_ASSERT_EQUAL(0, wm_merge_is_stale(merge, 0, 1900 * MS));
@@ -288,7 +287,7 @@ static void a_source_that_fell_silent_is_stale_against_its_own_rate(void) {
 }
 
 // A source without any datum is silent since the run's clock began, whatever time that is.
-static void a_source_without_data_is_silent_since_the_start(void) {
+TEST(a_source_without_data_is_silent_since_the_start) {
   open_merge((wm_merge_source[]){kMotion, kCamera}, 2);
   TEST_ASSERT_EQUAL_INT64(0, wm_merge_silent_ns(merge, 1, 3600 * WM_NS_PER_S));  // no clock yet
   for (int i = 0; i < 10; i++) arrive(0, 3600 * WM_NS_PER_S + i * 10 * MS, 3600 * WM_NS_PER_S + i * 10 * MS);
@@ -298,7 +297,7 @@ static void a_source_without_data_is_silent_since_the_start(void) {
 }
 
 // Three data in 4 s are two periods of 2 s: ten of these without a datum are none too many, eleven are.
-static void a_slow_source_is_stale_after_ten_of_its_periods(void) {
+TEST(a_slow_source_is_stale_after_ten_of_its_periods) {
   open_merge(&kCamera, 1);
   for (int i = 0; i < 3; i++) arrive(0, i * 2000 * MS, i * 2000 * MS);
   TEST_ASSERT_EQUAL(0, wm_merge_is_stale(merge, 0, 4000 * MS + 20000 * MS));
@@ -334,7 +333,7 @@ static int by_stamp(const void *a, const void *b) {
   return x->seq < y->seq ? -1 : 1;
 }
 
-static void random_lateness_below_the_bound_gives_exactly_the_sorted_stream(void) {
+TEST(random_lateness_below_the_bound_gives_exactly_the_sorted_stream) {
   for (int run = 0; run < 300; run++) {
     random_state = (uint64_t)run + 1;
     enum { SOURCES = 4, EACH = 120 };
@@ -393,7 +392,7 @@ static void random_lateness_below_the_bound_gives_exactly_the_sorted_stream(void
 }
 
 // Whatever comes, stamps never run back and every datum is somewhere.
-static void any_input_comes_out_in_order_and_is_accounted_for(void) {
+TEST(any_input_comes_out_in_order_and_is_accounted_for) {
   for (int run = 0; run < 200; run++) {
     random_state = 7000 + (uint64_t)run;
     open_merge((wm_merge_source[]){kMotion, kCamera, {.rank = 2, .lateness_max_ns = 50 * MS}}, 3);
@@ -421,31 +420,4 @@ static void any_input_comes_out_in_order_and_is_accounted_for(void) {
     TEST_ASSERT_EQUAL(wm_merge_waiting(merge),
                       wm_merge_waiting_of(merge, 0) + wm_merge_waiting_of(merge, 1) + wm_merge_waiting_of(merge, 2));
   }
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(nothing_is_handed_out_before_the_others_have_spoken_past_it);
-  RUN_TEST(newest_first_and_distinct_stamps_are_counted);
-  RUN_TEST(p99_of_the_lateness);
-  RUN_TEST(motion_comes_first_then_the_rank_then_the_file);
-  RUN_TEST(of_equal_ranks_the_lower_source_comes_first);
-  RUN_TEST(the_numbers_of_events_wrap);
-  RUN_TEST(events_of_one_stamp_keep_their_order_where_numbers_wrap);
-  RUN_TEST(a_silent_source_costs_its_lateness_and_its_first_datum_after_that_is_fused);
-  RUN_TEST(the_bound_rises_with_a_source_that_is_usually_late);
-  RUN_TEST(a_stated_bound_and_a_later_source_keep_their_bound);
-  RUN_TEST(what_is_late_by_chance_raises_no_bound);
-  RUN_TEST(what_is_late_is_counted_and_dropped);
-  RUN_TEST(a_periodic_source_lets_time_pass_until_its_next_datum);
-  RUN_TEST(rows_of_one_frame_arrive_within_a_millisecond);
-  RUN_TEST(a_datum_sent_twice_is_fused_once);
-  RUN_TEST(a_full_queue_drops_the_newest_and_counts);
-  RUN_TEST(stamps_from_the_future_and_absurd_ones_are_refused);
-  RUN_TEST(a_source_that_fell_silent_is_stale_against_its_own_rate);
-  RUN_TEST(a_source_without_data_is_silent_since_the_start);
-  RUN_TEST(a_slow_source_is_stale_after_ten_of_its_periods);
-  RUN_TEST(random_lateness_below_the_bound_gives_exactly_the_sorted_stream);
-  RUN_TEST(any_input_comes_out_in_order_and_is_accounted_for);
-  return UNITY_END();
 }

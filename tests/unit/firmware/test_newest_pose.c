@@ -2,13 +2,10 @@
 // The newest pose for detectors: each read is of one write, also where the count of writes wraps.
 #include <pthread.h>
 
+#include "common/suite.h"
 #include "sources/newest_pose.h"
-#include "unity.h"
 
 #define WRITES 400000
-
-void setUp(void) {}
-void tearDown(void) {}
 
 static newest_pose newest;
 
@@ -18,7 +15,7 @@ static void put(wm_time_ns t_ns) {
   newest_pose_put(&newest, &e);
 }
 
-static void the_newest_is_read(void) {
+TEST(the_newest_is_read) {
   wm_estimate e;
   newest = (newest_pose){0};
   TEST_ASSERT_EQUAL(0, newest_pose_get(&newest, &e));
@@ -31,7 +28,7 @@ static void the_newest_is_read(void) {
 }
 
 // A turn of 0 means that there is no pose yet: the count never comes back to it.
-static void after_its_count_wraps_there_is_a_pose(void) {
+TEST(after_its_count_wraps_there_is_a_pose) {
   wm_estimate e;
   newest = (newest_pose){0};
   atomic_store(&newest.turn, UINT32_MAX - 5);  // even, as between two writes
@@ -48,7 +45,7 @@ static void *writes(void *nothing) {
   return nothing;
 }
 
-static void a_reader_sees_whole_poses_while_the_count_wraps(void) {
+TEST(a_reader_sees_whole_poses_while_the_count_wraps) {
   pthread_t writer;
   wm_estimate e = {.t_ns = 0};
   wm_time_ns before_ns = 0;
@@ -65,12 +62,4 @@ static void a_reader_sees_whole_poses_while_the_count_wraps(void) {
   }
   TEST_ASSERT_EQUAL(0, pthread_join(writer, NULL));
   TEST_ASSERT_LESS_THAN_UINT32(2 * WRITES, atomic_load(&newest.turn));
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(the_newest_is_read);
-  RUN_TEST(after_its_count_wraps_there_is_a_pose);
-  RUN_TEST(a_reader_sees_whole_poses_while_the_count_wraps);
-  return UNITY_END();
 }

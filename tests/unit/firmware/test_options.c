@@ -2,10 +2,7 @@
 #include <string.h>
 
 #include "cli/options.h"
-#include "unity.h"
-
-void setUp(void) {}
-void tearDown(void) {}
+#include "common/suite.h"
 
 static const char *out_dir;
 static uint64_t seed;
@@ -24,7 +21,7 @@ static wm_status parse(int argc, char **argv) {
 }
 #define PARSE(...) parse((int)(sizeof((char *[]){__VA_ARGS__}) / sizeof(char *)), (char *[]){__VA_ARGS__})
 
-static void values_stand_behind_a_blank_or_an_equals_sign(void) {
+TEST(values_stand_behind_a_blank_or_an_equals_sign) {
   TEST_ASSERT_EQUAL(WM_OK, PARSE("rec", "--out", "run", "--seed=7", "--speed", "0.5", "--help", "--", "--strange"));
   TEST_ASSERT_EQUAL_STRING("run", out_dir);
   TEST_ASSERT_EQUAL_UINT64(7, seed);
@@ -34,7 +31,7 @@ static void values_stand_behind_a_blank_or_an_equals_sign(void) {
   TEST_ASSERT_EQUAL_STRING("--strange", words[1]);
 }
 
-static void an_option_may_be_given_several_times(void) {
+TEST(an_option_may_be_given_several_times) {
   from_s = 1;
   TEST_ASSERT_EQUAL(WM_OK, PARSE("--camera", "left=/dev/video0", "--from", "0", "--camera=right=/dev/video1"));
   TEST_ASSERT_EQUAL(2, cameras.count);
@@ -48,7 +45,7 @@ static void refuse(const char *message, wm_status status) {
   TEST_ASSERT_EQUAL_STRING(message, err.text);
 }
 
-static void mistakes_are_told(void) {
+TEST(mistakes_are_told) {
   refuse("option '--sed' is unknown; did you mean '--seed'?", PARSE("--sed", "7"));
   refuse("option '--sed' is unknown; did you mean '--seed'?", PARSE("--sed=7"));
   refuse("option '-x' is unknown", PARSE("-x"));
@@ -64,12 +61,4 @@ static void mistakes_are_told(void) {
   refuse("--from: '-1' is not a number from 0 on", PARSE("--from", "-1"));
   refuse("--camera: is empty", PARSE("--camera="));
   refuse("unexpected argument 'c'", PARSE("a", "b", "c"));
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(values_stand_behind_a_blank_or_an_equals_sign);
-  RUN_TEST(an_option_may_be_given_several_times);
-  RUN_TEST(mistakes_are_told);
-  return UNITY_END();
 }

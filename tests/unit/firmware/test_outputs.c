@@ -3,9 +3,9 @@
 // is marked.
 #include <stdlib.h>
 
+#include "common/suite.h"
 #include "live/live.h"
 #include "log_fixture.h"
-#include "unity.h"
 
 #define SLOTS 4
 
@@ -44,7 +44,7 @@ static uint64_t take(uint64_t *what) {
   return kind;
 }
 
-static void events_that_found_no_room_are_marked_before_the_next_one(void) {
+TEST(events_that_found_no_room_are_marked_before_the_next_one) {
   uint64_t what;
   for (uint32_t i = 0; i < 7; i++) put_event(i);  // 4, 5 and 6 find no room
   for (uint32_t i = 0; i < SLOTS; i++) {
@@ -60,7 +60,7 @@ static void events_that_found_no_room_are_marked_before_the_next_one(void) {
 }
 
 // Room for the mark, but not for the event behind it: the event counts into the next mark.
-static void a_mark_without_its_event_is_followed_by_another(void) {
+TEST(a_mark_without_its_event_is_followed_by_another) {
   uint64_t what, marked = 0, events = 0;
   for (uint32_t i = 0; i < 6; i++) put_event(i);
   TEST_ASSERT_EQUAL_UINT64(WM_OUTPUT_EVENT, take(&what));
@@ -77,7 +77,7 @@ static void a_mark_without_its_event_is_followed_by_another(void) {
   TEST_ASSERT_EQUAL_UINT64(1, events);
 }
 
-static void poses_that_find_no_room_are_counted(void) {
+TEST(poses_that_find_no_room_are_counted) {
   wm_published published = {.made_ns = 1};
   for (int i = 0; i < 10; i++) output.put(output.context, WM_OUTPUT_PUBLISHED, &published, sizeof published);
   TEST_ASSERT_EQUAL_UINT64(10 - SLOTS, wm_ring_dropped(&estimator->to_disk));
@@ -85,7 +85,7 @@ static void poses_that_find_no_room_are_counted(void) {
   TEST_ASSERT_EQUAL_UINT64(0, estimator->events_lost);
 }
 
-static void a_blocked_disk_holds_no_message_up(void) {
+TEST(a_blocked_disk_holds_no_message_up) {
   int sent = 0;
   for (uint32_t i = 0; i < 10; i++) {
     wm_event e = fixture_event(i);
@@ -101,7 +101,7 @@ static void a_blocked_disk_holds_no_message_up(void) {
 }
 
 // Lines of text of the publish thread and of the sources' threads wait for the same disk.
-static void lines_that_find_no_room_are_counted_in_health(void) {
+TEST(lines_that_find_no_room_are_counted_in_health) {
   static live run;
   static wm_health health;
   void *lines = malloc(wm_ring_bytes(SLOTS, 400));
@@ -118,14 +118,4 @@ static void lines_that_find_no_room_are_counted_in_health(void) {
   TEST_ASSERT_INT64_WITHIN(WM_NS_PER_MS, 3 * WM_NS_PER_MS, health.send_p99_ns);
   free(lines);
   free(of_source);
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(events_that_found_no_room_are_marked_before_the_next_one);
-  RUN_TEST(a_mark_without_its_event_is_followed_by_another);
-  RUN_TEST(poses_that_find_no_room_are_counted);
-  RUN_TEST(a_blocked_disk_holds_no_message_up);
-  RUN_TEST(lines_that_find_no_room_are_counted_in_health);
-  return UNITY_END();
 }

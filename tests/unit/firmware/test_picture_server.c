@@ -11,11 +11,11 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include "common/suite.h"
 #include "live/picture_server.h"
 #include "rt/clock.h"
 #include "sources/onlooker.h"
 #include "sources/picture_socket.h"
-#include "unity.h"
 #include "waymark/codec.h"
 
 #define WIDTH 640u
@@ -124,7 +124,7 @@ static int has_memory(int source) {
   return has;
 }
 
-static void nothing_is_copied_while_nobody_asks(void) {
+TEST(nothing_is_copied_while_nobody_asks) {
   for (int i = 0; i < 100; i++) look(0, 1);
   int reader = new_reader();  // that alone is no question
   (void)usleep(50000);
@@ -134,7 +134,7 @@ static void nothing_is_copied_while_nobody_asks(void) {
   (void)close(reader);
 }
 
-static void a_reader_gets_a_picture_with_what_was_found(void) {
+TEST(a_reader_gets_a_picture_with_what_was_found) {
   int reader = new_reader();
   ask(reader, 0);
   look_until_it_is_taken(0, 77);
@@ -159,7 +159,7 @@ static void a_reader_gets_a_picture_with_what_was_found(void) {
   TEST_ASSERT_FALSE(has_memory(0));
 }
 
-static void pictures_come_twice_a_second_at_most(void) {
+TEST(pictures_come_twice_a_second_at_most) {
   int reader = new_reader();
   wm_time_ns begin_ns = wm_monotonic_ns();
   for (int i = 0; i < 3; i++) {
@@ -171,7 +171,7 @@ static void pictures_come_twice_a_second_at_most(void) {
   (void)close(reader);
 }
 
-static void one_that_does_not_read_holds_nobody_up(void) {
+TEST(one_that_does_not_read_holds_nobody_up) {
   int stuck = new_reader(), other = new_reader();
   const int small = 4096;  // no room for a picture
   (void)setsockopt(stuck, SOL_SOCKET, SO_RCVBUF, &small, sizeof small);
@@ -193,7 +193,7 @@ static void one_that_does_not_read_holds_nobody_up(void) {
   (void)close(other);
 }
 
-static void strangers_are_sent_away(void) {
+TEST(strangers_are_sent_away) {
   int stranger = new_reader(), reader = new_reader();
   char rest[8];
   TEST_ASSERT_EQUAL(16, send(stranger, "GET / HTTP/1.1\r\n", 16, MSG_NOSIGNAL));
@@ -212,7 +212,7 @@ static void strangers_are_sent_away(void) {
   (void)close(reader);
 }
 
-static void the_socket_is_for_owner_and_group(void) {
+TEST(the_socket_is_for_owner_and_group) {
   struct stat what;
   TEST_ASSERT_EQUAL(0, stat(config.picture_socket, &what));
   TEST_ASSERT_EQUAL(0660, what.st_mode & 0777);
@@ -238,15 +238,4 @@ static void the_socket_is_for_owner_and_group(void) {
   TEST_ASSERT_EQUAL(0, stat(config.picture_socket, &what));
   (void)unlink(config.picture_socket);
   TEST_ASSERT_EQUAL(WM_OK, picture_server_start(&config, a_vision(), &server, &err));
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(nothing_is_copied_while_nobody_asks);
-  RUN_TEST(a_reader_gets_a_picture_with_what_was_found);
-  RUN_TEST(pictures_come_twice_a_second_at_most);
-  RUN_TEST(one_that_does_not_read_holds_nobody_up);
-  RUN_TEST(strangers_are_sent_away);
-  RUN_TEST(the_socket_is_for_owner_and_group);
-  return UNITY_END();
 }

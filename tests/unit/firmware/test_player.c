@@ -10,8 +10,8 @@
 #include "../drivers/folder.h"
 #include "../drivers/video_files.h"
 #include "cli/play/player.h"
+#include "common/suite.h"
 #include "rt/clock.h"
-#include "unity.h"
 
 #define FRAMES_HZ 2000
 #define PICTURES_HZ 30
@@ -112,7 +112,7 @@ static void start(double speed) {
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, player_start(&self, &err), err.text);
 }
 
-static void nothing_is_lost_and_the_times_are_kept(void) {
+TEST(nothing_is_lost_and_the_times_are_kept) {
   start(1);
   TEST_ASSERT_EQUAL(WM_OK, player_join(&self, &err));
   const double took_s = wm_seconds_between(self.begin_ns, wm_monotonic_ns());
@@ -136,7 +136,7 @@ static void nothing_is_lost_and_the_times_are_kept(void) {
   TEST_ASSERT_LESS_THAN_DOUBLE(20 * WM_NS_PER_MS, wm_histogram_quantile(&self.counts[can].late, 0.5));
 }
 
-static void a_stop_ends_it_soon_and_failures_are_counted(void) {
+TEST(a_stop_ends_it_soon_and_failures_are_counted) {
   sink[0].fails = 1;
   start(1);
   while (atomic_load(&self.at_ns) < 300 * WM_NS_PER_MS) (void)usleep(1000);
@@ -149,7 +149,7 @@ static void a_stop_ends_it_soon_and_failures_are_counted(void) {
   TEST_ASSERT_EQUAL(ENOBUFS, self.counts[0].first_failure);
 }
 
-static void faults_go_to_the_sinks_of_their_streams(void) {
+TEST(faults_go_to_the_sinks_of_their_streams) {
   static const char kText[] =
       "format: waymark-faults/1\nfaults:\n- {name: a, fault: camera_unplugged, camera: cam1, from_s: 1, until_s: 2}\n"
       "- {name: b, fault: process_killed, from_s: 1}\n";
@@ -161,12 +161,4 @@ static void faults_go_to_the_sinks_of_their_streams(void) {
   TEST_ASSERT_EQUAL(FAULT_DONE, self.progress[0]);
   TEST_ASSERT_EQUAL_UINT64(PICTURES_HZ * (SECONDS - 1), self.counts[wm_play_find(self.play, "camera:cam1")].sent);
   TEST_ASSERT_EQUAL_INT64(self.begin_ns + 100 * WM_NS_PER_MS, player_monotonic_ns(&self, WM_NS_PER_S));
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(nothing_is_lost_and_the_times_are_kept);
-  RUN_TEST(a_stop_ends_it_soon_and_failures_are_counted);
-  RUN_TEST(faults_go_to_the_sinks_of_their_streams);
-  return UNITY_END();
 }

@@ -3,8 +3,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/suite.h"
 #include "fusion/predictor.h"
-#include "unity.h"
 
 #define MS WM_NS_PER_MS
 
@@ -44,7 +44,7 @@ static void fuse(wm_time_ns ms, double x, double y, double heading, uint32_t res
   wm_predictor_fused(&predictor, &e, &kNeutral);
 }
 
-static void it_carries_the_fused_pose_to_now(void) {
+TEST(it_carries_the_fused_pose_to_now) {
   wm_published p;
   TEST_ASSERT_EQUAL(0, wm_predictor_publish(&predictor, 0, &p));  // nothing known yet
   for (int ms = 0; ms <= 200; ms += 10) move(ms, 1, 0);
@@ -59,7 +59,7 @@ static void it_carries_the_fused_pose_to_now(void) {
   TEST_ASSERT_EQUAL_UINT32(0, p.status_flags);
 }
 
-static void stamps_rise_strictly(void) {
+TEST(stamps_rise_strictly) {
   wm_published p;
   move(0, 1, 0);
   fuse(0, 0, 0, 0, 0);
@@ -70,7 +70,7 @@ static void stamps_rise_strictly(void) {
 }
 
 // The map is turned against odom: a fast drive along a curve is no jump, and a jump has its true size.
-static void odom_is_turned_into_the_map(void) {
+TEST(odom_is_turned_into_the_map) {
   wm_published p;
   const double turns[] = {0.4, 2.0, -1.2, M_PI};
   for (size_t i = 0; i < sizeof turns / sizeof turns[0]; i++) {
@@ -93,7 +93,7 @@ static void odom_is_turned_into_the_map(void) {
 }
 
 // The same bits on every machine: numbers that another sine or cosine rounds otherwise would differ.
-static void a_jump_is_measured_by_the_estimators_own_algebra(void) {
+TEST(a_jump_is_measured_by_the_estimators_own_algebra) {
   const wm_pose2 map_before = {1.25, -0.5, 3.0}, odom_before = {10.0, 4.0, -3.0}, odom_now = {10.5, 4.25, 3.0};
   const wm_pose2 map_now = {1.75, -0.25, -3.0};
   const wm_pose2 by = wm_odometry_jump(&map_before, &odom_before, &map_now, &odom_now);
@@ -107,7 +107,7 @@ static void a_jump_is_measured_by_the_estimators_own_algebra(void) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-14, -2.0 * turn, by.heading_rad);
 }
 
-static void a_move_of_map_against_odom_is_announced_once(void) {
+TEST(a_move_of_map_against_odom_is_announced_once) {
   wm_published p;
   for (int ms = 0; ms <= 100; ms += 10) move(ms, 1, 0.5);
   fuse(50, 0, 0, 0.3, 0);
@@ -134,7 +134,7 @@ static void a_move_of_map_against_odom_is_announced_once(void) {
 }
 
 // A move is a jump beyond its bounds, not at them.
-static void a_move_as_large_as_the_bounds_is_no_jump(void) {
+TEST(a_move_as_large_as_the_bounds_is_no_jump) {
   wm_predictor_params params = kParams;
   params.jump_m = 0.125;
   params.jump_rad = 0.0625;
@@ -157,7 +157,7 @@ static void a_move_as_large_as_the_bounds_is_no_jump(void) {
 }
 
 // Whatever the memory held before: the same message.
-static void a_message_overwrites_all_of_its_memory(void) {
+TEST(a_message_overwrites_all_of_its_memory) {
   static wm_published messages[2];
   memset(&messages[1], 0xff, sizeof messages[1]);
   for (int ms = 0; ms <= 100; ms += 10) move(ms, 1, 0.5);
@@ -169,7 +169,7 @@ static void a_message_overwrites_all_of_its_memory(void) {
   TEST_ASSERT_EQUAL_MEMORY(&messages[0], &messages[1], sizeof messages[0]);
 }
 
-static void a_pose_set_anew_is_announced_however_small_the_move(void) {
+TEST(a_pose_set_anew_is_announced_however_small_the_move) {
   wm_published p;
   move(0, 0, 0);
   fuse(0, 1, 1, 0, 1);
@@ -179,7 +179,7 @@ static void a_pose_set_anew_is_announced_however_small_the_move(void) {
   TEST_ASSERT_EQUAL_UINT32(1, p.jumps);
 }
 
-static void counts_of_resets_and_jumps_wrap(void) {
+TEST(counts_of_resets_and_jumps_wrap) {
   wm_published p;
   move(0, 0, 0);
   fuse(0, 1, 1, 0, UINT32_MAX);
@@ -194,7 +194,7 @@ static void counts_of_resets_and_jumps_wrap(void) {
   TEST_ASSERT_EQUAL_UINT32(0, p.jumps);
 }
 
-static void pictures_are_told_the_pose_or_the_motion_alone(void) {
+TEST(pictures_are_told_the_pose_or_the_motion_alone) {
   wm_published p;
   wm_estimate e;
   TEST_ASSERT_EQUAL(0, wm_predictor_expect(&predictor, 0, &e));
@@ -211,7 +211,7 @@ static void pictures_are_told_the_pose_or_the_motion_alone(void) {
   TEST_ASSERT_EQUAL_MEMORY(&p.now, &e, sizeof e);
 }
 
-static void old_motion_and_old_fusion_are_said(void) {
+TEST(old_motion_and_old_fusion_are_said) {
   wm_published p;
   move(0, 0, 0);
   fuse(0, 1, 1, 0, 0);
@@ -225,7 +225,7 @@ static void old_motion_and_old_fusion_are_said(void) {
   TEST_ASSERT_EQUAL_UINT32(WM_PUB_MOTION_STALE | WM_PUB_FUSION_STALE, p.status_flags);
 }
 
-static void without_a_pose_nothing_is_said(void) {
+TEST(without_a_pose_nothing_is_said) {
   wm_published p;
   move(0, 0, 0);
   wm_estimate e = {.t_ns = 0, .state = WM_STATE_SEARCHING};
@@ -233,21 +233,4 @@ static void without_a_pose_nothing_is_said(void) {
   TEST_ASSERT_EQUAL(0, wm_predictor_publish(&predictor, 20 * MS, &p));
   fuse(0, NAN, 1, 0, 0);
   TEST_ASSERT_EQUAL(0, wm_predictor_publish(&predictor, 40 * MS, &p));
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(it_carries_the_fused_pose_to_now);
-  RUN_TEST(stamps_rise_strictly);
-  RUN_TEST(odom_is_turned_into_the_map);
-  RUN_TEST(a_move_of_map_against_odom_is_announced_once);
-  RUN_TEST(a_jump_is_measured_by_the_estimators_own_algebra);
-  RUN_TEST(a_move_as_large_as_the_bounds_is_no_jump);
-  RUN_TEST(a_message_overwrites_all_of_its_memory);
-  RUN_TEST(a_pose_set_anew_is_announced_however_small_the_move);
-  RUN_TEST(counts_of_resets_and_jumps_wrap);
-  RUN_TEST(pictures_are_told_the_pose_or_the_motion_alone);
-  RUN_TEST(old_motion_and_old_fusion_are_said);
-  RUN_TEST(without_a_pose_nothing_is_said);
-  return UNITY_END();
 }

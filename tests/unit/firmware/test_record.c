@@ -6,10 +6,10 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "common/suite.h"
 #include "live/copy_map.h"
 #include "live/record.h"
 #include "output/avi_writer.h"
-#include "unity.h"
 #include "waymark/can.h"
 #include "waymark/video.h"
 
@@ -39,7 +39,7 @@ static void expect_again(const char *line) {
   TEST_ASSERT_EQUAL_STRING_LEN(line, written, strlen(line));
 }
 
-static void lines_of_candump_are_written_as_they_were_read(void) {
+TEST(lines_of_candump_are_written_as_they_were_read) {
   expect_again("(1700000000.002500) can0 101#0CFEFFFF00000000");
   expect_again("(0.000000) vcan12 7FF#");
   expect_again("(5.999999) can0 12345678#01");
@@ -88,7 +88,7 @@ static int pictures_in(void) {
   return count;
 }
 
-static void a_video_that_was_cut_anywhere_is_read_up_to_there(void) {
+TEST(a_video_that_was_cut_anywhere_is_read_up_to_there) {
   size_t length = write_video(), picture = 8 + W * H;
   TEST_ASSERT_EQUAL(PICTURES, pictures_in());
   for (size_t cut = length; cut-- > length - picture * 2 - 3;) {
@@ -98,7 +98,7 @@ static void a_video_that_was_cut_anywhere_is_read_up_to_there(void) {
   }
 }
 
-static void an_empty_configuration_is_refused(void) {
+TEST(an_empty_configuration_is_refused) {
   static wm_config config;
   wm_record_report report;
   const wm_record_options options = {.out_dir = folder};
@@ -126,7 +126,7 @@ static void expect_text(const char *name, const char *text) {
 
 // A bus that isn't there: the folder is a recording all the same, from its beginning on; its configuration names its
 // own files.
-static void without_its_devices_a_recording_is_begun_and_ended(void) {
+TEST(without_its_devices_a_recording_is_begun_and_ended) {
   const char *text =
       "format: waymark-config/1\nestimator: odometry\n"
       "dbc: /dev/null\ndevices: {can: [{interface: nocan7}]}\ncan_signals: /dev/null  # which is none";
@@ -152,7 +152,7 @@ static void without_its_devices_a_recording_is_begun_and_ended(void) {
 #define SIGNALS(quantity, signal) "- {quantity: " quantity ", message: Motion, signal: " signal "}\n"
 
 // Two buses with the same id for another meaning: each has its DBC and binding, in the recording, too.
-static void two_buses_are_recorded_and_read_again(void) {
+TEST(two_buses_are_recorded_and_read_again) {
   char text[1000], path[200], out[128];
   wm_config config;
   wm_record_report report;
@@ -202,7 +202,7 @@ static void two_buses_are_recorded_and_read_again(void) {
 }
 
 // Wherever its pictures lie, in the recording they lie beside it.
-static void a_map_is_copied_with_its_pictures(void) {
+TEST(a_map_is_copied_with_its_pictures) {
   char yaml[512], out[128], sub[128], from[160];
   (void)snprintf(sub, sizeof sub, "%s/plans", folder);
   (void)snprintf(out, sizeof out, "%s/rec", folder);
@@ -227,7 +227,7 @@ static void a_map_is_copied_with_its_pictures(void) {
 }
 
 // A disk that is full from the beginning.
-static void a_full_disk_ends_it_and_says_so(void) {
+TEST(a_full_disk_ends_it_and_says_so) {
   const char *text =
       "format: waymark-config/1\nestimator: odometry\n"
       "dbc: /dev/null\ndevices: {can: [{interface: nocan7}]}\ncan_signals: /dev/null  # which is none";
@@ -240,16 +240,4 @@ static void a_full_disk_ends_it_and_says_so(void) {
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_record(&config, &options, &report, &err), err.text);
   TEST_ASSERT_TRUE(report.is_full);
   wm_config_free(&config);
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(lines_of_candump_are_written_as_they_were_read);
-  RUN_TEST(a_video_that_was_cut_anywhere_is_read_up_to_there);
-  RUN_TEST(an_empty_configuration_is_refused);
-  RUN_TEST(without_its_devices_a_recording_is_begun_and_ended);
-  RUN_TEST(two_buses_are_recorded_and_read_again);
-  RUN_TEST(a_full_disk_ends_it_and_says_so);
-  RUN_TEST(a_map_is_copied_with_its_pictures);
-  return UNITY_END();
 }

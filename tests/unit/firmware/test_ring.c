@@ -4,11 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/suite.h"
 #include "rt/ring.h"
-#include "unity.h"
-
-void setUp(void) {}
-void tearDown(void) {}
 
 typedef struct record {
   uint64_t number, copies[7];
@@ -26,7 +23,7 @@ static int push(uint64_t number) {
   return 1;
 }
 
-static void it_hands_out_in_order_and_then_nothing(void) {
+TEST(it_hands_out_in_order_and_then_nothing) {
   wm_ring_init(&ring, memory, 8, sizeof(record));
   TEST_ASSERT_NULL(wm_ring_front(&ring));
   for (uint64_t round = 0; round < 100; round++) {
@@ -41,7 +38,7 @@ static void it_hands_out_in_order_and_then_nothing(void) {
   }
 }
 
-static void when_full_the_newest_is_dropped_and_counted(void) {
+TEST(when_full_the_newest_is_dropped_and_counted) {
   wm_ring_init(&ring, memory, 8, sizeof(record));
   for (uint64_t i = 0; i < 8; i++) TEST_ASSERT_TRUE(push(i));
   TEST_ASSERT_FALSE(push(8));
@@ -52,7 +49,7 @@ static void when_full_the_newest_is_dropped_and_counted(void) {
   TEST_ASSERT_TRUE(push(10));
 }
 
-static void a_ring_of_one_slot_holds_one_record(void) {
+TEST(a_ring_of_one_slot_holds_one_record) {
   static uint8_t few[64];
   wm_ring_init(&ring, few, 1, sizeof(record));
   TEST_ASSERT_TRUE(push(1));
@@ -64,7 +61,7 @@ static void a_ring_of_one_slot_holds_one_record(void) {
   TEST_ASSERT_EQUAL_UINT64(2, wm_ring_dropped(&ring));
 }
 
-static void a_record_larger_than_a_slot_finds_no_place(void) {
+TEST(a_record_larger_than_a_slot_finds_no_place) {
   static uint8_t few[64];
   wm_ring_init(&ring, few, 2, sizeof(record));
   TEST_ASSERT_NULL(wm_ring_reserve(&ring, ring.slot_bytes + 1));
@@ -72,7 +69,7 @@ static void a_record_larger_than_a_slot_finds_no_place(void) {
   TEST_ASSERT_TRUE(push(1));
 }
 
-static void slots_are_a_power_of_two(void) {
+TEST(slots_are_a_power_of_two) {
   TEST_ASSERT_EQUAL(1, wm_ring_slots(0));
   TEST_ASSERT_EQUAL(8, wm_ring_slots(5));
   TEST_ASSERT_EQUAL(8, wm_ring_slots(8));
@@ -93,7 +90,7 @@ static void *producer(void *unused) {
   return NULL;
 }
 
-static void two_threads_lose_nothing_and_see_whole_records(void) {
+TEST(two_threads_lose_nothing_and_see_whole_records) {
   wm_ring_init(&ring, memory, 64, sizeof(record));
   pthread_t thread;
   TEST_ASSERT_EQUAL(0, pthread_create(&thread, NULL, producer, NULL));
@@ -112,15 +109,4 @@ static void two_threads_lose_nothing_and_see_whole_records(void) {
   }
   pthread_join(thread, NULL);
   TEST_ASSERT_EQUAL_UINT64(0, wrong);
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(it_hands_out_in_order_and_then_nothing);
-  RUN_TEST(when_full_the_newest_is_dropped_and_counted);
-  RUN_TEST(a_ring_of_one_slot_holds_one_record);
-  RUN_TEST(a_record_larger_than_a_slot_finds_no_place);
-  RUN_TEST(slots_are_a_power_of_two);
-  RUN_TEST(two_threads_lose_nothing_and_see_whole_records);
-  return UNITY_END();
 }

@@ -3,11 +3,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/suite.h"
 #include "output/csv_row.h"
-#include "unity.h"
-
-void setUp(void) {}
-void tearDown(void) {}
 
 static wm_row row;
 static const char *text(void) {
@@ -16,7 +13,7 @@ static const char *text(void) {
   return row.bytes;
 }
 
-static void numbers_are_written_the_same_everywhere(void) {
+TEST(numbers_are_written_the_same_everywhere) {
   wm_row_fixed(&row, -1.5, 3);
   TEST_ASSERT_EQUAL_STRING("-1.500", text());
   wm_row_fixed(&row, 0.0005, 3);
@@ -39,7 +36,7 @@ static void numbers_are_written_the_same_everywhere(void) {
   TEST_ASSERT_EQUAL_STRING("-0.000000001", text());
 }
 
-static void exact_numbers_keep_every_bit(void) {
+TEST(exact_numbers_keep_every_bit) {
   uint64_t z = 1;
   for (int i = 0; i < 100000; i++) {
     z = z * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
@@ -52,16 +49,8 @@ static void exact_numbers_keep_every_bit(void) {
   }
 }
 
-static void a_row_that_is_too_long_is_cut_and_nothing_else(void) {
+TEST(a_row_that_is_too_long_is_cut_and_nothing_else) {
   for (int i = 0; i < 3000; i++) wm_row_text(&row, "abc");
   TEST_ASSERT_LESS_OR_EQUAL(sizeof row.bytes, row.length);
   row.length = 0;
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(numbers_are_written_the_same_everywhere);
-  RUN_TEST(exact_numbers_keep_every_bit);
-  RUN_TEST(a_row_that_is_too_long_is_cut_and_nothing_else);
-  return UNITY_END();
 }

@@ -7,22 +7,19 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include "common/suite.h"
 #include "live/lcm_commands.h"
 #include "live/lcm_sightings.h"
 #include "live/lcm_sink.h"
 #include "live/notify.h"
 #include "log_fixture.h"
 #include "rt/clock.h"
-#include "unity.h"
 #include "waymark_health_t.h"
 #include "waymark_innovation_t.h"
 #include "waymark_landmarks_t.h"
 #include "waymark_observations_t.h"
 #include "waymark_pose_t.h"
 #include "waymark_reset_t.h"
-
-void setUp(void) {}
-void tearDown(void) {}
 
 // ── LCM ─────────────────────────────────────────────────────────────────────────────────────────────────────────────
 
@@ -56,7 +53,7 @@ static void say(void *context, const char *line) {
   lines++;
 }
 
-static void messages_arrive_over_memq(void) {
+TEST(messages_arrive_over_memq) {
   fixture_assembly(&config, &assembly);
   lcm_t *lcm = lcm_create("memq://");
   TEST_ASSERT_NOT_NULL(lcm);
@@ -94,7 +91,7 @@ static void messages_arrive_over_memq(void) {
   lcm_destroy(lcm);
 }
 
-static void no_way_out_is_said_once_and_tried_again(void) {
+TEST(no_way_out_is_said_once_and_tried_again) {
   fixture_assembly(&config, &assembly);
   lines = 0;
   lcm_sink_open(&sink, 1, "udpm://0.0.0.300:7667", "TEST_", &assembly, say, NULL, NULL);
@@ -142,7 +139,7 @@ static void close_manager(notify *n) {
   unsetenv("WATCHDOG_USEC");
 }
 
-static void the_watchdog_is_fed_while_the_estimators_loops_advance(void) {
+TEST(the_watchdog_is_fed_while_the_estimators_loops_advance) {
   notify n;
   open_manager(&n, "2000000");
   TEST_ASSERT_GREATER_OR_EQUAL(0, n.socket);
@@ -166,7 +163,7 @@ static void the_watchdog_is_fed_while_the_estimators_loops_advance(void) {
   close_manager(&n);
 }
 
-static void the_first_pose_makes_ready_and_a_change_of_status_is_sent_once(void) {
+TEST(the_first_pose_makes_ready_and_a_change_of_status_is_sent_once) {
   notify n;
   open_manager(&n, "2000000");
   notify_status(&n, "tracking");
@@ -182,7 +179,7 @@ static void the_first_pose_makes_ready_and_a_change_of_status_is_sent_once(void)
   close_manager(&n);
 }
 
-static void ready_comes_without_a_pose_after_ten_seconds(void) {
+TEST(ready_comes_without_a_pose_after_ten_seconds) {
   notify n;
   open_manager(&n, "junk");
   TEST_ASSERT_EQUAL_INT64(0, n.feed_every_ns);
@@ -191,7 +188,7 @@ static void ready_comes_without_a_pose_after_ten_seconds(void) {
   close_manager(&n);
 }
 
-static void without_a_service_manager_nothing_happens(void) {
+TEST(without_a_service_manager_nothing_happens) {
   notify n;
   unsetenv("NOTIFY_SOCKET");
   notify_open(&n);
@@ -207,7 +204,7 @@ static void without_a_service_manager_nothing_happens(void) {
 
 // ── commands ────────────────────────────────────────────────────────────────────────────────────────────────────────
 
-static void poses_and_resets_that_are_told_become_events(void) {
+TEST(poses_and_resets_that_are_told_become_events) {
   wm_source *source;
   wm_event event;
   wm_error err;
@@ -239,7 +236,7 @@ static void poses_and_resets_that_are_told_become_events(void) {
   lcm_destroy(lcm);
 }
 
-static void nonsense_that_is_told_is_refused(void) {
+TEST(nonsense_that_is_told_is_refused) {
   wm_source *source;
   wm_event event;
   wm_error err;
@@ -267,7 +264,7 @@ static void nonsense_that_is_told_is_refused(void) {
 
 static const wm_sensor kEyes[] = {{.name = "left"}, {.name = "right"}};
 
-static void sightings_of_another_program_become_events(void) {
+TEST(sightings_of_another_program_become_events) {
   wm_source *source;
   wm_event event;
   wm_error err;
@@ -302,7 +299,7 @@ static void sightings_of_another_program_become_events(void) {
   lcm_destroy(lcm);
 }
 
-static void sightings_that_cannot_be_are_refused(void) {
+TEST(sightings_that_cannot_be_are_refused) {
   const struct {
     const char *sensor, *why;
     wm_event event;
@@ -339,19 +336,4 @@ static void sightings_that_cannot_be_are_refused(void) {
     source->ops->close(source);
     lcm_destroy(lcm);
   }
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(messages_arrive_over_memq);
-  RUN_TEST(no_way_out_is_said_once_and_tried_again);
-  RUN_TEST(the_watchdog_is_fed_while_the_estimators_loops_advance);
-  RUN_TEST(the_first_pose_makes_ready_and_a_change_of_status_is_sent_once);
-  RUN_TEST(ready_comes_without_a_pose_after_ten_seconds);
-  RUN_TEST(without_a_service_manager_nothing_happens);
-  RUN_TEST(poses_and_resets_that_are_told_become_events);
-  RUN_TEST(nonsense_that_is_told_is_refused);
-  RUN_TEST(sightings_of_another_program_become_events);
-  RUN_TEST(sightings_that_cannot_be_are_refused);
-  return UNITY_END();
 }

@@ -7,11 +7,11 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "common/suite.h"
 #include "config/config.h"
 #include "fusion/budget.h"
 #include "output/saved_map.h"
 #include "output/saved_pose.h"
-#include "unity.h"
 #include "waymark/keeper.h"
 
 static char folder[64], path[128];
@@ -41,7 +41,7 @@ static wm_estimate tracking(double x_m, double sigma_m) {
   return e;
 }
 
-static void a_pose_is_there_again(void) {
+TEST(a_pose_is_there_again) {
   wm_estimate e = tracking(12.25, 0.3);
   wm_saved_pose saved;
   wm_start start;
@@ -62,7 +62,7 @@ static void a_pose_is_there_again(void) {
 }
 
 // Killed while it drove: it is where it would be by now, as far off as it may have driven. An hour later it stands.
-static void a_pose_that_was_moving_goes_on(void) {
+TEST(a_pose_that_was_moving_goes_on) {
   wm_estimate e = tracking(10, 0.3);
   e.v_mps[0] = 2;
   e.w_radps[2] = M_PI / 4;
@@ -85,7 +85,7 @@ static void a_pose_that_was_moving_goes_on(void) {
 
 // Killed while it drove straight on: within the second since then it may have begun to turn, and braked or accelerated.
 // Later than two seconds nothing is known of the motion. A robot that was off for an hour stands.
-static void a_turn_that_began_after_the_save_is_within_sigma(void) {
+TEST(a_turn_that_began_after_the_save_is_within_sigma) {
   wm_estimate e = tracking(10, 0.01);
   e.v_mps[0] = 0.3;
   wm_saved_pose saved;
@@ -103,7 +103,7 @@ static void a_turn_that_began_after_the_save_is_within_sigma(void) {
 }
 
 // A run that lost its pose does not leave the one from before, with a sigma of then: the next run searches.
-static void a_lost_pose_replaces_the_one_before(void) {
+TEST(a_lost_pose_replaces_the_one_before) {
   wm_estimate e = tracking(12.25, 0.3);
   wm_saved_pose saved;
   wm_start start;
@@ -127,7 +127,7 @@ static void a_lost_pose_replaces_the_one_before(void) {
   TEST_ASSERT_DOUBLE_WITHIN(0.01, M_PI / sqrt(3), start.sigma_heading_rad);  // any heading
 }
 
-static void a_pose_that_is_worth_nothing_is_not_kept(void) {
+TEST(a_pose_that_is_worth_nothing_is_not_kept) {
   wm_estimate good = tracking(1, 0.3), e = good;
   TEST_ASSERT_TRUE(wm_saved_pose_is_worth_it(&good));
   e.state = WM_STATE_LOST;
@@ -147,7 +147,7 @@ static void put(const char *text) {
   (void)fclose(f);
 }
 
-static void a_file_that_is_none_is_refused_with_its_line(void) {
+TEST(a_file_that_is_none_is_refused_with_its_line) {
   wm_saved_pose saved;
   TEST_ASSERT_EQUAL(WM_NOT_FOUND, wm_saved_pose_read(path, &saved, &err));
   const char *const wrong[] = {"",
@@ -163,7 +163,7 @@ static void a_file_that_is_none_is_refused_with_its_line(void) {
   }
 }
 
-static void where_it_cant_be_written_the_old_one_stays(void) {
+TEST(where_it_cant_be_written_the_old_one_stays) {
   wm_estimate e = tracking(1, 0.3);
   TEST_ASSERT_EQUAL(WM_IO, wm_saved_pose_write("/proc/nowhere/pose.yaml", &e, 1, &err));
   TEST_ASSERT_NOT_NULL(strstr(err.text, "/proc/nowhere/pose.yaml: can't be written"));
@@ -183,7 +183,7 @@ static void drive(wm_budget *budget, wm_estimate *e, int seconds, double along_m
   }
 }
 
-static void the_way_left_is_where_the_variance_reaches_the_limit(void) {
+TEST(the_way_left_is_where_the_variance_reaches_the_limit) {
   wm_budget budget;
   wm_estimate e = tracking(0, 0.1);
   double way_m, time_s;
@@ -203,7 +203,7 @@ static void the_way_left_is_where_the_variance_reaches_the_limit(void) {
   TEST_ASSERT_EQUAL_DOUBLE(0, time_s);
 }
 
-static void a_robot_that_stands_has_time_without_end(void) {
+TEST(a_robot_that_stands_has_time_without_end) {
   wm_budget budget;
   wm_estimate e = tracking(0, 0.1);
   double way_m, time_s;
@@ -214,7 +214,7 @@ static void a_robot_that_stands_has_time_without_end(void) {
 }
 
 // The estimator's covariance grows faster than the odometry's noise alone (scales, biases): that is believed.
-static void growth_that_is_seen_while_reckoning_counts(void) {
+TEST(growth_that_is_seen_while_reckoning_counts) {
   wm_budget budget;
   wm_estimate e = tracking(0, 0.1);
   double way_m, time_s;
@@ -266,7 +266,7 @@ static void write_file(const void *bytes, size_t count) {
   fclose(f);
 }
 
-static void a_map_is_there_again_and_a_damaged_one_is_refused(void) {
+TEST(a_map_is_there_again_and_a_damaged_one_is_refused) {
   wm_setup setup = setup_of_slam("");
   const wm_map_identity of = wm_map_identity_of(&slam, &setup);
   static uint8_t whole[1 << 14];
@@ -302,7 +302,7 @@ static void a_map_is_there_again_and_a_damaged_one_is_refused(void) {
   wm_config_free(&slam);
 }
 
-static void a_map_of_another_configuration_or_robot_is_refused(void) {
+TEST(a_map_of_another_configuration_or_robot_is_refused) {
   wm_setup setup = setup_of_slam("");
   const wm_map_identity of = wm_map_identity_of(&slam, &setup);
   const size_t bytes = image_of(&setup);
@@ -325,7 +325,7 @@ static void a_map_of_another_configuration_or_robot_is_refused(void) {
 }
 
 // What is wrong inside is found though the sum is right.
-static void a_map_with_nan_is_refused(void) {
+TEST(a_map_with_nan_is_refused) {
   wm_setup setup = setup_of_slam("");
   const wm_map_identity of = wm_map_identity_of(&slam, &setup);
   const size_t bytes = image_of(&setup);
@@ -337,7 +337,7 @@ static void a_map_with_nan_is_refused(void) {
 }
 
 // Who may write into the folder may lay links there, which a program with more rights must not follow.
-static void links_are_not_followed(void) {
+TEST(links_are_not_followed) {
   char beside[160], other[160];
   (void)snprintf(beside, sizeof beside, "%s.new", path);
   (void)snprintf(other, sizeof other, "%s/other", folder);
@@ -353,23 +353,4 @@ static void links_are_not_followed(void) {
   fclose(f);
   TEST_ASSERT_EQUAL_STRING("precious", text);
   (void)unlink(other);
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(a_pose_is_there_again);
-  RUN_TEST(a_pose_that_was_moving_goes_on);
-  RUN_TEST(a_turn_that_began_after_the_save_is_within_sigma);
-  RUN_TEST(a_pose_that_is_worth_nothing_is_not_kept);
-  RUN_TEST(a_lost_pose_replaces_the_one_before);
-  RUN_TEST(a_file_that_is_none_is_refused_with_its_line);
-  RUN_TEST(where_it_cant_be_written_the_old_one_stays);
-  RUN_TEST(the_way_left_is_where_the_variance_reaches_the_limit);
-  RUN_TEST(a_robot_that_stands_has_time_without_end);
-  RUN_TEST(growth_that_is_seen_while_reckoning_counts);
-  RUN_TEST(a_map_is_there_again_and_a_damaged_one_is_refused);
-  RUN_TEST(a_map_of_another_configuration_or_robot_is_refused);
-  RUN_TEST(a_map_with_nan_is_refused);
-  RUN_TEST(links_are_not_followed);
-  return UNITY_END();
 }

@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "cli/watch/watch.h"
-#include "unity.h"
+#include "common/suite.h"
 #include "waymark/lcm_messages.h"
 
 static watch seen;
@@ -27,7 +27,6 @@ void setUp(void) {
   health.reckoning_left_m = 41.6;
   health.reckoning_left_s = (double)INFINITY;
 }
-void tearDown(void) {}
 
 static const char *state_of_health(void) {
   size_t length = wm_lcm_health(&health, bytes, sizeof bytes);
@@ -36,7 +35,7 @@ static const char *state_of_health(void) {
   return watch_state(&seen, 10 * WM_NS_PER_S, why, sizeof why);
 }
 
-static void the_state_says_what_is_wrong(void) {
+TEST(the_state_says_what_is_wrong) {
   TEST_ASSERT_EQUAL_STRING("waiting", watch_state(&seen, 0, why, sizeof why));
   TEST_ASSERT_EQUAL_STRING("tracking", state_of_health());
   TEST_ASSERT_EQUAL_STRING("", why);
@@ -52,7 +51,7 @@ static void the_state_says_what_is_wrong(void) {
   TEST_ASSERT_EQUAL_STRING("silent", watch_state(&seen, 20 * WM_NS_PER_S, why, sizeof why));
 }
 
-static void a_message_is_read_as_it_was_sent(void) {
+TEST(a_message_is_read_as_it_was_sent) {
   wm_health read;
   wm_published read_pose;
   health.sources[1].overflows = 5;
@@ -83,7 +82,7 @@ static void a_message_is_read_as_it_was_sent(void) {
   TEST_ASSERT_NOT_NULL(wm_lcm_read_health(bytes, 20, &read));
 }
 
-static void the_view_has_pose_sources_and_what_is_left(void) {
+TEST(the_view_has_pose_sources_and_what_is_left) {
   pose.now.pose_map_base = (wm_pose3){{12.5, -3, 0}, {0, 0, sqrt(0.5), sqrt(0.5)}};
   watch_pose(&seen, bytes, wm_lcm_pose(&pose, 0, bytes, sizeof bytes), 10 * WM_NS_PER_S);
   health.lost_probability = 0.25;
@@ -106,7 +105,7 @@ static void the_view_has_pose_sources_and_what_is_left(void) {
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(shown, parts[i]), shown);
 }
 
-static void landmarks_that_are_not_found_have_a_reason(void) {
+TEST(landmarks_that_are_not_found_have_a_reason) {
   uint64_t looks[WM_LOOK_COUNT] = {0};
   char text[200];
   TEST_ASSERT_EQUAL(0, wm_looks_text(looks, text, sizeof text));
@@ -133,7 +132,7 @@ static void landmarks_that_are_not_found_have_a_reason(void) {
   TEST_ASSERT_NOT_NULL_MESSAGE(strstr(shown, text), shown);
 }
 
-static void innovations_give_a_verdict(void) {
+TEST(innovations_give_a_verdict) {
   wm_innovation i = {.verdict = WM_FUSED, .residual = WM_RESIDUAL_RANGE, .variance = 0.01};
   TEST_ASSERT_EQUAL_STRING("too few observations to tell", watch_consistency(&seen));
   for (int n = 0; n < 200; n++) {
@@ -148,14 +147,4 @@ static void innovations_give_a_verdict(void) {
   i.observed = 0;
   for (int n = 0; n < 2000; n++) watch_innovation(&seen, bytes, wm_lcm_innovation(&i, bytes, sizeof bytes));
   TEST_ASSERT_EQUAL_STRING("observations are further off than the covariance allows", watch_consistency(&seen));
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(the_state_says_what_is_wrong);
-  RUN_TEST(a_message_is_read_as_it_was_sent);
-  RUN_TEST(the_view_has_pose_sources_and_what_is_left);
-  RUN_TEST(landmarks_that_are_not_found_have_a_reason);
-  RUN_TEST(innovations_give_a_verdict);
-  return UNITY_END();
 }

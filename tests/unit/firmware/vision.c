@@ -12,8 +12,8 @@
 #include <turbojpeg.h>
 
 #include "../drivers/folder.h"
+#include "common/suite.h"
 #include "sources/vision.h"
-#include "unity.h"
 
 #define W 320
 #define H 180
@@ -140,7 +140,7 @@ static size_t drain(wm_source *source, uint8_t *out, size_t capacity) {
   return used;
 }
 
-static void events_of_pictures(void) {
+TEST(events_of_pictures) {
   static uint8_t here[FRAMES * sizeof(wm_event)], ahead[FRAMES * sizeof(wm_event)];
   open_it("vision: {edges: {cameras: [front], rays: {range_max_m: 5}}}\n", POINTS | LOOKED);
   TEST_ASSERT_EQUAL(1, wm_vision_count(vision));
@@ -159,7 +159,7 @@ static void events_of_pictures(void) {
 
 // GIVEN two detectors on one recorded camera WHEN a replay reads both, in the order of their events THEN each picture
 // is decoded once, whether threads work ahead or not.
-static void two_detectors_on_one_camera_decode_a_picture_once(void) {
+TEST(two_detectors_on_one_camera_decode_a_picture_once) {
   for (int ahead = 0; ahead < 2; ahead++) {
     static wm_event event[2];
     int counts[2] = {0}, has[2] = {1, 1};
@@ -189,7 +189,7 @@ static void two_detectors_on_one_camera_decode_a_picture_once(void) {
 }
 
 // In a run a recorded picture is looked at when it arrives: detection delays what it finds.
-static void a_run_looks_at_a_recorded_picture_when_it_arrives(void) {
+TEST(a_run_looks_at_a_recorded_picture_when_it_arrives) {
   static wm_event event;
   open_it("vision: {edges: {cameras: [front]}}\n", POINTS | LOOKED);
   wm_vision_look_at_arrival(vision);
@@ -208,7 +208,7 @@ static void a_run_looks_at_a_recorded_picture_when_it_arrives(void) {
   TEST_ASSERT_EQUAL_UINT64(FRAMES, wm_vision_look_ns(vision, 0)->count);
 }
 
-static void ended_in_the_middle(void) {
+TEST(ended_in_the_middle) {
   open_it("vision: {edges: {}}\n", POINTS);
   TEST_ASSERT_EQUAL(2, wm_vision_count(vision));  // both cameras have pictures
   TEST_ASSERT_EQUAL(WM_OK, wm_vision_start_prefetch(vision, &err));
@@ -220,7 +220,7 @@ static void ended_in_the_middle(void) {
   TEST_ASSERT_EQUAL_INT64(400000000, event.t_ns);
 }
 
-static void old_pictures_are_passed_over(void) {
+TEST(old_pictures_are_passed_over) {
   open_it("vision: {edges: {cameras: [front]}}\n", POINTS);
   static wm_event event;
   wm_source *source = wm_vision_source(vision, 0);
@@ -234,7 +234,7 @@ static void old_pictures_are_passed_over(void) {
 }
 
 // What a detector would take on the robot, in a replay.
-static void observations_arrive_after_the_time_that_detection_takes(void) {
+TEST(observations_arrive_after_the_time_that_detection_takes) {
   static wm_event event;
   open_it("vision: {edges: {cameras: [front]}}\nsources: [{name: edges, ready_after_ms: 40}]\n", POINTS);
   wm_source *source = wm_vision_source(vision, 0);
@@ -248,7 +248,7 @@ static void observations_arrive_after_the_time_that_detection_takes(void) {
   TEST_ASSERT_EQUAL_INT64(170000000, event.arrival_ns);
 }
 
-static void only_for_who_takes_it(void) {
+TEST(only_for_who_takes_it) {
   parse("vision: {edges: {cameras: [front]}}\n", 0);
   TEST_ASSERT_EQUAL(WM_OK, wm_vision_open(&config, recording, NULL, NULL, &vision, &err));
   TEST_ASSERT_NULL(vision);
@@ -264,7 +264,7 @@ static void refused(const char *section, const char *text) {
   TEST_ASSERT_NOT_NULL_MESSAGE(strstr(err.text, text), err.text);
 }
 
-static void what_is_not_there(void) {
+TEST(what_is_not_there) {
   refused("vision: {edges: {cameras: [left]}}\n", "test.yaml:3: vision.edges.cameras: 'left' is not a camera");
   folder_write("calibration.yaml", "cameras:\n" CAMERA("side"));
   refused("vision: {edges: {}}\n", "has no pictures");
@@ -287,7 +287,7 @@ static size_t open_files(void) {
 static size_t heap_bytes(void) { return mallinfo2().uordblks; }
 
 // Detectors and pictures end with what opened them: a robot's configuration may be taken anew for years.
-static void opened_and_closed_without_growth(void) {
+TEST(opened_and_closed_without_growth) {
   size_t files = 0, bytes = 0;
   parse("vision: {apriltag: {family: tag36h11, size_m: 0.2}}\n", WM_EVENT_BIT(WM_EVENT_MARKER));
   for (int i = 0; i < 1000; i++) {
@@ -320,25 +320,10 @@ static void wrong_text(const char *section, const char *text) {
   TEST_ASSERT_NOT_NULL_MESSAGE(strstr(err.text, text), err.text);
 }
 
-static void wrong_configurations(void) {
+TEST(wrong_configurations) {
   wrong_text("vision: {edgs: {}}\n", "did you mean 'vision.edges'");
   wrong_text("vision: {edges: {rays: {range_max: 5}}}\n", "did you mean 'vision.edges.rays.range_max_m'");
   wrong_text("vision: {edges: {cameras: front}}\n", "a list of cameras");
   wrong_text("vision: [edges]\n", "a map of detectors");
   wrong_text("vision: {edges: {rays: {range_max_m: -1}}}\n", "vision.edges.rays.range_max_m");
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(events_of_pictures);
-  RUN_TEST(two_detectors_on_one_camera_decode_a_picture_once);
-  RUN_TEST(a_run_looks_at_a_recorded_picture_when_it_arrives);
-  RUN_TEST(ended_in_the_middle);
-  RUN_TEST(old_pictures_are_passed_over);
-  RUN_TEST(observations_arrive_after_the_time_that_detection_takes);
-  RUN_TEST(only_for_who_takes_it);
-  RUN_TEST(what_is_not_there);
-  RUN_TEST(opened_and_closed_without_growth);
-  RUN_TEST(wrong_configurations);
-  return UNITY_END();
 }

@@ -3,13 +3,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "unity.h"
+#include "common/suite.h"
 #include "waymark/bytes.h"
 #include "waymark/codec.h"
 #include "waymark/event_fields.h"
-
-void setUp(void) {}
-void tearDown(void) {}
 
 static uint64_t random_state = 42;
 static uint64_t random_bits(void) {
@@ -72,7 +69,7 @@ static void fill(wm_event *e, unsigned kind) {
 }
 
 // A member that has no row would be lost in the event log: bytes without a field are padding.
-static void fields_cover_their_structs(void) {
+TEST(fields_cover_their_structs) {
   const wm_event *none = NULL;
   const size_t sizes[WM_EVENT_KIND_COUNT] = {
       [WM_EVENT_TWIST2] = sizeof none->as.twist2,       [WM_EVENT_TWIST6] = sizeof none->as.twist6,
@@ -96,7 +93,7 @@ static void fields_cover_their_structs(void) {
   }
 }
 
-static void a_sighting_without_numbers_has_none(void) {
+TEST(a_sighting_without_numbers_has_none) {
   wm_event event = {.as.sighting = wm_sighting_without_numbers()};
   size_t count;
   const wm_event_field *fields = wm_event_fields(WM_EVENT_SIGHTING, &count);
@@ -109,7 +106,7 @@ static void a_sighting_without_numbers_has_none(void) {
   TEST_ASSERT_EQUAL(-1, event.as.sighting.landmark_id);
 }
 
-static void every_event_comes_back_as_it_was(void) {
+TEST(every_event_comes_back_as_it_was) {
   for (int round = 0; round < 200; round++)
     for (unsigned kind = 1; kind < WM_EVENT_KIND_COUNT; kind++) {
       wm_event in, out;
@@ -127,7 +124,7 @@ static void every_event_comes_back_as_it_was(void) {
 }
 
 // Changes one bit of each number of each field in turn.
-static void the_hash_of_an_event_sees_its_fields_and_its_stamp_alone(void) {
+TEST(the_hash_of_an_event_sees_its_fields_and_its_stamp_alone) {
   static const size_t kBytes[] = {
       [WM_FIELD_F64] = sizeof(double), [WM_FIELD_I64] = 8, [WM_FIELD_U64] = 8, [WM_FIELD_I32] = 4, [WM_FIELD_U16] = 2};
   static wm_event event, other;
@@ -157,7 +154,7 @@ static void the_hash_of_an_event_sees_its_fields_and_its_stamp_alone(void) {
 }
 
 // Lists count up to their length, and no further.
-static void the_hash_of_a_list_sees_each_of_its_numbers(void) {
+TEST(the_hash_of_a_list_sees_each_of_its_numbers) {
   static wm_event event, other;
   memset(&event, 0, sizeof event);
   event.kind = WM_EVENT_QUANTITIES;
@@ -192,7 +189,7 @@ static void the_hash_of_a_list_sees_each_of_its_numbers(void) {
   }
 }
 
-static void a_cut_event_is_refused_at_every_length(void) {
+TEST(a_cut_event_is_refused_at_every_length) {
   for (unsigned kind = 1; kind < WM_EVENT_KIND_COUNT; kind++) {
     wm_event in, out;
     fill(&in, kind);
@@ -207,7 +204,7 @@ static void a_cut_event_is_refused_at_every_length(void) {
   }
 }
 
-static void noise_never_gives_an_event_with_indices_out_of_bounds(void) {
+TEST(noise_never_gives_an_event_with_indices_out_of_bounds) {
   size_t good = 0;
   for (int round = 0; round < 20000; round++) {
     uint8_t bytes[128];
@@ -229,7 +226,7 @@ static void noise_never_gives_an_event_with_indices_out_of_bounds(void) {
   TEST_ASSERT_GREATER_THAN(1000, good);
 }
 
-static void another_version_is_refused(void) {
+TEST(another_version_is_refused) {
   wm_event in, out;
   fill(&in, WM_EVENT_TWIST2);
   uint8_t bytes[WM_EVENT_ENCODED_MAX];
@@ -247,7 +244,7 @@ static size_t sighting_bytes_after(uint8_t version) {
   return bytes;
 }
 
-static void a_version_without_elevation_is_read(void) {
+TEST(a_version_without_elevation_is_read) {
   wm_event in, out;
   fill(&in, WM_EVENT_SIGHTING);
   uint8_t bytes[WM_EVENT_ENCODED_MAX];
@@ -264,7 +261,7 @@ static void a_version_without_elevation_is_read(void) {
 }
 
 // Event logs from before NaN stood for every absent number.
-static void zeros_that_stood_for_absent_numbers_become_nan(void) {
+TEST(zeros_that_stood_for_absent_numbers_become_nan) {
   wm_event in = {.kind = WM_EVENT_SIGHTING}, out;
   uint8_t bytes[WM_EVENT_ENCODED_MAX];
   size_t length = wm_event_encode(&in, bytes, sizeof bytes), used;
@@ -286,7 +283,7 @@ static void zeros_that_stood_for_absent_numbers_become_nan(void) {
   TEST_ASSERT_EQUAL_DOUBLE(0, out.as.marker.yaw_rad);
 }
 
-static void a_number_is_read_from_the_version_on_it_came_with(void) {
+TEST(a_number_is_read_from_the_version_on_it_came_with) {
   wm_event in, out;
   uint8_t bytes[WM_EVENT_ENCODED_MAX];
   size_t used;
@@ -301,7 +298,7 @@ static void a_number_is_read_from_the_version_on_it_came_with(void) {
   TEST_ASSERT_EQUAL_DOUBLE(0.5, out.as.sighting.elevation_sigma_rad);
 }
 
-static void bytes_are_little_endian_on_every_machine(void) {
+TEST(bytes_are_little_endian_on_every_machine) {
   wm_event e = {
       .t_ns = 0x0102030405060708, .arrival_ns = -1, .seq = 0x11223344, .source = 0x5566, .kind = WM_EVENT_LOOKED};
   e.as.looked.sensor = 0x7788;
@@ -336,7 +333,7 @@ static void bytes_are_little_endian_on_every_machine(void) {
   TEST_ASSERT_EQUAL_MEMORY(kWanted, bytes, sizeof kWanted);
 }
 
-static void a_published_pose_comes_back(void) {
+TEST(a_published_pose_comes_back) {
   wm_published in = {.made_ns = 5, .fused_until_ns = -3, .jumps = 2, .status_flags = 7, .utc_uncertainty_ns = -1}, out;
   for (int i = 0; i < 36; i++) in.now.covariance[i] = random_f64();
   in.now.pose_map_base.q_xyzw[3] = 1;
@@ -354,7 +351,7 @@ static void a_published_pose_comes_back(void) {
 }
 
 // The version before had no probability behind the estimate's state.
-static void a_published_pose_of_the_version_before_is_read(void) {
+TEST(a_published_pose_of_the_version_before_is_read) {
   wm_published in = {.made_ns = 5, .jumps = 2}, out;
   in.now.state = WM_STATE_LOST;
   in.now.lost_probability = 0.25;
@@ -371,7 +368,7 @@ static void a_published_pose_of_the_version_before_is_read(void) {
   TEST_ASSERT_EQUAL(2, out.jumps);
 }
 
-static void an_innovation_comes_back_and_unknown_verdicts_do_not(void) {
+TEST(an_innovation_comes_back_and_unknown_verdicts_do_not) {
   wm_innovation in = {.t_ns = 1,
                       .source = 2,
                       .sensor = 3,
@@ -393,7 +390,7 @@ static void an_innovation_comes_back_and_unknown_verdicts_do_not(void) {
   TEST_ASSERT_EQUAL(WM_BAD_DATA, wm_innovation_decode(bytes, length, &out, &used));
 }
 
-static void a_setup_comes_back(void) {
+TEST(a_setup_comes_back) {
   uint8_t bytes[2048];
   size_t used;
   wm_wheels wheels = {.radius_m = 0.1, .track_m = NAN, .steering_table_count = 3, .actuator_m = {1, 2, 3}}, wheels2;
@@ -415,7 +412,7 @@ static void a_setup_comes_back(void) {
   TEST_ASSERT_EQUAL_MEMORY(&start, &start2, sizeof start);
 }
 
-static void a_rig_comes_back_and_a_cut_one_is_refused(void) {
+TEST(a_rig_comes_back_and_a_cut_one_is_refused) {
   wm_rig rig, back;
   wm_rig_init(&rig);
   rig.camera_count = 2;
@@ -456,7 +453,7 @@ static void a_rig_comes_back_and_a_cut_one_is_refused(void) {
 }
 
 // Of a rig of which nothing is known no number is given, and no camera belongs to the pair.
-static void a_rig_of_which_nothing_is_known_has_no_numbers(void) {
+TEST(a_rig_of_which_nothing_is_known_has_no_numbers) {
   wm_rig rig;
   memset(&rig, 0x55, sizeof rig);
   wm_rig_init(&rig);
@@ -477,7 +474,7 @@ static void a_rig_of_which_nothing_is_known_has_no_numbers(void) {
 }
 
 // Each model of a camera, none beside them, and names that fill their room.
-static void cameras_of_a_rig_have_a_model_and_a_name(void) {
+TEST(cameras_of_a_rig_have_a_model_and_a_name) {
   wm_rig rig, back;
   uint8_t bytes[WM_RIG_ENCODED_MAX];
   size_t used;
@@ -498,7 +495,7 @@ static void cameras_of_a_rig_have_a_model_and_a_name(void) {
   TEST_ASSERT_EQUAL(WM_NAME_MAX - 1, strnlen(back.marker_family, WM_NAME_MAX));
 }
 
-static void absent_numbers_of_a_landmark_are_nan_and_keep_the_hash_of_older_logs(void) {
+TEST(absent_numbers_of_a_landmark_are_nan_and_keep_the_hash_of_older_logs) {
   wm_landmark in = {
       .id = 3, .p_m = {1, 2, 3}, .sigma_m = NAN, .yaw_rad = NAN, .cov_m2 = {NAN, NAN, NAN}, .yaw_sigma_rad = NAN};
   wm_landmark zeros = in, out;
@@ -521,7 +518,7 @@ static void absent_numbers_of_a_landmark_are_nan_and_keep_the_hash_of_older_logs
 }
 
 // The same bytes give the same landmark to the last byte of its memory, whatever was there before.
-static void a_landmark_overwrites_all_of_its_memory(void) {
+TEST(a_landmark_overwrites_all_of_its_memory) {
   const wm_landmark in = {
       .id = 3, .p_m = {1, 2, 3}, .sigma_m = 4, .yaw_rad = 5, .cov_m2 = {6, 7, 8}, .yaw_sigma_rad = 9};
   wm_landmark once, again;
@@ -541,7 +538,7 @@ static void a_landmark_overwrites_all_of_its_memory(void) {
   TEST_ASSERT_EQUAL_DOUBLE(9, once.yaw_sigma_rad);
 }
 
-static void the_hash_of_a_map_sees_every_number_and_the_order(void) {
+TEST(the_hash_of_a_map_sees_every_number_and_the_order) {
   wm_landmark map[2] = {{.id = 1, .p_m = {1, 2, 0}, .sigma_m = 0.01, .yaw_rad = NAN},
                         {.id = 2, .p_m = {3, 4, 0}, .sigma_m = 0.01, .yaw_rad = NAN}};
   uint64_t hash = wm_landmarks_hash(map, 2);
@@ -550,31 +547,4 @@ static void the_hash_of_a_map_sees_every_number_and_the_order(void) {
   TEST_ASSERT_TRUE(hash != wm_landmarks_hash(map, 1));
   map[1].p_m[1] = nextafter(4, 5);
   TEST_ASSERT_TRUE(hash != wm_landmarks_hash(map, 2));
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(fields_cover_their_structs);
-  RUN_TEST(a_sighting_without_numbers_has_none);
-  RUN_TEST(every_event_comes_back_as_it_was);
-  RUN_TEST(the_hash_of_an_event_sees_its_fields_and_its_stamp_alone);
-  RUN_TEST(the_hash_of_a_list_sees_each_of_its_numbers);
-  RUN_TEST(a_cut_event_is_refused_at_every_length);
-  RUN_TEST(noise_never_gives_an_event_with_indices_out_of_bounds);
-  RUN_TEST(another_version_is_refused);
-  RUN_TEST(a_version_without_elevation_is_read);
-  RUN_TEST(zeros_that_stood_for_absent_numbers_become_nan);
-  RUN_TEST(a_number_is_read_from_the_version_on_it_came_with);
-  RUN_TEST(bytes_are_little_endian_on_every_machine);
-  RUN_TEST(a_published_pose_comes_back);
-  RUN_TEST(a_published_pose_of_the_version_before_is_read);
-  RUN_TEST(an_innovation_comes_back_and_unknown_verdicts_do_not);
-  RUN_TEST(a_setup_comes_back);
-  RUN_TEST(a_rig_comes_back_and_a_cut_one_is_refused);
-  RUN_TEST(a_rig_of_which_nothing_is_known_has_no_numbers);
-  RUN_TEST(cameras_of_a_rig_have_a_model_and_a_name);
-  RUN_TEST(absent_numbers_of_a_landmark_are_nan_and_keep_the_hash_of_older_logs);
-  RUN_TEST(a_landmark_overwrites_all_of_its_memory);
-  RUN_TEST(the_hash_of_a_map_sees_every_number_and_the_order);
-  return UNITY_END();
 }

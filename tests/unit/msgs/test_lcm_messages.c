@@ -5,7 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "unity.h"
+#include "common/suite.h"
 #include "waymark/event_fields.h"
 #include "waymark/lcm_messages.h"
 #include "waymark_health_t.h"
@@ -15,12 +15,9 @@
 #include "waymark_pose_t.h"
 #include "waymark_set_pose_t.h"
 
-void setUp(void) {}
-void tearDown(void) {}
-
 static uint8_t bytes[WM_LCM_MESSAGE_MAX];
 
-static void a_pose_arrives_whole(void) {
+TEST(a_pose_arrives_whole) {
   wm_published p = {.made_ns = 11,
                     .fused_until_ns = 7,
                     .jumps = 3,
@@ -52,7 +49,7 @@ static void a_pose_arrives_whole(void) {
   TEST_ASSERT_EQUAL(0, wm_lcm_pose(&p, 12, bytes, length - 1));
 }
 
-static void health_arrives_with_its_sources(void) {
+TEST(health_arrives_with_its_sources) {
   static wm_health h;
   h = (wm_health){.t_ns = 1, .source_count = 2, .calibration_count = 1, .loops = 77, .send_p99_ns = 8, .lines_lost = 9};
   strcpy(h.sources[1].name, "sightings:laser");
@@ -81,7 +78,7 @@ static void health_arrives_with_its_sources(void) {
   TEST_ASSERT_EQUAL_INT64(9, m.lines_lost);
 }
 
-static void the_largest_health_fits(void) {
+TEST(the_largest_health_fits) {
   static wm_health h;
   h = (wm_health){.source_count = WM_HEALTH_SOURCES_MAX,
                   .calibration_count = WM_HEALTH_CALIBRATION_MAX,
@@ -93,7 +90,7 @@ static void the_largest_health_fits(void) {
   TEST_ASSERT_EQUAL(WM_HEALTH_COUNTERS_MAX, read.counter_count);
 }
 
-static void names_from_a_stranger_cannot_write_to_a_terminal(void) {
+TEST(names_from_a_stranger_cannot_write_to_a_terminal) {
   static wm_health h, read;
   h = (wm_health){.source_count = 2};
   strcpy(h.sources[0].name,
@@ -107,7 +104,7 @@ static void names_from_a_stranger_cannot_write_to_a_terminal(void) {
 }
 
 // Senders from before NaN stood for every absent number have elevations with a sigma of 0.
-static void a_sighting_with_an_elevation_sigma_of_zero_has_no_elevation(void) {
+TEST(a_sighting_with_an_elevation_sigma_of_zero_has_no_elevation) {
   waymark_observations_t m = {.t_ns = 1, .count = 2, .elevation_sigma_rad = {0, 0.5}};
   strcpy((char *)m.sensor, "front");
   const int length = waymark_observations_t_encode(bytes, 0, sizeof bytes, &m);
@@ -125,7 +122,7 @@ static void a_sighting_with_an_elevation_sigma_of_zero_has_no_elevation(void) {
 }
 
 // So many sightings as a message has room for, and no count beyond it.
-static void counts_of_sightings_beyond_the_room_are_refused(void) {
+TEST(counts_of_sightings_beyond_the_room_are_refused) {
   char sensor[WM_NAME_MAX];
   wm_time_ns t_ns;
   static wm_sighting read[WM_LCM_OBSERVATIONS_MAX];
@@ -144,7 +141,7 @@ static void counts_of_sightings_beyond_the_room_are_refused(void) {
 }
 
 // By the table: what travels arrives, the rest is absent.
-static void each_number_of_a_sighting_arrives(void) {
+TEST(each_number_of_a_sighting_arrives) {
   wm_event sent = {.t_ns = 1, .kind = WM_EVENT_SIGHTING, .as.sighting = {.landmark_id = 7}};
   wm_sighting *given = &sent.as.sighting, read[WM_LCM_OBSERVATIONS_MAX];
   double step = 0;
@@ -180,7 +177,7 @@ static void has_constant(const char *file, const char *prefix, const char *name,
   TEST_ASSERT_TRUE_MESSAGE(at && !isdigit((unsigned char)at[strlen(wanted)]), wanted);
 }
 
-static void every_value_of_an_enum_has_its_constant(void) {
+TEST(every_value_of_an_enum_has_its_constant) {
   for (unsigned i = 0; i < WM_RESIDUAL_COUNT; i++)
     has_constant("innovation_t.lcm", "RESIDUAL_", wm_residual_name(i), i);
   for (unsigned i = 0; i < WM_VERDICT_COUNT; i++)
@@ -193,7 +190,7 @@ static void every_value_of_an_enum_has_its_constant(void) {
   TEST_ASSERT_EQUAL_STRING("?", wm_cause_name(WM_CAUSE_COUNT));
 }
 
-static void a_pose_beyond_all_bounds_is_no_command(void) {
+TEST(a_pose_beyond_all_bounds_is_no_command) {
   static const double kFar[][3] = {{1e300, -1e300, 0}, {0, NAN, 0}, {-2e9, 2e9, 0}, {INFINITY, -INFINITY, 0}};
   wm_event out;
   waymark_set_pose_t m = {.orientation_xyzw = {0, 0, 0, 1}, .sigma_xy_m = 1, .sigma_heading_rad = 1};
@@ -207,7 +204,7 @@ static void a_pose_beyond_all_bounds_is_no_command(void) {
   }
 }
 
-static void an_innovation_arrives(void) {
+TEST(an_innovation_arrives) {
   wm_innovation i = {.t_ns = 3,
                      .landmark_id = -1,
                      .verdict = WM_REJECTED_SINGULAR,
@@ -225,7 +222,7 @@ static void an_innovation_arrives(void) {
   TEST_ASSERT_EQUAL_DOUBLE(5, m.gate);
 }
 
-static void more_sightings_than_fit_are_counted(void) {
+TEST(more_sightings_than_fit_are_counted) {
   static wm_event sightings[70];
   for (int i = 0; i < 70; i++) {
     sightings[i] = (wm_event){.t_ns = 9, .kind = WM_EVENT_SIGHTING};
@@ -241,7 +238,7 @@ static void more_sightings_than_fit_are_counted(void) {
   TEST_ASSERT_EQUAL_STRING("front", (const char *)m.sensor);
 }
 
-static void a_large_map_goes_in_pieces(void) {
+TEST(a_large_map_goes_in_pieces) {
   static wm_landmark map[300];
   for (int i = 0; i < 300; i++) map[i] = (wm_landmark){.id = i, .p_m = {i, 0, 1}, .sigma_m = 0.1};
   static waymark_landmarks_t m;
@@ -251,21 +248,4 @@ static void a_large_map_goes_in_pieces(void) {
   TEST_ASSERT_EQUAL(300, m.total);
   TEST_ASSERT_EQUAL(299, m.id[43]);
   TEST_ASSERT_GREATER_THAN(0, wm_lcm_landmarks(map, 300, 0, 11, bytes, sizeof bytes));
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(a_pose_arrives_whole);
-  RUN_TEST(health_arrives_with_its_sources);
-  RUN_TEST(the_largest_health_fits);
-  RUN_TEST(names_from_a_stranger_cannot_write_to_a_terminal);
-  RUN_TEST(counts_of_sightings_beyond_the_room_are_refused);
-  RUN_TEST(each_number_of_a_sighting_arrives);
-  RUN_TEST(a_sighting_with_an_elevation_sigma_of_zero_has_no_elevation);
-  RUN_TEST(every_value_of_an_enum_has_its_constant);
-  RUN_TEST(a_pose_beyond_all_bounds_is_no_command);
-  RUN_TEST(an_innovation_arrives);
-  RUN_TEST(more_sightings_than_fit_are_counted);
-  RUN_TEST(a_large_map_goes_in_pieces);
-  return UNITY_END();
 }

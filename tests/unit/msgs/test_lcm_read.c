@@ -4,18 +4,15 @@
 #include <math.h>
 #include <string.h>
 
-#include "unity.h"
+#include "common/suite.h"
 #include "waymark/event_fields.h"
 #include "waymark/lcm_messages.h"
 #include "waymark/lcm_streams.h"
 #include "waymark_health_t.h"
 
-void setUp(void) {}
-void tearDown(void) {}
-
 static uint8_t bytes[WM_LCM_MESSAGE_MAX];
 
-static void pose(void) {
+TEST(pose) {
   wm_published p = {.made_ns = 11,
                     .fused_until_ns = 7,
                     .jumps = 3,
@@ -76,7 +73,7 @@ static void fill(wm_source_health *s) {
   s->stamp_uncertainty_ns = 106, s->stale = 1, s->device = WM_DEVICE_STATE_COUNT - 1;
 }
 
-static void health(void) {
+TEST(health) {
   static wm_health h, read;
   h = (wm_health){.t_ns = 1,
                   .fused_until_ns = 2,
@@ -117,7 +114,7 @@ static void health(void) {
 }
 
 // As many sources, values and counters as there is room for come back; of more, those that have room.
-static void a_full_health(void) {
+TEST(a_full_health) {
   static wm_health h, read;
   static waymark_health_t m;
   h = (wm_health){.source_count = WM_HEALTH_SOURCES_MAX,
@@ -143,7 +140,7 @@ static void a_full_health(void) {
 
 // Of more values than a message has room for, those with an alarm come first, and the last one states how many are
 // left.
-static void a_health_with_more_values_than_room(void) {
+TEST(a_health_with_more_values_than_room) {
   static wm_health h, read;
   h = (wm_health){.calibration_count = WM_HEALTH_CALIBRATION_MAX, .more_count = 3, .alarm_count = 2};
   for (int i = 0; i < WM_HEALTH_CALIBRATION_MAX; i++) h.calibration[i].value = i;
@@ -160,7 +157,7 @@ static void a_health_with_more_values_than_room(void) {
   TEST_ASSERT_EQUAL_DOUBLE(4, read.calibration[WM_HEALTH_CALIBRATION_MAX - 1].value);
 }
 
-static void innovation(void) {
+TEST(innovation) {
   const wm_innovation i = {.t_ns = 1,
                            .source = 2,
                            .sensor = 3,
@@ -191,7 +188,7 @@ static void innovation(void) {
   for (size_t cut = 0; cut < length; cut++) TEST_ASSERT_NOT_NULL(wm_lcm_read_innovation(bytes, cut, &read));
 }
 
-static void a_pose_that_is_set(void) {
+TEST(a_pose_that_is_set) {
   const wm_set_pose pose = {
       .pose_map_base = {.p_m = {1, 2, 3}, .q_xyzw = {0, 0, 0.6, 0.8}}, .sigma_xy_m = 0.5, .sigma_heading_rad = 0.25};
   const size_t length = wm_lcm_set_pose(&pose, 77, bytes, sizeof bytes);
@@ -219,7 +216,7 @@ static const char *set_pose_with(double sigma_xy_m, double sigma_heading_rad) {
   return wm_lcm_read_set_pose(bytes, wm_lcm_set_pose(&pose, 1, bytes, sizeof bytes), &read);
 }
 
-static void sigmas_of_a_pose_have_limits(void) {
+TEST(sigmas_of_a_pose_have_limits) {
   TEST_ASSERT_NULL(set_pose_with(999999, 9.99));
   TEST_ASSERT_NULL(set_pose_with(1e-6, 1e-6));
   TEST_ASSERT_NOT_NULL(set_pose_with(1e6, 1));
@@ -240,7 +237,7 @@ static const char *read_one(const wm_event *sent) {
 }
 
 // By the table: each number is taken at its limits, and refused one step beyond.
-static void limits_of_a_sighting(void) {
+TEST(limits_of_a_sighting) {
   wm_event sent = {.t_ns = 1, .kind = WM_EVENT_SIGHTING};
   wm_sighting *s = &sent.as.sighting;
 #define TRY(member, value, is_good)     \
@@ -259,7 +256,7 @@ static void limits_of_a_sighting(void) {
 }
 
 // -1: a landmark without identity; anything below is a fault.
-static void identities_of_sightings(void) {
+TEST(identities_of_sightings) {
   wm_event sent = {.t_ns = 9, .kind = WM_EVENT_SIGHTING};
   sent.as.sighting = wm_sighting_without_numbers();
   sent.as.sighting.bearing_rad = 0.5;
@@ -284,7 +281,7 @@ static void identities_of_sightings(void) {
 }
 
 // A terminal obeys control characters: C0, DEL, and C1 in UTF-8.
-static void control_characters_of_names(void) {
+TEST(control_characters_of_names) {
   static wm_health h, read;
   h = (wm_health){.source_count = 1};
   const char name[] = "a\x01\x1f \x7f\xc2\x80\xc2\x9f\xc2\xa0\xc3\x80~";
@@ -297,7 +294,7 @@ static void control_characters_of_names(void) {
 }
 
 // Of 32 bits, with a sign in the message.
-static void counts_of_a_pose_that_wrap(void) {
+TEST(counts_of_a_pose_that_wrap) {
   const uint32_t counts[] = {INT32_MAX, (uint32_t)INT32_MAX + 1, UINT32_MAX, 0};
   for (size_t i = 0; i < sizeof counts / sizeof counts[0]; i++) {
     wm_published p = {.jumps = counts[i], .now = {.resets = counts[i], .dof = 3}}, read;
@@ -308,7 +305,7 @@ static void counts_of_a_pose_that_wrap(void) {
 }
 
 // Into a row that was used before: nothing of it stays.
-static void rows_of_streams(void) {
+TEST(rows_of_streams) {
   static const struct {
     const char *stream, *type;
     int numbers;
@@ -332,21 +329,4 @@ static void rows_of_streams(void) {
   TEST_ASSERT_NULL(wm_lcm_stream_type("of nobody"));
   TEST_ASSERT_EQUAL_STRING("is of no stream", wm_lcm_read_row("of nobody", bytes, sizeof bytes, &read));
   TEST_ASSERT_EQUAL(0, wm_lcm_row("of nobody", &read, bytes, sizeof bytes));
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(pose);
-  RUN_TEST(health);
-  RUN_TEST(a_full_health);
-  RUN_TEST(a_health_with_more_values_than_room);
-  RUN_TEST(innovation);
-  RUN_TEST(a_pose_that_is_set);
-  RUN_TEST(sigmas_of_a_pose_have_limits);
-  RUN_TEST(limits_of_a_sighting);
-  RUN_TEST(identities_of_sightings);
-  RUN_TEST(control_characters_of_names);
-  RUN_TEST(counts_of_a_pose_that_wrap);
-  RUN_TEST(rows_of_streams);
-  return UNITY_END();
 }

@@ -3,17 +3,14 @@
 #include <math.h>
 #include <string.h>
 
-#include "unity.h"
+#include "common/suite.h"
 #include "waymark/lcm_messages.h"
 #include "waymark/lcm_views.h"
 #include "waymark_map_t.h"
 
-void setUp(void) {}
-void tearDown(void) {}
-
 static uint8_t bytes[WM_LCM_MESSAGE_MAX];
 
-static void places_arrive_whole(void) {
+TEST(places_arrive_whole) {
   wm_place sent[WM_LCM_PLACES_MAX + 1], heard[WM_LCM_PLACES_MAX];
   for (size_t i = 0; i <= WM_LCM_PLACES_MAX; i++) {
     sent[i] = (wm_place){4e6 + (double)i, -0.25, 0.5, 0.125, {(double)NAN, 0, 0, 0, 0, 0.25}};
@@ -41,7 +38,7 @@ static void places_arrive_whole(void) {
 }
 
 // A short list behind a long one has the same bytes as before it.
-static void lists_forget_the_one_before(void) {
+TEST(lists_forget_the_one_before) {
   static uint8_t again[WM_LCM_MESSAGE_MAX];
   static wm_place many[WM_LCM_PLACES_MAX];
   for (size_t i = 0; i < WM_LCM_PLACES_MAX; i++) many[i] = (wm_place){1, 2, 3, 4, {5, 6, 7, 8, 9, 10}};
@@ -51,7 +48,7 @@ static void lists_forget_the_one_before(void) {
   TEST_ASSERT_EQUAL_MEMORY(bytes, again, length);
 }
 
-static void a_map_arrives_in_parts(void) {
+TEST(a_map_arrives_in_parts) {
   static wm_landmark sent[300], heard[WM_LCM_LANDMARKS_MAX];
   static double covariance[300][4];
   for (int i = 0; i < 300; i++) {
@@ -80,7 +77,7 @@ static void a_map_arrives_in_parts(void) {
   TEST_ASSERT_EQUAL(300, seen);
 }
 
-static void landmarks_are_read_as_they_were_sent(void) {
+TEST(landmarks_are_read_as_they_were_sent) {
   const wm_landmark sent[2] = {{.id = 4, .p_m = {1, 2, 3}, .sigma_m = 0.5}, {.id = -1}};
   wm_landmark heard[WM_LCM_LANDMARKS_MAX];
   wm_lcm_part part;
@@ -93,7 +90,7 @@ static void landmarks_are_read_as_they_were_sent(void) {
 }
 
 // A map of which nothing is known yet is an empty list, not a wrong one.
-static void an_empty_map_is_a_map(void) {
+TEST(an_empty_map_is_a_map) {
   wm_landmark heard[WM_LCM_LANDMARKS_MAX];
   wm_lcm_part part = {1, 2, 3, 4};
   static waymark_map_t m;
@@ -106,7 +103,7 @@ static void an_empty_map_is_a_map(void) {
   TEST_ASSERT_EQUAL_size_t(0, part.count);
 }
 
-static void counts_beyond_the_room_are_refused(void) {
+TEST(counts_beyond_the_room_are_refused) {
   wm_landmark heard[WM_LCM_LANDMARKS_MAX];
   wm_place places[WM_LCM_PLACES_MAX];
   wm_lcm_part part;
@@ -121,15 +118,4 @@ static void counts_beyond_the_room_are_refused(void) {
   }
   TEST_ASSERT_NOT_NULL(wm_lcm_read_map("", 0, &part, heard));
   TEST_ASSERT_NOT_NULL(wm_lcm_read_places("nothing of ours", 15, &part, places));
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(places_arrive_whole);
-  RUN_TEST(lists_forget_the_one_before);
-  RUN_TEST(a_map_arrives_in_parts);
-  RUN_TEST(landmarks_are_read_as_they_were_sent);
-  RUN_TEST(an_empty_map_is_a_map);
-  RUN_TEST(counts_beyond_the_room_are_refused);
-  return UNITY_END();
 }

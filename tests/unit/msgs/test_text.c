@@ -3,17 +3,14 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "unity.h"
+#include "common/suite.h"
 #include "waymark/event.h"
 #include "waymark/health.h"
 #include "waymark/look.h"
 #include "waymark/pose.h"
 #include "waymark/status.h"
 
-void setUp(void) {}
-void tearDown(void) {}
-
-static void each_status_has_its_text(void) {
+TEST(each_status_has_its_text) {
   for (unsigned a = 0; a < WM_STATUS_COUNT; a++) {
     const char *text = wm_status_text((wm_status)a);
     TEST_ASSERT_GREATER_THAN(1, strlen(text));
@@ -24,7 +21,7 @@ static void each_status_has_its_text(void) {
   TEST_ASSERT_EQUAL_STRING("?", wm_status_text((wm_status)WM_STATUS_COUNT));
 }
 
-static void errors_are_cut_to_their_room(void) {
+TEST(errors_are_cut_to_their_room) {
   wm_error err = {0};
   char word[2 * WM_ERROR_TEXT_MAX];
   memset(word, 'a', sizeof word - 1);
@@ -50,7 +47,7 @@ static void check_names(const char *(*name)(unsigned), unsigned count, const cha
   for (unsigned i = 1; i < count; i++) TEST_ASSERT_NOT_EQUAL(0, strcmp(name(i - 1), name(i)));
 }
 
-static void names_have_bounds(void) {
+TEST(names_have_bounds) {
   check_names(wm_quantity_name, WM_Q_COUNT, "wheel_ticks_left", "acceleration_z");
   check_names(wm_state_name, WM_STATE_COUNT, "searching", "degraded");
   check_names(wm_cause_name, WM_CAUSE_COUNT, "", "turn");
@@ -61,12 +58,12 @@ static void names_have_bounds(void) {
   check_names(wm_look_name, WM_LOOK_COUNT, "found", "ambiguous");
 }
 
-static void quantities_are_found_by_name(void) {
+TEST(quantities_are_found_by_name) {
   for (int i = 0; i < WM_Q_COUNT; i++) TEST_ASSERT_EQUAL(i, wm_quantity_find(wm_quantity_name((unsigned)i)));
   TEST_ASSERT_EQUAL(-1, wm_quantity_find("yaw"));
 }
 
-static void looks_are_counted_in_words(void) {
+TEST(looks_are_counted_in_words) {
   char out[200];
   uint64_t looks[WM_LOOK_COUNT] = {0};
   TEST_ASSERT_EQUAL(0, wm_looks_text(looks, out, sizeof out));
@@ -92,14 +89,4 @@ static void looks_are_counted_in_words(void) {
     TEST_ASSERT_EQUAL_STRING_LEN(out, less, used);
     TEST_ASSERT_EQUAL('\0', less[used]);
   }
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(each_status_has_its_text);
-  RUN_TEST(errors_are_cut_to_their_room);
-  RUN_TEST(names_have_bounds);
-  RUN_TEST(quantities_are_found_by_name);
-  RUN_TEST(looks_are_counted_in_words);
-  return UNITY_END();
 }

@@ -8,9 +8,9 @@
 #include "calibrate/bundle.h"
 #include "calibrate/corners.h"
 #include "calibrate/coverage.h"
+#include "common/suite.h"
 #include "render/patterns.h"
 #include "render/render.h"
-#include "unity.h"
 
 using namespace wm::calibrate;
 using wm::images::Camera;
@@ -18,9 +18,6 @@ using wm::images::Model;
 using wm::images::Pose;
 using wm::images::Vec3;
 using wm::tools::GreyPicture;
-
-void setUp() {}
-void tearDown() {}
 
 namespace {
 
@@ -113,7 +110,7 @@ void differ(const Camera &truth, const Camera &found, double widest, double *mea
   *mean_px = sum / std::max(1, n);
 }
 
-void test_fisheye_of_200_degrees() {
+TEST(test_fisheye_of_200_degrees) {
   Camera camera;
   camera.width = 800, camera.height = 600;
   camera.intrinsics = {221, 222, 404, 296};
@@ -140,7 +137,7 @@ void test_fisheye_of_200_degrees() {
   TEST_ASSERT_TRUE(complaints(*found, coverage).empty());
 }
 
-void test_plain_lens() {
+TEST(test_plain_lens) {
   Camera camera;
   camera.model = Model::pinhole_radtan;
   camera.width = 640, camera.height = 480;
@@ -165,7 +162,7 @@ void test_plain_lens() {
   TEST_ASSERT_DOUBLE_WITHIN(std::max(4 * sigma, 1.0), 520, plain->camera.intrinsics[0]);
 }
 
-void test_too_little_is_said() {
+TEST(test_too_little_is_said) {
   Camera camera;
   camera.width = 640, camera.height = 480;
   camera.intrinsics = {300, 300, 320, 240};
@@ -177,7 +174,7 @@ void test_too_little_is_said() {
   TEST_ASSERT_FALSE(calibrate_camera({}, 640, 480).has_value());
 }
 
-void test_no_board() {
+TEST(test_no_board) {
   GreyPicture blank{640, 480, std::vector<uint8_t>(640UL * 480UL, 128)};
   TEST_ASSERT_EQUAL(0, grow_chessboard(blank, 0, 0).size());
   for (size_t i = 0; i < blank.pixels.size(); i++) blank.pixels[i] = static_cast<uint8_t>((i * 2654435761U) >> 9);
@@ -187,12 +184,3 @@ void test_no_board() {
 }
 
 }  // namespace
-
-int main() {
-  UNITY_BEGIN();
-  RUN_TEST(test_fisheye_of_200_degrees);
-  RUN_TEST(test_plain_lens);
-  RUN_TEST(test_too_little_is_said);
-  RUN_TEST(test_no_board);
-  return UNITY_END();
-}

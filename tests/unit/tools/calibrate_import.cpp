@@ -9,14 +9,11 @@
 #include "calibrate/fit.h"
 #include "calibrate/foreign.h"
 #include "common/failure.h"
+#include "common/suite.h"
 #include "made.h"
-#include "unity.h"
 
 using namespace wm::calibrate;
 using wm::images::Model;
-
-void setUp() {}
-void tearDown() {}
 
 namespace {
 
@@ -55,7 +52,7 @@ const char *const kOpenCv =
     "distortion_coefficients: !!opencv-matrix\n   rows: 8\n   cols: 1\n   dt: d\n"
     "   data: [ 0.31, 0.12, 1.0e-03, -2.0e-03, 0.01, 0.62, 0.21, 0.03 ]\n";
 
-void test_opencv_rational() {
+TEST(test_opencv_rational) {
   const ForeignCamera camera = read(kOpenCv);
   TEST_ASSERT_FALSE(camera.same.has_value());
   rays_agree(camera, 0.7, [](const Vec3 &d) {
@@ -70,7 +67,7 @@ void test_opencv_rational() {
   TEST_ASSERT_GREATER_THAN_DOUBLE(1e-6, fit.max_px);
 }
 
-void test_opencv_xml_and_fisheye() {
+TEST(test_opencv_xml_and_fisheye) {
   const std::string xml =
       "<?xml version=\"1.0\"?>\n<!-- made at a desk -->\n<opencv_storage>\n<image_size>1280 720</image_size>\n"
       "<fisheye_model>1</fisheye_model>\n<K type_id=\"opencv-matrix\"><rows>3</rows><cols>3</cols><dt>d</dt>\n"
@@ -86,7 +83,7 @@ void test_opencv_xml_and_fisheye() {
   refused("camera.yaml:3: </D> closes", "<opencv_storage>\n<K>\n</D>");
 }
 
-void test_four_coefficients_need_a_word() {
+TEST(test_four_coefficients_need_a_word) {
   const std::string text = "K: [[500, 0, 320], [0, 500, 240], [0, 0, 1]]\nD: [0.1, 0.01, 0, 0]\nsize: [640, 480]\n";
   refused("camera.yaml:2: D: four coefficients", text);
   ImportHints hints;
@@ -96,7 +93,7 @@ void test_four_coefficients_need_a_word() {
   TEST_ASSERT_EQUAL(Model::equidistant, read(text, hints).same->model);
 }
 
-void test_skew_is_honoured() {
+TEST(test_skew_is_honoured) {
   const ForeignCamera camera =
       read("K: [500, 2.5, 320, 0, 510, 240, 0, 0, 1]\nD: [0.1, 0.01, 0, 0, 0]\nimage_size: [640, 480]\n");
   TEST_ASSERT_FALSE(camera.same.has_value());
@@ -106,7 +103,7 @@ void test_skew_is_honoured() {
   });
 }
 
-void test_kalibr() {
+TEST(test_kalibr) {
   const std::string head = "cam0:\n  cam_overlaps: [1]\n  resolution: [752, 480]\n  rostopic: /cam0\n  ";
   const ForeignCamera equi = read(head +
                                   "camera_model: pinhole\n  distortion_model: equidistant\n  intrinsics: [380, 381, "
@@ -142,7 +139,7 @@ void test_kalibr() {
           head + "camera_model: pinhole\n  distortion_model: radtan\n  intrinsics: [1, 2, 3, x]\n");
 }
 
-void test_ros() {
+TEST(test_ros) {
   const std::string text =
       "image_width: 640\nimage_height: 480\ncamera_name: head\ncamera_matrix:\n  rows: 3\n  cols: 3\n"
       "  data: [400, 0, 320, 0, 401, 240, 0, 0, 1]\ndistortion_model: MODEL\ndistortion_coefficients:\n  rows: 1\n"
@@ -183,7 +180,7 @@ const char *const kEcho1 =
     "K: [500.0, 0.0, 322.0, 0.0, 505.0, 241.0, 0.0, 0.0, 1.0]\nbinning_x: 0\nroi: \n  width: 0\n  do_rectify: False\n";
 
 // What `topic echo` prints: a document for each message, closed by a line of ---. The first one is taken.
-void test_topic_echo() {
+TEST(test_topic_echo) {
   for (const std::string echo : {kEcho1, kEcho2}) {
     std::string crlf;
     for (const char c : echo) crlf += c == '\n' ? std::string("\r\n") : std::string(1, c);
@@ -201,7 +198,7 @@ void test_topic_echo() {
   }
 }
 
-void test_camera_info_as_json() {
+TEST(test_camera_info_as_json) {
   const std::string json =
       "{\"header\": {\"frame_id\": \"front\"}, \"height\": 480, \"width\": 640, \"distortion_model\": \"plumb_bob\",\n"
       "\"D\": [-0.3, 0.11, 0.001, -0.0007, -0.02], \"K\": [500, 0, 322, 0, 505, 241, 0, 0, 1]}";
@@ -219,7 +216,7 @@ std::string ini_of(const std::string &distortion) {
 }
 
 // ost.ini and ost.txt of camera_calibration.
-void test_ros_ini() {
+TEST(test_ros_ini) {
   const ForeignCamera camera = read(ini_of("-0.3 0.11 0.001 -0.0007 -0.02"));
   is_pinhole(camera, kFive);
   TEST_ASSERT_EQUAL_STRING("front", camera.name.c_str());
@@ -240,7 +237,7 @@ std::string photon(const std::string &coefficients_name, const std::string &coef
 }
 
 // PhotonVision's export of a calibration, in the spellings of its versions, and a camera's settings with all of them.
-void test_photonvision() {
+TEST(test_photonvision) {
   const std::string five = "-0.3, 0.11, 0.001, -0.0007, -0.02";
   for (const char *name : {"distCoeffs", "cameraExtrinsics"}) {
     is_pinhole(read(photon(name, five)), kFive);
@@ -266,7 +263,7 @@ void test_photonvision() {
 }
 
 // Packed by gzip: the same file.
-void test_packed() {
+TEST(test_packed) {
   const made::Folder folder;
   const std::filesystem::path path = folder.path() / "ost.yaml.gz";
   gzFile out = gzopen(path.c_str(), "wb");
@@ -287,7 +284,7 @@ const char *const kOcam =
     "-6.474789e-007 1.235631e-009\n\n#inverse\n\n1 0\n\n#center: \"row\" and \"column\"\n\n381.777786 505.480427\n\n"
     "#affine\n\n1.001 0.002 -0.001\n\n#image size: \"height\" and \"width\"\n\n768 1024\n";
 
-void test_ocamcalib() {
+TEST(test_ocamcalib) {
   const ForeignCamera camera = read(kOcam);
   TEST_ASSERT_EQUAL(1024, camera.width);
   // Its own forward way: rho along the ray by bisection of the polynomial, then the affine map to (row, column).
@@ -307,14 +304,14 @@ void test_ocamcalib() {
   refused("camera.yaml:3: 'x' is not a number", "#polynomial\n\n5 x\n");
 }
 
-void test_what_is_no_calibration() {
+TEST(test_what_is_no_calibration) {
   refused("no camera matrix", "a: 1\n");
   refused("is a calibration.yaml already", "cameras:\n  front: {model: equidistant}\n");
   refused("give --size WIDTHxHEIGHT", "K: [500, 0, 320, 0, 500, 240, 0, 0, 1]\n");
   refused("KEY: VALUE lines are needed", "[1, 2]\n");
 }
 
-void test_a_fit_to_the_same_model_is_exact() {
+TEST(test_a_fit_to_the_same_model_is_exact) {
   wm::images::Camera camera;
   camera.intrinsics = {-0.18, 0.62, 310, 312, 640, 360};
   camera.model = Model::double_sphere;
@@ -330,7 +327,7 @@ std::filesystem::path real_file() {
   return std::filesystem::path(data == nullptr ? "" : data) / "pictures/fisheye-ocamcalib/calib_results_fisheye.txt";
 }
 
-void test_real_ocamcalib() {
+TEST(test_real_ocamcalib) {
   const bool is_there = std::filesystem::exists(real_file());  // ignoring a test leaves without destructors
   if (!is_there) TEST_IGNORE_MESSAGE("the optional pictures are not there");
   const ForeignCamera camera = read_foreign(real_file(), {}).at(0);
@@ -349,23 +346,3 @@ void test_real_ocamcalib() {
 }
 
 }  // namespace
-
-int main() {
-  UNITY_BEGIN();
-  RUN_TEST(test_opencv_rational);
-  RUN_TEST(test_opencv_xml_and_fisheye);
-  RUN_TEST(test_four_coefficients_need_a_word);
-  RUN_TEST(test_skew_is_honoured);
-  RUN_TEST(test_kalibr);
-  RUN_TEST(test_ros);
-  RUN_TEST(test_topic_echo);
-  RUN_TEST(test_camera_info_as_json);
-  RUN_TEST(test_ros_ini);
-  RUN_TEST(test_photonvision);
-  RUN_TEST(test_packed);
-  RUN_TEST(test_ocamcalib);
-  RUN_TEST(test_what_is_no_calibration);
-  RUN_TEST(test_a_fit_to_the_same_model_is_exact);
-  RUN_TEST(test_real_ocamcalib);
-  return UNITY_END();
-}

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "common/failure.h"
-#include "unity.h"
+#include "common/suite.h"
 #include "waymark/random.h"
 
 namespace {
@@ -102,7 +102,7 @@ std::vector<MountingScan> drive() {
   return out;
 }
 
-void what_was_believed_wrongly_is_found(void) {
+TEST(what_was_believed_wrongly_is_found) {
   const wm::calibrate::Mounting m = wm::calibrate::find_mounting(drive(), map, camera);
   const double truth[wm::calibrate::kMountingErrors] = {kPitch, 0, kYaw, kHigher_m, kOlder_s, 0, kScale, kBias};
   const double most[wm::calibrate::kMountingErrors] = {0.002, 0.002, 0.002, 0.004, 0.008, 0.01, 0.005, 0.001};
@@ -117,7 +117,7 @@ void what_was_believed_wrongly_is_found(void) {
   TEST_ASSERT_GREATER_THAN_DOUBLE(0.9, m.explained);
 }
 
-void too_short_a_drive_is_refused(void) {
+TEST(too_short_a_drive_is_refused) {
   std::vector<MountingScan> scans = drive();
   scans.resize(30);
   const auto too_few = [&] {
@@ -133,10 +133,7 @@ void too_short_a_drive_is_refused(void) {
 
 }  // namespace
 
-void setUp(void) {}
-void tearDown(void) {}
-
-int main(void) {
+int suite_begin(int, char **) {
   for (const Segment &w : kWalls)
     for (int i = 0; i <= 4000; i++) {
       const auto column = static_cast<size_t>((w.ax + (w.bx - w.ax) * i / 4000) / kPixel_m);
@@ -150,8 +147,5 @@ int main(void) {
   camera.intrinsics_count = 4;
   camera.intrinsics[0] = camera.intrinsics[1] = 520;
   camera.mounting = {{1.0, 0, 0.4}, {0, 0.38, 0}};
-  UNITY_BEGIN();
-  RUN_TEST(what_was_believed_wrongly_is_found);
-  RUN_TEST(too_short_a_drive_is_refused);
-  return UNITY_END();
+  return SUITE_RUNS;
 }

@@ -11,16 +11,13 @@
 #include "calibrate/lens.h"
 #include "calibrate/rig.h"
 #include "common/failure.h"
+#include "common/suite.h"
 #include "common/trials.h"
-#include "unity.h"
 #include "waymark/random.h"
 
 using namespace wm::calibrate;
 using wm::images::Camera;
 using wm::images::Pose;
-
-void setUp() {}
-void tearDown() {}
 
 namespace {
 
@@ -64,7 +61,7 @@ void lens_agrees() {
   TEST_ASSERT_GREATER_THAN(200, shown);
 }
 
-void test_lens_functions_are_those_of_the_renderer() {
+TEST(test_lens_functions_are_those_of_the_renderer) {
   lens_agrees<Model::equidistant>();
   lens_agrees<Model::pinhole_radtan>();
   lens_agrees<Model::omni>();
@@ -142,7 +139,7 @@ double errors_over_sigmas(Model model) {
   return std::sqrt(squares / n);
 }
 
-void test_errors_are_as_large_as_their_sigmas() {
+TEST(test_errors_are_as_large_as_their_sigmas) {
   // The pixels of the double sphere's trials depend on each other: less than 40 are no statistic.
   const bool all = trials >= 40;
   for (const Model model : {Model::equidistant, Model::pinhole_radtan, Model::double_sphere}) {
@@ -161,7 +158,7 @@ std::vector<size_t> all_shots(const Calibration &c) {
   return out;
 }
 
-void test_a_pair_and_its_mounting() {
+TEST(test_a_pair_and_its_mounting) {
   const Camera left = camera_of(Model::equidistant), right = camera_of(Model::pinhole_radtan);
   Pose T_left_right = Pose::Identity();
   T_left_right.linear() = Eigen::AngleAxisd(0.05, Vec3(0.3, 1, 0.2).normalized()).toRotationMatrix();
@@ -199,7 +196,7 @@ void test_a_pair_and_its_mounting() {
   TEST_ASSERT_GREATER_THAN_DOUBLE(kFloor_m, rig.base_sigma_m);
 }
 
-void test_what_a_pair_lacks_is_said() {
+TEST(test_what_a_pair_lacks_is_said) {
   const Camera camera = camera_of(Model::equidistant);
   wm_random noise{5, 1, 0};
   std::vector<View> views;
@@ -226,13 +223,8 @@ void test_what_a_pair_lacks_is_said() {
 }  // namespace
 
 // calibrate_solver [TRIALS]
-int main(int argc, char **argv) {
+int suite_begin(int argc, char **argv) {
   if (argc > 1) trials = std::atoi(argv[1]);
   trials = static_cast<int>(wm_trials(static_cast<uint64_t>(trials), 10));
-  UNITY_BEGIN();
-  RUN_TEST(test_lens_functions_are_those_of_the_renderer);
-  RUN_TEST(test_errors_are_as_large_as_their_sigmas);
-  RUN_TEST(test_a_pair_and_its_mounting);
-  RUN_TEST(test_what_a_pair_lacks_is_said);
-  return UNITY_END();
+  return SUITE_RUNS;
 }

@@ -2,8 +2,8 @@
 // Points on the floor joined to polylines in the picture.
 #include <cmath>
 
+#include "common/suite.h"
 #include "detect/polylines.h"
-#include "unity.h"
 
 namespace {
 
@@ -17,7 +17,7 @@ void add(double x, double y, double normal) {
   points.sigma_m[points.count++] = 0.005F;
 }
 
-void a_corner_and_a_step() {
+TEST(a_corner_and_a_step) {
   for (int i = 0; i < 40; i++) add(3, -1 + 0.03 * i, 0);    // ahead
   for (int i = 0; i < 10; i++) add(4, 0.25 + 0.03 * i, 0);  // a metre behind it
   add(2, 1, 0);                                             // alone
@@ -31,7 +31,7 @@ void a_corner_and_a_step() {
   TEST_ASSERT_DOUBLE_WITHIN(0.01, at.v, lines[0][0].v);
 }
 
-void nothing_to_join() { TEST_ASSERT_EQUAL(0, wm::tools::join_points(points, camera).size()); }
+TEST(nothing_to_join) { TEST_ASSERT_EQUAL(0, wm::tools::join_points(points, camera).size()); }
 
 }  // namespace
 
@@ -44,12 +44,4 @@ void setUp() {
   std::copy(intrinsics, intrinsics + 4, c.intrinsics);
   c.mounting = {{0.5, 0, 0.4}, {0, 22 * M_PI / 180, 0}};
   TEST_ASSERT_NULL(wm::mounted_camera_init(&camera, c));
-}
-void tearDown() {}
-
-int main() {
-  UNITY_BEGIN();
-  RUN_TEST(a_corner_and_a_step);
-  RUN_TEST(nothing_to_join);
-  return UNITY_END();
 }

@@ -4,14 +4,11 @@
 #include <nlohmann/json.hpp>
 
 #include "common/failure.h"
+#include "common/suite.h"
 #include "eval/detector.h"
 #include "made.h"
-#include "unity.h"
 
 using namespace wm::tools;
-
-void setUp() {}
-void tearDown() {}
 
 namespace {
 
@@ -24,7 +21,7 @@ void expect(const Figures &f, const char *key, double value, double within = 1e-
   TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(within, value, f.at(key).get<double>(), key);
 }
 
-void test_region_is_a_rectangle_along_the_link() {
+TEST(test_region_is_a_rectangle_along_the_link) {
   const Polyline link = line(100, 100, 200, 100);
   TEST_ASSERT_TRUE(touches_region(line(150, 108, 150, 300), link, 9));
   TEST_ASSERT_FALSE(touches_region(line(150, 110, 150, 300), link, 9));
@@ -40,7 +37,7 @@ void test_region_is_a_rectangle_along_the_link() {
         touches_region(line(20 * c - off * s, 20 * s + off * c, 60 * c - off * s, 60 * s + off * c), sloped, 9));
 }
 
-void test_right_false_missed() {
+TEST(test_right_false_missed) {
   const FramePolylines truth{{0, {line(100, 100, 200, 100), line(100, 300, 200, 300)}}, {10, {line(0, 0, 50, 0)}}};
   const FramePolylines detected{{0, {line(100, 104, 150, 104), line(100, 500, 140, 500)}}, {5, {line(0, 0, 9, 9)}}};
   const Figures f = detector_figures(truth, detected, kMetric);
@@ -54,7 +51,7 @@ void test_right_false_missed() {
   expect(f, "length_recall", (50 + std::sqrt(81.0 - 16)) / 250, 0.01);
 }
 
-void test_left_out_is_neither_right_nor_wrong() {
+TEST(test_left_out_is_neither_right_nor_wrong) {
   const FramePolylines truth{{0, {line(100, 100, 120, 100), line(600, 100, 700, 100), line(0, 200, 100, 200)}}};
   const FramePolylines detected{{0, {line(100, 100, 120, 100), line(600, 100, 650, 100), line(0, 200, 100, 200)}}};
   DetectorMetric metric = kMetric;
@@ -70,7 +67,7 @@ void test_left_out_is_neither_right_nor_wrong() {
   expect(f, "length_recall", 1);
 }
 
-void test_nothing_detected_or_nothing_true() {
+TEST(test_nothing_detected_or_nothing_true) {
   const FramePolylines some{{0, {line(0, 0, 100, 0)}}}, none{{0, {}}};
   Figures f = detector_figures(some, none, kMetric);
   TEST_ASSERT_TRUE(f["precision"].is_null());
@@ -80,7 +77,7 @@ void test_nothing_detected_or_nothing_true() {
   TEST_ASSERT_TRUE(f["recall"].is_null());
 }
 
-void test_a_zigzag_over_the_picture_loses_by_length() {
+TEST(test_a_zigzag_over_the_picture_loses_by_length) {
   Polyline zigzag;
   for (int i = 0; i <= 64; i++) zigzag.emplace_back(20.0 * i, i % 2 == 0 ? 0 : 720);
   const FramePolylines truth{{0, {line(100, 400, 600, 380), line(700, 300, 1200, 420), line(640, 100, 660, 300)}}};
@@ -90,7 +87,7 @@ void test_a_zigzag_over_the_picture_loses_by_length() {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.2, f["length_precision"].get<double>());
 }
 
-void test_file_is_read_and_its_mistakes_are_named() {
+TEST(test_file_is_read_and_its_mistakes_are_named) {
   const made::Folder folder;
   folder.write("edges.csv", "frame,polyline,u_px,v_px\n0,0,1,2\n0,0,3,4\n0,1,5,6\n10,,,\n20,0,7,8\n");
   const FramePolylines lines = load_polylines(folder.path() / "edges.csv");
@@ -109,14 +106,3 @@ void test_file_is_read_and_its_mistakes_are_named() {
 }
 
 }  // namespace
-
-int main() {
-  UNITY_BEGIN();
-  RUN_TEST(test_region_is_a_rectangle_along_the_link);
-  RUN_TEST(test_right_false_missed);
-  RUN_TEST(test_left_out_is_neither_right_nor_wrong);
-  RUN_TEST(test_nothing_detected_or_nothing_true);
-  RUN_TEST(test_a_zigzag_over_the_picture_loses_by_length);
-  RUN_TEST(test_file_is_read_and_its_mistakes_are_named);
-  return UNITY_END();
-}

@@ -4,13 +4,8 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "common/suite.h"
 #include "eval/lines.h"
-
-extern "C" {
-#include "unity.h"
-void setUp(void);
-void tearDown(void);
-}
 
 using namespace wm::tools;
 
@@ -29,7 +24,7 @@ LinePicture picture(double turn_deg) {
   return p;
 }
 
-void test_found_right_and_false() {
+TEST(test_found_right_and_false) {
   const Figures f = line_figures({picture(0), picture(0)}, 0.5 * kDeg);
   TEST_ASSERT_EQUAL(20, f["labelled"].get<int>());
   TEST_ASSERT_EQUAL(16, f["with_contrast"].get<int>());
@@ -42,14 +37,14 @@ void test_found_right_and_false() {
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.1, f["azimuth_rms_deg"].get<double>());
 }
 
-void test_a_turned_mounting_is_told_and_loses_no_line() {
+TEST(test_a_turned_mounting_is_told_and_loses_no_line) {
   const Figures f = line_figures({picture(0.8), picture(0.8)}, 0.5 * kDeg);
   TEST_ASSERT_EQUAL(14, f["found"].get<int>());
   TEST_ASSERT_DOUBLE_WITHIN(0.11, 0.8, f["common_turn_deg"].get<double>());
   TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.8, f["azimuth_rms_deg"].get<double>());
 }
 
-void test_lines_beside_each_other_may_share_a_sighting() {
+TEST(test_lines_beside_each_other_may_share_a_sighting) {
   LinePicture p;
   p.labels = {{1, 0, true}, {2, 0.3 * kDeg, true}};
   p.seen = {{7, 0.1 * kDeg, std::numeric_limits<double>::quiet_NaN()}};
@@ -59,7 +54,7 @@ void test_lines_beside_each_other_may_share_a_sighting() {
   TEST_ASSERT_TRUE(f["normalised_rms"].is_null());
 }
 
-void test_nothing_seen_is_no_figure() {
+TEST(test_nothing_seen_is_no_figure) {
   LinePicture p;
   p.labels = {{1, 0, true}};
   const Figures f = line_figures({p}, 0.5 * kDeg);
@@ -70,15 +65,3 @@ void test_nothing_seen_is_no_figure() {
 }
 
 }  // namespace
-
-void setUp() {}
-void tearDown() {}
-
-int main() {
-  UNITY_BEGIN();
-  RUN_TEST(test_found_right_and_false);
-  RUN_TEST(test_a_turned_mounting_is_told_and_loses_no_line);
-  RUN_TEST(test_lines_beside_each_other_may_share_a_sighting);
-  RUN_TEST(test_nothing_seen_is_no_figure);
-  return UNITY_END();
-}

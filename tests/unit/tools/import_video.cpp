@@ -13,8 +13,8 @@ extern "C" {
 }
 
 #include "common/failure.h"
+#include "common/suite.h"
 #include "import/import.h"
-#include "unity.h"
 #include "waymark/video.h"
 
 namespace {
@@ -130,7 +130,7 @@ void refused(const wm::tools::ImportWish &wish, const char *text) {
   }
 }
 
-void the_containers_stamps_where_there_are_no_others() {
+TEST(the_containers_stamps_where_there_are_no_others) {
   const wm::tools::Imported made = wm::tools::import_video(wish_to("plain"));
   TEST_ASSERT_EQUAL(kPictures, made.pictures);
   TEST_ASSERT_EQUAL(0, made.damaged);
@@ -138,7 +138,7 @@ void the_containers_stamps_where_there_are_no_others() {
   judge(folder / "plain", 7'000'000'000, 8'100'000'000, 0);
 }
 
-void a_csv_of_stamps_is_kept_as_it_is() {
+TEST(a_csv_of_stamps_is_kept_as_it_is) {
   wm::tools::ImportWish wish = wish_to("stamped");
   wish.stamps = folder / "stamps.csv";
   write_stamps(wish.stamps, kPictures);
@@ -146,7 +146,7 @@ void a_csv_of_stamps_is_kept_as_it_is() {
   judge(folder / "stamped", 5'000'000'000, 6'000'000'070, 4'000'000);
 }
 
-void what_does_not_agree_is_said_and_leaves_nothing() {
+TEST(what_does_not_agree_is_said_and_leaves_nothing) {
   wm::tools::ImportWish wish = wish_to("refused");
   wish.stamps = folder / "short.csv";
   write_stamps(wish.stamps, kPictures - 1);
@@ -164,7 +164,7 @@ void what_does_not_agree_is_said_and_leaves_nothing() {
 }
 
 // libav draws these as pictures of letters; others it can't read at all.
-void text_is_no_video() {
+TEST(text_is_no_video) {
   struct Row {
     const char *name, *says;
   };
@@ -185,20 +185,12 @@ void text_is_no_video() {
 
 }  // namespace
 
-extern "C" void setUp() {}
-extern "C" void tearDown() {}
-
-int main() {
+int suite_begin(int, char **) {
   folder = fs::temp_directory_path() / ("import_video_" + std::to_string(getpid()));
   fs::create_directories(folder);
   av_log_set_level(AV_LOG_FATAL);
-  UNITY_BEGIN();
   encode(folder / "drive.mp4");
-  RUN_TEST(the_containers_stamps_where_there_are_no_others);
-  RUN_TEST(a_csv_of_stamps_is_kept_as_it_is);
-  RUN_TEST(what_does_not_agree_is_said_and_leaves_nothing);
-  RUN_TEST(text_is_no_video);
-  const int failed = UNITY_END();
-  fs::remove_all(folder);
-  return failed;
+  return SUITE_RUNS;
 }
+
+void suite_end() { fs::remove_all(folder); }

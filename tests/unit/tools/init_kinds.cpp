@@ -8,17 +8,14 @@
 #include <fstream>
 
 #include "common/failure.h"
+#include "common/suite.h"
 #include "init/files.h"
 #include "init/nmea2000.h"
 #include "init/robot.h"
 #include "made.h"
-#include "unity.h"
 #include "waymark/recording.h"
 
 using namespace wm::init;
-
-void setUp() {}
-void tearDown() {}
 
 namespace {
 
@@ -60,7 +57,7 @@ struct Noted {
   const char *type, *place, *text;  // "": no such note
 };
 
-void test_urdfs_that_are_not_meant_so() {
+TEST(test_urdfs_that_are_not_meant_so) {
   if (!can_read_urdf()) TEST_IGNORE_MESSAGE("this build reads no URDF");
   const char *const kPlain = "<origin xyz=\"0.3 0 0.5\" rpy=\"0 0.35 0\"/>";
   const Noted kRows[] = {
@@ -90,7 +87,7 @@ void test_urdfs_that_are_not_meant_so() {
   }
 }
 
-void test_a_wheel_in_millimetres() {
+TEST(test_a_wheel_in_millimetres) {
   if (!can_read_urdf()) TEST_IGNORE_MESSAGE("this build reads no URDF");
   std::string urdf = urdf_of("fixed", "");
   urdf.insert(
@@ -133,7 +130,7 @@ Robot proposed(const std::string &dbc, const std::string &log, const made::Folde
   return robot;
 }
 
-void test_j1939_is_bound_by_its_pgn() {
+TEST(test_j1939_is_bound_by_its_pgn) {
   for (const char *speed : {"18FEF1FE", "18FEF100", "0CFEF117"}) {
     const made::Folder folder;
     const Robot robot = proposed(kDbc, log_of(speed, "18F0090B", false), folder);
@@ -143,7 +140,7 @@ void test_j1939_is_bound_by_its_pgn() {
   }
 }
 
-void test_ids_that_differ_are_named() {
+TEST(test_ids_that_differ_are_named) {
   const made::Folder folder;
   const Robot robot = proposed(
       "BO_ 256 DRIVE: 8 X\n SG_ VEHICLE_SPEED : 8|16@1+ (0.00390625,0) [0|250.996] \"km/h\" X\n"
@@ -156,7 +153,7 @@ void test_ids_that_differ_are_named() {
       TEST_ASSERT_EQUAL_STRING("no frame of it is in the log, but 400 of 00000100 (29 bits)", one.refused.c_str());
 }
 
-void test_differences_are_summed_up() {
+TEST(test_differences_are_summed_up) {
   const made::Folder folder;
   const Robot robot = proposed(kDbc, log_of("18FEF100", "18F0090B", true), folder);
   TEST_ASSERT_TRUE(robot.binds(WM_Q_YAW_RATE));
@@ -189,7 +186,7 @@ std::string boat() {
   return out;
 }
 
-void test_nmea2000_needs_no_dbc() {
+TEST(test_nmea2000_needs_no_dbc) {
   const made::Folder folder;
   Robot robot = proposed("", boat(), folder);
   for (const unsigned quantity : {static_cast<unsigned>(WM_Q_VEHICLE_SPEED), static_cast<unsigned>(WM_Q_YAW_RATE),
@@ -222,7 +219,7 @@ void test_nmea2000_needs_no_dbc() {
   wm_can_decoder_free(decoder);
 }
 
-void test_a_log_without_nmea2000_needs_its_dbc() {
+TEST(test_a_log_without_nmea2000_needs_its_dbc) {
   const made::Folder folder;
   try {
     (void)proposed("", log_of("18FEF100", "18F0090B", false), folder);
@@ -234,15 +231,3 @@ void test_a_log_without_nmea2000_needs_its_dbc() {
 }
 
 }  // namespace
-
-int main() {
-  UNITY_BEGIN();
-  RUN_TEST(test_urdfs_that_are_not_meant_so);
-  RUN_TEST(test_a_wheel_in_millimetres);
-  RUN_TEST(test_j1939_is_bound_by_its_pgn);
-  RUN_TEST(test_ids_that_differ_are_named);
-  RUN_TEST(test_differences_are_summed_up);
-  RUN_TEST(test_nmea2000_needs_no_dbc);
-  RUN_TEST(test_a_log_without_nmea2000_needs_its_dbc);
-  return UNITY_END();
-}

@@ -8,16 +8,13 @@
 #include <memory>
 
 #include "common/failure.h"
+#include "common/suite.h"
 #include "init/files.h"
 #include "init/questions.h"
 #include "made.h"
-#include "unity.h"
 #include "waymark/recording.h"
 
 using namespace wm::init;
-
-void setUp() {}
-void tearDown() {}
 
 namespace {
 
@@ -239,7 +236,7 @@ const BadInput kTable[] = {
 
 bool is_built(Kind kind) { return kind != kUrdf || can_read_urdf(); }
 
-void each_gives_its_message() {
+TEST(each_gives_its_message) {
   for (const BadInput &bad : kTable) {
     if (!is_built(bad.kind)) continue;
     TEST_ASSERT_EQUAL_STRING_MESSAGE(bad.message, message_of(bad.kind, bad.input).c_str(), bad.name);
@@ -284,7 +281,7 @@ std::string damaged(std::string text, Random &random) {
 
 constexpr int kMutations = 200;
 
-void damage_is_named_or_harmless() {
+TEST(damage_is_named_or_harmless) {
   for (const Kind kind : {kUrdf, kCamchain, kLayout, kDbc, kLog}) {
     if (!is_built(kind)) continue;
     const std::string text = good(kind);
@@ -326,10 +323,7 @@ int print_markdown() {
 
 }  // namespace
 
-int main(int argc, char **argv) {
+int suite_begin(int argc, char **argv) {
   if (argc > 1 && std::strcmp(argv[1], "--markdown") == 0) return print_markdown();
-  UNITY_BEGIN();
-  RUN_TEST(each_gives_its_message);
-  RUN_TEST(damage_is_named_or_harmless);
-  return UNITY_END();
+  return SUITE_RUNS;
 }

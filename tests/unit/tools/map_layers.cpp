@@ -4,16 +4,13 @@
 #include <cstring>
 
 #include "common/failure.h"
+#include "common/suite.h"
 #include "images/pictures.h"
 #include "made.h"
 #include "map/check.h"
 #include "map/layers.h"
-#include "unity.h"
 
 using namespace wm::tools;
-
-void setUp() {}
-void tearDown() {}
 
 namespace {
 
@@ -53,7 +50,7 @@ void refused(const char *message, const Plan &plan, const LayerOptions &options)
   TEST_FAIL_MESSAGE(message);
 }
 
-void test_rooms_walls_and_edges() {
+TEST(test_rooms_walls_and_edges) {
   const Plan plan = plan_of(building(false));
   const Layers m = make_layers(plan, {});
   TEST_ASSERT_EQUAL(800, m.width);  // 0.05 m becomes 0.0125
@@ -75,7 +72,7 @@ void test_rooms_walls_and_edges() {
   TEST_ASSERT_EQUAL(60, faces);
 }
 
-void test_a_door_joins_and_inside_chooses() {
+TEST(test_a_door_joins_and_inside_chooses) {
   TEST_ASSERT_EQUAL(1, make_layers(plan_of(building(true)), {}).rooms);
   const Plan plan = plan_of(building(false));
   LayerOptions options;
@@ -89,7 +86,7 @@ void test_a_door_joins_and_inside_chooses() {
   refused("outside of the map", plan, options);
 }
 
-void test_clearance() {
+TEST(test_clearance) {
   const Plan plan = plan_of(building(false));
   LayerOptions options;
   options.clearance_m = 0.3;
@@ -98,7 +95,7 @@ void test_clearance() {
   TEST_ASSERT_TRUE(drivable_at(m, plan, -0.8 + 0.36, 4));
 }
 
-void test_grey_rims_are_half_walls() {
+TEST(test_grey_rims_are_half_walls) {
   // A wall's face in the middle of a pixel: the grey rim puts it there.
   GreyPicture p = building(false);
   for (int y = 24; y < 96; y++) p.pixels[static_cast<size_t>(y * 200 + 24)] = 128;
@@ -109,7 +106,7 @@ void test_grey_rims_are_half_walls() {
       TEST_ASSERT_DOUBLE_WITHIN(0.0126, -0.8 + 0.025, map_of(m, plan, x, 330).x());
 }
 
-void test_what_is_no_plan() {
+TEST(test_what_is_no_plan) {
   GreyPicture white{50, 40, std::vector<uint8_t>(2000, 255)};
   refused("no wall", plan_of(white), {});
   GreyPicture black{50, 40, std::vector<uint8_t>(2000, 0)};
@@ -120,7 +117,7 @@ void test_what_is_no_plan() {
   refused("400 million", huge, options);
 }
 
-void test_a_turned_origin_there_and_back() {
+TEST(test_a_turned_origin_there_and_back) {
   Plan plan = plan_of(building(true));
   plan.origin_yaw_rad = 0.7;
   const Layers m = make_layers(plan, {});
@@ -129,7 +126,7 @@ void test_a_turned_origin_there_and_back() {
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0, (map_of(m, plan, -0.5, m.height - 0.5) - Eigen::Vector2d(-2, 1)).norm());
 }
 
-void test_check_says_what_is_wrong() {
+TEST(test_check_says_what_is_wrong) {
   const made::Folder folder;
   const Plan plan = plan_of(building(true));
   const Layers m = make_layers(plan, {});
@@ -155,15 +152,3 @@ void test_check_says_what_is_wrong() {
 }
 
 }  // namespace
-
-int main() {
-  UNITY_BEGIN();
-  RUN_TEST(test_rooms_walls_and_edges);
-  RUN_TEST(test_a_door_joins_and_inside_chooses);
-  RUN_TEST(test_clearance);
-  RUN_TEST(test_grey_rims_are_half_walls);
-  RUN_TEST(test_what_is_no_plan);
-  RUN_TEST(test_a_turned_origin_there_and_back);
-  RUN_TEST(test_check_says_what_is_wrong);
-  return UNITY_END();
-}

@@ -5,8 +5,8 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "common/suite.h"
 #include "made.h"
-#include "unity.h"
 
 namespace {
 
@@ -52,7 +52,7 @@ std::string good(int from, int until, int id = 1) {
   return rows;
 }
 
-void test_a_good_run() {
+TEST(test_a_good_run) {
   const Survey s = of(good(0, 50) + good(50, 100, 2));
   TEST_ASSERT_EQUAL_MESSAGE(0, s.findings(), survey_table(s).c_str());
   TEST_ASSERT_EQUAL(2, s.landmarks.size());
@@ -64,7 +64,7 @@ void test_a_good_run() {
   TEST_ASSERT_EQUAL(2, survey_json(s)["landmarks"].size());
 }
 
-void test_one_that_moved() {
+TEST(test_one_that_moved) {
   std::string rows = good(0, 40, 2) + good(40, 60);
   for (int i = 60; i < 72; i++) rows += marker(i, 1, 1.2, -0.9, "gate");
   const Survey s = of(rows + good(72, 100));
@@ -72,7 +72,7 @@ void test_one_that_moved() {
   TEST_ASSERT_EQUAL(0, s.landmarks[1].findings.size());
 }
 
-void test_one_that_comes_and_goes() {
+TEST(test_one_that_comes_and_goes) {
   std::string rows = good(0, 40, 2) + good(40, 60);
   for (int turn = 0; turn < 2; turn++) {
     for (int i = 0; i < 12; i++) rows += marker(60 + 40 * turn + i, 1, 1.2, -0.9, "gate");
@@ -81,13 +81,13 @@ void test_one_that_comes_and_goes() {
   found(of(rows), 0, "two of one identity");
 }
 
-void test_two_of_one_identity_in_a_picture() {
+TEST(test_two_of_one_identity_in_a_picture) {
   std::string rows = good(0, 40, 2);
   for (int i = 40; i < 80; i++) rows += good(i, i + 1) + marker(i, 1, 0, 0, "no_association");
   found(of(rows), 0, "40 sightings while the same identity was elsewhere");
 }
 
-void test_misread_ones_and_the_unseen() {
+TEST(test_misread_ones_and_the_unseen) {
   std::string rows = good(0, 40);
   for (int i = 0; i < 5; i++) rows += marker(50 + 2 * i, 1, 2, 1, "gate") + good(51 + 2 * i, 52 + 2 * i);
   const Survey s = of(rows + marker(90, 77, 0, 0, "fused"));
@@ -96,24 +96,10 @@ void test_misread_ones_and_the_unseen() {
   found(s, 2, "seen 1 times only");
 }
 
-void test_what_fits_worse_than_it_should() {
+TEST(test_what_fits_worse_than_it_should) {
   std::string rows = good(0, 40, 2);
   for (int i = 0; i < 40; i++) rows += marker(i, 1, i % 2 ? 0.03 : -0.03, 0, "fused");
   found(of(rows), 0, "x fits worse than it should: 3.0 sigma");
 }
 
 }  // namespace
-
-void setUp() {}
-void tearDown() {}
-
-int main() {
-  UNITY_BEGIN();
-  RUN_TEST(test_a_good_run);
-  RUN_TEST(test_one_that_moved);
-  RUN_TEST(test_one_that_comes_and_goes);
-  RUN_TEST(test_two_of_one_identity_in_a_picture);
-  RUN_TEST(test_misread_ones_and_the_unseen);
-  RUN_TEST(test_what_fits_worse_than_it_should);
-  return UNITY_END();
-}

@@ -5,7 +5,7 @@
 #include <cstdio>
 
 #include "common/failure.h"
-#include "unity.h"
+#include "common/suite.h"
 
 namespace {
 
@@ -13,7 +13,7 @@ using namespace wm::tools;
 
 bool has(const std::string &pdf, const char *text) { return pdf.find(text) != std::string::npos; }
 
-void a_sheet_is_a_pdf_of_true_size() {
+TEST(a_sheet_is_a_pdf_of_true_size) {
   MarkerSheet sheet;
   sheet.ids = {3};
   sheet.size_m = 0.18;
@@ -31,7 +31,7 @@ void a_sheet_is_a_pdf_of_true_size() {
   TEST_ASSERT_EQUAL_STRING_LEN("xref", pdf.c_str() + std::stoul(pdf.substr(at + 10)), 4);
 }
 
-void many_small_ones_share_a_page_and_families_differ() {
+TEST(many_small_ones_share_a_page_and_families_differ) {
   MarkerSheet sheet;
   sheet.ids = ids_of("1-20,25");
   TEST_ASSERT_EQUAL(21, sheet.ids.size());
@@ -57,7 +57,7 @@ void refused(const MarkerSheet &sheet, const char *says) {
   TEST_FAIL_MESSAGE(says);
 }
 
-void what_cannot_be_printed_is_said() {
+TEST(what_cannot_be_printed_is_said) {
   MarkerSheet sheet;
   sheet.ids = {1};
   sheet.size_m = 0.28;
@@ -83,14 +83,3 @@ void what_cannot_be_printed_is_said() {
 }
 
 }  // namespace
-
-void setUp() {}
-void tearDown() {}
-
-int main() {
-  UNITY_BEGIN();
-  RUN_TEST(a_sheet_is_a_pdf_of_true_size);
-  RUN_TEST(many_small_ones_share_a_page_and_families_differ);
-  RUN_TEST(what_cannot_be_printed_is_said);
-  return UNITY_END();
-}

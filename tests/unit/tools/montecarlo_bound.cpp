@@ -4,16 +4,9 @@
 
 #include <cmath>
 
+#include "common/suite.h"
 #include "montecarlo/montecarlo.h"
 #include "simulate/angle.h"
-
-extern "C" {
-#include "unity.h"
-void setUp(void);
-void tearDown(void);
-}
-void setUp(void) {}
-void tearDown(void) {}
 
 using namespace wm;
 using namespace wm::sim;
@@ -44,7 +37,7 @@ Drive planned(const Scenario &s) {
 
 // A straight of 20 m with wheels of equal unknown scale: the way is off by the mean of the radii, the heading turns the
 // end sideways, and a difference of the radii bends the way.
-void test_a_straight_by_the_wheels_alone() {
+TEST(test_a_straight_by_the_wheels_alone) {
   Scenario s = simple();
   s.errors.wheel_radius = 0.01;
   Leg leg;
@@ -62,7 +55,7 @@ void test_a_straight_by_the_wheels_alone() {
 }
 
 // Standing for 10 s with a gyro of 100 Hz and known wheels: nothing moves, so nothing is lost.
-void test_standing_still_loses_nothing() {
+TEST(test_standing_still_loses_nothing) {
   Scenario s = simple();
   s.errors.yaw_rate_noise_radps = 0.003;
   s.errors.yaw_rate_bias_radps = 0.004;
@@ -76,7 +69,7 @@ void test_standing_still_loses_nothing() {
 
 // One camera, one landmark straight ahead at 10 m, seen 50 times with 5 % outliers, map off by 2 cm: the bearing ties
 // y + 10 heading - map_y together; by hand, information of one scalar measured n times.
-void test_one_landmark_ahead() {
+TEST(test_one_landmark_ahead) {
   Scenario s = simple();
   s.errors.landmark_m = 0.02;
   wm_landmark landmark{};
@@ -108,7 +101,7 @@ void test_one_landmark_ahead() {
 
 // The same landmark by a camera that is turned by an unknown angle, with bearings as a detector handed them on;
 // standing, the clock's error has no information.
-void test_bearings_of_a_camera_that_is_turned() {
+TEST(test_bearings_of_a_camera_that_is_turned) {
   Scenario s = simple();
   s.errors.landmark_m = 0.02;
   s.errors.camera_mounting_rad = 0.004;
@@ -129,7 +122,7 @@ void test_bearings_of_a_camera_that_is_turned() {
   TEST_ASSERT_DOUBLE_WITHIN(1e-10, 0.0009, end.x_var_m2);
 }
 
-void test_statistics_by_hand() {
+TEST(test_statistics_by_hand) {
   montecarlo::Statistics s;
   s.runs = 4;
   montecarlo::Step a, b;
@@ -157,13 +150,3 @@ void test_statistics_by_hand() {
 }
 
 }  // namespace
-
-int main() {
-  UNITY_BEGIN();
-  RUN_TEST(test_a_straight_by_the_wheels_alone);
-  RUN_TEST(test_standing_still_loses_nothing);
-  RUN_TEST(test_one_landmark_ahead);
-  RUN_TEST(test_bearings_of_a_camera_that_is_turned);
-  RUN_TEST(test_statistics_by_hand);
-  return UNITY_END();
-}

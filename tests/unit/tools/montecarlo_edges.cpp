@@ -3,10 +3,10 @@
 #include <cmath>
 #include <vector>
 
+#include "common/suite.h"
 #include "montecarlo/reliability.h"
 #include "montecarlo/trial.h"
 #include "montecarlo/views.h"
-#include "unity.h"
 
 namespace {
 
@@ -30,13 +30,13 @@ void draw_corridor() {
   for (double y = 1; y < 3; y += 0.01) mark(39, y);
 }
 
-void a_straight_corridor_looks_the_same_all_along(void) {
+TEST(a_straight_corridor_looks_the_same_all_along) {
   const Viewer viewer(map, 1);
   TEST_ASSERT_LESS_THAN_DOUBLE(0.05, viewer.distinction({20, 2, 0}, {26, 2, 0}));
   TEST_ASSERT_LESS_THAN_DOUBLE(0.05, Viewer::difference(viewer.at({20, 2, 0}), viewer.at({26, 2, 0})));
 }
 
-void its_end_and_a_turn_look_otherwise(void) {
+TEST(its_end_and_a_turn_look_otherwise) {
   const Viewer viewer(map, 1);
   TEST_ASSERT_GREATER_THAN_DOUBLE(wm::montecarlo::kOtherView, viewer.distinction({36.5, 2, 0}, {26, 2, 0}));
   TEST_ASSERT_GREATER_THAN_DOUBLE(wm::montecarlo::kOtherView, viewer.distinction({20, 2, 1}, {20, 2, 0}));
@@ -54,7 +54,7 @@ Sample at(double t_s, double error_m, bool tracking) {
   return s;
 }
 
-void a_run_is_judged_by_when_it_says_so_and_when_it_is_right(void) {
+TEST(a_run_is_judged_by_when_it_says_so_and_when_it_is_right) {
   Outcome o;
   for (int i = 0; i < 30; i++) o.samples.push_back(at(0.1 * i, 5, true));
   for (int i = 30; i < 80; i++) o.samples.push_back(at(0.1 * i, 5, false));
@@ -67,14 +67,14 @@ void a_run_is_judged_by_when_it_says_so_and_when_it_is_right(void) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0, o.covered());
 }
 
-void an_alarm_while_right_is_a_false_one(void) {
+TEST(an_alarm_while_right_is_a_false_one) {
   Outcome o;
   for (int i = 0; i < 100; i++) o.samples.push_back(at(0.1 * i, 0.02, i < 40 || i > 50));
   TEST_ASSERT_EQUAL(1, o.false_alarms());
   TEST_ASSERT_FALSE(o.lost());
 }
 
-void a_probability_that_is_right_scores_well(void) {
+TEST(a_probability_that_is_right_scores_well) {
   wm::montecarlo::Reliability good, bad;
   Outcome o;
   for (int i = 0; i < 100; i++) o.samples.push_back(at(0.1 * i, i < 95 ? 0.0 : 3.0, i < 95));
@@ -87,16 +87,7 @@ void a_probability_that_is_right_scores_well(void) {
 
 }  // namespace
 
-void setUp(void) {}
-void tearDown(void) {}
-
-int main(void) {
+int suite_begin(int, char **) {
   draw_corridor();
-  UNITY_BEGIN();
-  RUN_TEST(a_straight_corridor_looks_the_same_all_along);
-  RUN_TEST(its_end_and_a_turn_look_otherwise);
-  RUN_TEST(a_run_is_judged_by_when_it_says_so_and_when_it_is_right);
-  RUN_TEST(an_alarm_while_right_is_a_false_one);
-  RUN_TEST(a_probability_that_is_right_scores_well);
-  return UNITY_END();
+  return SUITE_RUNS;
 }

@@ -7,13 +7,8 @@
 #include <set>
 #include <string>
 
+#include "common/suite.h"
 #include "montecarlo/landmark_trials.h"
-
-extern "C" {
-#include "unity.h"
-void setUp(void);
-void tearDown(void);
-}
 
 using namespace wm::montecarlo;
 
@@ -29,7 +24,7 @@ const LandmarkTrial &trial(const char *name) {
   return landmark_trials()[0];
 }
 
-void test_as_driven_it_is_right_all_the_time() {
+TEST(test_as_driven_it_is_right_all_the_time) {
   for (uint64_t seed = 1; seed <= 3; seed++) {
     LandmarkWorld world(scenario, seed);
     const LandmarkOutcome o = run_landmark_trial(world, config, trial("as-driven"));
@@ -46,7 +41,7 @@ void test_as_driven_it_is_right_all_the_time() {
   }
 }
 
-void test_started_anywhere_it_finds_itself() {
+TEST(test_started_anywhere_it_finds_itself) {
   LandmarkWorld world(scenario, 2);
   const LandmarkOutcome o = run_landmark_trial(world, config, trial("start"));
   TEST_ASSERT_FALSE(o.outcome.samples.front().tracking);
@@ -55,7 +50,7 @@ void test_started_anywhere_it_finds_itself() {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.3, o.outcome.samples.back().error_m);
 }
 
-void test_carried_off_it_is_elsewhere_and_says_so() {
+TEST(test_carried_off_it_is_elsewhere_and_says_so) {
   LandmarkWorld world(scenario, 3);
   double at_s = NAN;
   const wm::sim::Recording carried = world.drive(trial("kidnap"), &at_s);
@@ -69,7 +64,7 @@ void test_carried_off_it_is_elsewhere_and_says_so() {
   TEST_ASSERT_TRUE(run_landmark_trial(world, config, trial("kidnap")).detected_after_s.has_value());
 }
 
-void test_only_so_many_landmarks() {
+TEST(test_only_so_many_landmarks) {
   LandmarkWorld world(scenario, 4);
   double at_s = NAN;
   const wm::sim::Recording two = world.drive(trial("two"), &at_s);
@@ -79,7 +74,7 @@ void test_only_so_many_landmarks() {
   TEST_ASSERT_EQUAL(2, ids.size());
 }
 
-void test_what_moved_is_seen() {
+TEST(test_what_moved_is_seen) {
   LandmarkWorld world(scenario, 5);
   double at_s = NAN;
   TEST_ASSERT_EQUAL(1, world.drive(trial("moved"), &at_s).moved.size());
@@ -91,10 +86,7 @@ void test_what_moved_is_seen() {
 
 }  // namespace
 
-void setUp(void) {}
-void tearDown(void) {}
-
-int main() {
+int suite_begin(int, char **) {
   const std::string root = std::getenv("WM_SOURCE_DIR");
   wm_error err{};
   if (wm::sim::load_scenario(root + "/config/worlds/crossing-drawn.yaml", scenario, &err) != WM_OK ||
@@ -102,12 +94,7 @@ int main() {
     std::fprintf(stderr, "%s\n", err.text);
     return 1;
   }
-  UNITY_BEGIN();
-  RUN_TEST(test_as_driven_it_is_right_all_the_time);
-  RUN_TEST(test_started_anywhere_it_finds_itself);
-  RUN_TEST(test_carried_off_it_is_elsewhere_and_says_so);
-  RUN_TEST(test_only_so_many_landmarks);
-  RUN_TEST(test_what_moved_is_seen);
-  wm_config_free(&config);
-  return UNITY_END();
+  return SUITE_RUNS;
 }
+
+void suite_end() { wm_config_free(&config); }

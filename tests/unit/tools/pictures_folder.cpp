@@ -8,14 +8,11 @@
 
 #include "common/failure.h"
 #include "common/grey_picture.h"
+#include "common/suite.h"
 #include "made.h"
-#include "unity.h"
 #ifdef WM_HAS_CALIBRATE
 #include "calibrate/board_pictures.h"
 #endif
-
-void setUp() {}
-void tearDown() {}
 
 namespace {
 
@@ -29,7 +26,7 @@ bool names(const std::vector<std::string> &lines, const std::string &text) {
                      [&](const std::string &l) { return l.find(text) != std::string::npos; });
 }
 
-void test_files_that_cannot_be_read_are_named() {
+TEST(test_files_that_cannot_be_read_are_named) {
   const made::Folder folder;
   folder.write("a.pgm", pgm(8, 6, 10));
   folder.write("b.jpg", "");
@@ -55,7 +52,7 @@ void test_files_that_cannot_be_read_are_named() {
   TEST_ASSERT_TRUE(names(broken, "e.JPG: neither PNG nor PGM"));
 }
 
-void test_a_folder_of_broken_files_is_refused() {
+TEST(test_a_folder_of_broken_files_is_refused) {
   const made::Folder folder;
   folder.write("a.jpg", "");
   folder.write("b.png", "");
@@ -86,7 +83,7 @@ std::string board(int width, int height, double square, double x, double y) {
 }
 
 // One photo in portrait, whatever its place in the order.
-void test_a_board_in_portrait_is_left_out() {
+TEST(test_a_board_in_portrait_is_left_out) {
   for (const char *odd : {"p0.pgm", "p3.pgm", "p9.pgm"}) {
     const made::Folder folder;
     for (int i = 1; i < 5; i++)
@@ -110,13 +107,3 @@ void test_a_board_in_portrait_is_left_out() {
 #endif
 
 }  // namespace
-
-int main() {
-  UNITY_BEGIN();
-  RUN_TEST(test_files_that_cannot_be_read_are_named);
-  RUN_TEST(test_a_folder_of_broken_files_is_refused);
-#ifdef WM_HAS_CALIBRATE
-  RUN_TEST(test_a_board_in_portrait_is_left_out);
-#endif
-  return UNITY_END();
-}

@@ -8,17 +8,12 @@
 #include <fstream>
 #include <set>
 
+#include "common/suite.h"
 #include "simulate/film.h"
 #include "simulate/write.h"
 #include "waymark/map.h"
 #include "waymark/recording.h"
 #include "waymark/video.h"
-
-extern "C" {
-#include "unity.h"
-void setUp(void);
-void tearDown(void);
-}
 
 using namespace wm::sim;
 namespace fs = std::filesystem;
@@ -148,10 +143,10 @@ void compare(const char *name, const std::string &world, std::initializer_list<c
   }
 }
 
-void test_corridor() { compare("corridor-a", "corridor", {"front"}, 160, 90); }
-void test_office() { compare("office-a", "office", {"ceiling"}, 160, 120); }
-void test_hall() { compare("hall-a", "hall", {"omni"}, 120, 120); }
-void test_seabed() { compare("seabed-a", "seabed", {"left", "right"}, 160, 120); }
+TEST(test_corridor) { compare("corridor-a", "corridor", {"front"}, 160, 90); }
+TEST(test_office) { compare("office-a", "office", {"ceiling"}, 160, 120); }
+TEST(test_hall) { compare("hall-a", "hall", {"omni"}, 120, 120); }
+TEST(test_seabed) { compare("seabed-a", "seabed", {"left", "right"}, 160, 120); }
 
 }  // namespace
 
@@ -161,7 +156,7 @@ void setUp(void) {
 }
 void tearDown(void) { fs::remove_all(ours); }
 
-int main() {
+int suite_begin(int, char **) {
   const char *there = std::getenv("WM_DATA_DIR");
   data = there ? there : "";
   if (!fs::exists(data / "corridor-a/recording.yaml")) {
@@ -169,10 +164,5 @@ int main() {
         "recordings_agree: skipped: the recordings corridor-a, office-a, hall-a, seabed-a are not in WM_DATA_DIR");
     return 77;
   }
-  UNITY_BEGIN();
-  RUN_TEST(test_corridor);
-  RUN_TEST(test_office);
-  RUN_TEST(test_hall);
-  RUN_TEST(test_seabed);
-  return UNITY_END();
+  return SUITE_RUNS;
 }

@@ -4,13 +4,10 @@
 #include <cmath>
 #include <cstdio>
 
+#include "common/suite.h"
 #include "reference/smoother.h"
-#include "unity.h"
 
 using namespace wm::tools;
-
-void setUp() {}
-void tearDown() {}
 
 namespace {
 
@@ -32,7 +29,7 @@ struct Room {
   void set(int x, int y) { edges[static_cast<size_t>(y) * kSide + static_cast<size_t>(x)] = 255; }
 };
 
-void test_field_is_the_distance() {
+TEST(test_field_is_the_distance) {
   const Room room;
   const EdgeField field(room.raster, 0.5);
   const double wall = (40 + 0.5) * kCell_m;
@@ -43,7 +40,7 @@ void test_field_is_the_distance() {
 }
 
 // Truth: a circle of 2 m. Points: edge pixels within 3 m, as the robot sees them.
-void test_smoothed_lies_on_the_way() {
+TEST(test_smoothed_lies_on_the_way) {
   const Room room;
   const EdgeField field(room.raster, 0.5);
   std::vector<SmootherStep> steps;
@@ -85,18 +82,10 @@ void test_smoothed_lies_on_the_way() {
   TEST_ASSERT_TRUE(smooth(steps, field, truth[0], options, {}).poses[9] != reference.poses[9]);
 }
 
-void test_nothing_to_smooth() {
+TEST(test_nothing_to_smooth) {
   const Room room;
   const EdgeField field(room.raster, 0.5);
   TEST_ASSERT_EQUAL(0, smooth({}, field, Eigen::Vector3d::Zero(), {}, {}).poses.size());
 }
 
 }  // namespace
-
-int main() {
-  UNITY_BEGIN();
-  RUN_TEST(test_field_is_the_distance);
-  RUN_TEST(test_smoothed_lies_on_the_way);
-  RUN_TEST(test_nothing_to_smooth);
-  return UNITY_END();
-}

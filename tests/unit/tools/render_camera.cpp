@@ -5,15 +5,8 @@
 #include <cmath>
 #include <cstring>
 
+#include "common/suite.h"
 #include "render_cameras.h"
-
-extern "C" {
-#include "unity.h"
-void setUp(void);
-void tearDown(void);
-}
-void setUp(void) {}
-void tearDown(void) {}
 
 using namespace wm::images;
 
@@ -23,7 +16,7 @@ Vec3 towards(double angle_rad, double around_rad) {
   return {std::sin(angle_rad) * std::cos(around_rad), std::sin(angle_rad) * std::sin(around_rad), std::cos(angle_rad)};
 }
 
-void test_there_and_back(void) {
+TEST(test_there_and_back) {
   for (const NamedCamera &named : all_cameras()) {
     int seen = 0;
     for (double angle = 0; angle <= named.half_angle_rad; angle += 0.05) {
@@ -41,7 +34,7 @@ void test_there_and_back(void) {
   }
 }
 
-void test_every_pixel_that_looks_somewhere_comes_back(void) {
+TEST(test_every_pixel_that_looks_somewhere_comes_back) {
   for (const NamedCamera &named : all_cameras()) {
     int seen = 0;
     for (int v = 0; v < named.camera.height; v += 17) {
@@ -60,7 +53,7 @@ void test_every_pixel_that_looks_somewhere_comes_back(void) {
 }
 
 // A step of a pixel turns the direction; projecting a step along that turn must give the pixel's step.
-void test_derivatives_fit(void) {
+TEST(test_derivatives_fit) {
   const double h = 1e-3;
   for (const NamedCamera &named : all_cameras()) {
     for (double angle = 0.1; angle < named.half_angle_rad; angle += 0.2) {
@@ -78,7 +71,7 @@ void test_derivatives_fit(void) {
   }
 }
 
-void test_values_by_hand(void) {
+TEST(test_values_by_hand) {
   Camera c;
   Vec2 p;
   c.intrinsics = {100, 110, 50, 60}, c.distortion = {0.1, 0, 0, 0};
@@ -98,7 +91,7 @@ void test_values_by_hand(void) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 50 + 100 / (0.5 * std::sqrt(1.25) + 0.25), p.x());
 }
 
-void test_frames_and_rows(void) {
+TEST(test_frames_and_rows) {
   Camera c;
   c.intrinsics = {100, 100, 639.5, 359.5};
   c.T_base_camera = pose_xyz_rpy({1, 2, 3}, 0, 0.1, 0);
@@ -114,7 +107,7 @@ void test_frames_and_rows(void) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-6, 359500, row_offset_ns(c, 719));
 }
 
-void test_what_has_no_pixel(void) {
+TEST(test_what_has_no_pixel) {
   Camera c;
   Vec2 p;
   std::string error;
@@ -136,14 +129,3 @@ void test_what_has_no_pixel(void) {
 }
 
 }  // namespace
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_there_and_back);
-  RUN_TEST(test_every_pixel_that_looks_somewhere_comes_back);
-  RUN_TEST(test_derivatives_fit);
-  RUN_TEST(test_values_by_hand);
-  RUN_TEST(test_frames_and_rows);
-  RUN_TEST(test_what_has_no_pixel);
-  return UNITY_END();
-}

@@ -7,16 +7,9 @@
 #include <cstdio>
 #include <vector>
 
+#include "common/suite.h"
 #include "render/render.h"
 #include "render_cameras.h"
-
-extern "C" {
-#include "unity.h"
-void setUp(void);
-void tearDown(void);
-}
-void setUp(void) {}
-void tearDown(void) {}
 
 using namespace wm::images;
 using namespace wm::render;
@@ -150,7 +143,7 @@ Shot moving(int64_t exposure_ns) {
   return shot;
 }
 
-void test_squares_standing(void) {
+TEST(test_squares_standing) {
   for (const NamedCamera &named : all_cameras()) {
     int count = 0;
     TEST_ASSERT_LESS_THAN_DOUBLE_MESSAGE(0.1, worst_square(named, standing(), 16, count), named.name);
@@ -158,7 +151,7 @@ void test_squares_standing(void) {
   }
 }
 
-void test_squares_in_motion_at_the_middle_of_the_exposure(void) {
+TEST(test_squares_in_motion_at_the_middle_of_the_exposure) {
   for (const NamedCamera &named : all_cameras()) {
     int count = 0;
     TEST_ASSERT_LESS_THAN_DOUBLE_MESSAGE(0.15, worst_square(named, moving(10000000), 16, count), named.name);
@@ -166,7 +159,7 @@ void test_squares_in_motion_at_the_middle_of_the_exposure(void) {
   }
 }
 
-void test_squares_with_rolling_shutter(void) {
+TEST(test_squares_with_rolling_shutter) {
   for (NamedCamera named : all_cameras()) {
     named.camera.readout_ns = 25000000;
     int count = 0;
@@ -185,7 +178,7 @@ double bilinear(const Image &image, const Vec2 &p) {
 }
 
 // The joint between a bright floor and a dark wall, as the edge system sees it.
-void test_edges_between_floor_and_wall(void) {
+TEST(test_edges_between_floor_and_wall) {
   for (NamedCamera named : all_cameras()) {
     for (int64_t readout_ns : {0, 20000000}) {
       named.camera.readout_ns = readout_ns;
@@ -238,7 +231,7 @@ void test_edges_between_floor_and_wall(void) {
   }
 }
 
-void test_project_shot_is_the_same(void) {
+TEST(test_project_shot_is_the_same) {
   for (NamedCamera named : all_cameras()) {
     named.camera.readout_ns = 30000000;
     const Shot shot = moving(0);
@@ -253,13 +246,3 @@ void test_project_shot_is_the_same(void) {
 }
 
 }  // namespace
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_squares_standing);
-  RUN_TEST(test_squares_in_motion_at_the_middle_of_the_exposure);
-  RUN_TEST(test_squares_with_rolling_shutter);
-  RUN_TEST(test_edges_between_floor_and_wall);
-  RUN_TEST(test_project_shot_is_the_same);
-  return UNITY_END();
-}

@@ -3,16 +3,9 @@
 #include <cmath>
 #include <cstring>
 
+#include "common/suite.h"
 #include "render/patterns.h"
 #include "render/render.h"
-
-extern "C" {
-#include "unity.h"
-void setUp(void);
-void tearDown(void);
-}
-void setUp(void) {}
-void tearDown(void) {}
 
 using namespace wm::images;
 using namespace wm::render;
@@ -71,7 +64,7 @@ void furnish(Scene &scene) {
   scene.add(std::move(mover));
 }
 
-void test_bits_do_not_depend_on_threads(void) {
+TEST(test_bits_do_not_depend_on_threads) {
   Scene first, second;
   furnish(first), furnish(second);
   commit(first), commit(second);
@@ -102,7 +95,7 @@ void test_bits_do_not_depend_on_threads(void) {
   TEST_ASSERT_NOT_EQUAL_INT(0, std::memcmp(one.values.data(), next.values.data(), one.values.size() * sizeof(float)));
 }
 
-void test_grey_is_the_weighted_colour(void) {
+TEST(test_grey_is_the_weighted_colour) {
   Scene scene;
   furnish(scene);
   commit(scene);
@@ -120,7 +113,7 @@ void test_grey_is_the_weighted_colour(void) {
 }
 
 // A plate 2 m under a lamp of power 3: irradiance / pi = 3 / (4 + radius²) straight below.
-void test_lamp_lights_by_the_square_of_the_distance(void) {
+TEST(test_lamp_lights_by_the_square_of_the_distance) {
   Scene scene;
   const uint32_t white = scene.add(Material{.albedo = Colour(0.5f), .texture = nullptr});
   scene.add(quad({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}, white));
@@ -144,7 +137,7 @@ void test_lamp_lights_by_the_square_of_the_distance(void) {
   TEST_ASSERT_FLOAT_WITHIN(0.001f, 0.0375f, image.values[20 * 41 + 20]);
 }
 
-void test_shadow_and_contact(void) {
+TEST(test_shadow_and_contact) {
   Scene scene;
   const uint32_t white = scene.add(Material{.albedo = Colour(1.0f), .texture = nullptr});
   scene.add(quad({-3, -3, 0}, {6, 0, 0}, {0, 6, 0}, white));
@@ -175,7 +168,7 @@ void test_shadow_and_contact(void) {
 }
 
 // A picture on a wall is seen as it is: not mirrored, not upside down, from either way the wall may run.
-void test_pictures_hang_upright(void) {
+TEST(test_pictures_hang_upright) {
   Picture sign(2, 2, 3);
   sign.set(0, 0, {1, 0, 0}), sign.set(1, 0, {0, 1, 0});
   sign.set(0, 1, {0, 0, 1}), sign.set(1, 1, {1, 1, 1});
@@ -199,7 +192,7 @@ void test_pictures_hang_upright(void) {
   check(38, 38, {1, 0, 0}), check(62, 38, {0, 1, 0}), check(38, 62, {0, 0, 1}), check(62, 62, {1, 1, 1});
 }
 
-void test_textures_far_away_become_their_mean(void) {
+TEST(test_textures_far_away_become_their_mean) {
   Picture stripes(64, 64, 1);
   for (int y = 0; y < 64; y++)
     for (int x = 0; x < 64; x++) stripes.at(x, y) = x % 2 ? 0.8f : 0.2f;
@@ -213,7 +206,7 @@ void test_textures_far_away_become_their_mean(void) {
   TEST_ASSERT_FLOAT_WITHIN(0.001f, 1.0f / 15, Texture::make(odd)->sample(0.5f, 0.5f, 10).r);
 }
 
-void test_mirror_shows_what_stands_on_it(void) {
+TEST(test_mirror_shows_what_stands_on_it) {
   auto floor_value = [](double mirror) {
     Scene scene;
     Material floor, glow;
@@ -234,7 +227,7 @@ void test_mirror_shows_what_stands_on_it(void) {
   TEST_ASSERT_FLOAT_WITHIN(0.002f, static_cast<float>(0.1 + 0.9 * rise), floor_value(0.1));
 }
 
-void test_motion_blur_smears_what_moves(void) {
+TEST(test_motion_blur_smears_what_moves) {
   Scene scene;
   Material glow;
   glow.albedo = Colour(0.0f), glow.emission = Colour(1.0f);
@@ -256,7 +249,7 @@ void test_motion_blur_smears_what_moves(void) {
 }
 
 // Somebody who turns round within the exposure is still there in its middle, where a single ray looks.
-void test_who_turns_round_at_once_stays_whole(void) {
+TEST(test_who_turns_round_at_once_stays_whole) {
   Scene scene;
   Material glow;
   glow.albedo = Colour(0.0f), glow.emission = Colour(1.0f);
@@ -270,7 +263,7 @@ void test_who_turns_round_at_once_stays_whole(void) {
   TEST_ASSERT_FLOAT_WITHIN(0.01f, 1, image.values[10 * 21 + 10]);
 }
 
-void test_water_dims_and_hazes(void) {
+TEST(test_water_dims_and_hazes) {
   Scene scene;
   Material wall;
   wall.albedo = Colour(0.0f), wall.emission = Colour(1.0f);
@@ -287,7 +280,7 @@ void test_water_dims_and_hazes(void) {
   TEST_ASSERT_FLOAT_WITHIN(0.002f, static_cast<float>(std::exp(-0.3) + 0.2 * (1 - std::exp(-0.3))), v[2]);
 }
 
-void test_what_cannot_be_is_refused(void) {
+TEST(test_what_cannot_be_is_refused) {
   Scene scene;
   std::string error;
   TEST_ASSERT_NULL(Renderer::make(scene, pinhole(9, 9, 9), {}, 1, false, error).get());
@@ -303,19 +296,3 @@ void test_what_cannot_be_is_refused(void) {
 }
 
 }  // namespace
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_bits_do_not_depend_on_threads);
-  RUN_TEST(test_grey_is_the_weighted_colour);
-  RUN_TEST(test_lamp_lights_by_the_square_of_the_distance);
-  RUN_TEST(test_shadow_and_contact);
-  RUN_TEST(test_pictures_hang_upright);
-  RUN_TEST(test_textures_far_away_become_their_mean);
-  RUN_TEST(test_mirror_shows_what_stands_on_it);
-  RUN_TEST(test_motion_blur_smears_what_moves);
-  RUN_TEST(test_who_turns_round_at_once_stays_whole);
-  RUN_TEST(test_water_dims_and_hazes);
-  RUN_TEST(test_what_cannot_be_is_refused);
-  return UNITY_END();
-}

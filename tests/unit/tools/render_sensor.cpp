@@ -6,16 +6,9 @@
 #include <cstdlib>
 #include <cstring>
 
+#include "common/suite.h"
 #include "images/video.h"
 #include "render/sensor.h"
-
-extern "C" {
-#include "unity.h"
-void setUp(void);
-void tearDown(void);
-}
-void setUp(void) {}
-void tearDown(void) {}
 
 using namespace wm::images;
 using namespace wm::render;
@@ -39,7 +32,7 @@ Spread spread_of(const Picture8 &p) {
   return {sum / n, std::sqrt(sum2 / n - sum / n * sum / n)};
 }
 
-void test_noise_is_shot_and_read(void) {
+TEST(test_noise_is_shot_and_read) {
   SensorModel model;
   model.vignetting = 0, model.response_power = 1, model.shoulder = 1;  // linear: the signal is grey / 255
   model.shot = 1.0 / 2000, model.read = 0.006;
@@ -57,7 +50,7 @@ void test_noise_is_shot_and_read(void) {
   }
 }
 
-void test_noise_is_the_frames_own_and_the_same_again(void) {
+TEST(test_noise_is_the_frames_own_and_the_same_again) {
   const Sensor sensor(SensorModel{}, 11, 64, 64, {31.5, 31.5});
   Picture8 a, b, c;
   sensor.develop(even(64, 64, 0.2f), {}, 3, a);
@@ -67,7 +60,7 @@ void test_noise_is_the_frames_own_and_the_same_again(void) {
   TEST_ASSERT_FALSE(a.bytes == c.bytes);
 }
 
-void test_response_curve(void) {
+TEST(test_response_curve) {
   SensorModel model;
   model.vignetting = 0;
   const Sensor sensor(model, 1, 8, 8, {3.5, 3.5});
@@ -81,7 +74,7 @@ void test_response_curve(void) {
   }
 }
 
-void test_vignetting(void) {
+TEST(test_vignetting) {
   SensorModel model;
   model.response_power = 1, model.shoulder = 1, model.vignetting = 0.4;
   const Sensor sensor(model, 1, 201, 101, {100, 50});
@@ -93,7 +86,7 @@ void test_vignetting(void) {
                          picture.bytes[50 * 201 + 50]);  // r² = 2500 of 12500
 }
 
-void test_auto_exposure_follows_slowly_and_wanders(void) {
+TEST(test_auto_exposure_follows_slowly_and_wanders) {
   AutoExposure steady(0.2, 0.25, 0, 1);
   TEST_ASSERT_DOUBLE_WITHIN(1e-6, 2, steady.next(even(50, 50, 0.1f), 0));
   TEST_ASSERT_DOUBLE_WITHIN(1e-6, 2, steady.next(even(50, 50, 0.4f), 1));  // it learns of a picture after it
@@ -154,7 +147,7 @@ void write_video(const std::string &path, AviWriter::Coding coding, int channels
   TEST_ASSERT_EQUAL_UINT32(frames, avi.frames());
 }
 
-void test_ffmpeg_reads_the_videos(void) {
+TEST(test_ffmpeg_reads_the_videos) {
   if (!have_ffmpeg()) TEST_IGNORE_MESSAGE("ffmpeg is not installed");
   const std::string dir = folder();
   struct Case {
@@ -183,7 +176,7 @@ void test_ffmpeg_reads_the_videos(void) {
   TEST_ASSERT_EQUAL_INT(0, std::system(("rm -r " + dir).c_str()));
 }
 
-void test_png_there_and_back_and_sheet(void) {
+TEST(test_png_there_and_back_and_sheet) {
   const std::string dir = folder(), path = dir + "/a.png";
   std::string error;
   const Picture8 picture = drawn(33, 21, 3, 0);
@@ -205,23 +198,10 @@ void test_png_there_and_back_and_sheet(void) {
   TEST_ASSERT_EQUAL_INT(0, std::system(("rm -r " + dir).c_str()));
 }
 
-void test_quality_control_finds_the_size(void) {
+TEST(test_quality_control_finds_the_size) {
   QualityControl control(5000, 20, 95);
   for (int i = 0; i < 200; i++) control.wrote(static_cast<size_t>(100 * control.quality()));
   TEST_ASSERT_INT_WITHIN(2, 50, control.quality());
 }
 
 }  // namespace
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_noise_is_shot_and_read);
-  RUN_TEST(test_noise_is_the_frames_own_and_the_same_again);
-  RUN_TEST(test_response_curve);
-  RUN_TEST(test_vignetting);
-  RUN_TEST(test_auto_exposure_follows_slowly_and_wanders);
-  RUN_TEST(test_ffmpeg_reads_the_videos);
-  RUN_TEST(test_png_there_and_back_and_sheet);
-  RUN_TEST(test_quality_control_finds_the_size);
-  return UNITY_END();
-}

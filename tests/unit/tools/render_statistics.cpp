@@ -10,17 +10,10 @@
 #include <map>
 #include <sstream>
 
+#include "common/suite.h"
 #include "render/sensor.h"
 #include "simulate/film.h"
 #include "simulate/motion.h"
-
-extern "C" {
-#include "unity.h"
-void setUp(void);
-void tearDown(void);
-}
-void setUp(void) {}
-void tearDown(void) {}
 
 using namespace wm::images;
 using namespace wm::render;
@@ -68,7 +61,7 @@ std::unique_ptr<Renderer> renderer_of(const Scene &scene, const Camera &camera, 
 }
 
 // A wedge of strips of known light through the whole camera, response curve and rounding with it.
-void test_noise_grows_with_the_light_as_said(void) {
+TEST(test_noise_grows_with_the_light_as_said) {
   const double levels[] = {0.01, 0.02, 0.05, 0.1, 0.2, 0.4};
   constexpr int kStrip = 40, kHeight = 150;
   Scene scene;
@@ -150,7 +143,7 @@ std::vector<double> row_of(const Image &image, int y) {
   return {begin, begin + image.width};
 }
 
-void test_blur_is_as_long_as_speed_times_exposure(void) {
+TEST(test_blur_is_as_long_as_speed_times_exposure) {
   Passing passing;
   const Camera camera = pinhole(61, 100);  // leans five whole pixels
   const auto variance_at = [&](double speed_mps, double exposure_s) {
@@ -173,7 +166,7 @@ void test_blur_is_as_long_as_speed_times_exposure(void) {
   TEST_ASSERT_DOUBLE_WITHIN(0.02 * kFocal / kAway, kFocal / kAway, length.slope());
 }
 
-void test_rolling_shutter_leans_by_readout_and_motion(void) {
+TEST(test_rolling_shutter_leans_by_readout_and_motion) {
   Passing passing;
   Camera camera = pinhole(121, 121);
   for (const double readout_s : {0.0, 0.01, 0.03}) {
@@ -229,7 +222,7 @@ double taken_s(const wm::sim::Film &film, size_t camera, const std::vector<std::
   return t_s;
 }
 
-void test_clock_and_losses_are_in_the_video(void) {
+TEST(test_clock_and_losses_are_in_the_video) {
   wm::sim::Scenario scenario;
   wm_error err{};
   const std::string path = std::string(std::getenv("WM_SOURCE_DIR")) + "/config/worlds/seabed-easy.yaml";
@@ -276,12 +269,3 @@ void test_clock_and_losses_are_in_the_video(void) {
 }
 
 }  // namespace
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_noise_grows_with_the_light_as_said);
-  RUN_TEST(test_blur_is_as_long_as_speed_times_exposure);
-  RUN_TEST(test_rolling_shutter_leans_by_readout_and_motion);
-  RUN_TEST(test_clock_and_losses_are_in_the_video);
-  return UNITY_END();
-}

@@ -6,14 +6,9 @@
 #include <filesystem>
 #include <fstream>
 
+#include "common/suite.h"
 #include "made.h"
 #include "simulate/film.h"
-
-extern "C" {
-#include "unity.h"
-void setUp(void);
-void tearDown(void);
-}
 
 using namespace wm::sim;
 
@@ -28,7 +23,7 @@ Plan building(const std::string &file, double resolution_m = 0) {
   return plan;
 }
 
-void test_plan_and_map_of_a_flat_agree() {
+TEST(test_plan_and_map_of_a_flat_agree) {
   const Plan drawn = building("plans/flat.yaml"), mapped = building("plans/map.yaml");
   size_t asked = 0;
   for (double x = 0.125; x < 9; x += 0.25)
@@ -45,7 +40,7 @@ void test_plan_and_map_of_a_flat_agree() {
 }
 
 // Its picture alone, with the map's resolution; the map's origin is 0, 0.
-void test_a_picture_is_a_plan() {
+TEST(test_a_picture_is_a_plan) {
   const Plan mapped = building("plans/map.yaml"), drawn = building("plans/flat.pgm", 0.05);
   TEST_ASSERT_EQUAL(mapped.faces.size(), drawn.faces.size());
   const Rectangle a = mapped.bounds(), b = drawn.bounds();
@@ -54,7 +49,7 @@ void test_a_picture_is_a_plan() {
 }
 
 // A route that is too narrow for the world's robot is driven by a smaller one.
-void test_the_size_of_the_body() {
+TEST(test_the_size_of_the_body) {
   const made::Folder folder;
   folder.write("room.yaml", "format: waymark-plan/1\noutside: solid\nrooms: [[[0, 0], [6, 0], [6, 4], [0, 4]]]\n");
   folder.write("x.yaml",
@@ -71,7 +66,7 @@ void test_the_size_of_the_body() {
   TEST_ASSERT_EQUAL_DOUBLE(0.175, film.world->footprint.half_width_m);
 }
 
-void test_shipped_scenarios_with_a_building_can_be_driven() {
+TEST(test_shipped_scenarios_with_a_building_can_be_driven) {
   for (const char *name : {"own-plan.yaml", "own-map.yaml"}) {
     Scenario scenario;
     Film film;
@@ -111,7 +106,7 @@ void refuse(const std::string &world, const std::string &route, const char *want
   TEST_ASSERT_EQUAL_STRING(wanted, said.c_str());
 }
 
-void test_mistakes_are_told() {
+TEST(test_mistakes_are_told) {
   const std::string along = "route: {start: {x_m: 1, y_m: 2}, points: [[4, 2]]}\n";
   refuse("kind: corridor, plan: room.yaml", "", "x.yaml:3: world: a world with a `plan` needs a `route` through it");
   refuse("kind: crossing, plan: room.yaml", along, "x.yaml:3: world.plan: only corridor, office and hall have a plan");
@@ -131,16 +126,3 @@ void test_mistakes_are_told() {
 }
 
 }  // namespace
-
-void setUp(void) {}
-void tearDown(void) {}
-
-int main() {
-  UNITY_BEGIN();
-  RUN_TEST(test_plan_and_map_of_a_flat_agree);
-  RUN_TEST(test_a_picture_is_a_plan);
-  RUN_TEST(test_the_size_of_the_body);
-  RUN_TEST(test_shipped_scenarios_with_a_building_can_be_driven);
-  RUN_TEST(test_mistakes_are_told);
-  return UNITY_END();
-}

@@ -4,12 +4,7 @@
 
 #include <cmath>
 #include <cstring>
-
-extern "C" {
-#include "unity.h"
-void setUp(void);
-void tearDown(void);
-}
+#include "common/suite.h"
 
 using namespace wm::sim;
 
@@ -40,13 +35,13 @@ double decoded(wm_can_frame &frame, wm_quantity quantity) {
   return NAN;
 }
 
-void test_every_quantity_is_bound() {
+TEST(test_every_quantity_is_bound) {
   const uint32_t wanted = 1u << WM_Q_WHEEL_TICKS_LEFT | 1u << WM_Q_WHEEL_TICKS_RIGHT | 1u << WM_Q_YAW_RATE |
                           1u << WM_Q_STEERING_ACTUATOR | 1u << WM_Q_GEAR;
   TEST_ASSERT_EQUAL_HEX32(wanted, wm_can_decoder_quantities(decoder));
 }
 
-void test_yaw_rate_signed_intel_and_limited() {
+TEST(test_yaw_rate_signed_intel_and_limited) {
   const double dps[] = {0, 0.002, -0.002, 12.346, -31.5, 65.534, -65.536};
   for (int i = 0; i < 7; i++) {
     wm_can_frame frame = frame_of(Bus_message::yaw_rate, i);
@@ -58,7 +53,7 @@ void test_yaw_rate_signed_intel_and_limited() {
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 65.534 * 3.14159265358979323846 / 180, decoded(frame, WM_Q_YAW_RATE));
 }
 
-void test_actuator_motorola_in_metres() {
+TEST(test_actuator_motorola_in_metres) {
   const double mm[] = {0, 8, 57.98, 112, 200};
   for (int i = 0; i < 5; i++) {
     wm_can_frame frame = frame_of(Bus_message::steering, i);
@@ -67,7 +62,7 @@ void test_actuator_motorola_in_metres() {
   }
 }
 
-void test_gear() {
+TEST(test_gear) {
   const double gears[] = {1, 0, -1, 1};
   for (int i = 0; i < 4; i++) {
     wm_can_frame frame = frame_of(Bus_message::gear, i);
@@ -76,7 +71,7 @@ void test_gear() {
   }
 }
 
-void test_ticks_wrap_at_16_bits_and_are_unwrapped() {
+TEST(test_ticks_wrap_at_16_bits_and_are_unwrapped) {
   double first_left = 0, first_right = 0;
   for (int i = 0; i < 200; i++) {
     const int64_t left = 65000 + 700 * i, right = 300 - 900 * i;
@@ -109,14 +104,4 @@ void setUp(void) {
 void tearDown(void) {
   wm_can_decoder_free(decoder);
   wm_dbc_free(dbc);
-}
-
-int main() {
-  UNITY_BEGIN();
-  RUN_TEST(test_every_quantity_is_bound);
-  RUN_TEST(test_yaw_rate_signed_intel_and_limited);
-  RUN_TEST(test_actuator_motorola_in_metres);
-  RUN_TEST(test_gear);
-  RUN_TEST(test_ticks_wrap_at_16_bits_and_are_unwrapped);
-  return UNITY_END();
 }

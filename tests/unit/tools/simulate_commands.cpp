@@ -6,13 +6,8 @@
 #include <cstdlib>
 #include <string>
 
+#include "common/suite.h"
 #include "simulate/simulate.h"
-
-extern "C" {
-#include "unity.h"
-void setUp(void) {}
-void tearDown(void) {}
-}
 
 using namespace wm::sim;
 
@@ -46,7 +41,7 @@ double worst(const Recording &r, const Actuators &a) {
   return out;
 }
 
-void test_commands_are_obeyed_after_the_dead_time_with_the_response() {
+TEST(test_commands_are_obeyed_after_the_dead_time_with_the_response) {
   Actuators a;
   a.publish_hz = 10;
   a.speed_step_mps = a.turn_step_radps = 0;
@@ -66,7 +61,7 @@ void test_commands_are_obeyed_after_the_dead_time_with_the_response() {
   TEST_ASSERT_GREATER_THAN_DOUBLE(50, r.length_m);
 }
 
-void test_rows_are_rounded_and_repeated() {
+TEST(test_rows_are_rounded_and_repeated) {
   Actuators a;
   a.speed_step_mps = 0.05;
   const Recording r = driven(a);
@@ -78,7 +73,7 @@ void test_rows_are_rounded_and_repeated() {
   TEST_ASSERT_GREATER_THAN_DOUBLE(0.6 * static_cast<double>(r.commands.size()), same);
 }
 
-void test_acceleration_is_limited() {
+TEST(test_acceleration_is_limited) {
   Actuators a;
   a.acceleration_mps2 = 0.4;
   const Recording r = driven(a);
@@ -87,7 +82,7 @@ void test_acceleration_is_limited() {
 }
 
 // A wheel that is asked for less than the static friction stands.
-void test_friction_holds_a_wheel() {
+TEST(test_friction_holds_a_wheel) {
   Actuators a;
   a.friction_mps = 0.1;
   const Recording r = driven(a);
@@ -100,12 +95,3 @@ void test_friction_holds_a_wheel() {
 }
 
 }  // namespace
-
-int main() {
-  UNITY_BEGIN();
-  RUN_TEST(test_commands_are_obeyed_after_the_dead_time_with_the_response);
-  RUN_TEST(test_rows_are_rounded_and_repeated);
-  RUN_TEST(test_acceleration_is_limited);
-  RUN_TEST(test_friction_holds_a_wheel);
-  return UNITY_END();
-}

@@ -7,14 +7,9 @@
 #include <cstring>
 #include <string>
 
+#include "common/suite.h"
 #include "simulate/angle.h"
 #include "simulate/simulate.h"
-
-extern "C" {
-#include "unity.h"
-void setUp(void);
-void tearDown(void);
-}
 
 using namespace wm::sim;
 
@@ -39,7 +34,7 @@ bool on_map(const Recording &r, int32_t id) {
   return std::any_of(r.map.begin(), r.map.end(), [id](const wm_landmark &l) { return l.id == id; });
 }
 
-void test_misread_codes_are_another_landmark_s() {
+TEST(test_misread_codes_are_another_landmark_s) {
   const Recording right = make({}, 3);
   Faults faults;
   faults.sightings_misread = 0.2;
@@ -57,7 +52,7 @@ void test_misread_codes_are_another_landmark_s() {
   check_share(0.2, misread, static_cast<double>(right.sightings.size()));
 }
 
-void test_false_detections_are_anywhere_and_added() {
+TEST(test_false_detections_are_anywhere_and_added) {
   const Recording right = make({}, 4);
   Faults faults;
   faults.sightings_false = 0.6;  // more than one to each right one
@@ -80,7 +75,7 @@ void test_false_detections_are_anywhere_and_added() {
   TEST_ASSERT_DOUBLE_WITHIN(0.1, 1, std::sqrt(squares / added) / (half / std::sqrt(3.0)));
 }
 
-void test_moved_landmarks_stay_on_the_map_where_they_were() {
+TEST(test_moved_landmarks_stay_on_the_map_where_they_were) {
   const Recording before = make({}, 5);
   Faults faults;
   faults.landmarks_moved = 2;
@@ -99,7 +94,7 @@ void test_moved_landmarks_stay_on_the_map_where_they_were() {
     TEST_ASSERT_EQUAL_DOUBLE(before.sightings[i].bearing_rad, now.sightings[i].bearing_rad);
 }
 
-void test_more_moved_than_there_are_is_all() {
+TEST(test_more_moved_than_there_are_is_all) {
   Faults faults;
   faults.landmarks_moved = 1000;
   faults.landmarks_moved_m = 1;
@@ -107,7 +102,7 @@ void test_more_moved_than_there_are_is_all() {
   TEST_ASSERT_EQUAL(all.map.size(), all.moved.size());
 }
 
-void test_a_mistake_is_told() {
+TEST(test_a_mistake_is_told) {
   const std::string text =
       "format: waymark-scenario/1\nname: x\nworld: {}\npath: {rounds: {duration_s: 20}}\n"
       "faults: {landmarks_moved: {count: 1}}\n";
@@ -123,15 +118,4 @@ void setUp(void) {
   wm_error err{};
   const std::string path = std::string(std::getenv("WM_SOURCE_DIR")) + "/config/worlds/crossing-drawn.yaml";
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, load_scenario(path, scenario, &err), err.text);
-}
-void tearDown(void) {}
-
-int main() {
-  UNITY_BEGIN();
-  RUN_TEST(test_misread_codes_are_another_landmark_s);
-  RUN_TEST(test_false_detections_are_anywhere_and_added);
-  RUN_TEST(test_moved_landmarks_stay_on_the_map_where_they_were);
-  RUN_TEST(test_more_moved_than_there_are_is_all);
-  RUN_TEST(test_a_mistake_is_told);
-  return UNITY_END();
 }

@@ -8,16 +8,11 @@
 #include <cstdlib>
 #include <vector>
 
+#include "common/suite.h"
 #include "simulate/angle.h"
 #include "simulate/bus.h"
 #include "simulate/motion.h"
 #include "simulate/simulate.h"
-
-extern "C" {
-#include "unity.h"
-void setUp(void);
-void tearDown(void);
-}
 
 using namespace wm::sim;
 
@@ -130,13 +125,13 @@ void wheels_are_off_as_said(const char *name, double percent) {
   TEST_ASSERT_DOUBLE_WITHIN(0.25, 1, std::sqrt(radius) * 100 / percent);
   TEST_ASSERT_DOUBLE_WITHIN(0.37, 1, std::sqrt(track) * 100 / percent);
 }
-void test_wheels_are_off_as_said() {
+TEST(test_wheels_are_off_as_said) {
   wheels_are_off_as_said("hall-easy", 1);
   wheels_are_off_as_said("crossing-hard", 2);
 }
 
 // Slip is what a wheel's count is off by beyond its radius: its deviation, and how it wanders.
-void test_slip_is_as_large_and_as_slow_as_said() {
+TEST(test_slip_is_as_large_and_as_slow_as_said) {
   Scenario s = eight("hall-easy");
   s.errors.wheel_radius = s.errors.track = 0;
   double squares = 0, products = 0, n = 0;
@@ -166,7 +161,7 @@ void test_slip_is_as_large_and_as_slow_as_said() {
 }
 
 // The actuator's position through the table of calibration.yaml, against the true curvature.
-void test_the_steering_table_is_off_as_said() {
+TEST(test_the_steering_table_is_off_as_said) {
   for (const char *name : {"corridor-easy", "crossing-hard"}) {
     const Scenario s = eight(name);
     const wm_wheels &w = s.robot.wheels;
@@ -221,12 +216,12 @@ void gyro_is_as_said(const char *name, double times) {
   const double wanted = square(0.0002 * times) * (60 - 10 / 3.0) / 60 + 2 * square(0.003 * times) / 1000;
   TEST_ASSERT_DOUBLE_WITHIN(0.32, 1, std::sqrt(walk / wanted));
 }
-void test_the_gyro_is_as_said() {
+TEST(test_the_gyro_is_as_said) {
   gyro_is_as_said("office-easy", 1);
   gyro_is_as_said("corridor-hard", 2);
 }
 
-void test_can_stamps_jitter_and_no_frame_overtakes_its_like() {
+TEST(test_can_stamps_jitter_and_no_frame_overtakes_its_like) {
   for (const char *name : {"hall-easy", "hall-hard"}) {
     const Recording r = driven(eight(name), 5);
     const double said = std::string(name) == "hall-easy" ? 0.002 : 0.004;
@@ -244,7 +239,7 @@ void test_can_stamps_jitter_and_no_frame_overtakes_its_like() {
 }
 
 // Losses by the counters' jumps, doubles and swaps by the order, lateness by what the frame says.
-void test_faults_of_the_bus() {
+TEST(test_faults_of_the_bus) {
   Scenario s = eight("corridor-easy");
   s.bus.stamp_jitter_s = 0;
   s.robot.sends_speeds = false;
@@ -305,7 +300,7 @@ void test_faults_of_the_bus() {
     TEST_ASSERT_GREATER_OR_EQUAL_INT64(waited.can[i - 1].t_ns, waited.can[i].t_ns);
 }
 
-void test_a_slip_and_a_dead_encoder() {
+TEST(test_a_slip_and_a_dead_encoder) {
   Scenario s = eight("hall-easy");
   make_perfect(s);
   const Recording plain = driven(s, 1);
@@ -329,7 +324,7 @@ void test_a_slip_and_a_dead_encoder() {
   TEST_ASSERT_TRUE(slipped > 400);
 }
 
-void test_hard_doubles_easy() {
+TEST(test_hard_doubles_easy) {
   for (const char *world : {"crossing", "corridor", "office", "hall", "seabed"}) {
     const Scenario easy = shipped(std::string(world) + "-easy"), hard = shipped(std::string(world) + "-hard");
     const Errors &e = easy.errors, &h = hard.errors;
@@ -378,19 +373,3 @@ void test_hard_doubles_easy() {
 }
 
 }  // namespace
-
-void setUp(void) {}
-void tearDown(void) {}
-
-int main() {
-  UNITY_BEGIN();
-  RUN_TEST(test_wheels_are_off_as_said);
-  RUN_TEST(test_slip_is_as_large_and_as_slow_as_said);
-  RUN_TEST(test_the_steering_table_is_off_as_said);
-  RUN_TEST(test_the_gyro_is_as_said);
-  RUN_TEST(test_can_stamps_jitter_and_no_frame_overtakes_its_like);
-  RUN_TEST(test_faults_of_the_bus);
-  RUN_TEST(test_a_slip_and_a_dead_encoder);
-  RUN_TEST(test_hard_doubles_easy);
-  return UNITY_END();
-}

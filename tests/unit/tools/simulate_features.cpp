@@ -10,17 +10,12 @@
 #include <filesystem>
 #include <map>
 
+#include "common/suite.h"
 #include "simulate/angle.h"
 #include "simulate/motion.h"
 #include "simulate/simulate.h"
 #include "simulate/write.h"
 #include "waymark/recording.h"
-
-extern "C" {
-#include "unity.h"
-void setUp(void);
-void tearDown(void);
-}
 
 using namespace wm::sim;
 using Eigen::Vector3d;
@@ -67,7 +62,7 @@ void check_share(double wanted, double part, double all) {
   TEST_ASSERT_DOUBLE_WITHIN(4 * std::sqrt(wanted * (1 - wanted) / all), wanted, part / all);
 }
 
-void test_markers_have_their_noise() {
+TEST(test_markers_have_their_noise) {
   load("loops-markers");
   scenario.sensors[0].outlier_fraction = 0.03;
   Sum distance, direction, heading, height;
@@ -100,7 +95,7 @@ void test_markers_have_their_noise() {
   check_share(0.03, outliers, all);
 }
 
-void test_stereo_pixels_have_their_noise() {
+TEST(test_stereo_pixels_have_their_noise) {
   load("seabed-slam");
   scenario.sensors[0].one_side_fraction = 0.04;
   Sum noise[4];
@@ -133,7 +128,7 @@ void test_stereo_pixels_have_their_noise() {
   TEST_ASSERT_DOUBLE_WITHIN(1.5, 30 * 0.95 * 0.96, sum / static_cast<double>(both.size()));
 }
 
-void test_fifteen_points_are_seen_well_enough() {
+TEST(test_fifteen_points_are_seen_well_enough) {
   load("seabed-points");
   double few = 0, steps = 0;
   Sum start;
@@ -155,7 +150,7 @@ void test_fifteen_points_are_seen_well_enough() {
 }
 
 // Ranges with echoes, depth, compass: through files and the reader.
-void test_instruments_under_water() {
+TEST(test_instruments_under_water) {
   load("seabed-acoustic");
   const std::string folder = "simulate_features." + std::to_string(getpid());
   Sum range, depth, compass, deviation;
@@ -213,7 +208,7 @@ void test_instruments_under_water() {
   TEST_ASSERT_DOUBLE_WITHIN(0.45, 1, deviation.rms() / (0.5 * kDegree));
 }
 
-void test_gnss_wanders_and_jumps() {
+TEST(test_gnss_wanders_and_jumps) {
   load("loops-lines");
   Sensor gnss;
   gnss.kind = Sensor::Kind::gnss;
@@ -246,7 +241,7 @@ void test_gnss_wanders_and_jumps() {
   check_share(0.02, outliers, whole.n + outliers);
 }
 
-void test_perfect_is_perfect() {
+TEST(test_perfect_is_perfect) {
   load("seabed-acoustic");
   make_perfect(scenario);
   make(2);
@@ -259,7 +254,7 @@ void test_perfect_is_perfect() {
     TEST_ASSERT_EQUAL_DOUBLE(made.landmarks[i].p_m[2], made.map[i].p_m[2]);
 }
 
-void test_a_landmark_less_changes_nothing_of_the_others() {
+TEST(test_a_landmark_less_changes_nothing_of_the_others) {
   load("loops-lines");
   wm_error err{};
   Recording all, ten;
@@ -285,7 +280,7 @@ void refuse(const char *extra, const char *wanted) {
   TEST_ASSERT_EQUAL_STRING(wanted, err.text);
 }
 
-void test_a_recording_that_ends_early_is_of_the_same_world() {
+TEST(test_a_recording_that_ends_early_is_of_the_same_world) {
   load("loops-markers");
   make(5);
   const std::vector<wm_landmark> whole = made.landmarks;
@@ -297,7 +292,7 @@ void test_a_recording_that_ends_early_is_of_the_same_world() {
     TEST_ASSERT_EQUAL_MEMORY(whole[i].p_m, made.landmarks[i].p_m, sizeof whole[i].p_m);
 }
 
-void test_mistakes_are_told() {
+TEST(test_mistakes_are_told) {
   refuse("{kind: landmarks}",
          "x.yaml:6: sensors[0]: give bearing_sigma_deg, range_sigma_m or both: they choose what this sensor measures");
   refuse("{kind: landmarks, bearing_sigma_deg: 1, sigma_px: 1}",
@@ -312,20 +307,3 @@ void test_mistakes_are_told() {
 }
 
 }  // namespace
-
-void setUp(void) {}
-void tearDown(void) {}
-
-int main() {
-  UNITY_BEGIN();
-  RUN_TEST(test_markers_have_their_noise);
-  RUN_TEST(test_stereo_pixels_have_their_noise);
-  RUN_TEST(test_fifteen_points_are_seen_well_enough);
-  RUN_TEST(test_instruments_under_water);
-  RUN_TEST(test_gnss_wanders_and_jumps);
-  RUN_TEST(test_perfect_is_perfect);
-  RUN_TEST(test_a_landmark_less_changes_nothing_of_the_others);
-  RUN_TEST(test_a_recording_that_ends_early_is_of_the_same_world);
-  RUN_TEST(test_mistakes_are_told);
-  return UNITY_END();
-}

@@ -11,16 +11,11 @@
 #include <iterator>
 #include <vector>
 
+#include "common/suite.h"
 #include "simulate/angle.h"
 #include "simulate/simulate.h"
 #include "simulate/write.h"
 #include "waymark/recording.h"
-
-extern "C" {
-#include "unity.h"
-void setUp(void);
-void tearDown(void);
-}
 
 using namespace wm::sim;
 
@@ -59,7 +54,7 @@ std::vector<wm_event> events_of(wm_source *source) {
   return events;
 }
 
-void test_what_was_known_beforehand_is_read_back() {
+TEST(test_what_was_known_beforehand_is_read_back) {
   write_and_open(false);
   TEST_ASSERT_EQUAL_STRING("crossing", wm_recording_name(opened));
   TEST_ASSERT_DOUBLE_WITHIN(1e-3, made.drive.duration_s(), wm_recording_duration_s(opened));
@@ -94,7 +89,7 @@ void test_what_was_known_beforehand_is_read_back() {
   TEST_ASSERT_DOUBLE_WITHIN(1e-7, 0.5 * kPi / 180, start->sigma_heading_rad);
 }
 
-void test_bearings_are_those_of_truth() {
+TEST(test_bearings_are_those_of_truth) {
   write_and_open(true);
   size_t sources = 0, seen = 0;
   wm_source *const *all = wm_recording_sources(opened, &sources);
@@ -127,7 +122,7 @@ void test_bearings_are_those_of_truth() {
 
 // Dead reckoning by hand from what the bus says, counts for the way and the yaw rate for the heading: ends where the
 // drive ends. No estimator in between.
-void test_counts_and_yaw_rate_lead_to_the_end() {
+TEST(test_counts_and_yaw_rate_lead_to_the_end) {
   write_and_open(true);
   size_t sources = 0;
   wm_source *const *all = wm_recording_sources(opened, &sources);
@@ -172,7 +167,7 @@ void test_counts_and_yaw_rate_lead_to_the_end() {
   TEST_ASSERT_DOUBLE_WITHIN(0.01, end.y_m, y);
 }
 
-void test_truth_is_the_drive() {
+TEST(test_truth_is_the_drive) {
   write_and_open(false);
   std::ifstream file(folder + "/truth.csv");
   std::string line;
@@ -198,7 +193,7 @@ std::string bytes_of(const std::filesystem::path &path) {
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
-void test_the_same_seed_gives_the_same_bytes() {
+TEST(test_the_same_seed_gives_the_same_bytes) {
   write_and_open(false);
   const std::string second = folder + "-again";
   wm_error err{};
@@ -216,7 +211,7 @@ void test_the_same_seed_gives_the_same_bytes() {
   std::filesystem::remove_all(second);
 }
 
-void test_a_folder_that_cannot_be_made_is_named() {
+TEST(test_a_folder_that_cannot_be_made_is_named) {
   wm_error err{};
   TEST_ASSERT_EQUAL(WM_OK, simulate(scenario, 1, 3, made, &err));
   TEST_ASSERT_EQUAL(WM_IO, write_recording(scenario, made, "/proc/no/such", &err));
@@ -235,15 +230,4 @@ void setUp(void) {
 void tearDown(void) {
   wm_recording_close(opened);
   std::filesystem::remove_all(folder);
-}
-
-int main() {
-  UNITY_BEGIN();
-  RUN_TEST(test_what_was_known_beforehand_is_read_back);
-  RUN_TEST(test_bearings_are_those_of_truth);
-  RUN_TEST(test_counts_and_yaw_rate_lead_to_the_end);
-  RUN_TEST(test_truth_is_the_drive);
-  RUN_TEST(test_the_same_seed_gives_the_same_bytes);
-  RUN_TEST(test_a_folder_that_cannot_be_made_is_named);
-  return UNITY_END();
 }

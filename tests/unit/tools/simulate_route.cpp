@@ -5,15 +5,8 @@
 #include <cmath>
 #include <cstring>
 
+#include "common/suite.h"
 #include "simulate/angle.h"
-
-extern "C" {
-#include "unity.h"
-void setUp(void);
-void tearDown(void);
-}
-void setUp(void) {}
-void tearDown(void) {}
 
 using namespace wm::sim;
 
@@ -61,7 +54,7 @@ Drive planned(const Route &route) {
   return drive;
 }
 
-void test_derivatives_agree_everywhere() {
+TEST(test_derivatives_agree_everywhere) {
   const Drive drive = planned(mixed_route());
   const double h = 1e-4;
   for (double t = h; t < drive.duration_s() - h; t += 0.013) {
@@ -74,7 +67,7 @@ void test_derivatives_agree_everywhere() {
   }
 }
 
-void test_position_is_the_integral_of_speed_and_heading() {
+TEST(test_position_is_the_integral_of_speed_and_heading) {
   const Drive drive = planned(mixed_route());
   const State start = drive.at(0);
   double x = start.x_m, y = start.y_m;
@@ -89,7 +82,7 @@ void test_position_is_the_integral_of_speed_and_heading() {
   TEST_ASSERT_DOUBLE_WITHIN(1e-4, y, end.y_m);
 }
 
-void test_speed_and_acceleration_keep_their_limits() {
+TEST(test_speed_and_acceleration_keep_their_limits) {
   const Drive drive = planned(mixed_route());
   double last = 0, fastest = 0, slowest = 0;
   const double h = 1e-3;
@@ -104,7 +97,7 @@ void test_speed_and_acceleration_keep_their_limits() {
   TEST_ASSERT_DOUBLE_WITHIN(1e-6, -1, slowest);
 }
 
-void test_turns_turn_as_they_say_forwards_and_backwards() {
+TEST(test_turns_turn_as_they_say_forwards_and_backwards) {
   const Drive drive = planned(mixed_route());
   const State end = drive.at(1e9);
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.3 + (90 - 40 + 35) * kPi / 180, end.heading_rad);
@@ -116,7 +109,7 @@ void test_turns_turn_as_they_say_forwards_and_backwards() {
   TEST_ASSERT_EQUAL_DOUBLE(0, end.speed_mps);
 }
 
-void test_four_equal_corners_return_to_the_start_lap_after_lap() {
+TEST(test_four_equal_corners_return_to_the_start_lap_after_lap) {
   Route route;
   route.laps = 2;
   for (int i = 0; i < 4; i++) {
@@ -131,7 +124,7 @@ void test_four_equal_corners_return_to_the_start_lap_after_lap() {
 }
 
 // The way that was driven, whether the end is cut off or a part of it is skipped by carrying the vehicle.
-void test_the_length_is_that_of_the_part_that_is_driven() {
+TEST(test_the_length_is_that_of_the_part_that_is_driven) {
   const auto way = [](const Drive &drive) {
     const double h = 0.001;
     double sum = 0;
@@ -148,7 +141,7 @@ void test_the_length_is_that_of_the_part_that_is_driven() {
   TEST_ASSERT_DOUBLE_WITHIN(0.01, way(carried), carried.length_m());
 }
 
-void test_a_turn_without_room_for_its_ease_is_refused() {
+TEST(test_a_turn_without_room_for_its_ease_is_refused) {
   Route route;
   route.legs = {straight(5, 1), turn(30, 4, 3, 1)};
   Drive drive;
@@ -159,15 +152,3 @@ void test_a_turn_without_room_for_its_ease_is_refused() {
 }
 
 }  // namespace
-
-int main() {
-  UNITY_BEGIN();
-  RUN_TEST(test_derivatives_agree_everywhere);
-  RUN_TEST(test_position_is_the_integral_of_speed_and_heading);
-  RUN_TEST(test_speed_and_acceleration_keep_their_limits);
-  RUN_TEST(test_turns_turn_as_they_say_forwards_and_backwards);
-  RUN_TEST(test_four_equal_corners_return_to_the_start_lap_after_lap);
-  RUN_TEST(test_the_length_is_that_of_the_part_that_is_driven);
-  RUN_TEST(test_a_turn_without_room_for_its_ease_is_refused);
-  return UNITY_END();
-}

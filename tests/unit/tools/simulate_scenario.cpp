@@ -8,14 +8,8 @@
 #include <fstream>
 #include <iterator>
 
+#include "common/suite.h"
 #include "simulate/angle.h"
-
-extern "C" {
-#include "unity.h"
-void setUp(void);
-void tearDown(void);
-}
-void tearDown(void) {}
 
 using namespace wm::sim;
 
@@ -31,7 +25,7 @@ std::string with(const char *from, const char *to) {
   return text.replace(at, std::strlen(from), to);
 }
 
-void test_the_shipped_crossing_is_read() {
+TEST(test_the_shipped_crossing_is_read) {
   Scenario s;
   wm_error err{};
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, parse_scenario(crossing, "crossing.yaml", s, &err), err.text);
@@ -51,7 +45,7 @@ void test_the_shipped_crossing_is_read() {
   TEST_ASSERT_EQUAL(-1, s.faults.dead_encoder);
 }
 
-void test_faults_are_read() {
+TEST(test_faults_are_read) {
   Scenario s;
   wm_error err{};
   const std::string text = crossing +
@@ -67,7 +61,7 @@ void test_faults_are_read() {
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, kPi / 2, s.faults.start_heading_rad);
 }
 
-void test_each_mistake_is_refused_with_file_line_and_key() {
+TEST(test_each_mistake_is_refused_with_file_line_and_key) {
   const struct {
     const char *from, *to;
     const char *says[3];
@@ -102,7 +96,7 @@ void test_each_mistake_is_refused_with_file_line_and_key() {
   }
 }
 
-void test_a_file_that_is_not_there_is_named() {
+TEST(test_a_file_that_is_not_there_is_named) {
   Scenario s;
   wm_error err{};
   TEST_ASSERT_NOT_EQUAL(WM_OK, load_scenario("no/such/scenario.yaml", s, &err));
@@ -115,13 +109,4 @@ void setUp(void) {
   std::ifstream file(std::string(std::getenv("WM_SOURCE_DIR")) + "/config/worlds/crossing.yaml");
   crossing.assign(std::istreambuf_iterator<char>(file), {});
   TEST_ASSERT_GREATER_THAN(1000, crossing.size());
-}
-
-int main() {
-  UNITY_BEGIN();
-  RUN_TEST(test_the_shipped_crossing_is_read);
-  RUN_TEST(test_faults_are_read);
-  RUN_TEST(test_each_mistake_is_refused_with_file_line_and_key);
-  RUN_TEST(test_a_file_that_is_not_there_is_named);
-  return UNITY_END();
 }

@@ -8,16 +8,10 @@
 #include <memory>
 #include <vector>
 
+#include "common/suite.h"
 #include "simulate/angle.h"
 #include "simulate/bus.h"
 #include "simulate/simulate.h"
-
-extern "C" {
-#include "unity.h"
-void setUp(void);
-void tearDown(void);
-}
-void tearDown(void) {}
 
 using namespace wm::sim;
 
@@ -64,7 +58,7 @@ double raw_yaw_rate(const wm_can_frame &f) {
   return raw * 0.002 * kPi / 180;
 }
 
-void test_a_seed_says_the_same_again_and_another_seed_something_else() {
+TEST(test_a_seed_says_the_same_again_and_another_seed_something_else) {
   const Recording a = simulated(crossing, 7), b = simulated(crossing, 7), c = simulated(crossing, 8);
   TEST_ASSERT_TRUE(same(a.can, b.can));
   TEST_ASSERT_TRUE(same(a.sightings, b.sightings));
@@ -74,7 +68,7 @@ void test_a_seed_says_the_same_again_and_another_seed_something_else() {
   TEST_ASSERT_NOT_EQUAL_DOUBLE(c.map[0].p_m[0], a.map[0].p_m[0]);
 }
 
-void test_landmarks_change_neither_wheels_nor_each_other() {
+TEST(test_landmarks_change_neither_wheels_nor_each_other) {
   const Recording three = simulated(crossing, 7, 3), one = simulated(crossing, 7, 1), none = simulated(crossing, 7, 0);
   TEST_ASSERT_TRUE(same(three.can, one.can));
   TEST_ASSERT_TRUE(same(three.can, none.can));
@@ -85,7 +79,7 @@ void test_landmarks_change_neither_wheels_nor_each_other() {
   TEST_ASSERT_TRUE(same(first, one.sightings));
 }
 
-void test_bearings_have_the_noise_and_the_outliers_that_are_asked_for() {
+TEST(test_bearings_have_the_noise_and_the_outliers_that_are_asked_for) {
   double sum = 0, squares = 0, n = 0, outliers = 0, all = 0;
   for (uint64_t seed = 1; seed <= 10; seed++) {
     const Recording r = simulated(crossing, seed);
@@ -108,7 +102,7 @@ void test_bearings_have_the_noise_and_the_outliers_that_are_asked_for() {
   TEST_ASSERT_DOUBLE_WITHIN(4 * std::sqrt(0.05 * 0.95 / all), 0.05, outliers / all);
 }
 
-void test_yaw_rate_has_bias_walk_and_noise() {
+TEST(test_yaw_rate_has_bias_walk_and_noise) {
   double bias_squares = 0, walk_squares = 0;
   const int runs = 200;
   for (uint64_t seed = 1; seed <= runs; seed++) {
@@ -135,7 +129,7 @@ void test_yaw_rate_has_bias_walk_and_noise() {
   TEST_ASSERT_DOUBLE_WITHIN(0.35, 1, walk_squares / runs / walked);
 }
 
-void test_wheels_count_what_they_roll() {
+TEST(test_wheels_count_what_they_roll) {
   Scenario sc = crossing;
   sc.errors.track = 0;
   for (uint64_t seed = 1; seed <= 5; seed++) {
@@ -161,7 +155,7 @@ void test_wheels_count_what_they_roll() {
   }
 }
 
-void test_draws_of_many_seeds_are_as_large_as_the_scenario_says() {
+TEST(test_draws_of_many_seeds_are_as_large_as_the_scenario_says) {
   double radius = 0, track = 0, steering = 0, map = 0, start = 0;
   const int runs = 400;
   for (uint64_t seed = 1; seed <= runs; seed++) {
@@ -183,7 +177,7 @@ void test_draws_of_many_seeds_are_as_large_as_the_scenario_says() {
   TEST_ASSERT_DOUBLE_WITHIN(0.28, 1, start / runs / (0.25 * deg * deg));
 }
 
-void test_faults_happen_as_often_as_asked() {
+TEST(test_faults_happen_as_often_as_asked) {
   Scenario sc = crossing;
   const Recording plain = simulated(sc, 3);
   sc.faults.can_lost = 0.1;
@@ -208,7 +202,7 @@ void test_faults_happen_as_often_as_asked() {
   TEST_ASSERT_DOUBLE_WITHIN(0.06, 0.3, static_cast<double>(late) / static_cast<double>(r.sightings.size()));
 }
 
-void test_dead_encoder_clock_offset_and_start_error() {
+TEST(test_dead_encoder_clock_offset_and_start_error) {
   Scenario sc = crossing;
   make_perfect(sc);
   sc.faults.dead_encoder = 0;
@@ -240,17 +234,4 @@ void setUp(void) {
   wm_error err{};
   const std::string path = std::string(std::getenv("WM_SOURCE_DIR")) + "/config/worlds/crossing.yaml";
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, load_scenario(path, crossing, &err), err.text);
-}
-
-int main() {
-  UNITY_BEGIN();
-  RUN_TEST(test_a_seed_says_the_same_again_and_another_seed_something_else);
-  RUN_TEST(test_landmarks_change_neither_wheels_nor_each_other);
-  RUN_TEST(test_bearings_have_the_noise_and_the_outliers_that_are_asked_for);
-  RUN_TEST(test_yaw_rate_has_bias_walk_and_noise);
-  RUN_TEST(test_wheels_count_what_they_roll);
-  RUN_TEST(test_draws_of_many_seeds_are_as_large_as_the_scenario_says);
-  RUN_TEST(test_faults_happen_as_often_as_asked);
-  RUN_TEST(test_dead_encoder_clock_offset_and_start_error);
-  return UNITY_END();
 }

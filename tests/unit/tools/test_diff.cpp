@@ -1,15 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // waymark diff: finds the first row, the largest difference and the counters.
 #include "common/failure.h"
+#include "common/suite.h"
 #include "diff/difference.h"
 #include "made.h"
-#include "unity.h"
 
 using namespace wm::tools;
 using made::stamp;
-
-void setUp() {}
-void tearDown() {}
 
 namespace {
 
@@ -27,7 +24,7 @@ std::string difference(const made::Folder &a, const made::Folder &b) {
   return difference_text(differences(a.path(), b.path()), "a", "b");
 }
 
-void test_the_same() {
+TEST(test_the_same) {
   made::Folder a;
   made::Folder b;
   for (const made::Folder *run : {&a, &b}) {
@@ -40,7 +37,7 @@ void test_the_same() {
   TEST_ASSERT_TRUE(has(difference(a, b), "The two runs are the same."));
 }
 
-void test_where_it_began() {
+TEST(test_where_it_began) {
   made::Folder a;
   made::Folder b;
   a.write("trajectory.csv", drive(99, 0));
@@ -59,7 +56,7 @@ void test_where_it_began() {
     TEST_ASSERT_TRUE_MESSAGE(has(text, said), (std::string(said) + "\n not in\n" + text).c_str());
 }
 
-void test_one_is_longer() {
+TEST(test_one_is_longer) {
   made::Folder a;
   made::Folder b;
   a.write("trajectory.csv", drive(99, 0));
@@ -69,7 +66,7 @@ void test_one_is_longer() {
   TEST_ASSERT_TRUE_MESSAGE(has(text, "the same up to row 51; from t = 5.1 s"), text.c_str());
 }
 
-void test_a_file_in_one_only_and_other_bytes() {
+TEST(test_a_file_in_one_only_and_other_bytes) {
   made::Folder a;
   made::Folder b;
   for (const made::Folder *run : {&a, &b}) run->write("trajectory.tum", "0 0 0 0 0 0 0 1\n");
@@ -81,7 +78,7 @@ void test_a_file_in_one_only_and_other_bytes() {
   TEST_ASSERT_TRUE(has(text, "the first that differs is byte 3"));
 }
 
-void test_no_run() {
+TEST(test_no_run) {
   made::Folder a;
   try {
     differences(a.path(), a.path());
@@ -92,13 +89,3 @@ void test_no_run() {
 }
 
 }  // namespace
-
-int main() {
-  UNITY_BEGIN();
-  RUN_TEST(test_the_same);
-  RUN_TEST(test_where_it_began);
-  RUN_TEST(test_one_is_longer);
-  RUN_TEST(test_a_file_in_one_only_and_other_bytes);
-  RUN_TEST(test_no_run);
-  return UNITY_END();
-}

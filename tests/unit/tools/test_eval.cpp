@@ -4,18 +4,15 @@
 
 #include "common/failure.h"
 #include "common/statistics.h"
+#include "common/suite.h"
 #include "eval/compare.h"
 #include "eval/figures.h"
 #include "eval/gnss_delay.h"
 #include "made.h"
-#include "unity.h"
 
 using namespace wm::tools;
 using made::format;
 using made::stamp;
-
-void setUp() {}
-void tearDown() {}
 
 namespace {
 
@@ -52,7 +49,7 @@ void straight(const made::Folder &run, const made::Folder &recording, double hea
 }
 
 // Half axes 0.3 and 0.1 m, the longer one turned by 30 degrees.
-void test_an_ellipse_has_its_axes_and_direction() {
+TEST(test_an_ellipse_has_its_axes_and_direction) {
   const Eigen::Matrix2d turn = Eigen::Rotation2Dd(kPi / 6).toRotationMatrix();
   const Eigen::Matrix2d covariance = turn * Eigen::Vector2d(0.09, 0.01).asDiagonal() * turn.transpose();
   const Ellipse is = ellipse_of(covariance);
@@ -62,7 +59,7 @@ void test_an_ellipse_has_its_axes_and_direction() {
   TEST_ASSERT_DOUBLE_IS_NAN(ellipse_of(covariance * kNan).longer_m);
 }
 
-void test_constant_offset_to_the_left() {
+TEST(test_constant_offset_to_the_left) {
   made::Folder run;
   made::Folder recording;
   straight(run, recording, 2.0, 0, 0.2, 0);
@@ -85,7 +82,7 @@ void test_constant_offset_to_the_left() {
   TEST_ASSERT_TRUE(f.at("landmark_rmse_m").is_null());
 }
 
-void test_behind_and_turned_across_pi() {
+TEST(test_behind_and_turned_across_pi) {
   made::Folder run;
   made::Folder recording;
   straight(run, recording, kPi - 0.01, -0.3, 0, 0.05);  // truth's heading and the run's on both sides of pi
@@ -101,7 +98,7 @@ void test_behind_and_turned_across_pi() {
   expect(f, "nees_inside_95", 0);  // 9.25 > 7.81
 }
 
-void test_nees_uses_the_whole_covariance() {
+TEST(test_nees_uses_the_whole_covariance) {
   made::Folder run;
   made::Folder recording;
   recording.write("truth.csv", made::kTruthHeader + ("0," + made::pose(0, 0, 0)) + "\n");
@@ -114,7 +111,7 @@ void test_nees_uses_the_whole_covariance() {
   expect(judge(run, recording), "nees_mean", 5, 1e-9);
 }
 
-void test_interpolation_between_the_nearest_and_no_further() {
+TEST(test_interpolation_between_the_nearest_and_no_further) {
   made::Folder run;
   made::Folder recording;
   // The run has poses at 0.0, 0.4, 1.0 s (a gap of 0.6 s) and 1.2 s; it is where truth is at its own stamps.
@@ -132,7 +129,7 @@ void test_interpolation_between_the_nearest_and_no_further() {
   expect(f, "heading_max_deg", 0, 1e-7);
 }
 
-void test_a_gap_of_half_a_second_is_allowed() {
+TEST(test_a_gap_of_half_a_second_is_allowed) {
   made::Folder run;
   made::Folder recording;
   recording.write("truth.csv", made::kTruthHeader + ("250000000," + made::pose(0, 0, 0)) + "\n");
@@ -152,7 +149,7 @@ void test_a_gap_of_half_a_second_is_allowed() {
   TEST_ASSERT_TRUE(refused);
 }
 
-void test_six_degrees_of_freedom() {
+TEST(test_six_degrees_of_freedom) {
   made::Folder run;
   made::Folder recording;
   // Truth turned by 90 degrees about z; the estimate is R_true Exp(-r) with r = 0.2 rad about the body's x.
@@ -182,7 +179,7 @@ void test_six_degrees_of_freedom() {
   expect(f, "nees_mean", 0.25 + 4, 1e-6);
 }
 
-void test_height_does_not_count_in_the_plane() {
+TEST(test_height_does_not_count_in_the_plane) {
   made::Folder run;
   made::Folder recording;
   recording.write("truth.csv", std::string(made::kTruthHeader) + "0,0,0,7,0,0,0,1\n100000000,1,0,9,0,0,0,1\n");
@@ -193,7 +190,7 @@ void test_height_does_not_count_in_the_plane() {
   expect(f, "position_max_m", 0.1);
 }
 
-void test_truth_without_orientation() {
+TEST(test_truth_without_orientation) {
   made::Folder run;
   made::Folder recording;
   straight(run, recording, 0, 0, 0.2, 0);
@@ -208,7 +205,7 @@ void test_truth_without_orientation() {
     TEST_ASSERT_TRUE_MESSAGE(f.at(key).is_null(), key);
 }
 
-void test_truth_of_another_point_of_the_robot() {
+TEST(test_truth_of_another_point_of_the_robot) {
   made::Folder run;
   made::Folder recording;
   straight(run, recording, 0.7, 0, 0, 0);
@@ -239,7 +236,7 @@ void off_between(const made::Folder &run, const made::Folder &recording, double 
   run.write("trajectory.csv", poses);
 }
 
-void test_lost() {
+TEST(test_lost) {
   made::Folder run;
   made::Folder recording;
   off_between(run, recording, 2, 4);  // 2 s is not longer than 2 s
@@ -258,7 +255,7 @@ void test_lost() {
   TEST_ASSERT_TRUE(judge(run, recording).at("position_end_percent").is_null());
 }
 
-void test_a_part_of_the_drive() {
+TEST(test_a_part_of_the_drive) {
   made::Folder run;
   made::Folder recording;
   off_between(run, recording, 4, 5);
@@ -271,7 +268,7 @@ void test_a_part_of_the_drive() {
   expect(judge(run, recording, options), "position_mean_m", 1);
 }
 
-void test_alignment_undoes_what_it_may_undo() {
+TEST(test_alignment_undoes_what_it_may_undo) {
   // A bent path in space, moved by a known similarity.
   std::vector<Eigen::Vector3d> from;
   for (int i = 0; i < 20; ++i) from.emplace_back(0.3 * i, std::sin(0.5 * i), 0.1 * i * i / 20);
@@ -292,7 +289,7 @@ void test_alignment_undoes_what_it_may_undo() {
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0, (space.t - Eigen::Vector3d(3, -4, 5)).norm());
 }
 
-void test_alignment_keeps_nees() {
+TEST(test_alignment_keeps_nees) {
   // Turning the map turns the covariance with it: NEES of a run does not depend on the axes that it is told in.
   Pose pose;
   pose.covariance.diagonal() << 1, 4, 9, 0.1, 0.2, 0.3;
@@ -304,7 +301,7 @@ void test_alignment_keeps_nees() {
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.3, turned.covariance(5, 5));
 }
 
-void test_a_covariance_that_is_none_is_not_inside() {
+TEST(test_a_covariance_that_is_none_is_not_inside) {
   made::Folder run;
   made::Folder recording;
   straight(run, recording, 0, 0, 0, 0, 0.0);  // sigma 0
@@ -314,7 +311,7 @@ void test_a_covariance_that_is_none_is_not_inside() {
   TEST_ASSERT_TRUE(f.at("nees_mean").is_null());
 }
 
-void test_landmarks_by_id_and_by_place() {
+TEST(test_landmarks_by_id_and_by_place) {
   Comparison comparison;
   const auto at = [](int64_t id, double x, double y, double yaw) {
     return Landmark{id, {x, y, 0}, Eigen::Matrix2d::Zero(), yaw};
@@ -341,7 +338,7 @@ void test_landmarks_by_id_and_by_place() {
 }
 
 // Numbers that the filter gave out itself, some of which are truth's ids by chance.
-void test_landmarks_whose_ids_are_the_filters_own() {
+TEST(test_landmarks_whose_ids_are_the_filters_own) {
   Comparison comparison;
   std::vector<Landmark> truth, estimate, distorted;
   for (int i = 0; i < 10; i++) {
@@ -366,7 +363,7 @@ void test_landmarks_whose_ids_are_the_filters_own() {
   TEST_ASSERT_EQUAL_STRING("place", f["landmarks_matched_by"].get<std::string>().c_str());
 }
 
-void test_statistics() {
+TEST(test_statistics) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 2.5, percentile({4, 1, 3, 2}, 50));
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 3.85, percentile({4, 1, 3, 2}, 95));
   // Published tables (Abramowitz and Stegun 26.8).
@@ -389,7 +386,7 @@ void refuses(const std::string &trajectory, const std::string &said) {
   TEST_FAIL_MESSAGE("not refused");
 }
 
-void test_errors_say_where() {
+TEST(test_errors_say_where) {
   const std::string header = made::kPlanarHeader;
   refuses("", "trajectory.csv: is empty");
   refuses(header, "has no pose in it");
@@ -401,7 +398,7 @@ void test_errors_say_where() {
           "trajectory.csv:3: t_ns: time runs back");
 }
 
-void test_tum_serves_where_there_is_no_csv() {
+TEST(test_tum_serves_where_there_is_no_csv) {
   made::Folder run;
   made::Folder recording;
   recording.write("truth.csv", made::kTruthHeader + ("123456789," + made::pose(1, 2, 0)) + "\n");
@@ -424,7 +421,7 @@ std::string sent(int64_t t_ms, double age_ms, double x, double odom_x, int reset
 }
 
 // A speed that changes, so that a delay is no shift; a fifth of the positions is far off.
-void test_the_delay_of_a_receiver() {
+TEST(test_the_delay_of_a_receiver) {
   Trajectory run;
   std::vector<Pose> gnss;
   const auto x_at = [](double t) { return 5 * t + 4 * std::sin(0.7 * t); };
@@ -458,7 +455,7 @@ void test_the_delay_of_a_receiver() {
                            why.c_str());
 }
 
-void test_published() {
+TEST(test_published) {
   made::Folder run;
   // 1 m/s at 50 Hz. At 200 ms map jumps by 0.5 m and says so; at 300 ms by 0.3 m and doesn't.
   std::string text = kPublishedHeader;
@@ -495,7 +492,7 @@ void test_published() {
   TEST_ASSERT_EQUAL_INT64(23'000'000, load_published(run.path()).rows.at(0).made_ns);
 }
 
-void test_sightings_of_known_landmarks() {
+TEST(test_sightings_of_known_landmarks) {
   made::Folder run;
   made::Folder recording;
   off_between(run, recording, 5, 10);  // right up to 4.9 s, 1 m off from 5 s
@@ -511,31 +508,3 @@ void test_sightings_of_known_landmarks() {
 }
 
 }  // namespace
-
-int main() {
-  UNITY_BEGIN();
-  RUN_TEST(test_an_ellipse_has_its_axes_and_direction);
-  RUN_TEST(test_constant_offset_to_the_left);
-  RUN_TEST(test_behind_and_turned_across_pi);
-  RUN_TEST(test_nees_uses_the_whole_covariance);
-  RUN_TEST(test_interpolation_between_the_nearest_and_no_further);
-  RUN_TEST(test_a_gap_of_half_a_second_is_allowed);
-  RUN_TEST(test_six_degrees_of_freedom);
-  RUN_TEST(test_height_does_not_count_in_the_plane);
-  RUN_TEST(test_truth_without_orientation);
-  RUN_TEST(test_truth_of_another_point_of_the_robot);
-  RUN_TEST(test_lost);
-  RUN_TEST(test_a_part_of_the_drive);
-  RUN_TEST(test_alignment_undoes_what_it_may_undo);
-  RUN_TEST(test_alignment_keeps_nees);
-  RUN_TEST(test_a_covariance_that_is_none_is_not_inside);
-  RUN_TEST(test_landmarks_by_id_and_by_place);
-  RUN_TEST(test_landmarks_whose_ids_are_the_filters_own);
-  RUN_TEST(test_statistics);
-  RUN_TEST(test_errors_say_where);
-  RUN_TEST(test_tum_serves_where_there_is_no_csv);
-  RUN_TEST(test_the_delay_of_a_receiver);
-  RUN_TEST(test_published);
-  RUN_TEST(test_sightings_of_known_landmarks);
-  return UNITY_END();
-}

@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "common/failure.h"
+#include "common/suite.h"
 #include "made.h"
 #include "report/axes.h"
 #include "report/data.h"
@@ -13,7 +14,6 @@
 #include "report/picture.h"
 #include "report/side_views.h"
 #include "report/words.h"
-#include "unity.h"
 extern "C" {
 #include "output/event_log.h"
 }
@@ -21,9 +21,6 @@ extern "C" {
 using namespace wm::tools;
 using made::format;
 using made::stamp;
-
-void setUp() {}
-void tearDown() {}
 
 namespace {
 
@@ -33,7 +30,7 @@ void says(const std::string &expected, const std::string &said) {
 
 bool has(const std::string &text, const std::string &part) { return text.find(part) != std::string::npos; }
 
-void test_numbers_in_words() {
+TEST(test_numbers_in_words) {
   says("3.2\u202fmm", length_text(0.0032));
   says("1.4\u202fcm", length_text(0.0142));
   says("82\u202fcm", length_text(0.8213));
@@ -51,7 +48,7 @@ void test_numbers_in_words() {
   says("a&lt;b&gt; &amp; &quot;c&quot;", escape("a<b> & \"c\""));
 }
 
-void test_ticks_are_round() {
+TEST(test_ticks_are_round) {
   const auto ticks = round_ticks(-0.31, 1.0, 4);
   TEST_ASSERT_EQUAL(3, ticks.size());
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.0, ticks[0]);
@@ -59,7 +56,7 @@ void test_ticks_are_round() {
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 120, time_ticks(0, 630, 8)[1]);
 }
 
-void test_no_peak_is_lost() {
+TEST(test_no_peak_is_lost) {
   // 100 000 points, one of them high: the path must reach it.
   std::vector<double> x;
   std::vector<double> v;
@@ -80,7 +77,7 @@ size_t count(const std::string &text, const std::string &part) {
   return n;
 }
 
-void test_a_drive_in_space_has_two_sides() {
+TEST(test_a_drive_in_space_has_two_sides) {
   ReportData data{};
   for (int i = 0; i <= 50; i++) {
     Pose pose;
@@ -103,7 +100,7 @@ void test_a_drive_in_space_has_two_sides() {
   TEST_ASSERT_EQUAL(0, count(html, "nan"));
 }
 
-void test_a_gap_is_a_gap() {
+TEST(test_a_gap_is_a_gap) {
   Panel panel({0, 10}, {0, 1});
   panel.line({1, 2, 8, 9}, {0.5, 0.5, 0.5, 0.5}, "value", 3);
   const std::string html = panel.html({});
@@ -138,7 +135,7 @@ void make(const made::Folder &run, const made::Folder &recording) {
                                "allocations_after_start":0,"deadlines_missed":2,"deadlines_total":500})");
 }
 
-void test_page_says_what_happened() {
+TEST(test_page_says_what_happened) {
   made::Folder run;
   made::Folder recording;
   make(run, recording);
@@ -156,7 +153,7 @@ void test_page_says_what_happened() {
     TEST_ASSERT_FALSE_MESSAGE(has(page, outside), outside);
 }
 
-void test_page_without_truth_and_without_recording() {
+TEST(test_page_without_truth_and_without_recording) {
   made::Folder run;
   made::Folder recording;
   make(run, recording);
@@ -177,7 +174,7 @@ void test_page_without_truth_and_without_recording() {
   if (has(bare, "nan")) TEST_FAIL_MESSAGE(bare.substr(bare.find("nan") - 60, 80).c_str());
 }
 
-void test_odd_files_are_survived_or_refused_with_words() {
+TEST(test_odd_files_are_survived_or_refused_with_words) {
   made::Folder run;
   made::Folder recording;
   make(run, recording);
@@ -193,7 +190,7 @@ void test_odd_files_are_survived_or_refused_with_words() {
   }
 }
 
-void test_lines_of_sight_start_at_the_sensor() {
+TEST(test_lines_of_sight_start_at_the_sensor) {
   made::Folder run;
   made::Folder recording;
   make(run, recording);
@@ -208,7 +205,7 @@ void test_lines_of_sight_start_at_the_sensor() {
   TEST_ASSERT_TRUE(has(picture.svg, "M" + at(1.2, 0.05) + "L" + at(5, 2)));
 }
 
-void test_a_small_pgm_becomes_a_png() {
+TEST(test_a_small_pgm_becomes_a_png) {
   made::Folder recording;
   std::filesystem::create_directory(recording.path() / "map");
   recording.write("map/map.yaml", "image: m.pgm\nresolution: 0.5\norigin: [-1, -2, 0]\n");
@@ -263,7 +260,7 @@ std::string layer(const Set &set) {
   return pgm;
 }
 
-void test_edges_are_drawn_where_they_are_seen() {
+TEST(test_edges_are_drawn_where_they_are_seen) {
   made::Folder run;
   made::Folder recording;
   make(run, recording);
@@ -360,7 +357,7 @@ void shows(const std::vector<double> &film_s, const std::string &times, const st
   TEST_ASSERT_TRUE(has(section, note.empty() ? "Pictures" : "<p class=\"note\">" + note + "</p>"));
 }
 
-void test_pictures_are_of_what_the_camera_filmed() {
+TEST(test_pictures_are_of_what_the_camera_filmed) {
   shows(every(0.1, 0, 10), "1.2 3.7 6.2 8.7", "");
   // Silent before an eighth of the drive, silent until late in it, or both.
   shows(every(0.1, 0, 1), "0.1 0.4 0.6 0.9",
@@ -377,7 +374,7 @@ void test_pictures_are_of_what_the_camera_filmed() {
   shows(every(1.5, 1.5, 9), "3.0 4.5 6.0 7.5", "");
 }
 
-void test_why_there_are_no_pictures_is_said() {
+TEST(test_why_there_are_no_pictures_is_said) {
   shows(every(0.1, 12, 13), "",
         "Camera front has no pictures of the drive: its own are from 12.0 s to 13.0 s; the drive lasted 10.0 s.");
   shows({}, "", "No pictures of front: its video is empty");
@@ -396,21 +393,3 @@ void test_why_there_are_no_pictures_is_said() {
 }
 
 }  // namespace
-
-int main() {
-  UNITY_BEGIN();
-  RUN_TEST(test_numbers_in_words);
-  RUN_TEST(test_ticks_are_round);
-  RUN_TEST(test_no_peak_is_lost);
-  RUN_TEST(test_a_drive_in_space_has_two_sides);
-  RUN_TEST(test_a_gap_is_a_gap);
-  RUN_TEST(test_page_says_what_happened);
-  RUN_TEST(test_page_without_truth_and_without_recording);
-  RUN_TEST(test_odd_files_are_survived_or_refused_with_words);
-  RUN_TEST(test_lines_of_sight_start_at_the_sensor);
-  RUN_TEST(test_a_small_pgm_becomes_a_png);
-  RUN_TEST(test_edges_are_drawn_where_they_are_seen);
-  RUN_TEST(test_pictures_are_of_what_the_camera_filmed);
-  RUN_TEST(test_why_there_are_no_pictures_is_said);
-  return UNITY_END();
-}

@@ -12,17 +12,14 @@
 #include <random>
 
 #include "common/failure.h"
+#include "common/suite.h"
 #include "common/trials.h"
-#include "unity.h"
 #include "web/live.h"
 #include "web/pictures.h"
 #include "web/server.h"
 
 using namespace wm::tools;
 using nlohmann::json;
-
-void setUp() {}
-void tearDown() {}
 
 namespace {
 
@@ -67,7 +64,7 @@ void take(Live *live, const char *what, const Bytes &bytes, int64_t now_ns = kSe
 
 json state(const Live &live, const Has &has = {}) { return json::parse(live.state(kSecond, has)); }
 
-void numbers_that_are_none_become_null() {
+TEST(numbers_that_are_none_become_null) {
   Live live(kNowhere);
   TEST_ASSERT_EQUAL_STRING("waiting", state(live)["state"].get<std::string>().c_str());
   take(&live, "POSE", pose_bytes(1, kNone, INFINITY));
@@ -83,7 +80,7 @@ void numbers_that_are_none_become_null() {
   TEST_ASSERT_TRUE(!seen["health"]["sources"][0]["remedy"].get<std::string>().empty());
 }
 
-void names_of_strangers_are_text() {
+TEST(names_of_strangers_are_text) {
   Live live(kNowhere);
   take(&live, "HEALTH", health_bytes("<script>alert(\"1\")</script>"));
   TEST_ASSERT_EQUAL_STRING("<script>alert(\"1\")</script>",
@@ -93,7 +90,7 @@ void names_of_strangers_are_text() {
 }
 
 // A browser that takes what is new each time has what the server has.
-void the_trail_is_bounded_and_whole() {
+TEST(the_trail_is_bounded_and_whole) {
   Live live(kNowhere);
   json mine = json::array();
   Has has;
@@ -120,7 +117,7 @@ void the_trail_is_bounded_and_whole() {
   TEST_ASSERT_EQUAL(1, jumps);
 }
 
-void a_map_in_parts_is_taken_when_it_is_whole() {
+TEST(a_map_in_parts_is_taken_when_it_is_whole) {
   Live live(kNowhere);
   std::vector<wm_landmark> landmarks(300);
   std::vector<double> covariance(4 * landmarks.size(), 0.25);
@@ -143,7 +140,7 @@ void a_map_in_parts_is_taken_when_it_is_whole() {
   TEST_ASSERT_FALSE(state(live, has).contains("landmarks"));
 }
 
-void a_sighting_is_a_line_to_its_landmark() {
+TEST(a_sighting_is_a_line_to_its_landmark) {
   WebSite site;
   site.sensors["eye"].T_base.translation() = Eigen::Vector3d(0.5, 0, 0);
   Live live(site);
@@ -176,7 +173,7 @@ void a_sighting_is_a_line_to_its_landmark() {
 }
 
 // Any bytes, and messages with bytes changed.
-void whatever_comes_gives_valid_json() {
+TEST(whatever_comes_gives_valid_json) {
   std::mt19937 draw(1);
   Live live(kNowhere);
   const std::vector<std::string> kinds = {"POSE", "HEALTH",    "INNOVATION", "OBSERVATIONS", "LANDMARKS",
@@ -207,7 +204,7 @@ wm_picture_head head_of(uint32_t width, uint32_t height) {
 }
 
 // A camera 1 m above the floor, tilted down; an edge point 2 m ahead is seen where the map's edge is expected.
-void what_is_seen_and_what_is_expected_meet() {
+TEST(what_is_seen_and_what_is_expected_meet) {
   WebSite site;
   NamedCamera camera{"front", {}};
   camera.camera.width = 640;
@@ -251,7 +248,7 @@ void what_is_seen_and_what_is_expected_meet() {
   TEST_ASSERT_EQUAL(0, json::parse(picture_json(*looked, site, &map, around, 2))["map_dots"].size());
 }
 
-void pictures_of_strangers_are_refused() {
+TEST(pictures_of_strangers_are_refused) {
   std::mt19937 draw(2);
   const Bytes whole(64);
   wm_picture_head head = head_of(8, 8);
@@ -275,7 +272,7 @@ void pictures_of_strangers_are_refused() {
   }
 }
 
-void addresses_and_hosts() {
+TEST(addresses_and_hosts) {
   TEST_ASSERT_EQUAL(9000, listen_at("9000").port);
   TEST_ASSERT_EQUAL_STRING("127.0.0.1", listen_at("9000").address.c_str());
   TEST_ASSERT_EQUAL_STRING("0.0.0.0", listen_at("0.0.0.0").address.c_str());
@@ -324,7 +321,7 @@ std::string answer_of(uint16_t port, const std::string &request) {
 }
 
 // A client that sends single bytes is disconnected after the timeout; others are answered meanwhile.
-void a_slow_client_is_sent_away() {
+TEST(a_slow_client_is_sent_away) {
   WebServer server(
       {"127.0.0.1", 0},
       [](const WebRequest &request) {
@@ -350,18 +347,3 @@ void a_slow_client_is_sent_away() {
 }
 
 }  // namespace
-
-int main() {
-  UNITY_BEGIN();
-  RUN_TEST(numbers_that_are_none_become_null);
-  RUN_TEST(names_of_strangers_are_text);
-  RUN_TEST(the_trail_is_bounded_and_whole);
-  RUN_TEST(a_map_in_parts_is_taken_when_it_is_whole);
-  RUN_TEST(a_sighting_is_a_line_to_its_landmark);
-  RUN_TEST(whatever_comes_gives_valid_json);
-  RUN_TEST(what_is_seen_and_what_is_expected_meet);
-  RUN_TEST(pictures_of_strangers_are_refused);
-  RUN_TEST(addresses_and_hosts);
-  RUN_TEST(a_slow_client_is_sent_away);
-  return UNITY_END();
-}

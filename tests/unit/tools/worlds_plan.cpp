@@ -7,20 +7,13 @@
 #include <filesystem>
 #include <string>
 
+#include "common/suite.h"
 #include "common/trials.h"
 #include "simulate/route.h"
 #include "worlds/corridor.h"
 #include "worlds/path6.h"
 #include "worlds/raster.h"
 #include "worlds/rooms.h"
-
-extern "C" {
-#include "unity.h"
-void setUp(void);
-void tearDown(void);
-}
-void setUp(void) {}
-void tearDown(void) {}
 
 using namespace wm::sim;
 
@@ -37,7 +30,7 @@ Drive drive_of(const CorridorDrawing &drawn) {
   return drive;
 }
 
-void corridor_ways_keep_clear_of_walls() {
+TEST(corridor_ways_keep_clear_of_walls) {
   double least = 1e9, shortest = 1e9, longest = 0;
   const uint64_t seeds = wm_trials(50, 4);
   for (uint64_t seed = 1; seed <= seeds; seed++) {
@@ -64,7 +57,7 @@ void corridor_ways_keep_clear_of_walls() {
               longest);
 }
 
-void room_ways_keep_clear_of_furniture() {
+TEST(room_ways_keep_clear_of_furniture) {
   constexpr Footprint round{0.28, -0.28, 0.25};
   double least[2] = {1e9, 1e9};
   const uint64_t seeds = wm_trials(50, 4);
@@ -88,7 +81,7 @@ void room_ways_keep_clear_of_furniture() {
   std::printf("%d offices: least gap %.3f m; as many halls: %.3f m\n", static_cast<int>(seeds), least[0], least[1]);
 }
 
-void corridors_are_connected() {
+TEST(corridors_are_connected) {
   const uint64_t seeds = wm_trials(20, 4);
   for (uint64_t seed = 1; seed <= seeds; seed++) {
     const CorridorDrawing drawn = draw_corridor(seed, false);
@@ -117,7 +110,7 @@ void corridors_are_connected() {
   }
 }
 
-void outlines_are_closed_and_have_free_space_on_their_left() {
+TEST(outlines_are_closed_and_have_free_space_on_their_left) {
   const CorridorDrawing drawn = draw_corridor(3, false);
   double sum_x = 0, sum_y = 0;
   for (const Face &f : drawn.plan.faces) {
@@ -134,7 +127,7 @@ void outlines_are_closed_and_have_free_space_on_their_left() {
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0, sum_y);
 }
 
-void floor_pieces_cover_the_free_floor_once() {
+TEST(floor_pieces_cover_the_free_floor_once) {
   for (uint64_t seed = 1; seed <= 5; seed++) {
     const CorridorDrawing drawn = draw_corridor(seed, false);
     double pieces_m2 = 0, outline_m2 = 0;
@@ -150,7 +143,7 @@ void floor_pieces_cover_the_free_floor_once() {
   }
 }
 
-void map_agrees_with_plan() {
+TEST(map_agrees_with_plan) {
   const CorridorDrawing drawn = draw_corridor(7, true);
   const RasterMap map =
       draw_map(drawn.plan, kCorridorOrigin, kCorridorWidth_px, kCorridorHeight_px, kCorridorResolution_m);
@@ -186,7 +179,7 @@ void map_agrees_with_plan() {
   }
 }
 
-void seeds_draw_the_same_and_others_another() {
+TEST(seeds_draw_the_same_and_others_another) {
   const CorridorDrawing a = draw_corridor(11, false), b = draw_corridor(11, false), c = draw_corridor(12, false);
   TEST_ASSERT_EQUAL(a.plan.faces.size(), b.plan.faces.size());
   for (size_t i = 0; i < a.plan.faces.size(); i++)
@@ -194,7 +187,7 @@ void seeds_draw_the_same_and_others_another() {
   TEST_ASSERT_FALSE(a.start.x_m == c.start.x_m && a.start.y_m == c.start.y_m);
 }
 
-void a_map_read_back_gives_the_same_walls() {
+TEST(a_map_read_back_gives_the_same_walls) {
   const CorridorDrawing drawn = draw_corridor(5, false);
   const RasterMap map =
       draw_map(drawn.plan, kCorridorOrigin, kCorridorWidth_px, kCorridorHeight_px, kCorridorResolution_m);
@@ -216,7 +209,7 @@ void a_map_read_back_gives_the_same_walls() {
   std::filesystem::remove_all(folder);
 }
 
-void a_polyline_plan_is_read() {
+TEST(a_polyline_plan_is_read) {
   const std::string text =
       "format: waymark-plan/1\nceiling_m: 3\nwalls:\n"
       "  - {points_m: [[0, 0], [10, 0], [10, 6], [0, 6]], closed: true, thickness_m: 0.2,\n"
@@ -252,7 +245,7 @@ void a_polyline_plan_is_read() {
           "spans");
 }
 
-void ways_that_cannot_be_driven_are_refused() {
+TEST(ways_that_cannot_be_driven_are_refused) {
   Route route;
   wm_error err{};
   TEST_ASSERT_EQUAL(WM_BAD_CONFIG, route_through({0, 0}, {{{1, 0}}, {{1, 5}}}, {}, route, &err));
@@ -269,7 +262,7 @@ void ways_that_cannot_be_driven_are_refused() {
   TEST_ASSERT_DOUBLE_WITHIN(1e-6, 2, end.y_m);
 }
 
-void twists_of_a_path_in_space_are_its_derivatives() {
+TEST(twists_of_a_path_in_space_are_its_derivatives) {
   const Path6 path({{0, 0, 0, 3, 0, 0.1, 0},
                     {4, 2, 1, 2.8, 0.05, -0.05, 0.7},
                     {9, 1, 4, 3.2, -0.1, 0.2, 2.2},
@@ -309,19 +302,3 @@ void twists_of_a_path_in_space_are_its_derivatives() {
 }
 
 }  // namespace
-
-int main() {
-  UNITY_BEGIN();
-  RUN_TEST(corridor_ways_keep_clear_of_walls);
-  RUN_TEST(room_ways_keep_clear_of_furniture);
-  RUN_TEST(corridors_are_connected);
-  RUN_TEST(outlines_are_closed_and_have_free_space_on_their_left);
-  RUN_TEST(floor_pieces_cover_the_free_floor_once);
-  RUN_TEST(map_agrees_with_plan);
-  RUN_TEST(seeds_draw_the_same_and_others_another);
-  RUN_TEST(a_map_read_back_gives_the_same_walls);
-  RUN_TEST(a_polyline_plan_is_read);
-  RUN_TEST(ways_that_cannot_be_driven_are_refused);
-  RUN_TEST(twists_of_a_path_in_space_are_its_derivatives);
-  return UNITY_END();
-}

@@ -19,12 +19,8 @@ extern "C" {
 #include <apriltag/apriltag.h>
 #include <apriltag/tag36h11.h>
 
-#include "unity.h"
-void setUp(void);
-void tearDown(void);
+#include "common/suite.h"
 }
-void setUp(void) {}
-void tearDown(void) {}
 
 using namespace wm::sim;
 using wm::images::Pose;
@@ -138,7 +134,7 @@ bool edge_offset(const Image &image, double u, double v, double du, double dv, d
   return std::fabs(centre) < 1.95;
 }
 
-void corridor_labels_lie_on_edges_of_the_picture() {
+TEST(corridor_labels_lie_on_edges_of_the_picture) {
   const auto world = made("corridor", false, 2);
   const Motion motion(*world);
   const wm::images::Camera &camera = world->cameras[0].camera;
@@ -192,7 +188,7 @@ void corridor_labels_lie_on_edges_of_the_picture() {
 
 // An outside judge: AprilTag's own detector, whose pixel centres lie at +0.5. Its corners run counter-clockwise from
 // the lower left one; the recordings' upper left corner (ArUco's) is its lower right one.
-void office_labels_are_what_apriltag_finds() {
+TEST(office_labels_are_what_apriltag_finds) {
   // The detector looks into its family when it is destroyed: the family goes last.
   std::unique_ptr<apriltag_family_t, decltype(&tag36h11_destroy)> family(tag36h11_create(), tag36h11_destroy);
   std::unique_ptr<apriltag_detector_t, decltype(&apriltag_detector_destroy)> detector(apriltag_detector_create(),
@@ -247,7 +243,7 @@ void office_labels_are_what_apriltag_finds() {
 }
 
 // Nobody hangs a print where the robot's camera never sees it whole.
-void office_prints_come_whole_into_view() {
+TEST(office_prints_come_whole_into_view) {
   struct Room {
     bool hard, on_walls;
     Markers markers;
@@ -273,7 +269,7 @@ void office_prints_come_whole_into_view() {
   }
 }
 
-void hall_labels_point_at_upright_edges() {
+TEST(hall_labels_point_at_upright_edges) {
   const auto world = made("hall", false, 3);
   const Motion motion(*world);
   const wm::images::Camera &camera = world->cameras[0].camera;
@@ -313,7 +309,7 @@ void hall_labels_point_at_upright_edges() {
 }
 
 // What a label's pixel shows, by a ray of its own.
-void labels_of_signs_and_beacons_show_them() {
+TEST(labels_of_signs_and_beacons_show_them) {
   for (const char *name : {"crossing", "seabed"}) {
     const auto world = made(name, false, 1);
     const Motion motion(*world);
@@ -347,7 +343,7 @@ void labels_of_signs_and_beacons_show_them() {
   }
 }
 
-void requests_repeat_and_differ() {
+TEST(requests_repeat_and_differ) {
   wm::images::Camera small;
   const char *const names[] = {"corridor", "seabed", "office", "hall"};
   for (uint64_t k = 0; k < wm_trials(4, 2); k++) {
@@ -376,7 +372,7 @@ void requests_repeat_and_differ() {
   }
 }
 
-void what_is_none_is_refused() {
+TEST(what_is_none_is_refused) {
   WorldRequest request;
   wm_error err{};
   request.name = "castle";
@@ -388,15 +384,3 @@ void what_is_none_is_refused() {
 }
 
 }  // namespace
-
-int main() {
-  UNITY_BEGIN();
-  RUN_TEST(corridor_labels_lie_on_edges_of_the_picture);
-  RUN_TEST(office_labels_are_what_apriltag_finds);
-  RUN_TEST(office_prints_come_whole_into_view);
-  RUN_TEST(hall_labels_point_at_upright_edges);
-  RUN_TEST(labels_of_signs_and_beacons_show_them);
-  RUN_TEST(requests_repeat_and_differ);
-  RUN_TEST(what_is_none_is_refused);
-  return UNITY_END();
-}
