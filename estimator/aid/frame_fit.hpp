@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Where a map of the robot's own lies in the frame of positions: the turn and the shift that take places of the path to
-// the positions measured there, by least squares [Arun1987] over running sums.
+// the positions measured there, by least squares [Horn1987] over running sums.
 #ifndef WAYMARK_ESTIMATOR_AID_FRAME_FIT_HPP
 #define WAYMARK_ESTIMATOR_AID_FRAME_FIT_HPP
 
