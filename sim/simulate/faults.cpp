@@ -109,6 +109,7 @@ void settle(const Scenario &sc, Recording &r) {
   fault(sc.faults, random, 1, frames, r.markers);
   fault(sc.faults, random, 2, frames, r.stereo);
   fault(sc.faults, random, 3, false, r.fixes);
+  fault(sc.faults, random, 4, frames, r.edges);
 }
 
 void move_landmarks(const Scenario &sc, Recording &r) {

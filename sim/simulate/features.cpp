@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "simulate/angle.h"
+#include "simulate/motion.h"
 #include "waymark/internal/math/elementary.hpp"
 
 namespace wm::sim {
@@ -27,8 +28,15 @@ uint16_t sensor_index(const Scenario &sc, size_t number) {
 
 uint64_t camera_number(const Scenario &sc, size_t number) { return sc.cameras.size() + number; }
 
+bool is_covered(const Sensor &s, const Recording &r, double t_s) {
+  if (s.areas.empty()) return true;
+  const Eigen::Vector3d p = true_pose(r, t_s).translation();
+  return std::any_of(s.areas.begin(), s.areas.end(), [&](const Area &a) { return a.holds(p.x(), p.y()); });
+}
+
 bool by_pictures(const Scenario &sc, const Sensor &s) {
-  return sc.world.pictured() && (s.kind == Kind::markers || s.kind == Kind::stereo || !s.camera.empty());
+  return sc.world.pictured() &&
+         (s.kind == Kind::markers || s.kind == Kind::edges || s.kind == Kind::stereo || !s.camera.empty());
 }
 
 void see_landmark(const Scenario &sc, size_t number, const Seen &seen, const Eigen::Vector3d &p, Recording &out) {

@@ -39,6 +39,8 @@ struct Seen {
 uint16_t sensor_index(const Scenario &scenario, size_t number);
 // The number by which true_mounting() draws for it: that of its camera's, or one of its own.
 uint64_t camera_number(const Scenario &scenario, size_t number);
+// Whether it speaks at that time: base_link is in one of its areas.
+bool is_covered(const Sensor &sensor, const Recording &recording, double t_s);
 // Whether it looks at pictures, so that only what is in these is seen.
 bool by_pictures(const Scenario &scenario, const Sensor &sensor);
 

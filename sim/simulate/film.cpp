@@ -127,8 +127,8 @@ class Reel {
   }
 
   // Renders picture `index` of the video; the one before is being developed, labelled and written meanwhile. Its labels
-  // are appended to `labels`. At index = count() nothing is left to render.
-  wm_status step(size_t index, std::string &labels, wm_error *err) {
+  // are appended to `labels`, which has a text for each kind. At index = count() nothing is left to render.
+  wm_status step(size_t index, std::vector<std::string> &labels, wm_error *err) {
     if (index < times_.size() && !repeats(index))
       lens_.expose(times_[index].t_s, times_[index].number, images_[index % 2]);
     if (const wm_status s = finish(labels, err); s != WM_OK) return s;
@@ -146,16 +146,16 @@ class Reel {
   struct Written {
     wm_status status = WM_OK;
     wm_error err{};
-    std::string labels;
+    std::vector<std::string> labels;
   };
 
   bool frozen(size_t index) const { return film_.scenario.faults.frozen_picture.holds(times_[index].t_s) && index > 0; }
   bool repeats(size_t index) const { return frozen(index) || times_[index].again; }
 
-  wm_status finish(std::string &labels, wm_error *err) {
+  wm_status finish(std::vector<std::string> &labels, wm_error *err) {
     if (!behind_.valid()) return WM_OK;
     const Written written = behind_.get();
-    labels += written.labels;
+    for (size_t i = 0; i < written.labels.size(); i++) labels[i] += written.labels[i];
     if (written.status != WM_OK && err) *err = written.err;
     return written.status;
   }
@@ -164,7 +164,9 @@ class Reel {
     const FrameTime &time = times_[index];
     Written out;
     if (!repeats(index)) lens_.develop(images_[index % 2], time.number, picture_);
-    if (!frozen(index)) film_.world->label(number_, camera_.truth, lens_.shot(time.t_s, index), out.labels);
+    for (const World::Labels what : film_.world->labels)
+      if (!frozen(index))
+        film_.world->label(what, number_, camera_.truth, lens_.shot(time.t_s, index), out.labels.emplace_back());
     std::string problem;
     if (!video_.add(picture_, film_.scenario.pictures.jpeg_quality, problem)) {
       out.status = wm_fail(&out.err, WM_IO, "%s", problem.c_str());
@@ -296,8 +298,11 @@ wm_status write_pictures(const Film &film, const std::string &dir, const Progres
   if (const wm_status s = make_folder(dir + "/labels", err); s != WM_OK) return s;
   if (const wm_status s = write_map(film, dir, err); s != WM_OK) return s;
   if (const wm_status s = write_appearances(film, dir, err); s != WM_OK) return s;
-  TextFile labels(dir + "/" + film.world->label_file);
-  labels.write(film.world->label_header + "\n");
+  std::vector<std::unique_ptr<TextFile>> labels;
+  for (const World::Labels what : film.world->labels) {
+    labels.push_back(std::make_unique<TextFile>(dir + "/" + label_file(what)));
+    labels.back()->write(std::string(label_header(what)) + "\n");
+  }
   std::vector<std::unique_ptr<Reel>> reels;
   size_t most = 0, total = 0, done = 0;
   for (size_t c = 0; c < film.cameras.size(); c++) {
@@ -307,17 +312,19 @@ wm_status write_pictures(const Film &film, const std::string &dir, const Progres
     total += reels.back()->count();
   }
   for (size_t i = 0; i <= most; i++) {
-    std::string rows;
+    std::vector<std::string> rows(labels.size());
     for (const auto &reel : reels) {
       if (i > reel->count()) continue;
       if (const wm_status s = reel->step(i, rows, err); s != WM_OK) return s;
       if (progress && i < reel->count()) progress(++done, total);
     }
-    labels.write(rows);
+    for (size_t k = 0; k < rows.size(); k++) labels[k]->write(rows[k]);
   }
   for (const auto &reel : reels)
     if (const wm_status s = reel->close(err); s != WM_OK) return s;
-  return labels.close(err);
+  for (const auto &file : labels)
+    if (const wm_status s = file->close(err); s != WM_OK) return s;
+  return WM_OK;
 }
 
 }  // namespace wm::sim

@@ -73,7 +73,7 @@ bool take(const Film &film, const Photo &photo, uint64_t seed, images::Picture8 
 }  // namespace
 
 wm_status write_appearances(const Film &film, const std::string &dir, wm_error *err) {
-  if (film.world->labels != World::Labels::landmarks) return WM_OK;
+  if (!film.world->has(World::Labels::landmarks)) return WM_OK;
   const std::string folder = dir + "/landmarks";
   std::error_code failed;
   std::filesystem::create_directories(folder, failed);

@@ -42,10 +42,23 @@ Vec3 levelled(const Sensor &s, const Vec3 &base) {
   return {yaw.cos * base.x() + yaw.sin * base.y(), yaw.cos * base.y() - yaw.sin * base.x(), base.z()};
 }
 
+// The labels that a sensor of this kind reads; false where the world has none.
+bool looked_for(const World &world, Kind kind, World::Labels &what) {
+  for (const World::Labels one : world.labels) {
+    what = one;
+    const Kind reader = one == World::Labels::edges     ? Kind::edges
+                        : one == World::Labels::markers ? Kind::markers
+                                                        : Kind::landmarks;
+    if (reader == kind || (kind == Kind::stereo && reader == Kind::landmarks)) return true;
+  }
+  return false;
+}
+
 wm_status fit(const Film &film, Sensor &s, size_t &camera, wm_error *err) {
   const World &world = *film.world;
-  const bool marker = s.kind == Kind::markers, stereo = s.kind == Kind::stereo;
-  if (stereo ? world.stereo_left.empty() : marker != (world.labels == World::Labels::markers))
+  const bool stereo = s.kind == Kind::stereo;
+  World::Labels what;
+  if (stereo ? world.stereo_left.empty() : !looked_for(world, s.kind, what))
     return wm_fail(err, WM_BAD_CONFIG, "sensors: %s: the world `%s` has nothing for a sensor of this kind",
                    s.name.c_str(), world.name.c_str());
   const std::string &name = stereo ? world.stereo_left : s.camera;
@@ -64,13 +77,13 @@ wm_status fit(const Film &film, Sensor &s, size_t &camera, wm_error *err) {
   return WM_OK;
 }
 
-// Calls act(index, time, moment) for each picture of a camera in which there is something to see.
+// Calls act(time, moment) for each picture of a camera in which there is something to see for the sensor.
 template <class Act>
-void for_each_picture(const Film &film, size_t camera, const Act &act) {
+void for_each_picture(const Film &film, const Sensor &s, size_t camera, const Act &act) {
   const Faults &f = film.scenario.faults;
   double shown_s = 0;
   for (const FrameTime &time : frame_times(film, camera)) {
-    if (f.lights_off.holds(time.t_s)) continue;
+    if (f.lights_off.holds(time.t_s) || !is_covered(s, film.recording, time.t_s)) continue;
     if (!f.frozen_picture.holds(time.t_s)) shown_s = time.t_s;
     Moment moment{film.cameras[camera], {}};
     moment.shot.t_ns = std::llround(shown_s * 1e9);
@@ -82,9 +95,11 @@ void for_each_picture(const Film &film, size_t camera, const Act &act) {
 }
 
 // The rows that the world labels a picture with, as numbers.
-std::vector<std::vector<double>> labels_of(const Film &film, size_t camera, const Moment &moment) {
+std::vector<std::vector<double>> labels_of(const Film &film, Kind kind, size_t camera, const Moment &moment) {
   std::string text, line;
-  film.world->label(camera, film.cameras[camera].truth, moment.shot, text);
+  World::Labels what;
+  if (!looked_for(*film.world, kind, what)) return {};
+  film.world->label(what, camera, film.cameras[camera].truth, moment.shot, text);
   std::replace(text.begin(), text.end(), ',', ' ');
   std::vector<std::vector<double>> rows;
   for (std::istringstream lines(text); std::getline(lines, line);) {
@@ -107,12 +122,12 @@ void find_landmarks(Film &film, size_t number, size_t camera) {
   const Sensor &s = film.scenario.sensors[number];
   const World &world = *film.world;
   const Random random(film.recording.seed);
-  for_each_picture(film, camera, [&](const FrameTime &time, const Moment &moment) {
+  for_each_picture(film, s, camera, [&](const FrameTime &time, const Moment &moment) {
     const Vec3 eye = moment.T_map_camera().translation();
-    for (const auto &row : labels_of(film, camera, moment)) {
+    for (const auto &row : labels_of(film, s.kind, camera, moment)) {
       Vec3 direction, place;
       double id = row[1];
-      if (world.labels == World::Labels::lines) {
+      if (world.has(World::Labels::lines)) {
         const auto line = std::find_if(world.lines.begin(), world.lines.end(),
                                        [&](const World::Line &l) { return l.id == static_cast<int32_t>(id); });
         place = line->foot + 0.97 * (line->head - line->foot);
@@ -133,9 +148,9 @@ void find_landmarks(Film &film, size_t number, size_t camera) {
 void find_markers(Film &film, size_t number, size_t camera) {
   const Sensor &s = film.scenario.sensors[number];
   const Random random(film.recording.seed);
-  for_each_picture(film, camera, [&](const FrameTime &time, const Moment &moment) {
+  for_each_picture(film, s, camera, [&](const FrameTime &time, const Moment &moment) {
     const Vec3 eye = moment.T_map_camera().translation();
-    for (const auto &row : labels_of(film, camera, moment)) {
+    for (const auto &row : labels_of(film, s.kind, camera, moment)) {
       const auto &panels = film.world->panels;
       const auto panel = std::find_if(panels.begin(), panels.end(),
                                       [&](const World::Panel &p) { return p.id == static_cast<int32_t>(row[1]); });
@@ -148,6 +163,28 @@ void find_markers(Film &film, size_t number, size_t camera) {
                  levelled(s, direction * (panel->middle() - eye).norm()),
                  levelled(s, moment.by_mounting(panel->corners[1] - panel->corners[0])), film.recording);
     }
+  });
+}
+
+// Pixels of edges, with the sensor's noise, as points on the floor; an outlier is something nearer on the same ray.
+void find_edges(Film &film, size_t number, size_t camera) {
+  const Sensor &s = film.scenario.sensors[number];
+  const Random random(film.recording.seed);
+  for_each_picture(film, s, camera, [&](const FrameTime &time, const Moment &moment) {
+    const Seen seen = seen_at(time, s, random, number, 0);
+    EdgesSeen out{seen.t_ns, seen.arrival_ns, static_cast<uint16_t>(number), {}};
+    const Vec3 eye = moment.camera.believed.T_base_camera.translation();
+    const auto rows = labels_of(film, s.kind, camera, moment);
+    for (size_t i = 0; i < rows.size(); i++) {
+      const FeatureDice dice(film.recording.seed, number, time.number, i);
+      const Vec2 pixel(rows[i][2] + s.sigma_px * dice.noise(0), rows[i][3] + s.sigma_px * dice.noise(1));
+      Vec3 direction;
+      if (dice.missed() < s.missed_fraction || !moment.believed(pixel, direction) || direction.z() >= 0) continue;
+      const Vec2 ahead = direction.head<2>() * (-eye.z() / direction.z());
+      const double share = dice.outlier() < s.outlier_fraction ? dice.anything(0) : 1;
+      if (ahead.norm() <= s.range_m) out.points_m.emplace_back(eye.head<2>() + share * ahead);
+    }
+    if (!out.points_m.empty()) film.recording.edges.push_back(out);
   });
 }
 
@@ -172,8 +209,8 @@ void find_stereo(Film &film, size_t number) {
   for (size_t camera = 0; camera < film.cameras.size(); camera++) {
     const bool right = film.cameras[camera].name == film.world->stereo_right;
     if (camera != left && !right) continue;
-    for_each_picture(film, camera, [&](const FrameTime &time, const Moment &moment) {
-      for (const auto &row : labels_of(film, camera, moment)) {
+    for_each_picture(film, s, camera, [&](const FrameTime &time, const Moment &moment) {
+      for (const auto &row : labels_of(film, s.kind, camera, moment)) {
         const Vec2 pixel = rectified(moment.camera, k, {row[3], row[4]});
         if (std::isnan(pixel.x())) continue;
         Pair &pair =
@@ -206,6 +243,7 @@ wm_status observe_pictures(Film &film, wm_error *err) {
     if (!by_pictures(sc, sc.sensors[i])) continue;
     switch (sc.sensors[i].kind) {
       case Kind::markers: find_markers(film, i, cameras[i]); break;
+      case Kind::edges: find_edges(film, i, cameras[i]); break;
       case Kind::stereo: find_stereo(film, i); break;
       default: find_landmarks(film, i, cameras[i]); break;
     }

@@ -156,7 +156,8 @@ std::vector<wm_landmark> landmarks_of(const World &world) {
     wm_landmark landmark{};
     landmark.id = l.id;
     for (int i = 0; i < 3; i++) landmark.p_m[i] = l.p[i];
-    landmark.yaw_rad = world.labels == World::Labels::markers ? l.yaw_rad : static_cast<double>(NAN);
+    landmark.yaw_rad = l.yaw_rad;
+    landmark.sigma_m = l.sigma_m;
     out.push_back(landmark);
   }
   return out;
@@ -197,6 +198,8 @@ wm_status prepare(const Scenario &scenario, uint64_t seed, Film &out, wm_error *
   request.seed = seed;
   if (!scenario.route.legs.empty()) request.route = scenario.route;
   request.footprint = scenario.robot.body;
+  request.landmarks = scenario.landmarks;
+  request.tag_m = scenario.world.tag_m;
   if (!scenario.world.plan.empty()) {
     request.plan.emplace();
     if (const wm_status s = load_building(scenario.world.plan, scenario.world.ceiling_m, scenario.world.resolution_m,
@@ -222,6 +225,7 @@ wm_status record(uint64_t seed, Film &out, wm_error *err) {
     return s;
   r.landmarks = landmarks_of(*out.world);
   if (out.world->landmarks_known) r.map = r.landmarks;
+  for (wm_landmark &l : r.landmarks) l.sigma_m = 0;
   misplace(out.scenario, 3, r);
   move_landmarks(out.scenario, r);
   r.camera_calibration = calibration_of(out);
@@ -231,8 +235,8 @@ wm_status record(uint64_t seed, Film &out, wm_error *err) {
     r.picture_streams.push_back("video/" + c.name + ".avi");
     r.picture_streams.push_back("video/" + c.name + ".csv");
   }
-  r.picture_streams.push_back(out.world->label_file);
-  if (out.world->labels == World::Labels::landmarks) r.picture_streams.push_back("landmarks/appearance.csv");
+  for (const World::Labels what : out.world->labels) r.picture_streams.emplace_back(label_file(what));
+  if (out.world->has(World::Labels::landmarks)) r.picture_streams.push_back("landmarks/appearance.csv");
   return WM_OK;
 }
 

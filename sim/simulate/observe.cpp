@@ -105,10 +105,12 @@ void look_for_landmarks(const Scenario &sc, size_t number, Recording &r) {
   const Isometry3d T_base_sensor =
       true_mounting(pose_of(s.xyz_m, s.rpy_rad), sc.errors, r.seed, camera_number(sc, number));
   at_its_rate(sc, number, r, [&](uint64_t k, double t_s, wm_time_ns t_ns, wm_time_ns arrival_ns) {
+    if (!is_covered(s, r, t_s)) return;
     const Isometry3d T_sensor_map = (true_pose(r, t_s) * T_base_sensor).inverse();
     for (size_t i = 0; i < r.landmarks.size(); i++) {
       const wm_landmark &l = r.landmarks[i];
       const Seen seen{k, i, l.id, t_ns, arrival_ns};
+      if (s.kind == Kind::markers && std::isnan(l.yaw_rad)) continue;  // no marker
       if (s.kind == Kind::markers)
         see_marker(sc, number, seen, T_sensor_map * Vector3d(l.p_m),
                    T_sensor_map.linear() * Vector3d(wm::cos(l.yaw_rad), wm::sin(l.yaw_rad), 0), r);
@@ -140,6 +142,7 @@ void look_by_stereo(const Scenario &sc, size_t number, Recording &r) {
   const Sensor &s = sc.sensors[number];
   const StereoPair pair = StereoPair::drawn(s, sc.errors, r.seed);
   at_its_rate(sc, number, r, [&](uint64_t k, double t_s, wm_time_ns t_ns, wm_time_ns arrival_ns) {
+    if (!is_covered(s, r, t_s)) return;
     const Isometry3d T_map_base = true_pose(r, t_s);
     for (size_t i = 0; i < r.landmarks.size(); i++) {
       const wm_landmark &l = r.landmarks[i];
@@ -163,7 +166,7 @@ void look_north(const Scenario &sc, size_t number, Recording &r) {
     seen.outlier = dice.outlier() < s.outlier_fraction;
     seen.bearing_rad = seen.outlier ? wrap(2 * kPi * dice.anything(0))
                                     : wrap(wm::atan2(p.y(), p.x()) + deviation + s.bearing_sigma_rad * dice.noise(0));
-    if (dice.missed() >= s.missed_fraction) r.sightings.push_back(seen);
+    if (dice.missed() >= s.missed_fraction && is_covered(s, r, t_s)) r.sightings.push_back(seen);
   });
   if (std::any_of(r.map.begin(), r.map.end(), [](const wm_landmark &l) { return l.id == kNorthId; })) return;
   wm_landmark north{};
@@ -198,7 +201,7 @@ void find_position(const Scenario &sc, size_t number, Recording &r) {
         fix.p_m[i] = p[static_cast<Eigen::Index>(i)] + sigma * dice.noise(i) + s.wander_m * wander[i] + off;
       wander[i] = keep * wander[i] + fresh * random.normal(Stream::position_wander, k + 1, 4 * number + i);
     }
-    r.fixes.push_back(fix);
+    if (is_covered(s, r, t_s)) r.fixes.push_back(fix);
   });
 }
 
@@ -241,6 +244,7 @@ void observe(const Scenario &sc, Recording &out) {
     switch (s.kind) {
       case Kind::landmarks:
       case Kind::markers: look_for_landmarks(sc, i, out); break;
+      case Kind::edges: break;  // of pictures alone
       case Kind::stereo: look_by_stereo(sc, i, out); break;
       case Kind::compass: look_north(sc, i, out); break;
       case Kind::gnss:

@@ -12,9 +12,30 @@
 namespace wm::sim {
 namespace {
 
+void read_landmarks(Reader &r, const wm_yaml_node &list, Scenario &out) {
+  static const char *const known[] = {"id", "what", "xyz_m", "yaw_deg", "sigma_m", nullptr};
+  std::set<int32_t> ids;
+  for (size_t i = 0, n = r.list(list); i < n && r.ok(); i++) {
+    const wm_yaml_node item = wm_yaml_item(&list, i);
+    r.keys(item, known);
+    wm_landmark landmark{};
+    landmark.yaw_rad = NAN;
+    int64_t id = 0;
+    r.integer(item, "id", 0, INT32_MAX, id, true);
+    r.numbers(item, "xyz_m", 3, 3, landmark.p_m, true);
+    r.number(item, "yaw_deg", -360, 360, kDeg, landmark.yaw_rad);
+    r.number(item, "sigma_m", 0, 10, 1, landmark.sigma_m);
+    landmark.id = static_cast<int32_t>(id);
+    if (r.ok() && !ids.insert(landmark.id).second)
+      r.fail(item, "this id is there already; each landmark needs its own");
+    out.landmarks.push_back(landmark);
+  }
+}
+
 void read_world(Reader &r, const wm_yaml_node &world, Scenario &out) {
-  static const char *const known[] = {"landmarks", "kind",      "variant",      "markers_on_walls", "scatter", "map",
-                                      "plan",      "ceiling_m", "resolution_m", "markers",          "rounds",  nullptr};
+  static const char *const known[] = {"landmarks", "kind",  "variant",   "markers_on_walls", "scatter",
+                                      "map",       "plan",  "ceiling_m", "resolution_m",     "markers",
+                                      "rounds",    "tag_m", nullptr};
   static const char *const maps[] = {"all", "listed", "none", nullptr};
   static const char *const kinds[] = {"features", "crossing", "corridor", "office", "hall", "seabed", nullptr};
   static const char *const variants[] = {"easy", "hard", nullptr};
@@ -43,24 +64,13 @@ void read_world(Reader &r, const wm_yaml_node &world, Scenario &out) {
     const std::string file = wm_yaml_file(&world);
     out.world.plan = file.substr(0, file.find_last_of('/') + 1) + out.world.plan;
   }
-  const wm_yaml_node list = r.child(world, "landmarks", false);
-  if (r.ok() && kind > 0 && wm_yaml_there(&list))
-    return r.fail(list, "a world of this kind has its own landmarks; leave the key out");
-  std::set<int32_t> ids;
-  for (size_t i = 0, n = r.list(list); i < n && r.ok(); i++) {
-    static const char *const known_item[] = {"id", "what", "xyz_m", nullptr};
-    const wm_yaml_node item = wm_yaml_item(&list, i);
-    r.keys(item, known_item);
-    wm_landmark landmark{};
-    landmark.yaw_rad = NAN;
-    int64_t id = 0;
-    r.integer(item, "id", 0, INT32_MAX, id, true);
-    r.numbers(item, "xyz_m", 3, 3, landmark.p_m, true);
-    landmark.id = static_cast<int32_t>(id);
-    if (r.ok() && !ids.insert(landmark.id).second)
-      r.fail(item, "this id is there already; each landmark needs its own");
-    out.landmarks.push_back(landmark);
-  }
+  const wm_yaml_node list = r.child(world, "landmarks", false), tag = r.child(world, "tag_m", false);
+  const bool own_plan = out.world.kind == "corridor" && !out.world.plan.empty();
+  if (r.ok() && kind > 0 && !own_plan && wm_yaml_there(&list))
+    return r.fail(list, "a world of this kind has its own landmarks; leave the key out, or give a corridor a `plan`");
+  if (r.ok() && !own_plan && wm_yaml_there(&tag)) return r.fail(tag, "only a corridor with a `plan` has such tags");
+  r.number(world, "tag_m", 0.01, 2, 1, out.world.tag_m);
+  read_landmarks(r, list, out);
   const wm_yaml_node scatter = r.child(world, "scatter", false), map = r.child(world, "map", false);
   if (r.ok() && kind > 0 && wm_yaml_there(&scatter))
     return r.fail(scatter, "a world of this kind has its own landmarks; leave the key out");
@@ -501,7 +511,7 @@ void read_scenario(Reader &r, const wm_yaml_node &root, Scenario &out) {
     r.fail(cameras, "this vehicle has a sensor of kind stereo in place of `cameras`; leave the key out");
   if (r.ok() && !pictured && wm_yaml_there(&pictures))
     r.fail(pictures, "there are pictures only in a world that has a `kind`");
-  const bool steered = out.world.kind == "crossing" || out.world.kind == "corridor";
+  const bool steered = out.world.kind == "crossing" || (out.world.kind == "corridor" && out.world.plan.empty());
   if (!six) read_robot(r, robot, steered, out.robot);
   read_motion(r, r.child(root, "motion", false), out);
   if (pictured)
@@ -545,6 +555,7 @@ void make_perfect(Scenario &scenario) {
   scenario.errors = Errors{};
   scenario.faults = Faults{};
   scenario.bus.stamp_jitter_s = 0;
+  for (wm_landmark &l : scenario.landmarks) l.sigma_m = 0;
   Motion &m = scenario.motion;
   m.speed_noise_mps = m.side_noise_mps = m.turn_noise_radps = m.speed_noise = m.side_noise = m.turn_noise = 0;
   m.accelerometer_noise_mps2 = m.accelerometer_bias_mps2 = m.vibration_mps2 = m.bump_mps2 = 0;

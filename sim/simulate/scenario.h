@@ -109,6 +109,7 @@ struct WorldKind {
   std::string plan;         // corridor, office, hall: the file of a building of one's own; empty: drawn by the seed
   double ceiling_m = 2.6;   // of a ROS map or a picture
   double resolution_m = 0;  // of a plan that is a picture: metres of a pixel
+  double tag_m = 0.2;       // corridor: black square of the tags among `landmarks`
   bool pictured() const { return !kind.empty(); }
 };
 
@@ -127,9 +128,15 @@ struct Camera {
   double latency_jitter_s = 0;  // uniform, added
 };
 
+// A rectangle on the map.
+struct Area {
+  double x0_m, y0_m, x1_m, y1_m;
+  bool holds(double x_m, double y_m) const { return x_m >= x0_m && x_m <= x1_m && y_m >= y0_m && y_m <= y1_m; }
+};
+
 // A sensor that gives features, or a position or a direction.
 struct Sensor {
-  enum class Kind { landmarks, markers, stereo, gnss, depth, compass };
+  enum class Kind { landmarks, markers, edges, stereo, gnss, depth, compass };
   Kind kind = Kind::landmarks;
   std::string name;
   std::string camera;                                   // worlds with pictures: whose pictures it looks at
@@ -139,13 +146,14 @@ struct Sensor {
   double rate_hz = 10, phase_s = 0;
   double field_of_view_rad = 6.283185307179586, range_m = 1e5;  // what lies outside is not seen
   int32_t ids[2] = {0, INT32_MAX};                              // only these landmarks are seen
+  std::vector<Area> areas;  // it speaks while base_link is in one of these; none: everywhere
   bool gives_bearing = false, gives_range = false, range_is_depth = false;
   double bearing_sigma_rad = 0, range_sigma_m = 0, heading_sigma_rad = 0;
   double range_sigma = 0;                            // relative, added
   double outlier_fraction = 0, missed_fraction = 0;  // of what is seen
   double outlier_m = 0;                              // ranges: an outlier is up to so much too long; gnss: off
   double latency_s = 0, latency_jitter_s = 0;        // arrival; the jitter is uniform and added
-  // stereo: a rectified pair, its left camera at xyz_m; level sigma of each coordinate
+  // stereo: a rectified pair, its left camera at xyz_m. sigma_px: of each coordinate, of edges, too
   double sigma_px = 0, focal_px = 420, centre_px[2] = {319.5, 239.5}, baseline_m = 0.3;
   int size_px[2] = {640, 480};
   double one_side_fraction = 0;  // only one of both pictures has the point
@@ -263,7 +271,7 @@ struct Scenario {
   double clock_start_s = 0;  // first stamp of the recording's clock
   double duration_s = 0;     // the recording ends then; 0: with the drive
   WorldKind world;
-  std::vector<wm_landmark> landmarks;  // true places
+  std::vector<wm_landmark> landmarks;  // true places; sigma_m: of the place on the map, 0: errors.landmark_m
   Scatter scatter;
   Mapped mapped = Mapped::all;
   Robot robot;

@@ -11,7 +11,7 @@ namespace {
 
 using Kind = Sensor::Kind;
 
-constexpr const char *kKinds[] = {"landmarks", "markers", "stereo", "gnss", "depth", "compass", nullptr};
+constexpr const char *kKinds[] = {"landmarks", "markers", "edges", "stereo", "gnss", "depth", "compass", nullptr};
 
 bool there(Reader &r, const wm_yaml_node &map, const char *key) {
   const wm_yaml_node node = r.child(map, key, false);
@@ -28,6 +28,18 @@ void read_angles(Reader &r, const wm_yaml_node &map, Sensor &out) {
   double rpy_deg[3];
   if (r.numbers(map, "rpy_deg", 3, 3, rpy_deg) == 3)
     for (int i = 0; i < 3; i++) out.rpy_rad[i] = rpy_deg[i] * kDeg;
+}
+
+void read_areas(Reader &r, const wm_yaml_node &map, Sensor &out) {
+  const wm_yaml_node list = r.child(map, "areas_m", false);
+  for (size_t i = 0, n = r.list(list); i < n && r.ok(); i++) {
+    const wm_yaml_node item = wm_yaml_item(&list, i);
+    double v[4];
+    r.take(wm_yaml_f64_list(&item, 4, 4, v, nullptr, r.error()));
+    if (r.ok() && (v[2] <= v[0] || v[3] <= v[1]))
+      return r.fail(item, "an area is [x0, y0, x1, y1]; x1 is above x0 and y1 above y0");
+    out.areas.push_back({v[0], v[1], v[2], v[3]});
+  }
 }
 
 void read_stereo(Reader &r, const wm_yaml_node &map, Sensor &out) {
@@ -86,6 +98,7 @@ void read_sensor(Reader &r, const wm_yaml_node &map, bool pictured, Sensor &out)
                                       "range_m",
                                       "field_of_view_deg",
                                       "ids",
+                                      "areas_m",
                                       "bearing_sigma_deg",
                                       "baseline_m",
                                       "range_is",
@@ -116,16 +129,19 @@ void read_sensor(Reader &r, const wm_yaml_node &map, bool pictured, Sensor &out)
   out.kind = static_cast<Kind>(kind);
   const bool stereo = out.kind == Kind::stereo, position = out.kind == Kind::gnss || out.kind == Kind::depth;
   const bool looks = out.kind == Kind::landmarks || out.kind == Kind::markers;  // at landmarks
-  only(r, map, "camera", pictured && looks, "landmarks or markers in a world with pictures");
-  only(r, map, "beside_pictures", pictured && (looks || stereo),
-       "landmarks, markers or stereo in a world with pictures");
+  const bool edges = out.kind == Kind::edges;
+  only(r, map, "camera", pictured && (looks || edges), "landmarks, markers or edges in a world with pictures");
+  only(r, map, "beside_pictures", pictured && (looks || stereo || edges),
+       "landmarks, markers, edges or stereo in a world with pictures");
   for (const char *key : {"field_of_view_deg", "range_sigma_m", "range_sigma_percent", "range_is"})
     only(r, map, key, looks, "landmarks or markers");
   only(r, map, "heading_sigma_deg", out.kind == Kind::markers, "markers");
-  for (const char *key : {"range_m", "ids", "missed_percent"})
-    only(r, map, key, looks || stereo, "landmarks, markers or stereo");
-  for (const char *key : {"focal_px", "centre_px", "baseline_m", "size", "sigma_px", "one_side_percent",
-                          "appearance_noise_percent", "alike_percent"})
+  for (const char *key : {"range_m", "missed_percent"})
+    only(r, map, key, looks || stereo || edges, "landmarks, markers, edges or stereo");
+  only(r, map, "ids", looks || stereo, "landmarks, markers or stereo");
+  only(r, map, "sigma_px", stereo || edges, "stereo or edges");
+  for (const char *key :
+       {"focal_px", "centre_px", "baseline_m", "size", "one_side_percent", "appearance_noise_percent", "alike_percent"})
     only(r, map, key, stereo, "stereo");
   for (const char *key : {"sigma_xy_m", "wander_m", "wander_s"}) only(r, map, key, out.kind == Kind::gnss, "gnss");
   only(r, map, "sigma_z_m", position, "gnss or depth");
@@ -152,6 +168,8 @@ void read_sensor(Reader &r, const wm_yaml_node &map, bool pictured, Sensor &out)
   r.number(map, "missed_percent", 0, 100, kPercent, out.missed_fraction);
   r.number(map, "latency_ms", 0, 1e4, kMilli, out.latency_s);
   r.number(map, "latency_jitter_ms", 0, 1e4, kMilli, out.latency_jitter_s);
+  read_areas(r, map, out);
+  if (edges) r.number(map, "sigma_px", 0, 100, 1, out.sigma_px, true);
   if (looks || out.kind == Kind::compass) read_landmark_sensor(r, map, out);
   if (stereo) read_stereo(r, map, out);
   if (position) read_position(r, map, out);
@@ -170,6 +188,8 @@ void read_sensors(Reader &r, const wm_yaml_node &list, Scenario &out) {
     if (r.ok() && !names.insert(sensor.name).second)
       r.fail(item, ("the name '" + sensor.name + "' is there already; give this sensor a `name` of its own").c_str());
     if (r.ok() && sensor.kind == Kind::stereo && ++pairs > 1) r.fail(item, "a recording has one stereo pair");
+    if (r.ok() && sensor.kind == Kind::edges && out.world.kind != "corridor")
+      r.fail(item, "only the world `corridor` has edges on the floor");
     if (r.ok() && sensor.kind == Kind::markers && (out.swims() || out.world.kind == "seabed"))
       r.fail(item, "markers.csv is for robots on wheels");
     if (r.ok() && sensor.kind == Kind::stereo && !out.swims() && !out.world.pictured())

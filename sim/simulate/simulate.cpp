@@ -238,8 +238,8 @@ wm_status place_landmarks(const Scenario &sc, size_t landmarks, Recording &out, 
   const size_t mapped = sc.mapped == Mapped::none     ? 0
                         : sc.mapped == Mapped::listed ? std::min(out.landmarks.size(), sc.landmarks.size())
                                                       : out.landmarks.size();
-  for (wm_landmark &l : out.landmarks) l.sigma_m = 0;
   out.map.assign(out.landmarks.begin(), out.landmarks.begin() + static_cast<std::ptrdiff_t>(mapped));
+  for (wm_landmark &l : out.landmarks) l.sigma_m = 0;
   misplace(sc, out.motion6.empty() ? 2 : 3, out);
   move_landmarks(sc, out);
   return WM_OK;
@@ -250,9 +250,10 @@ wm_status place_landmarks(const Scenario &sc, size_t landmarks, Recording &out, 
 void misplace(const Scenario &sc, uint64_t axes, Recording &out) {
   const Random random(out.seed);
   for (uint64_t i = 0; i < out.map.size(); i++) {
-    out.map[i].sigma_m = sc.errors.landmark_m;
+    double &sigma_m = out.map[i].sigma_m;
+    if (sigma_m <= 0) sigma_m = sc.errors.landmark_m;
     for (uint64_t axis = 0; axis < axes; axis++)
-      out.map[i].p_m[axis] += sc.errors.landmark_m * random.normal(Stream::landmark_map, i, axis);
+      out.map[i].p_m[axis] += sigma_m * random.normal(Stream::landmark_map, i, axis);
   }
 }
 

@@ -2,6 +2,7 @@
 // A scenario and a seed become what the robot's sensors said, and the truth. All in memory; write.h makes a recording.
 #pragma once
 
+#include <Eigen/Core>
 #include <cmath>
 #include <limits>
 #include <string>
@@ -46,6 +47,13 @@ struct StereoSeen {
   double left_px[2], right_px[2];  // NaN where that picture hasn't got it
   bool outlier;
   uint64_t appearance[4] = {};
+};
+
+// Points of edges on the floor in one picture, in base_link; rows of points.csv.
+struct EdgesSeen {
+  wm_time_ns t_ns, arrival_ns;
+  uint16_t sensor;  // into Scenario::sensors
+  std::vector<Eigen::Vector2d> points_m;
 };
 
 // A row of gnss.csv. A depth sensor's row knows nothing of x and y: sigma_xy_m is kNoIdea_m.
@@ -100,6 +108,7 @@ struct Recording {
   std::vector<Command> commands;    // rows of motion.csv: of robot.commands, or measured twists; in place of `can`
   std::vector<Sighting> sightings;  // by arrival, as all that follows
   std::vector<MarkerSeen> markers;
+  std::vector<EdgesSeen> edges;
   std::vector<StereoSeen> stereo;
   std::vector<Fix> fixes;
   std::vector<wm_sensor> sensors;      // as in calibration.yaml
@@ -135,7 +144,8 @@ void settle(const Scenario &scenario, Recording &recording);
 
 // Moves `faults.landmarks_moved` of them, drawn by the seed: on the map each stays where it was measured.
 void move_landmarks(const Scenario &scenario, Recording &recording);
-// Makes the recording's map wrong by `errors.landmark_m` on each of the first `axes` axes, and states that in it.
+// Makes the recording's map wrong by each landmark's sigma_m (0: `errors.landmark_m`) on each of the first `axes` axes,
+// and states that in it.
 void misplace(const Scenario &scenario, uint64_t axes, Recording &recording);
 
 // The same for a vehicle with six degrees of freedom on `path`: motion6 instead of CAN.

@@ -75,6 +75,7 @@ bool has_sightings(const Scenario &sc) {
   return !sc.cameras.empty() || any(sc, {Sensor::Kind::landmarks, Sensor::Kind::compass});
 }
 bool has_markers(const Scenario &sc) { return any(sc, {Sensor::Kind::markers}); }
+bool has_edges(const Scenario &sc) { return any(sc, {Sensor::Kind::edges}); }
 bool has_stereo(const Scenario &sc) { return any(sc, {Sensor::Kind::stereo}); }
 bool has_fixes(const Scenario &sc) { return any(sc, {Sensor::Kind::gnss, Sensor::Kind::depth}); }
 // A world of features whose map is known has a file even for no landmark at all.
@@ -97,6 +98,7 @@ std::string streams(const Scenario &sc, const Recording &r) {
   if (has_map(sc, r)) text += ", landmarks.csv";
   if (has_sightings(sc)) text += ", sightings.csv";
   if (has_markers(sc)) text += ", markers.csv";
+  if (has_edges(sc)) text += ", points.csv";
   if (has_stereo(sc)) text += ", stereo.csv";
   if (has_fixes(sc)) text += ", gnss.csv";
   for (const std::string &stream : r.picture_streams) text += ", " + stream;
@@ -231,6 +233,15 @@ wm_status write_markers(const Recording &r, const std::string &path, wm_error *e
   return f.close(err);
 }
 
+wm_status write_edges(const Recording &r, const std::string &path, wm_error *err) {
+  File f(path);
+  f.text("t_ns,x_m,y_m,arrival_ns\n");
+  for (const EdgesSeen &seen : r.edges)
+    for (const Eigen::Vector2d &p : seen.points_m)
+      f.print("%" PRId64 ",%.4f,%.4f,%" PRId64 "\n", seen.t_ns, p.x(), p.y(), seen.arrival_ns);
+  return f.close(err);
+}
+
 wm_status write_stereo(const Recording &r, const std::string &path, wm_error *err) {
   File f(path);
   const auto looks = [](const StereoSeen &p) { return p.appearance[0] != 0; };
@@ -258,11 +269,12 @@ wm_status write_fixes(const Recording &r, const std::string &path, wm_error *err
 
 wm_status write_landmarks(const std::vector<wm_landmark> &landmarks, const std::string &path, wm_error *err) {
   File f(path);
-  const bool markers = !landmarks.empty() && !std::isnan(landmarks[0].yaw_rad);
+  const bool markers =
+      std::any_of(landmarks.begin(), landmarks.end(), [](const wm_landmark &l) { return !std::isnan(l.yaw_rad); });
   f.print("id,x_m,y_m,z_m,sigma_m%s\n", markers ? ",yaw_rad" : "");
   for (const wm_landmark &l : landmarks) {
     f.print("%d,%.6f,%.6f,%.6f,%.6g", l.id, l.p_m[0], l.p_m[1], l.p_m[2], l.sigma_m);
-    if (markers) f.print(",%.6f", l.yaw_rad);
+    if (markers) f.print(",%s", number(l.yaw_rad, 6).c_str());
     f.text("\n");
   }
   return f.close(err);
@@ -348,6 +360,7 @@ wm_status write_sensors(const Scenario &sc, const Recording &r, const std::strin
   if (status == WM_OK && has_map(sc, r)) status = write_landmarks(r.map, in("landmarks.csv"), err);
   if (status == WM_OK && has_sightings(sc)) status = write_sightings(r, in("sightings.csv"), err);
   if (status == WM_OK && has_markers(sc)) status = write_markers(r, in("markers.csv"), err);
+  if (status == WM_OK && has_edges(sc)) status = write_edges(r, in("points.csv"), err);
   if (status == WM_OK && has_stereo(sc)) status = write_stereo(r, in("stereo.csv"), err);
   if (status == WM_OK && has_fixes(sc)) status = write_fixes(r, in("gnss.csv"), err);
   if (status == WM_OK) status = six ? write_truth6(r, in("truth.csv"), err) : write_truth(r, in("truth.csv"), err);

@@ -10,6 +10,7 @@
 #include "worlds/dice.h"
 #include "worlds/dress.h"
 #include "worlds/makers.h"
+#include "worlds/prints.h"
 
 namespace wm::sim {
 namespace {
@@ -108,11 +109,10 @@ wm_status make_corridor(const WorldRequest &request, World &world, wm_error *err
   } else {
     world.map = draw_map(world.plan, kCorridorOrigin, kCorridorWidth_px, kCorridorHeight_px, kCorridorResolution_m);
   }
-  world.labels = World::Labels::edges;
-  world.label_file = "labels/edges.csv";
-  world.label_header = "frame,polyline,u_px,v_px";
+  world.labels = {World::Labels::edges};
+  world.landmarks_known = !request.landmarks.empty();
   world.label_reach_m = 15;
-  return WM_OK;
+  return hang_listed(request, world, err);
 }
 
 }  // namespace wm::sim

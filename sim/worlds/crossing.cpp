@@ -311,7 +311,7 @@ class Builder {
     const int32_t id = static_cast<int32_t>(world_.truth.size()) + 1;
     const Vec3 r = 0.5 * width * right, u(0, 0, 0.5 * height);
     world_.panels.push_back({id, {middle - r + u, middle + r + u, middle + r - u, middle - r - u}, normal});
-    world_.truth.push_back({id, middle, 0, what});
+    world_.truth.push_back({id, middle, NAN, what});
   }
 
   // Signs on posts at the crossing's corners.
@@ -460,9 +460,7 @@ wm_status make_crossing(const WorldRequest &request, World &world, wm_error *) {
   Builder(request, world).build(streets_around(world.route, request.seed));
   world.landmarks_known = true;
   world.cameras = {fisheye("left", 0.4, 50 * kDeg), fisheye("right", -0.4, -50 * kDeg)};
-  world.labels = World::Labels::landmarks;
-  world.label_file = "labels/landmarks.csv";
-  world.label_header = "frame,camera,id,u_px,v_px";
+  world.labels = {World::Labels::landmarks};
   world.label_reach_m = 40;
   return WM_OK;
 }

@@ -136,9 +136,7 @@ wm_status make_hall(const WorldRequest &request, World &world, wm_error *err) {
   c.rate_hz = 10;
   c.exposure_s = 0.008;
   world.cameras = {c};
-  world.labels = World::Labels::lines;
-  world.label_file = "labels/lines.csv";
-  world.label_header = "frame,id,azimuth_rad";
+  world.labels = {World::Labels::lines};
   world.label_reach_m = 30;
   return WM_OK;
 }

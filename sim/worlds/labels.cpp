@@ -169,10 +169,32 @@ bool panel_in_view(const World &world, const images::Camera &camera, const rende
   return panel_seen({world, camera, shot}, panel, pixels);
 }
 
-void World::label(size_t camera_index, const images::Camera &camera, const render::Shot &shot,
+const char *label_file(World::Labels what) {
+  switch (what) {
+    case World::Labels::edges: return "labels/edges.csv";
+    case World::Labels::markers: return "labels/markers.csv";
+    case World::Labels::lines: return "labels/lines.csv";
+    case World::Labels::landmarks: return "labels/landmarks.csv";
+    case World::Labels::beacons: return "labels/beacons.csv";
+  }
+  return "";
+}
+
+const char *label_header(World::Labels what) {
+  switch (what) {
+    case World::Labels::edges: return "frame,polyline,u_px,v_px";
+    case World::Labels::markers: return "frame,id,u0_px,v0_px,u1_px,v1_px,u2_px,v2_px,u3_px,v3_px";
+    case World::Labels::lines: return "frame,id,azimuth_rad";
+    case World::Labels::landmarks:
+    case World::Labels::beacons: return "frame,camera,id,u_px,v_px";
+  }
+  return "";
+}
+
+void World::label(Labels what, size_t camera_index, const images::Camera &camera, const render::Shot &shot,
                   std::string &rows) const {
   const View view{*this, camera, shot};
-  switch (labels) {
+  switch (what) {
     case Labels::edges: return label_edges(view, rows);
     case Labels::markers: return label_markers(view, rows);
     case Labels::lines: return label_lines(view, rows);

@@ -7,12 +7,11 @@
 #include "simulate/angle.h"
 #include "simulate/route.h"
 #include "waymark/internal/math/elementary.hpp"
-#include "waymark/mr_code.h"
 #include "worlds/dice.h"
 #include "worlds/dress.h"
 #include "worlds/makers.h"
+#include "worlds/prints.h"
 #include "worlds/rooms.h"
-#include "worlds/tags.h"
 
 namespace wm::sim {
 namespace {
@@ -21,42 +20,7 @@ using images::Vec3;
 
 constexpr double kMarker_m = 0.198, kMr_m = 0.27, kReach_m = 12;
 
-// A marker in its place.
-struct Print {
-  int id;
-  bool mr;
-  Vec3 middle, right, up;
-
-  double whole_m() const { return mr ? kMr_m * kMrSheet : kMarker_m * 10 / 8; }
-  double module_m() const { return mr ? kMr_m * WM_MR_MODULE : kMarker_m / 8; }
-  // A square on it.
-  World::Panel square(double left, double top, double edge) const {
-    const Vec3 r = right.normalized(), u = up.normalized(), corner = middle + left * r + top * u;
-    World::Panel panel;
-    panel.id = id;
-    panel.corners[0] = corner;
-    panel.corners[1] = corner + edge * r;
-    panel.corners[2] = corner + edge * r - edge * u;
-    panel.corners[3] = corner - edge * u;
-    panel.normal = right.cross(up).normalized();
-    return panel;
-  }
-};
-
-// What one sees of it and what the map of truth says.
-void hang(const Print &print, World &world) {
-  render::Material m;
-  m.albedo = images::Colour(1.f);
-  m.texture =
-      render::Texture::make(print.mr ? mr_picture(print.id, 512) : tag36h11_picture(print.id, 16), render::Wrap::clamp);
-  const double whole = print.whole_m();
-  m.texture_size_m = {whole, whole};
-  world.scene.add(render::picture(print.middle, print.right, print.up, whole, whole, world.scene.add(m)));
-  const double left = print.mr ? kMr_m * WM_MR_CODE_LEFT : -0.5 * kMarker_m;
-  world.panels.push_back(print.square(left, print.mr ? -kMr_m * WM_MR_CODE_TOP : -left, -2 * left));
-  world.truth.push_back(
-      {print.id, print.middle, wm::atan2(print.right.y(), print.right.x()), print.mr ? "mr" : "marker"});
-}
+double size_of(bool mr) { return mr ? kMr_m : kMarker_m; }
 
 // Where the robot's camera looks on its way, with nothing in the room but what stands there.
 class Patrol {
@@ -126,7 +90,8 @@ std::vector<Print> prints_on_ceiling(const WorldRequest &request, const std::vec
                         std::fabs(l.p.y_m - middle.y()) > 0.5 * l.length_m + 0.25);
     if (!apart) continue;
     const auto [s, c] = wm::sincos(yaw);
-    Print print{0, is_mr(request.markers, prints), middle, {c, s, 0}, {s, -c, 0}};
+    const bool mr = is_mr(request.markers, prints);
+    Print print{0, mr, middle, {c, s, 0}, {s, -c, 0}, size_of(mr)};
     if (!patrol.sees(print)) continue;
     print.id = fresh_id(dice, prints);
     prints.push_back(print);
@@ -148,7 +113,8 @@ std::vector<Print> prints_on_walls(const WorldRequest &request, const Plan &plan
       if (plan.clearance_m({foot.x() + 0.3 * normal.x(), foot.y() + 0.3 * normal.y()}) < 0.15) continue;
       const Vec3 middle = foot + Vec3(0, 0, dice.uniform(0.7, 1.5)) + 0.004 * normal;
       const int id = fresh_id(dice, prints);
-      prints.push_back({id, is_mr(request.markers, prints), middle, right, {0, 0, 1}});
+      const bool mr = is_mr(request.markers, prints);
+      prints.push_back({id, mr, middle, right, {0, 0, 1}, size_of(mr)});
     }
   }
   std::erase_if(prints, [&](const Print &print) { return !patrol.sees(print); });
@@ -258,9 +224,7 @@ wm_status make_office(const WorldRequest &request, World &world, wm_error *err) 
 
   world.marker_family = request.markers == Markers::mr ? "mr" : "tag36h11";
   world.marker_size_m = request.markers == Markers::mr ? kMr_m : kMarker_m;
-  world.labels = World::Labels::markers;
-  world.label_file = "labels/markers.csv";
-  world.label_header = "frame,id,u0_px,v0_px,u1_px,v1_px,u2_px,v2_px,u3_px,v3_px";
+  world.labels = {World::Labels::markers};
   world.label_reach_m = kReach_m;
   return WM_OK;
 }

@@ -212,7 +212,7 @@ wm_status make_seabed(const WorldRequest &request, World &world, wm_error *err) 
     world.scene.add(render::sphere(p, radius, 24, world.scene.add(m)));
     world.scene.add(render::cylinder(images::pose_xyz_rpy({x, y, p.z() - height - 0.1}, 0, 0, 0), 0.006,
                                      height + 0.1 - radius, 6, line));
-    world.truth.push_back({id, p, 0, "beacon"});
+    world.truth.push_back({id, p, NAN, "beacon"});
     id++;
   }
 
@@ -241,9 +241,7 @@ wm_status make_seabed(const WorldRequest &request, World &world, wm_error *err) 
   world.cameras = {stereo_camera("left", 0.15), stereo_camera("right", -0.15)};
   world.stereo_left = "left";
   world.stereo_right = "right";
-  world.labels = World::Labels::beacons;
-  world.label_file = "labels/beacons.csv";
-  world.label_header = "frame,camera,id,u_px,v_px";
+  world.labels = {World::Labels::beacons};
   world.label_reach_m = 9;
   world.landmarks_known = true;
   return WM_OK;

@@ -4,6 +4,8 @@
 // `route` or `path`; this says nothing about errors of sensors.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -29,6 +31,8 @@ struct WorldRequest {
   std::optional<Plan> plan;    // corridor, office, hall: this building instead of a drawn one; then give `route`, too
   std::optional<Route> route;  // instead of the drawn one (not for seabed); clutter and people keep out of its way
   std::optional<Footprint> footprint;  // corridor, office, hall: the robot's body instead of the world's usual one
+  std::vector<wm_landmark> landmarks;  // corridor: those with a yaw hang as upright tags, the others are not seen
+  double tag_m = 0.2;                  // edge of the tags' black square
 };
 
 struct WorldCamera {
@@ -42,8 +46,9 @@ struct WorldCamera {
 struct WorldLandmark {
   int32_t id = 0;
   images::Vec3 p{0, 0, 0};  // map
-  double yaw_rad = 0;       // markers: of the print's edge from upper left to upper right
+  double yaw_rad = NAN;     // markers: of the print's edge from upper left to upper right
   std::string what;
+  double sigma_m = 0;  // of its place on the map; 0: as the scenario's errors say
 };
 
 enum class Vehicle { car, differential, six };  // six: six degrees of freedom, `path` instead of `route`
@@ -67,15 +72,18 @@ struct World {
   std::string marker_family;              // office; of `both` the AprilTags'
   double marker_size_m = 0;               // likewise
   std::string stereo_left, stereo_right;  // seabed: names of the cameras of the rectified pair
-  std::string label_file, label_header;   // "labels/edges.csv", "frame,polyline,u_px,v_px"
 
-  // Appends the true features of a picture to the rows of `label_file`. `shot` is the one that the picture was rendered
-  // with, `camera` the TRUE camera (with its mounting's error) at this place in `cameras`. Any thread, some ms.
-  void label(size_t camera_index, const images::Camera &camera, const render::Shot &shot, std::string &rows) const;
-
-  // What label() looks for; filled by the maker.
+  // What label() looks for; filled by the maker. Each is a file of the recording.
   enum class Labels { edges, markers, lines, landmarks, beacons };
-  Labels labels = Labels::edges;
+  std::vector<Labels> labels;
+  bool has(Labels what) const { return std::find(labels.begin(), labels.end(), what) != labels.end(); }
+
+  // Appends the true features of a picture to the rows of `label_file(what)`. `shot` is the one that the picture was
+  // rendered with, `camera` the TRUE camera (with its mounting's error) at this place in `cameras`. Any thread, some
+  // ms.
+  void label(Labels what, size_t camera_index, const images::Camera &camera, const render::Shot &shot,
+             std::string &rows) const;
+
   struct Line {  // an upright edge
     int32_t id;
     images::Vec3 foot, head;
@@ -93,6 +101,9 @@ struct World {
   double label_reach_m = 15;
   double beacon_radius_m = 0.14;  // the largest one
 };
+
+const char *label_file(World::Labels what);    // "labels/edges.csv"
+const char *label_header(World::Labels what);  // "frame,polyline,u_px,v_px"
 
 // Whether a panel is whole in a picture with nothing before it, and where its corners are there.
 bool panel_in_view(const World &world, const images::Camera &camera, const render::Shot &shot,

@@ -62,7 +62,7 @@ std::vector<Label> labels_of(const Film &film, size_t camera) {
     shot.frame = i;
     shot.T_map_base = motion_of(film.recording);
     std::string text, line;
-    film.world->label(camera, film.cameras[camera].truth, shot, text);
+    film.world->label(film.world->labels[0], camera, film.cameras[camera].truth, shot, text);
     for (std::istringstream lines(text); std::getline(lines, line);) {
       double u = 0, v = 0;
       int id = 0;

@@ -246,7 +246,7 @@ TEST(test_clock_and_losses_are_in_the_video) {
   double squares = 0, frames = 0, lost = 0;
   for (size_t camera = 0; camera < 2; camera++) {
     std::map<size_t, std::vector<std::vector<double>>> seen;
-    for (const auto &label : rows_of(dir + "/" + film.world->label_file))
+    for (const auto &label : rows_of(dir + "/" + wm::sim::label_file(film.world->labels[0])))
       if (static_cast<size_t>(label[1]) == camera) seen[static_cast<size_t>(label[0])].push_back(label);
     const auto stamps = rows_of(dir + "/video/" + film.cameras[camera].name + ".csv");
     lost += 400 - static_cast<double>(stamps.size());

@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // Buildings of one's own: the shipped polyline plan and the same flat as a ROS map become worlds that agree; what a
 // wrong plan, map or route says.
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <set>
 
 #include "common/suite.h"
 #include "made.h"
+#include "simulate/angle.h"
 #include "simulate/film.h"
 
 using namespace wm::sim;
@@ -104,6 +107,85 @@ void refuse(const std::string &world, const std::string &route, const char *want
   for (size_t at; (at = said.find(folder.path().string() + "/")) != std::string::npos;)
     said.erase(at, folder.path().string().size() + 1);
   TEST_ASSERT_EQUAL_STRING(wanted, said.c_str());
+}
+
+// The way that `way` leads to on a wall of the plan: the nearest face of what the map has.
+double to_wall_m(const Plan &plan, double x_m, double y_m) {
+  double least = 1e9;
+  for (const Face &f : plan.faces)
+    if (f.mapped && f.bottom_m == 0) least = std::min(least, distance_m({x_m, y_m}, f));
+  return least;
+}
+
+// Without errors edge points lie on the plan's walls and tags where they hang; radio and RTK speak in their areas
+// alone.
+TEST(test_the_hospital_has_all_of_its_sources) {
+  Scenario scenario;
+  Film film;
+  wm_error err{};
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, load_scenario(worlds() + "hospital.yaml", scenario, &err), err.text);
+  TEST_ASSERT_TRUE(scenario.robot.differential);
+  make_perfect(scenario);
+  scenario.pictures.none = true;
+  scenario.pixel_cameras[0].rate_hz = 2;
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, prepare(scenario, 1, film, &err), err.text);
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, observe_pictures(film, &err), err.text);
+  const Recording &r = film.recording;
+  const auto place_at = [&r](wm_time_ns t_ns) {
+    return r.drive.at(1e-9 * static_cast<double>(t_ns - r.clock_start_ns));
+  };
+  size_t points = 0;
+  for (const EdgesSeen &seen : r.edges) {
+    const State s = place_at(seen.t_ns);
+    for (const Eigen::Vector2d &p : seen.points_m) {
+      const double c = std::cos(s.heading_rad), q = std::sin(s.heading_rad);
+      const double off_m = to_wall_m(film.world->plan, s.x_m + c * p.x() - q * p.y(), s.y_m + q * p.x() + c * p.y());
+      TEST_ASSERT_LESS_THAN_DOUBLE(0.01, off_m);
+      points++;
+    }
+  }
+  TEST_ASSERT_GREATER_THAN(5000, points);
+  std::set<int32_t> tags;
+  for (const MarkerSeen &m : r.markers) {
+    const State s = place_at(m.t_ns);
+    const auto at =
+        std::find_if(r.landmarks.begin(), r.landmarks.end(), [&](const wm_landmark &l) { return l.id == m.id; });
+    const double c = std::cos(s.heading_rad), q = std::sin(s.heading_rad), x = 0.33 + m.p_m[0], y = m.p_m[1];
+    TEST_ASSERT_DOUBLE_WITHIN(0.01, at->p_m[0], s.x_m + c * x - q * y);
+    TEST_ASSERT_DOUBLE_WITHIN(0.01, at->p_m[1], s.y_m + q * x + c * y);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-3, 0, wrap(at->yaw_rad - s.heading_rad - m.yaw_rad));
+    tags.insert(m.id);
+  }
+  TEST_ASSERT_EQUAL(8, tags.size());
+  TEST_ASSERT_GREATER_THAN(100, r.sightings.size());
+  for (const Sighting &s : r.sightings) TEST_ASSERT_DOUBLE_WITHIN(7, 29, place_at(s.t_ns).x_m);
+  TEST_ASSERT_GREATER_THAN(100, r.fixes.size());
+  for (const Fix &f : r.fixes) TEST_ASSERT_DOUBLE_WITHIN(12, 49, place_at(f.t_ns).x_m);
+  TEST_ASSERT_EQUAL(12, r.map.size());
+}
+
+void refuse_landmark(const char *landmark, const char *wanted) {
+  const made::Folder folder;
+  folder.write("room.yaml", "format: waymark-plan/1\noutside: solid\nrooms: [[[0, 0], [6, 0], [6, 4], [0, 4]]]\n");
+  folder.write("x.yaml", std::string("format: waymark-scenario/1\nname: x\nworld: {kind: corridor, plan: room.yaml, ") +
+                             "landmarks: [" + landmark + "]}\nrobot: {wheel_radius_m: 0.05, ticks_per_turn: 100, " +
+                             "track_m: 0.3, body: {front_m: 0.2, back_m: 0.2, width_m: 0.3}}\n" +
+                             "route: {start: {x_m: 1, y_m: 2}, points: [[5, 2]]}\n");
+  Scenario scenario;
+  Film film;
+  wm_error err{};
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, load_scenario((folder.path() / "x.yaml").string(), scenario, &err), err.text);
+  TEST_ASSERT_EQUAL_MESSAGE(WM_BAD_CONFIG, prepare(scenario, 1, film, &err), landmark);
+  TEST_ASSERT_EQUAL_STRING(wanted, err.text);
+}
+
+TEST(test_tags_that_nobody_could_see_are_refused) {
+  refuse_landmark(
+      "{id: 3, xyz_m: [2, 0, 1], yaw_deg: 0}",
+      "world.landmarks: tag 3 at (2.00, 0.00) looks into a wall; yaw_deg is the direction from its left edge "
+      "to its right one, as who stands before it reads it");
+  refuse_landmark("{id: 999, xyz_m: [2, 0, 1], yaw_deg: 180}",
+                  "world.landmarks: tag 999: tag36h11 has the ids 0 to 586");
 }
 
 TEST(test_mistakes_are_told) {

@@ -241,6 +241,73 @@ TEST(test_gnss_wanders_and_jumps) {
   check_share(0.02, outliers, whole.n + outliers);
 }
 
+// A receiver with areas says there what one without says, and nothing elsewhere.
+TEST(test_areas_change_nothing_but_where_it_speaks) {
+  load("yard-rtk");
+  scenario.sensors[0].wander_m = 0.5;
+  make(3);
+  const std::vector<Fix> everywhere = made.fixes;
+  const std::vector<Area> areas = {{2, -3, 6, 8}, {5, -3, 9, 1}};
+  scenario.sensors[0].areas = areas;
+  make(3);
+  size_t next = 0;
+  for (const Fix &f : everywhere) {
+    const State s = made.drive.at(since_start(f.t_ns));
+    const bool inside = (s.x_m >= 2 && s.x_m <= 6 && s.y_m >= -3 && s.y_m <= 8) ||
+                        (s.x_m >= 5 && s.x_m <= 9 && s.y_m >= -3 && s.y_m <= 1);
+    if (!inside) continue;
+    TEST_ASSERT_LESS_THAN(made.fixes.size(), next);
+    TEST_ASSERT_EQUAL_INT64(f.t_ns, made.fixes[next].t_ns);
+    TEST_ASSERT_EQUAL_DOUBLE(f.p_m[0], made.fixes[next++].p_m[0]);
+  }
+  TEST_ASSERT_EQUAL(next, made.fixes.size());
+  TEST_ASSERT_GREATER_THAN(20, next);
+  TEST_ASSERT_LESS_THAN(everywhere.size() / 2, next);
+}
+
+// Tags and an anchor in one list: each with its own sigma on the map; an anchor is no marker, and has no yaw.
+TEST(test_listed_landmarks_have_yaw_and_sigma) {
+  const std::string text =
+      "format: waymark-scenario/1\nname: x\n"
+      "world: {landmarks: [{id: 1, xyz_m: [3, 1, 1], yaw_deg: 90, sigma_m: 0.1}, {id: 2, xyz_m: [4, -1, 1]},\n"
+      "  {id: 3, xyz_m: [5, 1, 1], sigma_m: 0.3}]}\n"
+      "robot: {wheel_radius_m: 0.1, ticks_per_turn: 1000, track_m: 0.5}\n"
+      "sensors: [{kind: markers, bearing_sigma_deg: 0.1, range_sigma_m: 0.01, heading_sigma_deg: 1}]\n"
+      "route: {start: {x_m: 0, y_m: 0, heading_deg: 0}, legs: [{stand_s: 2}]}\n"
+      "errors: {landmark_m: 0.02}\n";
+  wm_error err{};
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, parse_scenario(text, "x.yaml", scenario, &err), err.text);
+  Sum off[3];
+  for (uint64_t seed = 1; seed <= 300; seed++) {
+    make(seed);
+    for (size_t i = 0; i < 3; i++) off[i].add(made.map[i].p_m[0] - made.landmarks[i].p_m[0]);
+    for (const MarkerSeen &m : made.markers) TEST_ASSERT_EQUAL(1, m.id);
+  }
+  TEST_ASSERT_GREATER_THAN(15, made.markers.size());
+  const double sigma[] = {0.1, 0.02, 0.3};
+  for (size_t i = 0; i < 3; i++) {
+    check_rms(sigma[i], off[i]);
+    TEST_ASSERT_EQUAL_DOUBLE(sigma[i], made.map[i].sigma_m);
+  }
+
+  char dir[] = "/tmp/simulate-listed-XXXXXX";
+  TEST_ASSERT_NOT_NULL(mkdtemp(dir));
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, write_recording(scenario, made, dir, &err), err.text);
+  wm_landmark *read = nullptr;
+  size_t count = 0;
+  const std::string file = std::string(dir) + "/landmarks.csv";
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_landmarks_load(file.c_str(), nullptr, nullptr, &read, &count, &err), err.text);
+  TEST_ASSERT_EQUAL(3, count);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-5, 90 * kDegree, read[0].yaw_rad);
+  TEST_ASSERT_TRUE(std::isnan(read[1].yaw_rad) && std::isnan(read[2].yaw_rad));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.3, read[2].sigma_m);
+  std::free(read);
+  std::filesystem::remove_all(dir);
+  make_perfect(scenario);
+  make(1);
+  for (size_t i = 0; i < 3; i++) TEST_ASSERT_EQUAL_DOUBLE(made.landmarks[i].p_m[0], made.map[i].p_m[0]);
+}
+
 TEST(test_perfect_is_perfect) {
   load("seabed-acoustic");
   make_perfect(scenario);
@@ -296,12 +363,15 @@ TEST(test_mistakes_are_told) {
   refuse("{kind: landmarks}",
          "x.yaml:6: sensors[0]: give bearing_sigma_deg, range_sigma_m or both: they choose what this sensor measures");
   refuse("{kind: landmarks, bearing_sigma_deg: 1, sigma_px: 1}",
-         "x.yaml:6: sensors[0].sigma_px: only a sensor of kind stereo has this");
+         "x.yaml:6: sensors[0].sigma_px: only a sensor of kind stereo or edges has this");
   refuse("{kind: stereo}", "x.yaml:6: sensors[0]: `sigma_px` is missing here");
   refuse("{kind: markers, bearing_sigma_deg: 1, range_sigma_m: 0.1, heading_sigma_deg: 1}",
          "x.yaml:6: sensors[0]: markers.csv is for robots on wheels");
   refuse("{kind: depth, sigma_z_m: 0.1}\n  - {kind: depth, sigma_z_m: 0.1}",
          "x.yaml:7: sensors[1]: the name 'depth' is there already; give this sensor a `name` of its own");
+  refuse("{kind: landmarks, bearing_sigma_deg: 1, areas_m: [[3, 0, 2, 1]]}",
+         "x.yaml:6: sensors[0].areas_m[0]: an area is [x0, y0, x1, y1]; x1 is above x0 and y1 above y0");
+  refuse("{kind: edges, sigma_px: 1}", "x.yaml:6: sensors[0]: only the world `corridor` has edges on the floor");
   refuse("{kind: landmarks, bearing_sigma_deg: 1, ids: [9, 3]}",
          "x.yaml:6: sensors[0].ids: two numbers from 0 to 2.14748e+09, the smaller one first");
 }

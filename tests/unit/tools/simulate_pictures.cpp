@@ -88,7 +88,8 @@ void check_world(const char *name, std::initializer_list<const char *> cameras, 
   wm_recording_close(opened);
 
   for (const char *camera : cameras) TEST_ASSERT_EQUAL(1 + 4, lines_of(a + "/video/" + camera + ".csv"));
-  TEST_ASSERT_GREATER_THAN_MESSAGE(1, lines_of(a + "/" + film.world->label_file), film.world->label_file.c_str());
+  for (const World::Labels what : film.world->labels)
+    TEST_ASSERT_GREATER_THAN_MESSAGE(1, lines_of(a + "/" + label_file(what)), label_file(what));
 
   Film again;
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, prepare(scenario, 3, again, &err), err.text);

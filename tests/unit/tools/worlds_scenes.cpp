@@ -146,7 +146,7 @@ TEST(corridor_labels_lie_on_edges_of_the_picture) {
     const wm::render::Shot shot = motion.shot(share, 5);
     const Image image = picture(*world, camera, shot, 16);
     std::string text;
-    world->label(0, camera, shot, text);
+    world->label(world->labels[0], 0, camera, shot, text);
     const auto rows = numbers(text);
     TEST_ASSERT_GREATER_THAN(40, rows.size());
     for (size_t i = 1; i + 1 < rows.size(); i++) {
@@ -212,7 +212,7 @@ TEST(office_labels_are_what_apriltag_finds) {
         bytes.push_back(static_cast<uint8_t>(std::clamp(255 * std::sqrt(v), 0.f, 255.f)));
       image_u8_t view{image.width, image.height, image.width, bytes.data()};
       std::string text;
-      world->label(0, camera, shot, text);
+      world->label(world->labels[0], 0, camera, shot, text);
       const auto rows = numbers(text);
       labelled += static_cast<int>(rows.size());
       zarray_t *detections = apriltag_detector_detect(detector.get(), &view);
@@ -257,7 +257,8 @@ TEST(office_prints_come_whole_into_view) {
     const int pictures = static_cast<int>(motion.duration_s() * world->cameras[0].rate_hz);
     for (int i = 0; i < pictures; i++) {
       std::string text;
-      world->label(0, world->cameras[0].camera, motion.shot(static_cast<double>(i) / pictures, 0), text);
+      world->label(world->labels[0], 0, world->cameras[0].camera, motion.shot(static_cast<double>(i) / pictures, 0),
+                   text);
       for (const auto &row : numbers(text)) whole[static_cast<int>(row[1])]++;
     }
     TEST_ASSERT_GREATER_OR_EQUAL(9, world->truth.size());
@@ -280,7 +281,7 @@ TEST(hall_labels_point_at_upright_edges) {
     const wm::render::Shot shot = motion.shot(share, 3);
     const Image image = picture(*world, camera, shot, 16);
     std::string text;
-    world->label(0, camera, shot, text);
+    world->label(world->labels[0], 0, camera, shot, text);
     const auto rows = numbers(text);
     TEST_ASSERT_GREATER_OR_EQUAL(15, rows.size());
     TEST_ASSERT_LESS_OR_EQUAL(world->lines.size(), rows.size());
@@ -322,7 +323,7 @@ TEST(labels_of_signs_and_beacons_show_them) {
         camera.readout_ns = 20000000;  // a rolling shutter moves what is seen
         const wm::render::Shot shot = motion.shot(share, 3);
         std::string text;
-        world->label(k, camera, shot, text);
+        world->label(world->labels[0], k, camera, shot, text);
         for (const auto &row : numbers(text)) {
           TEST_ASSERT_EQUAL(static_cast<int>(k), static_cast<int>(row[1]));
           Vec3 direction;
@@ -358,7 +359,7 @@ TEST(requests_repeat_and_differ) {
       const wm::render::Shot shot = motion.shot(0.3, 9);
       pictures.push_back(picture(*world, small, shot, 1).values);
       labels.emplace_back();
-      world->label(0, small, shot, labels.back());
+      world->label(world->labels[0], 0, small, shot, labels.back());
     }
     TEST_ASSERT_TRUE_MESSAGE(pictures[0] == pictures[1], name);
     TEST_ASSERT_TRUE_MESSAGE(labels[0] == labels[1], name);
