@@ -13,6 +13,8 @@ import canmatrix.formats
 import cantools
 from dronecan import uavcan
 
+from experiment import said
+
 TOOLS, PYTHON, MATRIX, DRONE = "cantools 45.1.0", "python-can 4.6.1", "canmatrix 1.2", "dronecan 1.0.27"
 DBC = '''VERSION ""
 NS_ :
@@ -27,13 +29,6 @@ BO_ 256 Motion: 8 A
 VAL_ 2566844926 Brake 0 "off" 1 "on" 2 "error" 3 "not available" ;
 VAL_ 256 v 32767 "SNA" ;
 '''
-
-
-def said(function):
-    try:
-        return str(function())
-    except Exception as error:  # noqa: BLE001  (that it raises is what is measured)
-        return f"raises {type(error).__name__}"
 
 
 def zone(name):
