@@ -146,6 +146,7 @@ static wm_status add_vision(wm_assembly *self, wm_recording *recording, wm_error
       return wm_fail(err, WM_FULL, "%s: more than %d sources", config->path, WM_SOURCES_MAX);
     add_source(self, wm_vision_source(self->vision, i));
   }
+  if (wm_vision_count(self->vision) > 0) wm_video_decoder(self->decoder, sizeof self->decoder);
   return status;
 }
 

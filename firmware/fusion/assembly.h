@@ -14,6 +14,7 @@
 #include "waymark/estimator.h"
 #include "waymark/recording.h"
 #include "waymark/source.h"
+#include "waymark/video.h"
 
 // A source that is used; its place in the table is the `source` of its events.
 typedef struct wm_assembled_source {
@@ -54,8 +55,9 @@ typedef struct wm_assembly {
   wm_vision *vision;  // sources of pictures; NULL where there are none
   const void *kept;   // map of an earlier run for the estimator (waymark/keeper.h); NULL: none
   size_t kept_bytes;
-  const char *map_path;              // NULL where the estimator takes no map
-  char recording[WM_NAME_MAX + 96];  // the recording's name
+  const char *map_path;               // NULL where the estimator takes no map
+  char recording[WM_NAME_MAX + 96];   // the recording's name
+  char decoder[WM_DECODER_NAME_MAX];  // of JPEG pictures, where the run has pictures; else ""
 } wm_assembly;
 
 // `config` and `recording` outlive the assembly. WM_BAD_CONFIG where they don't match: no data, a source of the

@@ -42,7 +42,8 @@ typedef enum wm_log_tag {
   WM_LOG_EVENT,   // struct
   WM_LOG_GAP,     // u64: events that are missing here, because they found no room in the ring to the disk thread
   WM_LOG_CLOSED,  // u64: events in the file; regular end of the run
-  WM_LOG_KEPT     // of the head: map of an earlier run that this one began with (waymark/keeper.h); absent without one
+  WM_LOG_KEPT,    // of the head: map of an earlier run that this one began with (waymark/keeper.h); absent without one
+  WM_LOG_DECODER  // of the head, text: what decoded the run's JPEG pictures (wm_video_decoder); absent without pictures
 } wm_log_tag;
 
 // ── writing ─────────────────────────────────────────────────────────────────────────────────────────────────────────
@@ -70,7 +71,7 @@ typedef struct wm_log_reader wm_log_reader;
 // The head's content. Pointers live as long as the reader.
 typedef struct wm_log_head {
   char program[32], estimator[WM_NAME_MAX], recording[WM_NAME_MAX + 96], config_path[WM_PATH_MAX],
-      map_path[WM_PATH_MAX];
+      map_path[WM_PATH_MAX], decoder[WM_DECODER_NAME_MAX];  // decoder: "" without pictures
   uint64_t seed, landmark_hash;
   uint64_t map_hash;  // 0: there was no map
   const char *config_text, *calibration_text;

@@ -155,6 +155,7 @@ static wm_status take_head_record(wm_log_reader *self, const record *r, wm_error
     case WM_LOG_RECORDING: get_text(h->recording, sizeof h->recording, r); break;
     case WM_LOG_CONFIG_PATH: get_text(h->config_path, sizeof h->config_path, r); break;
     case WM_LOG_MAP_PATH: get_text(h->map_path, sizeof h->map_path, r); break;
+    case WM_LOG_DECODER: get_text(h->decoder, sizeof h->decoder, r); break;
     case WM_LOG_SEED: h->seed = wm_get_u64(&bytes); break;
     case WM_LOG_LANDMARK_HASH:
       h->landmark_hash = wm_get_u64(&bytes);
@@ -214,7 +215,8 @@ static wm_status read_head(wm_log_reader *self, wm_error *err) {
     if (status == WM_END) return bad(self, err, "the file ends within its head; nothing can be replayed from it");
     if (status != WM_OK) return status;
     if (r.tag == WM_LOG_HEAD_END) break;
-    if (r.tag >= WM_LOG_EVENT && r.tag != WM_LOG_KEPT) return bad(self, err, "an event before the end of the head");
+    if (r.tag >= WM_LOG_EVENT && r.tag != WM_LOG_KEPT && r.tag != WM_LOG_DECODER)
+      return bad(self, err, "an event before the end of the head");
     status = take_head_record(self, &r, err);
     if (status != WM_OK) return status;
   }

@@ -91,6 +91,7 @@ wm_status wm_log_create(wm_log_writer *self, const char *path, const wm_assembly
   write_setup(self, &assembly->setup);
   write_map(self, assembly);
   write_sources(self, assembly);
+  if (assembly->decoder[0]) write_text(self, WM_LOG_DECODER, assembly->decoder);
   if (assembly->kept) write_record(self, WM_LOG_KEPT, assembly->kept, assembly->kept_bytes);
   write_record(self, WM_LOG_HEAD_END, "", 0);
   return WM_OK;

@@ -194,6 +194,10 @@ wm_status wm_write_health_json(const char *dir, const wm_assembly *assembly, con
   string(f, assembly->recording);
   (void)fputs(",\n  \"estimator\": ", f);
   string(f, assembly->config->estimator->name);
+  if (assembly->decoder[0]) {
+    (void)fputs(",\n  \"decoder\": ", f);
+    string(f, assembly->decoder);
+  }
   (void)fputs(",\n  \"state\": ", f);
   string(f, wm_state_name(h->state));
   (void)fputs(",\n  \"cause\": ", f);

@@ -51,6 +51,7 @@ static void assemble(log_replay *self, const wm_config *config, const wm_log_hea
   a->calibration_text = head->calibration_text;
   a->calibration_length = head->calibration_length;
   (void)snprintf(a->recording, sizeof a->recording, "%s", head->recording);
+  (void)snprintf(a->decoder, sizeof a->decoder, "%s", head->decoder);
 }
 
 // A log's poses belong to its map, which is not in it: another map is refused.

@@ -7,10 +7,13 @@ import csv
 import json
 import math
 import pathlib
+import re
+import shutil
+import subprocess
 import sys
 import tempfile
 
-from judged import ROOT, check, failures, run
+from judged import BIN, ROOT, check, failures, run
 
 sys.path.insert(0, str(ROOT / "sim/montecarlo"))
 import carried_off
@@ -50,6 +53,18 @@ def reasons(out, landmarks):
         check(sums["not_in_view"] > 0 and sums["unlike"] > 0, f"{name}: of those that weren't found it says why")
 
 
+def decoder(folder):
+    """health.json names the library that made grey of the pictures, by its build ID; a replay of the log, that of the run."""
+    names = [json.loads((folder / run_ / "health.json").read_text()).get("decoder", "") for run_ in ("a", "c")]
+    check(names[0] == names[1], f"the log keeps the run's decoder: {names[1]}")
+    said = re.fullmatch(r"libjpeg-turbo (\d+\.\d+\.\d+) when built, (libturbojpeg\.so\S+) \(build ([0-9a-f]{16})\)", names[0])
+    check(said is not None, names[0])
+    loaded = re.search(r"libturbojpeg\S* => (\S+)", subprocess.run(["ldd", BIN / "waymark"], capture_output=True, text=True, check=True).stdout)
+    if said and loaded and shutil.which("readelf"):
+        notes = subprocess.run(["readelf", "-n", loaded[1]], capture_output=True, text=True, check=True).stdout
+        check(said[3] in notes and pathlib.Path(loaded[1]).resolve().name == said[2], f"which is {loaded[1]}")
+
+
 def drives(folder, world):
     rec = folder / "rec"
     run("waymark-simulate", world, "--duration", 7, "--out", rec)
@@ -58,6 +73,7 @@ def drives(folder, world):
     run("waymark", "replay", folder / "a/events.wmlog", "--out", folder / "c")
     check(trajectory(folder / "a") == trajectory(folder / "b"), "two replays give the same bytes")
     check(trajectory(folder / "a") == trajectory(folder / "c"), "and so does the event log")
+    decoder(folder)
     reasons(folder / "a", len(list(csv.DictReader(open(rec / "landmarks/appearance.csv")))))
     judged = json.loads(run("waymark-eval", folder / "a", rec, "--json"))
     check(judged["position_rmse_m"] < 0.1, f"position {judged['position_rmse_m']:.4f} m RMS")

@@ -40,6 +40,12 @@ typedef struct wm_video_counts {
 
 typedef struct wm_video wm_video;
 
+#define WM_DECODER_NAME_MAX 128
+
+// What decodes JPEG here, so that a run can say so: "libjpeg-turbo 2.1.5 when built, libturbojpeg.so.0.2.0 (build
+// b1cab8d497a983b4)". The file and its build ID are of the library that is loaded.
+void wm_video_decoder(char *out, size_t capacity);
+
 // Whether the recording has pictures of this camera (in any format, also .mp4).
 int wm_video_there(const char *recording_dir, const char *camera_name);
 

@@ -48,6 +48,7 @@ static void fixture_assembly(wm_config *config, wm_assembly *assembly) {
   assembly->calibration_text = "sensors: {}\n";
   assembly->calibration_length = strlen(assembly->calibration_text);
   (void)snprintf(assembly->recording, sizeof assembly->recording, "fixture");
+  (void)snprintf(assembly->decoder, sizeof assembly->decoder, "libjpeg-turbo of the fixture");
 }
 
 static wm_event fixture_event(uint32_t i) {

@@ -24,6 +24,7 @@ TEST(what_was_written_is_read) {
   TEST_ASSERT_EQUAL_STRING(WM_VERSION, head->program);
   TEST_ASSERT_EQUAL_STRING("tiny", head->estimator);
   TEST_ASSERT_EQUAL_STRING("fixture", head->recording);
+  TEST_ASSERT_EQUAL_STRING("libjpeg-turbo of the fixture", head->decoder);
   TEST_ASSERT_EQUAL_STRING(fixture_config_text, head->config_text);
   TEST_ASSERT_EQUAL_STRING("sensors: {}\n", head->calibration_text);
   TEST_ASSERT_EQUAL_UINT64(77, head->seed);
