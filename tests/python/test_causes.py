@@ -19,8 +19,8 @@ if not LIBRARY.exists():
 os.environ["WAYMARK_LIBRARY"] = str(LIBRARY)
 
 from waymark.causes import changes, search  # noqa: E402
-from waymark.causes.fault import Fault, discrete, factor_words  # noqa: E402
-from waymark.causes.trial import Drive, likelihoods  # noqa: E402
+from waymark.causes.fault import Clock, Fault, discrete, factor_words  # noqa: E402
+from waymark.causes.trial import Drive, Undo, likelihoods  # noqa: E402
 
 YAML = b"# a robot\nsensors:\n  front:   # screwed on by eye\n    mounting: {xyz_m: [0.1, 0, 0.2]}\nwheels: {radius_m: 0.05}\n"
 DBC = b"BO_ 256 ODOMETRY: 8 R\n SG_ TICKS : 0|32@1- (1,0) [0|1] \"\" W\n\nBO_ 257 OTHER: 8 R\n SG_ TICKS : 8|16@1+ (2,0) [0|1] \"\" W\n"
@@ -54,7 +54,8 @@ class Changes(unittest.TestCase):
 def drive(gain, unusual=0.0, lost=0.0):
     """A drive of 40 blocks with 20 updates each, of `gain` nats an update."""
     rng = np.random.default_rng(1)
-    return Drive(20 * gain + rng.normal(0, 0.5, 40), np.full(40, 20), 1.0, 0.9, lost, 0.0, 0.1, unusual=unusual)
+    nats = 20 * gain + rng.normal(0, 0.5, 40)
+    return Drive(nats, nats, np.full(40, 20), 1.0, 0.9, lost, 0.0, 0.1, unusual=unusual)
 
 
 def row(name, group=""):
@@ -98,6 +99,21 @@ class Judgement(unittest.TestCase):
             return {"residual": np.array(["range"] * 3), "observed": scale * np.array([2.0, 3.0, 4.0]), "expected": scale * np.array([2.02, 3.01, 3.97]),
                     "variance": scale**2 * np.array([0.01] * 3)}
         np.testing.assert_allclose(likelihoods(rows(0.5), {"range": -3.91}, {"range": math.log(0.5)}), likelihoods(rows(1.0), {"range": -3.91}, {}))
+
+    def test_a_far_size_is_told_from_one_that_is_further(self):
+        rows = {"residual": np.array(["x", "x"]), "observed": np.array([2.0, 4.0]), "expected": np.zeros(2), "variance": np.full(2, 0.0009)}
+        near, far = (likelihoods(rows, {"x": -3.91}, {}, is_far) for is_far in (False, True))
+        self.assertAlmostEqual(near[0], near[1])
+        self.assertAlmostEqual(far[0] - far[1], math.log(4), places=2)
+
+    def test_observations_whose_stamps_a_trial_moves_stay_in_their_blocks(self):
+        begin = 1_700_000_000_000_000_000
+        stamps = begin + np.arange(0, 100, 10, np.int64) * 10**9
+        for clock, size, moved in ((Clock("sightings", begin), (-2.0,), stamps - 2 * 10**9), (Clock("sightings:front", begin, True), (0.02,), stamps - (stamps - begin) // 50)):
+            change = Fault("f", (size,), lambda _: [], lambda _: "", clock=clock), size
+            rows = {"t_ns": np.concatenate([moved, stamps]), "source": np.repeat([1, 2], 10)}
+            original = Undo.of([change], ("can", "sightings:front", "gnss")).original(rows)
+            np.testing.assert_allclose((original - begin) * 1e-9, np.tile(stamps - begin, 2) * 1e-9, atol=1e-6)
 
     def test_student_s_distribution(self):
         self.assertAlmostEqual(search._student(2.086, 20), 0.975, places=3)

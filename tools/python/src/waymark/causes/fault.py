@@ -20,6 +20,27 @@ Size = tuple[float, ...]
 
 
 @dataclass(frozen=True)
+class Clock:
+    """What a size does to the stamps of a source: adds it, s, or takes `size` times the time since `begin_ns` off."""
+
+    source: str  # "sightings": all of the kind
+    begin_ns: int
+    is_rate: bool = False
+
+    def original(self, size: Size) -> tuple[float, float]:
+        """Of an original stamp, ns since begin_ns: factor of the changed one, and what is added to it."""
+        return (1 / (1 - size[0]), 0.0) if self.is_rate else (1.0, -1e9 * size[0])
+
+    def later_s(self, size: Size) -> float:
+        """How much later a source's stamps become, s; 0: earlier."""
+        return 0.0 if self.is_rate else max(0.0, size[0])
+
+    def is_of(self, source: str) -> bool:
+        """Whether it moves this source."""
+        return source == self.source or source.startswith(f"{self.source}:")
+
+
+@dataclass(frozen=True)
 class Fault:
     """A mistake. `start`: sizes to begin with. With `step` its size is fitted, in logarithms where `is_log`, to `smallest`. `group`:
     rows of one group have one effect; where a drive cannot tell them apart, the likeliest is named with the others. `prior`: log
@@ -36,8 +57,8 @@ class Fault:
     group: str = ""
     named: Sequence[float] = ()
     prior: float = 0.0
-    is_clock: bool = False
-    """It changes stamps."""
+    clock: Clock | None = None
+    """What it does to stamps."""
     scales: str = ""
     """The residual whose observations are multiplied by the size."""
     settled: Callable[[Size, dict[str, float]], Size] = lambda size, states: size

@@ -11,11 +11,13 @@ import numpy as np
 
 from . import motion_faults
 from .changes import CONFIG, Edit, Mirrored, Sorted, Value, column, degrees, identities, numbers, stretched, swapped
-from .fault import DEG, LENGTHS, NEAR, Fault, Size, discrete, factor_words
+from .fault import DEG, LENGTHS, NEAR, Clock, Fault, Size, discrete, factor_words
 from .robot import Robot, Source
 
 PLACE_MOST_M = 6.0  # of a sensor from base_link: half of a lorry
 PLACE_LEAST_M = 0.05  # of one that was measured at all
+AROUND = tuple((round(away * math.cos(k * math.pi / 4), 3), round(away * math.sin(k * math.pi / 4), 3)) for away in (0.4, 1.1, 2.8) for k in range(8))
+"""Places around the stated one, m."""
 CLOCK_MOST_S = 60.0
 CLOCKS_S = tuple(sign * s for s in (0.15, 0.4, 0.8, 1.2, 1.6, 2.0, 2.5, 3.0, 3.5, 4.0, 5.0, 10.0, 18.0, 37.0) for sign in (-1, 1))
 """The last ones: leap seconds of GPS, of TAI."""
@@ -66,15 +68,15 @@ def _clocks(robot: Robot, source: Source) -> Iterator[Fault]:
                            lambda _, u=unit: f"the stamps of {name} are in {u}", group=f"clock of {name}")
         yield Fault(f"clock of {name}", ((gap,), (float(round(gap)),)), shift, late)
         return
-    yield Fault(f"clock of {name}", tuple((s,) for s in CLOCKS_S), shift, late, step=(0.25,), smallest=(0.01,),
-                is_possible=lambda size: abs(size[0]) <= CLOCK_MOST_S, is_clock=True, group=f"along the way of {name}",
-                settled=lambda size, states: (size[0] - states.get(f"{source.sensor or source.kind}.time_offset_s", 0.0),))
     begin, only = int(stamps.min()), source.sensor if source.kind != "pictures" else ""
+    yield Fault(f"clock of {name}", tuple((s,) for s in CLOCKS_S), shift, late, step=(0.25,), smallest=(0.01,),
+                is_possible=lambda size: abs(size[0]) <= CLOCK_MOST_S, clock=Clock(name, begin), group=f"along the way of {name}",
+                settled=lambda size, states: (size[0] - states.get(f"{source.sensor or source.kind}.time_offset_s", 0.0),))
     yield Fault(f"drift of {name}", tuple((rate,) for rate in DRIFTS),
                 lambda size: [stretched(source.file, n, size[0], begin, only, n == "arrival_ns") for n in ("t_ns", "arrival_ns")],
                 lambda size: f"the stamps of {name} run away: {abs(size[0]) * 1e3:.3g} ms {'more' if size[0] > 0 else 'less'} each second "
                              "(a queue that nobody empties, or a clock of its own)",
-                step=(0.01,), smallest=(1e-4,), is_possible=lambda size: abs(size[0]) < 0.3, is_clock=True, group=f"along the way of {name}")
+                step=(0.01,), smallest=(1e-4,), is_possible=lambda size: abs(size[0]) < 0.3, clock=Clock(name, begin, is_rate=True), group=f"along the way of {name}")
 
 
 # ── values ───────────────────────────────────────────────────────────────────────────────────────────────────────────
@@ -162,7 +164,7 @@ def _mountings(robot: Robot, source: Source) -> Iterator[Fault]:
         here = [states.get(f"gnss.antenna_{axis}_m") if source.kind == "gnss" else None for axis in "xy"]
         return tuple(s if state is None else state - float(place[k]) for k, (s, state) in enumerate(zip(size, here)))
 
-    yield Fault(f"place of {source.name}", ((-0.3, 0.0), (0.3, 0.0), (0.0, -0.3), (0.0, 0.3), (-1.0, 0.0), (1.0, 0.0), (0.0, -1.0), (0.0, 1.0), *mirrored), placed, place_words,
+    yield Fault(f"place of {source.name}", (*AROUND, *mirrored), placed, place_words,
                 step=(0.3, 0.3), smallest=(0.02, 0.02), settled=settled, group=f"along the way of {source.name}",
                 is_possible=lambda s: math.hypot(place[0] + s[0], place[1] + s[1]) <= PLACE_MOST_M and math.hypot(s[0], s[1]) >= 0.05)
     for f, unit in ((0.01, "cm"), (0.001, "mm")):

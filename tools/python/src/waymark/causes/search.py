@@ -84,11 +84,10 @@ class Search:
         self.rows: list[Fault] = []
         self.cost = 0.0  # processor time of a second of the drive
         self.duration_s = 0.0
-        self.usual_seen = 0  # updates of the part that is driven
 
     def left_s(self) -> float:
         """Of the budget."""
-        return BUDGET_S * self.trials.at_once - self.trials.spent_s
+        return BUDGET_S * self.trials.pool.at_once - self.trials.spent_s
 
     def part_s(self, drives: int, share: float, most_s: float) -> float:
         """How much of the drive so many trials may take; 0: all of it."""
@@ -147,7 +146,9 @@ class Search:
         self.trials.blocks = Blocks(int(stamps[0]), length, max(2, math.ceil(self.duration_s / length)), outliers(self.robot))
         self.cost = cpu_s / self.duration_s
         self.trials.spent_s += cpu_s
-        return self.trials.run([[]], keeps=True, has_states=True)[0]
+        before = self.trials.run([[]], keeps=True, has_states=True)[0]
+        self.trials.sources = before.sources if before else ()
+        return before
 
     # ── a round ──────────────────────────────────────────────────────────────────────────────────────────────────────
 
@@ -167,8 +168,6 @@ class Search:
         base = self._plain(fixed, over_s) or now
         more = self._tried([*((c.fault, c.size) for c in kept), *proposed], fixed, over_s)
         ordered = self._within_reach(self._best_sizes(more, over_s), base, over_s)
-        if fit_s != over_s:
-            self._plain(fixed, fit_s)
         fitted = self._fitted(ordered[:ROWS_FITTED], fixed, fit_s)
         others = [(c.fault, c.size) for c in ordered[ROWS_FITTED:ROWS_JUDGED]]
         self.trials.settings = {}
@@ -188,7 +187,7 @@ class Search:
         """The rows that gain, and that a fitted size may make the best."""
         assert self.trials.blocks is not None
         part, least = self.trials.blocks.part(until_s), self._score(now, until_s)
-        gains = {c.fault.name: self._score(c.drive, until_s, c.fault.is_clock) - least for c in ordered}
+        gains = {c.fault.name: self._score(c.drive, until_s) - least for c in ordered}
         most = max(gains.values(), default=0.0)
         updates = max([1, int(now.seen[:part].sum()), *(int(c.drive.seen[:part].sum()) for c in ordered)]) / 2
         return [c for c in ordered if most >= FIT_GAIN_MIN * updates and gains[c.fault.name] >= REACH * most]
@@ -198,22 +197,20 @@ class Search:
 
     def _tried(self, changes: Sequence[Change], fixed: list[Change], until_s: float, has_states: bool = False) -> list[Candidate]:
         drives = self._drives(changes, fixed, until_s, has_states=has_states)
-        self.progress(min(0.99, self.trials.spent_s / (BUDGET_S * self.trials.at_once)))
+        self.progress(min(0.99, self.trials.spent_s / (BUDGET_S * self.trials.pool.at_once)))
         return [Candidate(fault, size, drive) for (fault, size), drive in zip(changes, drives) if drive is not None]
 
-    def _score(self, drive: Drive, until_s: float, is_clock: bool = False) -> float:
+    def _score(self, drive: Drive, until_s: float) -> float:
         """On the blocks of a part that are for fitting."""
         assert self.trials.blocks is not None
         part = self.trials.blocks.part(until_s)
-        gain = float(drive.gain[:part][_fit(part)].sum())
-        # Other stamps bring more or less of the data into a part: more are no merit.
-        return gain * min(1.0, self.usual_seen / max(1, int(drive.seen[:part].sum()))) if is_clock and until_s > 0 and self.usual_seen else gain
+        return float(drive.far[:part][_fit(part)].sum())
 
     def _best_sizes(self, tried: list[Candidate], until_s: float) -> list[Candidate]:
         """Of each row its best size; the best rows first."""
         best: dict[str, tuple[float, Candidate]] = {}
         for candidate in tried:
-            score = self._score(candidate.drive, until_s, candidate.fault.is_clock) + candidate.fault.prior
+            score = self._score(candidate.drive, until_s) + candidate.fault.prior
             if candidate.fault.name not in best or score > best[candidate.fault.name][0]:
                 best[candidate.fault.name] = score, candidate
         return [candidate for _, candidate in sorted(best.values(), key=lambda pair: -pair[0])]
@@ -228,7 +225,7 @@ class Search:
             threes = [[f.fault.moved(f.size, axis, way) for way in (-f.steps[axis], 0.0, f.steps[axis])] for f in active]
             jobs = {(f.fault.name, size): (f.fault, size) for f, three in zip(active, threes) for size in three if (f.fault.name, size) not in known}
             for key, drive in zip(jobs, self._drives(list(jobs.values()), fixed, until_s)):
-                known[key] = self._score(drive, until_s, jobs[key][0].is_clock) if drive else -math.inf
+                known[key] = self._score(drive, until_s) if drive else -math.inf
             for f, three in zip(active, threes):
                 f.size, f.steps[axis] = _parabola(f.fault, f.size, axis, f.steps[axis], [known[f.fault.name, size] for size in three])
         return [(f.fault, f.fault.neat(f.size) if f.steps else f.size) for f in state]
@@ -243,9 +240,7 @@ class Search:
 
     def _plain(self, fixed: list[Change], until_s: float) -> Drive | None:
         """The drive with what is fixed alone."""
-        drive = self._drives([], fixed, until_s, plain=True)[0]
-        self.usual_seen = int(drive.seen.sum()) if drive else 0
-        return drive
+        return self._drives([], fixed, until_s, plain=True)[0]
 
     def _without_search(self) -> dict[str, str]:
         """Settings with which a filter that starts at a known pose does not look for it elsewhere: a copy that is wrong need not be
@@ -369,7 +364,7 @@ class Search:
     def _pairs(self, firsts: list[Candidate], before: Drive, verdict: Verdict) -> tuple[list[Change], Drive] | None:
         """Two mistakes of which neither explains the drive alone."""
         for first in firsts:
-            if self.left_s() < 0.2 * BUDGET_S * self.trials.at_once:
+            if self.left_s() < 0.2 * BUDGET_S * self.trials.pool.at_once:
                 break
             fixed: list[Change] = [(first.fault, first.size)]
             found = self._round(fixed, first.drive)

@@ -1,15 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """A drive of changed copies of a recording, and how well its observations agree with its poses, over blocks of time."""
 
-import contextlib
 import dataclasses
 import json
 import math
-import os
-import pickle
-import select
 import shutil
-import signal
 import tempfile
 import time
 from collections.abc import Sequence
@@ -20,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..native import WaymarkError
+from ..pool import Pool
 from ..replaying import Estimate, replay
 from ..tables import Array
 from .changes import CONFIG, NAMED, Edit, Impossible, Value
@@ -28,12 +24,13 @@ from .robot import Robot
 
 # Log density of an outlier, which has any value: over a turn, over 50 m, over a picture of 1000 px, over half a turn. That of ranges and
 # bearings is over the values that the recording has, where they are further: of ranges in mm.
-_OUTLIER = {"bearing": -1.84, "heading": -1.84, "range": -3.91, "x": -3.91, "y": -3.91, "z": -3.91, "pixel": -6.91, "elevation": -1.14}
+OUTLIER = {"bearing": -1.84, "heading": -1.84, "range": -3.91, "x": -3.91, "y": -3.91, "z": -3.91, "pixel": -6.91, "elevation": -1.14}
 _ANGLES = ("bearing", "heading")
 # nats an update while the pose is lost or degraded: a filter that starts anew again and again fits, too. A degraded state alone names nothing:
 # it costs no more than the least gain of a cause.
 DOUBT = {"lost": 0.3, "degraded": 0.1}
-_OUTLIERS = 0.05  # share of outliers that is expected whatever the filter did: refusing more is not rewarded
+OUTLIERS = 0.05  # share of outliers that is expected whatever the filter did: refusing more is not rewarded
+FAR_OUTLIERS = 1e-6  # where sizes are fitted: an update of any size still tells which is nearer
 
 BEGIN_S = 0.02  # of a drive that states where the calibration begins: before its first observations are fused
 UNUSUAL_MOST = 12.0  # nats of one state: of 5 sigma and more
@@ -43,11 +40,12 @@ Change = tuple[Fault, Size]
 
 @dataclass(frozen=True)
 class Drive:
-    """`gain`: of each block the log likelihood of its updates over that of outliers, nats, less DOUBT; a missing update has none.
-    `seen`: updates of each block. Of the whole: shares of the updates that were fused, of the time, and the mean square of the
+    """`gain`: of each block the log likelihood of its updates over that of outliers, nats, less DOUBT; a missing update has none. `far`:
+    the same by a density with far tails, for fitting. `seen`: updates of each block. Of the whole: shares of the updates that were fused, of the time, and the mean square of the
     innovations over their sigma."""
 
     gain: Array
+    far: Array
     seen: Array
     explained: float
     squares: float
@@ -55,6 +53,7 @@ class Drive:
     degraded: float
     cpu_s: float
     estimate: Estimate | None = None
+    sources: tuple[str, ...] = ()  # by their numbers
     states: dict[str, float] = field(default_factory=dict)  # calibration states at the end, by their names
     unusual: float = 0.0  # nats that their distance from where they began costs by their start sigmas
 
@@ -66,7 +65,7 @@ class Blocks:
     begin_ns: int
     length_s: float
     count: int
-    outliers: dict[str, float] = field(default_factory=lambda: dict(_OUTLIER))
+    outliers: dict[str, float] = field(default_factory=lambda: dict(OUTLIER))
 
     def of(self, stamps: Array) -> Array:
         """The block of each stamp."""
@@ -81,7 +80,7 @@ class Blocks:
 def outliers(robot: Robot) -> dict[str, float]:
     """Log densities of outliers, in the units of the recording."""
     values = robot.table("sightings.csv")
-    out = dict(_OUTLIER)
+    out = dict(OUTLIER)
     for kind, name in (("range", "range_m"), ("bearing", "bearing_rad")):
         finite = np.abs(values.get(name, np.zeros(0)))
         finite = finite[np.isfinite(finite)]
@@ -89,9 +88,10 @@ def outliers(robot: Robot) -> dict[str, float]:
     return out
 
 
-def likelihoods(rows: dict[str, Array], densities: dict[str, float], scaled: dict[str, float]) -> Array:
+def likelihoods(rows: dict[str, Array], densities: dict[str, float], scaled: dict[str, float], is_far: bool = False) -> Array:
     """Of each update, nats over an outlier's. `scaled`: log factor by which a residual's observations were multiplied: the density is
-    that of the recording's own values."""
+    that of the recording's own values. `is_far`: by Cauchy's density, which tells a far size from one that is further still."""
+    outliers = FAR_OUTLIERS if is_far else OUTLIERS
     kinds = rows["residual"]
     out = np.zeros(len(kinds))
     for kind, outlier in densities.items():
@@ -100,18 +100,42 @@ def likelihoods(rows: dict[str, Array], densities: dict[str, float], scaled: dic
         if kind in _ANGLES:
             away = np.remainder(away + math.pi, 2 * math.pi) - math.pi
         with np.errstate(all="ignore"):
-            log = -0.5 * away**2 / variance - 0.5 * np.log(2 * math.pi * variance) + scaled.get(kind, 0.0) - outlier
-            value = np.logaddexp(math.log(_OUTLIERS), math.log(1 - _OUTLIERS) + log) - math.log(_OUTLIERS)
+            shape = -np.log1p(away**2 / variance) - 0.5 * np.log(math.pi**2 * variance) if is_far else -0.5 * (away**2 / variance + np.log(2 * math.pi * variance))
+            value = np.logaddexp(math.log(outliers), math.log(1 - outliers) + shape + scaled.get(kind, 0.0) - outlier) - math.log(outliers)
         out[mine] = np.where((variance > 0) & np.isfinite(value), value, 0)
     return out
 
 
-def judged(estimate: Estimate, blocks: Blocks, scaled: dict[str, float], cpu_s: float, keeps: bool) -> Drive:
+@dataclass(frozen=True)
+class Undo:
+    """What a trial changed of the observations, so that those of two trials are compared with each other: log factors of residuals'
+    values, and of a source's stamps begin, factor and offset, ns."""
+
+    scaled: dict[str, float] = field(default_factory=dict)
+    moved: dict[int, tuple[int, float, float]] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, changes: Sequence[Change], sources: Sequence[str]) -> "Undo":
+        """Of these changes."""
+        clocks = [(number, fault.clock, size) for fault, size in changes for number, name in enumerate(sources) if fault.clock and fault.clock.is_of(name)]
+        return cls({fault.scales: math.log(abs(size[0])) for fault, size in changes if fault.scales},
+                   {number: (clock.begin_ns, *clock.original(size)) for number, clock, size in clocks})
+
+    def original(self, rows: dict[str, Array]) -> Array:
+        """Stamps as they are in the recording."""
+        out: Array = rows["t_ns"].copy()
+        for source, (begin, factor, offset) in self.moved.items():
+            mine = rows["source"] == source
+            out[mine] = begin + ((out[mine] - begin) * factor + offset).astype(np.int64)
+        return out
+
+
+def judged(estimate: Estimate, blocks: Blocks, undo: Undo, cpu_s: float, keeps: bool) -> Drive:
     """A drive's blocks and shares."""
     rows = estimate.innovations
-    counts = np.isin(rows["residual"], list(_OUTLIER))
+    counts = np.isin(rows["residual"], list(OUTLIER))
     rows = {name: column[counts] for name, column in rows.items()}
-    at, fused = blocks.of(rows["t_ns"]), rows["verdict"] == "fused"
+    at, fused = blocks.of(undo.original(rows)), rows["verdict"] == "fused"
     away = rows["observed"] - rows["expected"]
     turn = np.isin(rows["residual"], _ANGLES)
     away = np.where(turn, np.remainder(away + math.pi, 2 * math.pi) - math.pi, away)
@@ -122,7 +146,8 @@ def judged(estimate: Estimate, blocks: Blocks, scaled: dict[str, float], cpu_s: 
     costs = sum((states == name) * cost for name, cost in DOUBT.items())
     doubt = np.bincount(when, costs, blocks.count) / np.maximum(1, np.bincount(when, minlength=blocks.count))
     seen = np.bincount(at, minlength=blocks.count)
-    return Drive(np.bincount(at, likelihoods(rows, blocks.outliers, scaled), blocks.count) - doubt * seen, seen, float(fused.mean()) if len(fused) else 0.0,
+    near, far = (np.bincount(at, likelihoods(rows, blocks.outliers, undo.scaled, is_far), blocks.count) - doubt * seen for is_far in (False, True))
+    return Drive(near, far, seen, float(fused.mean()) if len(fused) else 0.0,
                  float(np.mean(away[good] ** 2 / rows["variance"][good])) if good.any() else math.inf, share["lost"], share["degraded"], cpu_s,
                  estimate if keeps else None)
 
@@ -132,91 +157,36 @@ def edits_of(changes: Sequence[Change]) -> list[Edit]:
     return [edit for fault, size in changes for edit in fault.edits(size)]
 
 
-Job = tuple[dict[str, Any], Blocks, dict[str, float], bool, float]
-"""What a worker drives: arguments of a replay, its blocks, how observations were scaled, whether its records are returned, and the most
-processor time, s."""
+Job = tuple[dict[str, Any], Blocks, Undo, bool]
+"""What a worker drives: arguments of a replay, its blocks, how observations were changed, whether its records are returned."""
 
 
-def _work(jobs: int, results: int) -> None:
-    """A worker: drives until the pipe of jobs ends. A drive that takes longer than it may ends the worker."""
-    signal.signal(signal.SIGPROF, signal.SIG_DFL)
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
-    with os.fdopen(jobs, "rb") as given, os.fdopen(results, "wb") as taken:
-        while True:
-            try:
-                arguments, blocks, scaled, keeps, most_s = pickle.load(given)  # written by this program itself
-            except EOFError:
-                return
-            signal.setitimer(signal.ITIMER_PROF, most_s)
-            pickle.dump(_driven(arguments, blocks, scaled, keeps), taken)
-            taken.flush()
-
-
-def _driven(arguments: dict[str, Any], blocks: Blocks, scaled: dict[str, float], keeps: bool) -> Drive | None:
+def _driven(job: Job) -> Drive | None:
+    arguments, blocks, undo, keeps = job
     begun = time.process_time()
     try:
         estimate = replay(**arguments)
     except WaymarkError:
         return None  # such a copy can't be driven: it explains nothing
-    drive = judged(estimate, blocks, scaled, time.process_time() - begun, keeps)
+    drive = judged(estimate, blocks, undo, time.process_time() - begun, keeps)
     if not arguments.get("out"):
         return drive
-    ended = _states(arguments["out"])
+    ended, sources = ended_states(arguments["out"])
     began = arguments["out"].with_name(arguments["out"].name + "-begin")
     replay(**arguments | {"until_s": BEGIN_S, "out": began})
-    stated = _states(began)
+    stated, _ = ended_states(began)
     sigmas = {name: (value - stated[name][0]) / stated[name][1] for name, (value, _) in ended.items()
               if name in stated and stated[name][1] > 0 and not name.startswith("noise.")}
     remove(began)
-    return dataclasses.replace(drive, states={name: value for name, (value, _) in ended.items()},
+    return dataclasses.replace(drive, sources=sources, states={name: value for name, (value, _) in ended.items()},
                                unusual=sum(min(UNUSUAL_MOST, 0.5 * sigma**2) for sigma in sigmas.values()))
 
 
-def _states(run: Path) -> dict[str, tuple[float, float]]:
-    """Calibration states of a run: value and sigma."""
+def ended_states(run: Path) -> tuple[dict[str, tuple[float, float]], tuple[str, ...]]:
+    """Calibration states of a run, value and sigma, and its sources."""
     health = json.loads((run / "health.json").read_text())
-    return {name: (float(state["value"]), float(state["sigma"])) for name, state in health["calibration"].items()
-            if state["value"] is not None and state["sigma"] is not None}
-
-
-class _Worker:
-    """A process that drives one copy after the other: its memory is prepared once."""
-
-    def __init__(self) -> None:
-        given, self._jobs = os.pipe()
-        results, taken = os.pipe()
-        self.process = os.fork()
-        if self.process == 0:
-            try:
-                os.close(self._jobs)
-                os.close(results)
-                _work(given, taken)
-            finally:
-                os._exit(0)
-        os.close(given)
-        os.close(taken)
-        self.results = os.fdopen(results, "rb")
-
-    def give(self, job: Job) -> None:
-        """Begins a drive."""
-        data = pickle.dumps(job)
-        while data:
-            data = data[os.write(self._jobs, data):]
-
-    def take(self) -> tuple[bool, Drive | None]:
-        """The drive; False: the worker has ended over it."""
-        try:
-            return True, pickle.load(self.results)  # written by this program's own child
-        except (EOFError, pickle.UnpicklingError):
-            return False, None
-
-    def end(self) -> None:
-        """Ends the worker, whatever it does."""
-        with contextlib.suppress(ProcessLookupError):
-            os.kill(self.process, signal.SIGKILL)
-        os.close(self._jobs)
-        self.results.close()
-        os.waitpid(self.process, 0)
+    return ({name: (float(state["value"]), float(state["sigma"])) for name, state in health["calibration"].items()
+             if state["value"] is not None and state["sigma"] is not None}, tuple(health["sources"]))
 
 
 @dataclass
@@ -229,8 +199,8 @@ class Trials:
     drives: int = 0
     spent_s: float = 0.0  # processor time of the drives
     settings: dict[str, str] = field(default_factory=dict)  # of the configuration, in place of its own
-    idle: list[_Worker] = field(default_factory=list)
-    at_once: int = len(os.sched_getaffinity(0))
+    sources: tuple[str, ...] = ()  # names, by their numbers in the innovations
+    pool: Pool = field(default_factory=lambda: Pool(_driven))
 
     def alone(self) -> tuple[Estimate, float]:
         """The drive as it is, in this process, and its processor time, s."""
@@ -241,53 +211,42 @@ class Trials:
         """Of the replay of a copy, which is written where files of the recording change."""
         files, edits = self.robot.files, edits_of(changes)
         named = dict(files.named)
+        later_s = sum(fault.clock.later_s(size) for fault, size in changes if fault.clock)
         named |= files.copy(edits, copy) if any(edit.file != CONFIG for edit in edits) else {}
         lines = dict(self.settings) | {edit.dotted(): edit.text for edit in edits if isinstance(edit, Value) and edit.file == CONFIG}
         lines |= {NAMED[file]: f'"{path.resolve()}"' for file, path in named.items() if file in ("vehicle.dbc", "can-signals.yaml")}
-        return {"input": copy if copy.exists() else files.recording, "config": files.config, "changes": lines or None, "until_s": until_s,
+        return {"input": copy if copy.exists() else files.recording, "config": files.config, "changes": lines or None, "until_s": until_s + later_s if until_s else 0.0,
                 "landmarks": named.get("landmarks.csv"), "calibration": named.get("calibration.yaml"), "map": named.get("map/map.yaml")}
 
     def run(self, jobs: Sequence[Sequence[Change]], until_s: float = 0.0, keeps: bool = False, most_s: float = 120.0,
             has_states: bool = False) -> list[Drive | None]:
         """A drive for each list of changes; None where there is none: it was refused, or took longer than `most_s`."""
-        assert self.blocks is not None
+        blocks = self.blocks
+        assert blocks is not None
         out: list[Drive | None] = [None] * len(jobs)
-        waiting = list(range(len(jobs)))[::-1]
-        self.idle += [_Worker() for _ in range(min(self.at_once, len(jobs)) - len(self.idle))]
-        running: dict[int, tuple[_Worker, int]] = {}
-        while waiting or running:
-            while waiting and self.idle:
-                number = waiting.pop()
-                copy = self.folder / str(number)
-                try:
-                    arguments = self._arguments(jobs[number], copy, until_s)
-                except (Impossible, OSError, ValueError):
-                    remove(copy)
-                    continue  # nothing to change: it explains nothing
-                worker = self.idle.pop()
-                arguments["out"] = self.folder / f"run-{number}" if has_states else None
-                scaled = {fault.scales: math.log(abs(size[0])) for fault, size in jobs[number] if fault.scales}
-                worker.give((arguments, self.blocks, scaled, keeps, most_s))
-                running[worker.results.fileno()] = worker, number
-            for pipe in select.select(list(running), [], [])[0] if running else []:
-                worker, number = running.pop(pipe)
-                is_there, out[number] = worker.take()
-                if not is_there:
-                    worker.end()
-                    worker = _Worker()
-                self.idle.append(worker)
-                drive = out[number]
-                self.spent_s += drive.cpu_s if drive else 0.0 if is_there else most_s
-                self.drives += 1
+
+        def prepared(number: int) -> Job | None:
+            try:
+                arguments = self._arguments(jobs[number], self.folder / str(number), until_s)
+            except (Impossible, OSError, ValueError):
                 remove(self.folder / str(number))
-                remove(self.folder / f"run-{number}")
+                return None  # nothing to change: it explains nothing
+            arguments["out"] = self.folder / f"run-{number}" if has_states else None
+            return arguments, blocks, Undo.of(jobs[number], self.sources), keeps
+
+        def ended(number: int, drive: Drive | None, is_there: bool) -> None:
+            out[number] = drive
+            self.spent_s += drive.cpu_s if drive else 0.0 if is_there else most_s
+            self.drives += 1
+            remove(self.folder / str(number))
+            remove(self.folder / f"run-{number}")
+
+        self.pool.run(len(jobs), prepared, ended, most_s)
         return out
 
     def end(self) -> None:
         """Ends the workers and removes the copies."""
-        for worker in self.idle:
-            worker.end()
-        self.idle.clear()
+        self.pool.end()
         remove(self.folder)
 
 
