@@ -69,7 +69,7 @@ __attribute__((format(printf, 2, 3))) static void tell(const wm_camera_device *s
   (void)vsnprintf(text, sizeof text, format, arguments);
   va_end(arguments);
   (void)snprintf(line, sizeof line, "camera %s: %s", self->config.name, text);
-  self->warn(self->warn_context, line);
+  self->warn(self->warn_context, WM_NOTE_FILE, line);
 }
 
 // ── set up ──────────────────────────────────────────────────────────────────────────────────────────────────────────

@@ -27,7 +27,7 @@ static wm_status check_keys(const wm_yaml_node *map, const char *const *known, w
     if (err) *err = said;
     return status;
   }
-  if (unknown > 0 && warn) warn(context, said.text);
+  if (unknown > 0 && warn) warn(context, WM_NOTE_FILE, said.text);
   return WM_OK;
 }
 

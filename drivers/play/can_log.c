@@ -29,12 +29,11 @@ static wm_status read_frame(play_file *base, play_datum *out, wm_error *err) {
   for (;;) {
     const char *text;
     size_t length;
-    int too_long;
+    const char *problem;
     wm_error why = {0};
-    wm_status status = lines_next(&self->lines, &text, &length, &too_long, err);
+    wm_status status = lines_next(&self->lines, &text, &length, &problem, err);
     if (status != WM_OK) return status;
-    status = too_long ? wm_fail(&why, WM_BAD_DATA, "the line is too long")
-                      : wm_candump_parse(text, length, &out->frame, &why);
+    status = problem ? wm_fail(&why, WM_BAD_DATA, "%s", problem) : wm_candump_parse(text, length, &out->frame, &why);
     const int stream = status == WM_OK ? stream_of(base, out->frame.iface) : -1;
     if (stream >= 0) {
       out->due_ns = out->t_ns = out->frame.t_ns;
@@ -66,11 +65,11 @@ static const play_file_ops kLog = {read_frame, rewind_log, NULL, close_log};
 static wm_status find_interfaces(can_log *self, wm_error *err) {
   const char *text;
   size_t length;
-  int too_long;
+  const char *problem;
   wm_can_frame frame;
   wm_status status;
-  while ((status = lines_next(&self->lines, &text, &length, &too_long, err)) == WM_OK) {
-    if (too_long || wm_candump_parse(text, length, &frame, NULL) != WM_OK) continue;
+  while ((status = lines_next(&self->lines, &text, &length, &problem, err)) == WM_OK) {
+    if (problem || wm_candump_parse(text, length, &frame, NULL) != WM_OK) continue;
     if (stream_of(&self->base, frame.iface) >= 0) continue;
     if (self->base.stream_count == PLAY_INTERFACES_MAX)
       return wm_fail(err, WM_FULL, "%s: frames of more than %d interfaces", self->lines.path, PLAY_INTERFACES_MAX);

@@ -15,14 +15,14 @@
 
 static const double kDegree = M_PI / 180.0;
 
-void warn_line(const warner *warn, const char *format, ...) {
+void warn_line(const warner *warn, wm_note note, const char *format, ...) {
   if (!warn || !warn->fn) return;
   char text[WM_ERROR_TEXT_MAX];
   va_list args;
   va_start(args, format);
   (void)vsnprintf(text, sizeof text, format, args);
   va_end(args);
-  warn->fn(warn->context, text);
+  warn->fn(warn->context, note, text);
 }
 
 void calibration_init(calibration *self) {
@@ -39,7 +39,7 @@ wm_status calibration_keys(const wm_yaml_node *map, const char *const *known, co
   if (wm_yaml_check_keys(map, known, WM_YAML_NEAR, &unknown, &said) != WM_OK)
     return wm_fail(err, WM_BAD_CONFIG, "%s", said.text);
   if (unknown == 0) return WM_OK;
-  for (char *rest = said.text, *line; (line = strsep(&rest, "\n"));) warn_line(warn, "%s", line);
+  for (char *rest = said.text, *line; (line = strsep(&rest, "\n"));) warn_line(warn, WM_NOTE_FILE, "%s", line);
   return WM_OK;
 }
 
@@ -93,7 +93,7 @@ wm_status calibration_mounting(const wm_yaml_node *parent, const wm_mounting *ot
     return WM_OK;
   }
   if (!wm_yaml_there(&mounting)) {
-    warn_line(warn, "%s:%d: %s: no mounting given; it is taken to sit at base_link", wm_yaml_file(parent),
+    warn_line(warn, WM_NOTE_FILE, "%s:%d: %s: no mounting given; it is taken to sit at base_link", wm_yaml_file(parent),
               wm_yaml_line(parent), parent->path);
     return WM_OK;
   }

@@ -13,7 +13,7 @@ typedef struct warner {
 } warner;
 
 // One line to the caller's `warn`, printf-like; nothing without one.
-void warn_line(const warner *warn, const char *format, ...) __attribute__((format(printf, 2, 3)));
+void warn_line(const warner *warn, wm_note note, const char *format, ...) __attribute__((format(printf, 3, 4)));
 
 typedef struct calibration {
   wm_wheels wheels;

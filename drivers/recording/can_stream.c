@@ -50,13 +50,12 @@ static wm_status read_frame(can_stream *self, log_frame *out, wm_error *err) {
   for (;;) {
     const char *text;
     size_t length;
-    int too_long;
+    const char *problem;
     wm_error why = {0};
-    wm_status status = lines_next(&self->lines, &text, &length, &too_long, err);
+    wm_status status = lines_next(&self->lines, &text, &length, &problem, err);
     if (status != WM_OK) return status;
     out->line = self->lines.number;
-    status = too_long ? wm_fail(&why, WM_BAD_DATA, "the line is longer than %d bytes", LINES_BUFFER_BYTES)
-                      : wm_candump_parse(text, length, &out->can, &why);
+    status = problem ? wm_fail(&why, WM_BAD_DATA, "%s", problem) : wm_candump_parse(text, length, &out->can, &why);
     if (status == WM_OK && self->has_differences) out->can.t_ns = self->sum_ns += out->can.t_ns;
     if (status == WM_OK && is_mine(self, out->can.iface)) return WM_OK;
     if (status == WM_OK || status == WM_AGAIN || self->bus > 0) continue;
@@ -132,23 +131,23 @@ static wm_status survey_log(can_stream *self, const char *log, wm_warn_fn warn, 
   const char *line;
   char text[320], whole[WM_PATH_MAX + sizeof text];
   size_t length;
-  int too_long;
+  const char *problem;
   wm_can_frame frame;
   line_reader lines;
   wm_status status = lines_open(&lines, log, err);
   if (status != WM_OK) return status;
-  while ((status = lines_next(&lines, &line, &length, &too_long, err)) == WM_OK)
-    if (!too_long && wm_candump_parse(line, length, &frame, NULL) == WM_OK && !wm_can_survey_take(self->survey, &frame))
+  while ((status = lines_next(&lines, &line, &length, &problem, err)) == WM_OK)
+    if (!problem && wm_candump_parse(line, length, &frame, NULL) == WM_OK && !wm_can_survey_take(self->survey, &frame))
       break;
   lines_close(&lines);
   self->has_differences = wm_can_survey_has_differences(self->survey);
   if (self->has_differences && self->bus == 0 && warn) {
     (void)snprintf(whole, sizeof whole, "%s: its times are differences (candump -td): they are summed up", log);
-    warn(context, whole);
+    warn(context, WM_NOTE_FILE, whole);
   }
   if (wm_can_decoder_senders(self->decoder, self->survey, text, sizeof text) > 0 && warn) {
     (void)snprintf(whole, sizeof whole, "%s: %s", log, text);
-    warn(context, whole);
+    warn(context, WM_NOTE_FILE, whole);
   }
   return status == WM_END ? WM_OK : status;
 }
@@ -170,7 +169,6 @@ wm_status can_stream_open(const char *log, const can_buses *buses, size_t bus, w
   self->base.kinds = WM_EVENT_BIT(part == WM_CAN_GNSS ? WM_EVENT_POSITION : WM_EVENT_QUANTITIES);
   self->part = part;
   wm_can_gnss_init(&self->gnss, gnss_origin);
-  self->lines.fd = -1;
   self->buses = *buses;
   self->bus = bus;
   snprintf(self->base.name, sizeof self->base.name, "can%s%s%s", part == WM_CAN_GNSS ? "-gnss" : "",

@@ -55,10 +55,10 @@ wm_status csv_next(csv_reader *self, wm_error *err) {
   for (;;) {
     const char *text;
     size_t length;
-    wm_status status = lines_next(&self->lines, &text, &length, &self->too_long, err);
+    wm_status status = lines_next(&self->lines, &text, &length, &self->line_problem, err);
     if (status != WM_OK) return status;
     csv_field all = trimmed(text, length);
-    if (all.length == 0 && !self->too_long) continue;
+    if (all.length == 0 && !self->line_problem) continue;
     split(self, text, length);
     return WM_OK;
   }
@@ -125,7 +125,7 @@ static wm_status check_unknown(const csv_reader *self, csv_field field, wm_warn_
     const char *meant = begins_missing(self, shown);
     snprintf(text, sizeof text, "%s:1: unknown column '%s', ignored%s%s%s", self->lines.path, shown,
              meant ? "; did you mean '" : "", meant ? meant : "", meant ? "'?" : "");
-    warn(context, text);
+    warn(context, meant ? WM_NOTE_MISSPELT : WM_NOTE_UNUSED, text);
   }
   return WM_OK;
 }
@@ -135,7 +135,7 @@ static wm_status read_header(csv_reader *self, wm_warn_fn warn, void *context, w
   const csv_column *columns = self->format->columns;
   wm_status status = csv_next(self, err);
   if (status == WM_IO) return status;
-  if (status == WM_END || self->too_long) {
+  if (status == WM_END || self->line_problem) {
     snprintf(text, sizeof text, "no header line; needed: %s", columns_of(self->format, all, sizeof all));
     return csv_fail(self, err, WM_BAD_CONFIG, text);
   }
@@ -188,7 +188,8 @@ csv_field csv_name(const csv_reader *self) {
   for (int i = 0; self->format->columns[i].name; i++) {
     if (self->format->columns[i].type != CSV_NAME) continue;
     size_t found = self->fields_found < CSV_FIELDS_MAX ? self->fields_found : CSV_FIELDS_MAX;
-    if (!self->too_long && self->place[i] >= 0 && (size_t)self->place[i] < found) return self->fields[self->place[i]];
+    if (!self->line_problem && self->place[i] >= 0 && (size_t)self->place[i] < found)
+      return self->fields[self->place[i]];
   }
   return (csv_field){"", 0};
 }
@@ -257,7 +258,7 @@ static wm_row_problem problem_of(const csv_column *column, csv_field field, wm_s
 wm_status csv_read(csv_reader *self, csv_row *row, wm_error *err) {
   char text[96];
   self->problem = WM_ROW_OTHER;
-  if (self->too_long) return csv_fail(self, err, WM_BAD_DATA, "the line is longer than 65536 bytes");
+  if (self->line_problem) return csv_fail(self, err, WM_BAD_DATA, self->line_problem);
   if (self->fields_found != self->field_count) {
     snprintf(text, sizeof text, "%zu fields where the header has %zu", self->fields_found, self->field_count);
     return csv_fail(self, err, WM_BAD_DATA, text);

@@ -55,9 +55,9 @@ typedef struct csv_reader {
   int place[CSV_COLUMNS_MAX];  // field of each known column, -1 where the file lacks it
   size_t field_count;          // of the header
   csv_field fields[CSV_FIELDS_MAX];
-  size_t fields_found;  // in the current line
-  int too_long;
-  wm_row_problem problem;  // of the line that csv_read refused last
+  size_t fields_found;       // in the current line
+  const char *line_problem;  // why the line can't be read; NULL: it can
+  wm_row_problem problem;    // of the line that csv_read refused last
 } csv_reader;
 
 // Opens the file and reads its header. A missing or doubled column is an error with its name. Unknown columns are

@@ -95,7 +95,7 @@ wm_status landmarks_read(const char *path, const warner *warn, wm_landmark **out
   if (status == WM_OK && *count > 0) status = check_twice(path, lines, *count, err);
   free(lines);
   if (status == WM_OK && flat > 0)
-    warn_line(warn, "%s:1: z_m: empty for %zu of %zu landmarks; taken as 0", path, flat, *count);
+    warn_line(warn, WM_NOTE_FILE, "%s:1: z_m: empty for %zu of %zu landmarks; taken as 0", path, flat, *count);
   if (status == WM_OK) return WM_OK;
   free(*out);
   *out = NULL;

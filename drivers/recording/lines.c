@@ -7,23 +7,26 @@
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
+#include <zlib.h>
 
 wm_status lines_open(line_reader *self, const char *path, wm_error *err) {
-  *self = (line_reader){.fd = -1};
+  *self = (line_reader){0};
   snprintf(self->path, sizeof self->path, "%s", path);
-  self->fd = open(path, O_RDONLY | O_CLOEXEC);
-  if (self->fd < 0 && errno == ENOENT) return wm_fail(err, WM_NOT_FOUND, "%s: there is no such file", path);
-  if (self->fd < 0) return wm_fail(err, WM_IO, "%s: cannot be opened: %s", path, strerror(errno));
+  const int fd = open(path, O_RDONLY | O_CLOEXEC);
+  if (fd < 0 && errno == ENOENT) return wm_fail(err, WM_NOT_FOUND, "%s: there is no such file", path);
+  if (fd < 0) return wm_fail(err, WM_IO, "%s: cannot be opened: %s", path, strerror(errno));
   self->buffer = malloc(LINES_BUFFER_BYTES);
-  if (self->buffer) return WM_OK;
+  self->file = self->buffer ? gzdopen(fd, "rb") : NULL;
+  if (self->file) return WM_OK;
+  close(fd);
   lines_close(self);
   return wm_fail(err, WM_IO, "%s: no memory to read it", path);
 }
 
 void lines_close(line_reader *self) {
-  if (self->fd >= 0) close(self->fd);
+  if (self->file) gzclose(self->file);
   free(self->buffer);
-  self->fd = -1;
+  self->file = NULL;
   self->buffer = NULL;
 }
 
@@ -32,16 +35,16 @@ static wm_status fill(line_reader *self, wm_error *err) {
   if (self->begin > 0) memmove(self->buffer, self->buffer + self->begin, self->end - self->begin);
   self->end -= self->begin;
   self->begin = 0;
-  ssize_t n;
+  errno = 0;
+  int n, problem = Z_OK;
   do {
-    n = read(self->fd, self->buffer + self->end, LINES_BUFFER_BYTES - self->end);
+    n = gzread(self->file, self->buffer + self->end, (unsigned)(LINES_BUFFER_BYTES - self->end));
   } while (n < 0 && errno == EINTR);
-  if (n < 0) return wm_fail(err, WM_IO, "%s: cannot be read: %s", self->path, strerror(errno));
-  self->ended = n == 0;
-  self->end += (size_t)n;
-  if (self->line_end == '\0' && self->end >= 2 && memcmp(self->buffer, "\x1F\x8B", 2) == 0)
-    return wm_fail(err, WM_UNSUPPORTED,
-                   "%s: is packed by gzip; rename it to end in .gz, and `gunzip` makes a text of it", self->path);
+  if (n <= 0) (void)gzerror(self->file, &problem);
+  if (n < 0 && problem == Z_ERRNO) return wm_fail(err, WM_IO, "%s: cannot be read: %s", self->path, strerror(errno));
+  self->ended = n <= 0;
+  self->is_cut = problem != Z_OK;
+  self->end += n > 0 ? (size_t)n : 0;
   if (self->line_end == '\0') {  // by the first part of the file
     const int is_old_mac = memchr(self->buffer, '\r', self->end) && !memchr(self->buffer, '\n', self->end);
     self->line_end = is_old_mac ? '\r' : '\n';
@@ -49,16 +52,16 @@ static wm_status fill(line_reader *self, wm_error *err) {
   return WM_OK;
 }
 
-wm_status lines_next(line_reader *self, const char **text, size_t *length, int *too_long, wm_error *err) {
+wm_status lines_next(line_reader *self, const char **text, size_t *length, const char **problem, wm_error *err) {
   size_t searched = 0;
-  *too_long = 0;
+  *problem = NULL;
   for (;;) {
     size_t there = self->end - self->begin;
     const char *from = self->buffer + self->begin;
     const char *newline = there > searched ? memchr(from + searched, self->line_end, there - searched) : NULL;
     if (!newline && !self->ended) {
       if (there == LINES_BUFFER_BYTES) {  // drop the content, skip to the line's end
-        *too_long = 1;
+        *problem = "the line is longer than 65536 bytes";
         self->begin = self->end = 0;
         there = 0;
       }
@@ -67,7 +70,11 @@ wm_status lines_next(line_reader *self, const char **text, size_t *length, int *
       if (status != WM_OK) return status;
       continue;
     }
-    if (!newline && there == 0 && !*too_long) return WM_END;
+    if (!newline && self->is_cut) {
+      *problem = "the file is packed by gzip, and ends too early or is damaged from here on";
+      self->is_cut = 0;
+    }
+    if (!newline && there == 0 && !*problem) return WM_END;
     size_t n = newline ? (size_t)(newline - from) : there;
     self->begin += n + (newline ? 1 : 0);
     self->number++;
@@ -77,7 +84,7 @@ wm_status lines_next(line_reader *self, const char **text, size_t *length, int *
       n -= 3;
     }
     *text = from;
-    *length = *too_long ? 0 : n;
+    *length = *problem ? 0 : n;
     return WM_OK;
   }
 }

@@ -85,8 +85,8 @@ static wm_status check_streams(const wm_recording *self, const wm_yaml_node *str
     if (access(path, F_OK) == 0) continue;
     if (is_read(file))
       return wm_yaml_fail(&item, err, "'%s' is not in the folder; put it there or take it off the list", file);
-    warn_line(&self->warn, "%s:%d: streams: '%s' is not in the folder; nothing here reads it", wm_yaml_file(&item),
-              wm_yaml_line(&item), file);
+    warn_line(&self->warn, WM_NOTE_UNUSED, "%s:%d: streams: '%s' is not in the folder; nothing here reads it",
+              wm_yaml_file(&item), wm_yaml_line(&item), file);
   }
   return WM_OK;
 }
@@ -100,12 +100,12 @@ static wm_status read_start(wm_recording *self, wm_error *err) {
   wm_yaml_node pose = wm_yaml_get(root, "vehicle.initial_pose");
   wm_yaml_node misplaced = wm_yaml_get(root, "initial_pose");
   if (wm_yaml_there(&misplaced))
-    warn_line(&self->warn, "%s:%d: initial_pose: belongs under vehicle; here it is ignored", wm_yaml_file(root),
-              wm_yaml_line(&misplaced));
+    warn_line(&self->warn, WM_NOTE_FILE, "%s:%d: initial_pose: belongs under vehicle; here it is ignored",
+              wm_yaml_file(root), wm_yaml_line(&misplaced));
   if (!wm_yaml_there(&pose)) return WM_OK;
   // Unknown keys are allowed in recording.yaml; a misspelt one gets a warning.
-  if (wm_yaml_check_keys(&pose, wm_start_keys, WM_YAML_NEAR, &unknown, &said) != WM_OK || unknown)
-    warn_line(&self->warn, "%s", said.text);
+  const int is_near = wm_yaml_check_keys(&pose, wm_start_keys, WM_YAML_NEAR, &unknown, &said) != WM_OK;
+  if (is_near || unknown) warn_line(&self->warn, is_near ? WM_NOTE_MISSPELT : WM_NOTE_FILE, "%s", said.text);
   wm_status status = wm_start_read(&pose, &start, err);
   if (status == WM_OK) wm_site_set_start(self->site, &start);
   return status;
@@ -115,7 +115,7 @@ static wm_status read_start(wm_recording *self, wm_error *err) {
 static void refuse_motion_kind(wm_recording *self) {
   const wm_yaml_node root = wm_yaml_root(self->about), kind = wm_yaml_get(&root, "vehicle.motion_kind");
   if (!wm_yaml_there(&kind)) return;
-  warn_line(&self->warn,
+  warn_line(&self->warn, WM_NOTE_FILE,
             "%s:%d: vehicle.motion_kind: is not read; whether the rows of motion.csv are commands or measured is found "
             "from them, unless motion.twist in the configuration states it",
             wm_yaml_file(&root), wm_yaml_line(&kind));
@@ -158,7 +158,8 @@ static wm_status find_stream(const wm_recording *self, const char *file, char pa
                              wm_error *err) {
   wm_status status = choose(self, "", file, path, there, err);
   if (status == WM_OK && *there && !is_listed(self, file))
-    warn_line(&self->warn, "%s: is not listed under streams in recording.yaml, but there: it is read", path);
+    warn_line(&self->warn, WM_NOTE_FILE, "%s: is not listed under streams in recording.yaml, but there: it is read",
+              path);
   return status;
 }
 
@@ -223,7 +224,7 @@ static wm_status find_buses(const wm_recording *self, can_buses *out, wm_error *
   wm_yaml_node root = wm_yaml_root(self->about), list = wm_yaml_get(&root, "can");
   wm_status status = can_buses_read(&list, self->dir, out, err);
   if (status == WM_OK && out->count > 1 && (self->overrides.dbc[0] || self->overrides.can_signals[0]))
-    warn_line(&self->warn,
+    warn_line(&self->warn, WM_NOTE_FILE,
               "%s: has %zu CAN buses with files of their own; the configuration's dbc and can_signals are "
               "not taken",
               self->dir, out->count);
@@ -274,7 +275,7 @@ static wm_status add_can(wm_recording *self, wm_error *err) {
                    "%s: is not there, but needed to read can.log; name one in the configuration or put "
                    "it into the folder",
                    missing);
-  if (missing) warn_line(&self->warn, "%s: is not there; can.log is not read", missing);
+  if (missing) warn_line(&self->warn, WM_NOTE_FILE, "%s: is not there; can.log is not read", missing);
   for (size_t i = 0; !missing && status == WM_OK && (i == 0 || i < buses.count); i++) {
     status = add_bus(self, log, &buses, i, WM_CAN_MOTION, err);
     if (status == WM_OK) status = add_bus(self, log, &buses, i, WM_CAN_GNSS, err);

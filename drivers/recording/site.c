@@ -86,7 +86,7 @@ static void warn_unknown_sensor(wm_site *self, const char *path, const char *nam
   const char *known[WM_SENSORS_MAX + 1] = {NULL}, *nearest;
   for (size_t i = 0; i < self->calibration.sensor_count; i++) known[i] = self->calibration.sensors[i].name;
   nearest = wm_word_nearest(name, known);
-  warn_line(&self->warn,
+  warn_line(&self->warn, nearest ? WM_NOTE_SENSOR_MISSPELT : WM_NOTE_SENSOR_UNKNOWN,
             "%s: the sensor '%s' is not in calibration.yaml%s%s%s; it is taken to sit at base_link, sigmas unknown",
             path, name, nearest ? "; did you mean '" : "", nearest ? nearest : "", nearest ? "'?" : "");
 }

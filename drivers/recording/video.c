@@ -91,7 +91,8 @@ static wm_status open_pictures(wm_video *self, const char *dir, const char *came
     return wm_fail(err, WM_NOT_FOUND,
                    "%s/video: no pictures of the camera '%s': %s.avi, %s.mkv or a folder %s/ of JPEGs", dir, camera,
                    camera, camera, camera);
-  if (find_place(dir, camera, found + 1, other) < PLACE_COUNT) warn_line(warn, "%s: is not read; %s is", other, path);
+  if (find_place(dir, camera, found + 1, other) < PLACE_COUNT)
+    warn_line(warn, WM_NOTE_FILE, "%s: is not read; %s is", other, path);
   return kPlaces[found].is_folder ? folder_open(&self->file, path, err) : container_open(&self->file, path, err);
 }
 
@@ -507,7 +508,7 @@ wm_status wm_video_open(const char *recording_dir, const wm_camera *camera, int3
   wm_video *self = calloc(1, sizeof *self);
   if (!self) return wm_fail(err, WM_IO, "%s: no memory to open its video", recording_dir);
   self->base.ops = &kFrames;
-  self->file.fd = self->csv.lines.fd = -1;
+  self->file.fd = -1;
   self->camera = index;
   self->newest_row = -1;
   self->last_ns = WM_TIME_NONE;

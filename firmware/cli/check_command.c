@@ -90,13 +90,16 @@ static void print_quantities(uint32_t quantities) {
 }
 
 // A name that is nearly a known one is a mistake; other notes may be intended.
-static void take_note(void *context, const char *text) {
-  const int is_mistake = strstr(text, "did you mean") != NULL;
-  const wm_finding_id id = strstr(text, "is not in calibration.yaml")                   ? WM_FOUND_SENSOR_UNKNOWN
-                           : is_mistake                                                 ? WM_FOUND_MISSPELT_NAME
-                           : strstr(text, "unknown column") || strstr(text, "reads it") ? WM_FOUND_DATA_UNUSED
-                                                                                        : WM_FOUND_FILE_NOTE;
-  wm_find(context, id, is_mistake ? WM_SEVERITY_BAD : WM_SEVERITY_NOTE, "files", NULL, "%s", text);
+static void take_note(void *context, wm_note note, const char *text) {
+  static const struct {
+    wm_finding_id id;
+    wm_severity severity;
+  } kOf[] = {[WM_NOTE_FILE] = {WM_FOUND_FILE_NOTE, WM_SEVERITY_NOTE},
+             [WM_NOTE_UNUSED] = {WM_FOUND_DATA_UNUSED, WM_SEVERITY_NOTE},
+             [WM_NOTE_MISSPELT] = {WM_FOUND_MISSPELT_NAME, WM_SEVERITY_BAD},
+             [WM_NOTE_SENSOR_UNKNOWN] = {WM_FOUND_SENSOR_UNKNOWN, WM_SEVERITY_NOTE},
+             [WM_NOTE_SENSOR_MISSPELT] = {WM_FOUND_SENSOR_UNKNOWN, WM_SEVERITY_BAD}};
+  wm_find(context, kOf[note].id, kOf[note].severity, "files", NULL, "%s", text);
 }
 
 // With --json: the facts as an object, printed at the end; NULL: none.

@@ -23,8 +23,9 @@ int command_stamps(int argc, char *const *argv);
 int exit_code(wm_status status);
 // "waymark: TEXT" on standard error; returns the exit code of the error.
 int complain(const wm_error *err);
-// A wm_warn_fn and wm_line_fn: "note: TEXT" on standard error.
+// A wm_line_fn, and a wm_warn_fn: "note: TEXT" on standard error.
 void print_note(void *context, const char *text);
+void print_warning(void *context, wm_note note, const char *text);
 // `--landmarks` and `--calibration` replace the configuration's files.
 wm_status override_path(char out[WM_PATH_MAX], const char *path, wm_error *err);
 // Refuses an output folder whose files would overwrite the input: a recording, or the log that is replayed.

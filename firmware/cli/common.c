@@ -27,6 +27,11 @@ void print_note(void *context, const char *text) {
   (void)fprintf(stderr, "note: %s\n", text);
 }
 
+void print_warning(void *context, wm_note note, const char *text) {
+  (void)note;
+  print_note(context, text);
+}
+
 wm_status override_path(char out[WM_PATH_MAX], const char *path, wm_error *err) {
   if (!path) return WM_OK;
   size_t length = strlen(path);

@@ -100,7 +100,7 @@ static int replay_recording(const arguments *args) {
   wm_status status = override_path(config.overrides.landmarks, args->landmarks, &err);
   if (status == WM_OK) status = override_path(config.overrides.calibration, args->calibration, &err);
   if (status == WM_OK) status = override_path(config.overrides.map, args->map, &err);
-  if (status == WM_OK) status = wm_recording_open(args->what, &config.overrides, print_note, NULL, &recording, &err);
+  if (status == WM_OK) status = wm_recording_open(args->what, &config.overrides, print_warning, NULL, &recording, &err);
   if (status == WM_OK && !args->force) status = put_run_aside(args->out, wm_recording_name(recording), &err);
   int code = EXIT_DONE;
   if (status == WM_OK) {
@@ -138,7 +138,7 @@ static wm_status check_map(const char *file, const wm_log_head *head, const char
   if (!file) return WM_OK;
   wm_landmark *landmarks;
   size_t count;
-  wm_status status = wm_landmarks_load(file, print_note, NULL, &landmarks, &count, err);
+  wm_status status = wm_landmarks_load(file, print_warning, NULL, &landmarks, &count, err);
   if (status != WM_OK) return status;
   uint64_t hash = wm_landmarks_hash(landmarks, count);
   free(landmarks);
@@ -154,7 +154,7 @@ static wm_status check_map(const char *file, const wm_log_head *head, const char
 static wm_status load_map(const char *file, const wm_log_head *head, wm_map **out, wm_error *err) {
   *out = NULL;
   if (!head->map_hash) return WM_OK;
-  return wm_map_load(file ? file : head->map_path, print_note, NULL, out, err);
+  return wm_map_load(file ? file : head->map_path, print_warning, NULL, out, err);
 }
 
 static int replay_log(const arguments *args) {

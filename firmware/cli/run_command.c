@@ -117,8 +117,8 @@ static wm_status open_all(const arguments *args, opened *out, wm_error *err) {
   if (status == WM_OK) status = override_path(config->overrides.map, args->map, err);
   if (status == WM_OK)
     status = args->recording
-                 ? wm_recording_open(args->recording, &config->overrides, print_note, NULL, &out->recording, err)
-                 : wm_robot_open(config, print_note, NULL, &out->recording, err);
+                 ? wm_recording_open(args->recording, &config->overrides, print_warning, NULL, &out->recording, err)
+                 : wm_robot_open(config, print_warning, NULL, &out->recording, err);
   if (status != WM_OK) close_all(out);
   return status;
 }

@@ -28,14 +28,9 @@ wm_finding *wm_find(wm_findings *out, wm_finding_id id, wm_severity severity, co
 }
 
 void wm_find_error(wm_findings *out, const char *about, const wm_error *err) {
-  const char *fix = NULL;
-  for (const char *at = err->text; (at = strstr(at, "; ")) != NULL; at += 2) fix = at;
-  const int length = fix ? (int)(fix - err->text) : (int)strlen(err->text);
-  if (fix)
-    fix += 2;
-  else if (err->status == WM_NOT_FOUND || err->status == WM_IO)
-    fix = "put the file there so that it can be read, or name another one";
-  wm_find(out, WM_FOUND_REFUSED_INPUT, WM_SEVERITY_BAD, about, fix, "%.*s", length, err->text);
+  const int is_missing = err->status == WM_NOT_FOUND || err->status == WM_IO;
+  wm_find(out, WM_FOUND_REFUSED_INPUT, WM_SEVERITY_BAD, about,
+          is_missing ? "put the file there so that it can be read, or name another one" : NULL, "%s", err->text);
 }
 
 size_t wm_findings_of(const wm_findings *self, wm_severity severity) {

@@ -120,7 +120,7 @@ typedef struct wm_findings {
 // Adds a finding and returns it, for its size. `fix` NULL: that of its kind.
 wm_finding *wm_find(wm_findings *out, wm_finding_id id, wm_severity severity, const char *about, const char *fix,
                     const char *format, ...) __attribute__((format(printf, 6, 7)));
-// Adds an error; its text after the last semicolon is the fix.
+// Adds an error; its text has the remedy, too.
 void wm_find_error(wm_findings *out, const char *about, const wm_error *err);
 // Number of findings of this severity.
 size_t wm_findings_of(const wm_findings *self, wm_severity severity);

@@ -21,6 +21,17 @@ static void show(void *context, double done) {
   options->progress(options->context, done);
 }
 
+static void pass_warning(void *context, wm_note note, const char *text) {
+  const waymark_replay_options *options = context;
+  (void)note;
+  if (options->note) options->note(options->context, text);
+}
+
+static int keeps(void *context, const wm_event *observation) {
+  const waymark_replay_options *options = context;
+  return options->keeps(options->context, observation) != 0;
+}
+
 static wm_replay_watch watch_of(waymark_replay_options *options) {
   return (wm_replay_watch){.context = options, .put = options->take ? put : NULL};
 }
@@ -35,6 +46,9 @@ static wm_status override(char out[WM_PATH_MAX], const char *path, wm_error *err
 static wm_status replay_recording(waymark_replay_options *options, wm_config *config, wm_run_report *report,
                                   wm_error *err) {
   wm_recording *recording = NULL;
+  if (options->keeps)
+    return wm_fail(err, WM_BAD_USAGE,
+                   "%s: observations are withheld from an event log alone; replay that of a run of it", options->input);
   wm_recording_overrides *files = &config->overrides;
   if (options->lost) {
     config->has_initial_pose = 1;
@@ -43,8 +57,7 @@ static wm_status replay_recording(waymark_replay_options *options, wm_config *co
   wm_status status = override(files->landmarks, options->landmarks, err);
   if (status == WM_OK) status = override(files->calibration, options->calibration, err);
   if (status == WM_OK) status = override(files->map, options->map, err);
-  if (status == WM_OK)
-    status = wm_recording_open(options->input, files, options->note, options->context, &recording, err);
+  if (status == WM_OK) status = wm_recording_open(options->input, files, pass_warning, options, &recording, err);
   if (status != WM_OK) return status;
   const wm_replay_watch watch = watch_of(options);
   const wm_replay_options how = {.out_dir = options->out,
@@ -70,10 +83,14 @@ static wm_status replay_log(waymark_replay_options *options, wm_log_reader *log,
   if (status != WM_OK) return status;
   wm_map *map = NULL;
   if (head->map_hash)
-    status = wm_map_load(options->map ? options->map : head->map_path, options->note, options->context, &map, err);
+    status = wm_map_load(options->map ? options->map : head->map_path, pass_warning, options, &map, err);
   if (status == WM_OK) {
     const wm_replay_watch watch = watch_of(options);
-    const wm_replay_options how = {.out_dir = options->out, .watch = &watch, .map = map ? wm_map_raster(map) : NULL};
+    const wm_replay_options how = {.out_dir = options->out,
+                                   .watch = &watch,
+                                   .keeps = options->keeps ? keeps : NULL,
+                                   .keeps_context = options,
+                                   .map = map ? wm_map_raster(map) : NULL};
     status = wm_replay_log(&config, log, &how, report, err);
   }
   wm_map_free(map);

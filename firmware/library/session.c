@@ -86,11 +86,16 @@ static wm_status read_start(const char *folder, wm_site *site, wm_error *err) {
   return status;
 }
 
+static void pass_warning(void *context, wm_note note, const char *text) {
+  const waymark_options *options = &((const session *)context)->options;
+  (void)note;
+  if (options->note) options->note(options->context, text);
+}
+
 static wm_status open_robot(session *self, wm_error *err) {
   wm_site *site;
   const char *folder = self->site[0] ? self->site : NULL;
-  wm_status status =
-      wm_site_open(folder, &self->config.overrides, self->options.note, self->options.context, &site, err);
+  wm_status status = wm_site_open(folder, &self->config.overrides, pass_warning, self, &site, err);
   if (status != WM_OK) return status;
   status = folder ? read_start(folder, site, err) : WM_OK;
   if (status != WM_OK) {

@@ -205,6 +205,12 @@ static void take_picture(stream *self, const wm_frame *frame) {
   atomic_fetch_add(&all->bytes, raw.is_jpeg ? raw.bytes : (uint64_t)frame->width_px * frame->height_px);
 }
 
+static void say_warning(void *context, wm_note note, const char *text) {
+  const wm_record_options *options = ((const recorder *)context)->options;
+  (void)note;
+  if (options->say) options->say(options->say_context, text);
+}
+
 static void say_device(stream *self, const wm_source_counts *counts) {
   if (counts->device == self->said_device && counts->news == self->said_news) return;
   self->said_device = counts->device;
@@ -544,7 +550,7 @@ wm_status wm_record(const wm_config *config, const wm_record_options *options, w
   self->options = options;
   wm_status status = WM_OK;
   self->robot = options->robot;
-  if (!self->robot) status = wm_robot_open_site(config, options->say, options->say_context, &self->robot, err);
+  if (!self->robot) status = wm_robot_open_site(config, say_warning, self, &self->robot, err);
   if (status == WM_OK) status = make_folder(options->out_dir, err);
   if (status == WM_OK) status = write_about(self, err);
   if (status == WM_OK) status = open_can(self, err);

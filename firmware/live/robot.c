@@ -90,7 +90,7 @@ wm_status wm_robot_open(const wm_config *config, wm_warn_fn warn, void *context,
   wm_status status = wm_robot_open_site(config, warn, context, &robot, err);
   if (status != WM_OK) return status;
   if (config->devices.camera_count > 0 && config->vision_count == 0 && warn)
-    warn(context, "devices.cameras: their pictures are not used: `vision:` names no detector");
+    warn(context, WM_NOTE_UNUSED, "devices.cameras: their pictures are not used: `vision:` names no detector");
   status = add_can(config, robot, err);
   if (status == WM_OK) status = add_rows(config, robot, err);
   if (status != WM_OK) {

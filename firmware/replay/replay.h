@@ -52,6 +52,9 @@ typedef struct wm_replay_options {
   uint64_t seed;
   wm_progress_fn progress;  // may be NULL
   void *progress_context;
+  // Event log only: whether an observation is fused. NULL: all are.
+  int (*keeps)(void *context, const wm_event *observation);
+  void *keeps_context;
   const wm_raster *map;   // event log only: the map with the hash in its head; NULL where it has none
   const char *frames_of;  // recording only: event log of a run of it, whose pictures alone are processed
   const char *timing_of;  // recording only: folder of a run, whose times of detection are taken

@@ -116,6 +116,7 @@ static wm_status play(log_replay *self, wm_log_reader *log, const wm_replay_opti
     if (self->fuser.events == 0) self->first_ns = event.t_ns;
     self->last_ns = event.t_ns;
     self->received[event.source]++;
+    if (options->keeps && !wm_event_is_motion(&event) && !options->keeps(options->keeps_context, &event)) continue;
     wm_fuser_feed(&self->fuser, &event);
   }
   wm_fuser_finish(&self->fuser);

@@ -64,6 +64,24 @@ class Replays(unittest.TestCase):
         with self.assertRaises(ValueError):
             waymark.eval(self.drive.folder, self.drive.recording)
 
+    def test_observations_of_a_log_can_be_withheld(self):
+        log = self.drive.run / "events.wmlog"
+        whole = waymark.replay(log).innovations
+        middle = int(np.median(whole["t_ns"]))
+        early = waymark.replay(log, keeps=lambda event: event.t_ns < middle)
+        np.testing.assert_array_equal(early.innovations["observed"], whole["observed"][whole["t_ns"] < middle])
+        self.assertGreater(early.trajectory["t_ns"].max(), middle)  # the motion goes on
+        with self.assertRaisesRegex(waymark.WaymarkError, "from an event log alone"):
+            waymark.replay(self.drive.recording, self.drive.folder / "robot.yaml", keeps=lambda event: True)
+
+    def test_parameters_have_values_defaults_and_limits(self):
+        found = waymark.parameters("format: waymark-config/1\nestimator: landmark_ekf\nmotion: {noise: {speed_mps: 0.5}}\n")
+        speed = found["motion.noise.speed_mps"]
+        self.assertEqual((speed["value"], speed["initial"], speed["min"]), (0.5, 0.02, 0.0))
+        self.assertFalse([key for key in found if key.split(".")[0] not in ("motion", "sightings", "landmark_ekf")])
+        with self.assertRaisesRegex(waymark.WaymarkError, "sped_mps"):
+            waymark.parameters("format: waymark-config/1\nestimator: landmark_ekf\nmotion: {noise: {sped_mps: 0.5}}\n")
+
     def test_errors_have_the_library_s_text(self):
         with self.assertRaisesRegex(waymark.WaymarkError, "nowhere"):
             waymark.replay("/nowhere/events.wmlog", self.drive.folder / "robot.yaml")

@@ -63,7 +63,9 @@ MapReport check_map(const std::string &map_yaml, const std::vector<Eigen::Vector
   MapReport out;
   wm_error error{};
   wm_map *loaded = nullptr;
-  const auto odd = [](void *context, const char *line) { static_cast<MapReport *>(context)->odd.emplace_back(line); };
+  const auto odd = [](void *context, wm_note, const char *line) {
+    static_cast<MapReport *>(context)->odd.emplace_back(line);
+  };
   const wm_status status = wm_map_load(map_yaml.c_str(), odd, &out, &loaded, &error);
   const std::unique_ptr<wm_map, void (*)(wm_map *)> map(loaded, wm_map_free);
   if (status != WM_OK) throw Failure(error.text, kUsage);

@@ -26,8 +26,17 @@ typedef struct wm_recording_overrides {
   char map[WM_PATH_MAX];  // a map.yaml
 } wm_recording_overrides;
 
+// What a warning is about.
+typedef enum wm_note {
+  WM_NOTE_FILE,             // something is ignored or unusual
+  WM_NOTE_UNUSED,           // data that nothing reads
+  WM_NOTE_MISSPELT,         // a name is nearly a known one: a mistake
+  WM_NOTE_SENSOR_UNKNOWN,   // calibration.yaml has no such sensor
+  WM_NOTE_SENSOR_MISSPELT,  // nor does it, but one of nearly this name
+} wm_note;
+
 // `warn` (may be NULL) gets unknown keys and other warnings, one line each.
-typedef void (*wm_warn_fn)(void *context, const char *text);
+typedef void (*wm_warn_fn)(void *context, wm_note note, const char *text);
 
 typedef struct wm_site wm_site;
 

@@ -69,8 +69,9 @@ static int complain(const wm_error *err) {
   return err->status == WM_BAD_USAGE || err->status == WM_BAD_CONFIG ? EXIT_USAGE : EXIT_WORK_FAILED;
 }
 
-static void print_note(void *context, const char *text) {
+static void print_warning(void *context, wm_note note, const char *text) {
   (void)context;
+  (void)note;
   (void)fprintf(stderr, "note: %s\n", text);
 }
 
@@ -204,8 +205,11 @@ static wm_status play_into(const arguments *a, player *self, play_places *places
 static wm_status play_recording(const arguments *a, const wm_config *config, const wm_faults *faults, wm_error *err) {
   static player self;
   static play_places places;
-  const wm_play_options options = {
-      .from_s = a->from_s, .until_s = a->until_s, .passes = (uint32_t)a->passes, .faults = faults, .warn = print_note};
+  const wm_play_options options = {.from_s = a->from_s,
+                                   .until_s = a->until_s,
+                                   .passes = (uint32_t)a->passes,
+                                   .faults = faults,
+                                   .warn = print_warning};
   self.faults = faults;
   self.speed = a->speed;
   self.from_s = a->from_s;

@@ -22,8 +22,9 @@ static char warned[1024];
 static fake_step steps[200];
 static size_t step_count;
 
-static void hear(void *context, const char *line) {
+static void hear(void *context, wm_note note, const char *line) {
   (void)context;
+  (void)note;
   size_t used = strlen(warned);
   (void)snprintf(warned + used, sizeof warned - used, "%s\n", line);
 }

@@ -16,8 +16,9 @@ static wm_map *map;
 static wm_error err;
 static char warnings[1024];
 
-static void keep_warning(void *context, const char *text) {
+static void keep_warning(void *context, wm_note note, const char *text) {
   (void)context;
+  (void)note;
   snprintf(warnings, sizeof warnings, "%s", text);
 }
 

@@ -13,7 +13,9 @@
 
 static const char *data_dir;
 
-static void print_warning(void *context, const char *text) { printf("  %s: %s\n", (const char *)context, text); }
+static void print_warning(void *context, wm_note note, const char *text) {
+  printf("  %s, %d: %s\n", (const char *)context, (int)note, text);
+}
 
 // What the source's kind is called under `counts`, NULL where nothing is.
 static const char *count_key(const wm_source *source) {

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
+#include <zlib.h>
 
 #include "common/suite.h"
 #include "folder.h"
@@ -14,6 +15,7 @@
 static wm_recording *recording;
 static wm_error err;
 static char warnings[4096];
+static unsigned noted;  // bits of wm_note
 static wm_recording_overrides overrides;
 
 #define ABOUT "format: waymark-recording/1\nname: drive\nduration_s: 12.5\nsomething_else: [1, 2]\n"
@@ -24,6 +26,7 @@ void setUp(void) {
   folder_write("motion.csv", "t_ns,v_mps,w_radps\n0,0,0\n");
   recording = NULL;
   warnings[0] = '\0';
+  noted = 0;
   memset(&overrides, 0, sizeof overrides);
 }
 
@@ -32,8 +35,9 @@ void tearDown(void) {
   folder_remove();
 }
 
-static void keep_warning(void *context, const char *text) {
+static void keep_warning(void *context, wm_note note, const char *text) {
   (void)context;
+  noted |= 1u << note;
   strncat(warnings, text, sizeof warnings - strlen(warnings) - 2);
   strcat(warnings, "\n");
 }
@@ -100,6 +104,7 @@ TEST(start_pose) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, M_PI / 2, start->heading_rad);
   TEST_ASSERT_NOT_NULL(strstr(warnings, "recording.yaml:7: initial_pose: belongs under vehicle; here it is ignored"));
   TEST_ASSERT_NOT_NULL_MESSAGE(strstr(warnings, "hedaing_rad: unknown key; did you mean 'heading_rad'?"), warnings);
+  TEST_ASSERT_BITS(1u << WM_NOTE_MISSPELT, 1u << WM_NOTE_MISSPELT, noted);
 }
 
 TEST(whole_calibration) {
@@ -270,6 +275,40 @@ TEST(can_and_its_binding) {
   folder_write("motion.csv", "t_ns,v_mps,w_radps\n0,0,0\n");
   open_it();
   TEST_ASSERT_NOT_NULL(strstr(warnings, "vehicle.dbc: is not there; can.log is not read"));
+}
+
+// A log that is packed by gzip is read as it is, up to where it is cut.
+TEST(packed_can_log) {
+  enum { kFrames = 3000 };
+  static char packed[1 << 16];
+  folder_write("vehicle.dbc", "BU_: CAR\nBO_ 291 SPEED: 4 CAR\n SG_ A : 0|16@1+ (1,0) [0|0] \"m/s\" CAR\n");
+  folder_write("can-signals.yaml", "- {quantity: vehicle_speed, message: SPEED, signal: A}\n");
+  gzFile file = gzopen(folder_path("can.log"), "wb");
+  for (int i = 0; i < kFrames; i++)
+    TEST_ASSERT_GREATER_THAN(
+        0, gzprintf(file, "(%d.%06d) can0 123#%04X0000\n", 1 + i / 100, i % 100 * 9973, i * 7919 % 65536));
+  TEST_ASSERT_EQUAL(Z_OK, gzclose(file));
+  FILE *from = fopen(folder_path("can.log"), "rb");
+  const size_t length = fread(packed, 1, sizeof packed, from);
+  (void)fclose(from);
+  TEST_ASSERT_LESS_THAN(sizeof packed, length);
+  for (int is_cut = 0; is_cut < 2; is_cut++) {
+    size_t sources, count = 0;
+    wm_event event;
+    wm_status status;
+    folder_write_bytes("can.log", packed, is_cut ? length / 2 : length);
+    open_it();
+    wm_source *can = wm_recording_sources(recording, &sources)[0];
+    while ((status = can->ops->next(can, &event, &err)) == WM_OK) count++;
+    TEST_ASSERT_EQUAL(WM_END, status);
+    TEST_ASSERT_EQUAL(is_cut, can->counts.malformed);
+    if (!is_cut) TEST_ASSERT_EQUAL(kFrames, count);
+    if (!is_cut) continue;
+    TEST_ASSERT_GREATER_THAN(kFrames / 4, count);
+    TEST_ASSERT_LESS_THAN(kFrames, count);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(can->counts.first_problem, "is packed by gzip, and ends too early"),
+                                 can->counts.first_problem);
+  }
 }
 
 // Positions of a receiver on the bus: about the origin of calibration.yaml, with its own accuracy, none without a fix.

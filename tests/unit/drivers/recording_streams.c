@@ -27,8 +27,9 @@ void tearDown(void) {
   folder_remove();
 }
 
-static void keep_warning(void *context, const char *text) {
+static void keep_warning(void *context, wm_note note, const char *text) {
   (void)context;
+  (void)note;
   strncat(warnings, text, sizeof warnings - strlen(warnings) - 2);
   strcat(warnings, "\n");
 }

@@ -22,7 +22,7 @@ namespace {
 
 fs::path data, ours;
 
-void complain(void *, const char *text) { TEST_FAIL_MESSAGE(text); }
+void complain(void *, wm_note, const char *text) { TEST_FAIL_MESSAGE(text); }
 
 // A second of ours, in small pictures.
 void make(const std::string &world, std::initializer_list<const char *> cameras, int width, int height) {

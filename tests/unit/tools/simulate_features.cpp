@@ -163,7 +163,8 @@ TEST(test_instruments_under_water) {
     TEST_ASSERT_EQUAL_MESSAGE(
         WM_OK,
         wm_recording_open(
-            folder.c_str(), nullptr, [](void *, const char *text) { TEST_FAIL_MESSAGE(text); }, nullptr, &opened, &err),
+            folder.c_str(), nullptr, [](void *, wm_note, const char *text) { TEST_FAIL_MESSAGE(text); }, nullptr,
+            &opened, &err),
         err.text);
     size_t count = 0, seen = 0;
     Sum north;

@@ -69,7 +69,7 @@ void write(const Film &film, const std::string &dir) {
 
 std::string warnings;
 
-void note(void *, const char *text) { warnings += std::string(text) + "\n"; }
+void note(void *, wm_note, const char *text) { warnings += std::string(text) + "\n"; }
 
 void check_world(const char *name, std::initializer_list<const char *> cameras, int width, int height) {
   Scenario scenario = load(name);

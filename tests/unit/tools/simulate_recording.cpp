@@ -26,7 +26,7 @@ Scenario scenario;
 Recording made;
 wm_recording *opened;
 
-void count_warning(void *context, const char *text) {
+void count_warning(void *context, wm_note, const char *text) {
   (void)text;
   ++*static_cast<int *>(context);
 }

@@ -154,7 +154,9 @@ typedef struct waymark_replay_options {
   waymark_take_fn take;                          // NULL: none
   waymark_note_fn note;                          // NULL: none
   void (*progress)(void *context, double done);  // 0 to 1, a few times a second; NULL
-  void *context;                                 // of take, note and progress
+  void *context;                                 // of take, note, progress and keeps
+  // Event log only: 0 withholds an observation from the estimator; not called for motion. NULL: none is withheld.
+  int32_t (*keeps)(void *context, const wm_event *observation);
 } waymark_replay_options;
 
 typedef struct waymark_report {
@@ -166,6 +168,16 @@ typedef struct waymark_report {
 } waymark_report;
 
 wm_status waymark_replay(const waymark_replay_options *options, waymark_report *out, size_t bytes, wm_error *err);
+
+// A number of a configuration that its estimator reads: under motion, sightings or the estimator's name.
+typedef struct waymark_parameter {
+  const char *key;  // "motion.noise.speed_mps"
+  double value, initial, min, max;
+} waymark_parameter;
+
+// Calls `take` for each parameter that the estimator of the configuration `text` reads. Its files are not opened.
+wm_status waymark_parameters(const char *text, void (*take)(void *context, const waymark_parameter *parameter),
+                             void *context, wm_error *err);
 
 // ── event logs ──────────────────────────────────────────────────────────────────────────────────────────────────────
 

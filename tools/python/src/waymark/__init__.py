@@ -22,10 +22,10 @@ from .tables import Array, Table, read_table, write_table
 if TYPE_CHECKING:
     from .live import Live
     from .native import WaymarkError
-    from .replaying import Estimate, EventLog, replay
+    from .replaying import Estimate, EventLog, parameters, replay
 
 __all__ = ["Array", "CanFrame", "Estimate", "EventLog", "FloorPlan", "Frame", "Live", "Recording", "RecordingWriter", "Run", "Table",
-           "WaymarkError", "covariance", "eval", "read_floor_plan", "read_landmarks", "read_table", "replay",
+           "WaymarkError", "covariance", "eval", "parameters", "read_floor_plan", "read_landmarks", "read_table", "replay",
            "write_floor_plan", "write_landmarks", "write_table"]
 
 
@@ -40,7 +40,7 @@ def __getattr__(name: str) -> Any:
         from .live import Live
 
         return Live
-    if name in ("Estimate", "EventLog", "replay"):
+    if name in ("Estimate", "EventLog", "parameters", "replay"):
         from . import replaying
 
         return getattr(replaying, name)

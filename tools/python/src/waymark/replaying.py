@@ -57,11 +57,13 @@ _KINDS = {2: "wm_estimate", 3: "wm_innovation", 4: "wm_published"}
 def replay(input: str | Path, config: str | Path | None = None, *, changes: Mapping[str, object] | None = None,
            out: str | Path | None = None, landmarks: str | Path | None = None, calibration: str | Path | None = None,
            map: str | Path | None = None, seed: int = 1, from_s: float = 0.0, until_s: float = 0.0, lost: bool = False,
-           note: Callable[[str], None] | None = None, progress: Callable[[float], None] | None = None) -> Estimate:
+           note: Callable[[str], None] | None = None, progress: Callable[[float], None] | None = None,
+           keeps: Callable[[Any], bool] | None = None) -> Estimate:
     """Localizes from a recording, or from the event log of a run, as `waymark replay` does, with the same bits.
 
     `changes` are values of the configuration by their keys: {"sightings.noise.bearing_factor": 2}. An event log needs no
-    configuration. With `out` the files of a run are written, too. WaymarkError has the library's message.
+    configuration. With `out` the files of a run are written, too. `keeps` gets each observation of an event log (a wm_event) and tells
+    whether it is fused. WaymarkError has the library's message.
     """
     records: dict[int, bytearray] = {kind: bytearray() for kind in _KINDS}
     failed: list[BaseException] = []
@@ -84,12 +86,16 @@ def replay(input: str | Path, config: str | Path | None = None, *, changes: Mapp
     def path(value: str | Path | None) -> Any:
         return ffi.NULL if value is None else ffi.new("char[]", str(value).encode())
 
+    def is_kept(_: Any, event: Any) -> int:
+        return int(keeps is None or keeps(event))
+
     lines = None if changes is None else "\n".join(f"{key}: {value}" for key, value in changes.items())
     texts = {"input": path(input), "config": path(config), "changes": path(lines), "out": path(out), "landmarks": path(landmarks),
              "calibration": path(calibration), "map": path(map)}
     calls = {"take": ffi.callback("void(void *, waymark_record, const void *, size_t)", take, onerror=keep),
              "note": ffi.callback("void(void *, const char *)", say, onerror=keep),
-             "progress": ffi.callback("void(void *, double)", show, onerror=keep)}  # referenced until the call has returned
+             "progress": ffi.callback("void(void *, double)", show, onerror=keep),
+             "keeps": ffi.callback("int32_t(void *, const wm_event *)", is_kept, onerror=keep) if keeps else ffi.NULL}  # referenced until the call has returned
     options = ffi.new("waymark_replay_options *", {"bytes": ffi.sizeof("waymark_replay_options"), **texts, "seed": seed,
                                                    "from_s": from_s, "until_s": until_s, "lost": lost, **calls})
     report = ffi.new("waymark_report *")
@@ -99,6 +105,17 @@ def replay(input: str | Path, config: str | Path | None = None, *, changes: Mapp
     arrays = {kind: np.frombuffer(bytes(data), dtype(_KINDS[kind])) for kind, data in records.items()}
     return Estimate(_poses(arrays[2]), _published(arrays[4]), _innovations(arrays[3]),
                     {name: getattr(report, name) for name in ("poses", "events", "recorded_s", "events_missing", "log_was_cut")})
+
+
+def parameters(config: str) -> dict[str, dict[str, float]]:
+    """Value, initial, min and max of each number that the estimator of a configuration's text reads, by their keys: "motion.noise.speed_mps"."""
+    out: dict[str, dict[str, float]] = {}
+
+    def take(_: Any, parameter: Any) -> None:
+        out[text(parameter.key)] = {name: getattr(parameter, name) for name in ("value", "initial", "min", "max")}
+
+    check(library().waymark_parameters, config.encode(), ffi.callback("void(void *, const waymark_parameter *)", take), ffi.NULL)
+    return out
 
 
 def _offset(kind: np.dtype[Any], field: str) -> int:
