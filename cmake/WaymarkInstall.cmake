@@ -20,7 +20,9 @@ install(FILES ${WM_PACKAGE_DIR}/completion/_waymark DESTINATION ${CMAKE_INSTALL_
 file(GLOB examples CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/config/*.yaml)
 install(FILES ${examples} DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/waymark/examples COMPONENT runtime)
 install(DIRECTORY config/datasets config/faults DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/waymark/examples COMPONENT runtime)
-install(FILES docs/config.md docs/live.md docs/motion-sources.md docs/errors.md docs/play.md docs/faults.md DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/waymark COMPONENT runtime)
+# The pages: messages and configurations name many of them.
+file(GLOB pages CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/docs/*.md)
+install(FILES ${pages} DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/waymark COMPONENT runtime)
 
 # Manual pages are compressed as Debian wants them: without a time, so that the same sources give the same bytes.
 function(wm_install_compressed file name where component)

@@ -4,6 +4,7 @@ option(WM_TESTS "Build the tests" ON)
 option(WM_FUZZ "Build the fuzz targets (clang)" OFF)
 option(WM_RENDER "Build what renders pictures of worlds (with Embree): waymark-simulate, its tests and benchmarks" ON)
 option(WM_UNITY "Compile the desk's sources in batches: half of their time is the same headers. OFF for editors that need each source's own command" ON)
+option(WM_REPRODUCIBLE "Programs without the paths of this computer: the same bytes from the same sources in any folder; packages are built so" OFF)
 set(WM_SANITIZE "" CACHE STRING "Sanitizers, as for -fsanitize=")
 
 set(WM_WARNINGS -Wall -Wextra -Wshadow
@@ -29,6 +30,9 @@ target_compile_options(wm_rules INTERFACE
   # The same bits on every machine: no fused multiply-add, no reordering (docs/design.md, numbers).
   -ffp-contract=off -fno-fast-math
   -fno-omit-frame-pointer)
+if(WM_REPRODUCIBLE) # the last one that fits is taken: a build folder below the sources has one name, whatever its own is
+  target_compile_options(wm_rules INTERFACE -ffile-prefix-map=${CMAKE_SOURCE_DIR}=. -ffile-prefix-map=${CMAKE_BINARY_DIR}=./build)
+endif()
 # As Debian builds its packages (dpkg-buildflags, hardening=+all). All programs: addresses are resolved and read-only before
 # they begin; the robot's rooms, also checked copies and canaries on the stack (of code with the property WM_HARDENED). Sanitizers
 # bring their own checks. tests/package/hardening.py looks for it in the programs.

@@ -19,6 +19,7 @@ set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_RELEASE 1)
 set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
 set(CPACK_DEBIAN_COMPRESSION_TYPE xz)
+set(CPACK_THREADS 1) # the bytes of xz depend on how many there are
 
 # What the programs need, written down: dpkg-shlibdeps looks into the database of this machine, which doesn't know another
 # architecture's libraries. tests/package/depends.py holds it against what is linked, and against dpkg-shlibdeps.
@@ -50,7 +51,8 @@ endif()
 
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_NAME waymark)
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_SECTION misc)
-set(CPACK_DEBIAN_RUNTIME_PACKAGE_DEPENDS "${base}, ${pictures}, liblcm1 (>= 1.3.1)${cameras}${page}")
+set(used "iproute2, procps") # by the service: `ip route`, `kill`
+set(CPACK_DEBIAN_RUNTIME_PACKAGE_DEPENDS "${base}, ${pictures}, liblcm1 (>= 1.3.1)${cameras}${page}, ${used}")
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_SUGGESTS "waymark-tools, can-utils, v4l-utils, liblcm-bin")
 set(CPACK_DEBIAN_RUNTIME_DESCRIPTION "localization of a robot on its own computer
 Estimates the pose of a robot from cameras, CAN and other sensors on its
@@ -142,6 +144,24 @@ and /fix for the run. It needs no ROS. The service is installed, not started.")
 set(CPACK_DEBIAN_ROS2_PACKAGE_CONTROL_EXTRA ${WM_PACKAGE_DIR}/ros2/postinst ${WM_PACKAGE_DIR}/ros2/prerm
   ${WM_PACKAGE_DIR}/ros2/postrm)
 
-# /usr is the prefix; what is below /usr/etc for CMake is in /etc for Debian.
-set(CPACK_PRE_BUILD_SCRIPTS ${CMAKE_SOURCE_DIR}/cmake/etc_outside_usr.cmake)
+# What a package is for, by its description: packages of several boards have one name and version.
+if(CMAKE_TOOLCHAIN_FILE)
+  file(STRINGS ${CMAKE_TOOLCHAIN_FILE} about REGEX "^# [A-Z].*[.:]" LIMIT_COUNT 2) # behind the licence
+  list(GET about -1 about)
+  string(REGEX REPLACE "^# |\\.$" "" about "${about}")
+elseif("${CMAKE_C_FLAGS}" MATCHES "-march=native")
+  set(about "computers with the processor of the one that built it")
+else()
+  set(about "any computer of its architecture")
+endif()
+foreach(component ${CPACK_COMPONENTS_ALL})
+  string(TOUPPER ${component} component)
+  if(NOT "${CPACK_DEBIAN_${component}_PACKAGE_ARCHITECTURE}" STREQUAL all)
+    string(APPEND CPACK_DEBIAN_${component}_DESCRIPTION "\nBuilt for: ${about}.")
+  endif()
+endforeach()
+
+# The same sources give the same bytes, whenever, wherever and by whomever they are packed.
+set(CPACK_PROJECT_CONFIG_FILE ${CMAKE_SOURCE_DIR}/cmake/source_date.cmake)
+set(CPACK_PRE_BUILD_SCRIPTS ${CMAKE_SOURCE_DIR}/cmake/staged.cmake)
 include(CPack)

@@ -43,6 +43,7 @@ static const struct {
     {"detect", "run a detector on pictures: what it finds, drawn and as a table", "waymark-tools"},
     {"diff", "compare two runs: what differs, and where the difference begins", "waymark-tools"},
     {"eval", "measure a run against truth, GNSS or labels", "waymark-tools"},
+    {"hil", "play recordings into a robot's computer or a guest, and judge its run", "waymark-fleet"},
     {"import", "make a video of any kind part of a recording", "waymark-tools"},
     {"init", "make the configuration of a new robot from what it has", "waymark-tools"},
     {"map", "make, check and survey maps; print markers", "waymark-tools"},

@@ -3,13 +3,16 @@
 #include <signal.h>
 #include <stdatomic.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
 #include "cli/commands.h"
 #include "cli/options.h"
+#include "cli/watch/metrics.h"
 #include "cli/watch/watch.h"
 #include "live/lcm_connect.h"
+#include "output/replace_file.h"
 #include "rt/clock.h"
 
 static const char kHelp[] =
@@ -21,6 +24,9 @@ static const char kHelp[] =
     "  --url URL      LCM's (default: LCM_DEFAULT_URL, else this computer's)\n"
     "  --prefix TEXT  of the channels (default WAYMARK_)\n"
     "  --duration S   seconds, then stop\n"
+    "  --metrics FILE instead of the view, metrics in Prometheus' text format, written anew each 5 s: for "
+    "node_exporter's\n"
+    "                 collector of text files; `waymark web` has the same as /metrics\n"
     "  --log FILE     instead of the view, all messages into a log, as LCM's own logger writes it\n"
     "  --foxglove [ADDRESS:]PORT\n"
     "                 for Foxglove instead of a terminal, by the Python package (--foxglove --help: its options)\n"
@@ -31,8 +37,10 @@ static const char kHelp[] =
     "\n"
     "For a browser, with the map and live pictures: `waymark web CONFIG`.\n";
 
-#define SHOW_EVERY_NS (500 * WM_NS_PER_MS)  // refresh of the terminal
-#define LOG_QUEUE 1000                      // messages that wait for a disk: 15 s of poses and health
+#define SHOW_EVERY_NS (500 * WM_NS_PER_MS)   // refresh of the terminal
+#define METRICS_EVERY_NS (5 * WM_NS_PER_S)   // Prometheus asks each 15 s or less often
+#define METRICS_MAX_BYTES ((size_t)1 << 18)  // of 32 sources 100 kB
+#define LOG_QUEUE 1000                       // messages that wait for a disk: 15 s of poses and health
 
 static atomic_int stop;
 
@@ -49,6 +57,11 @@ static void on_pose(const lcm_recv_buf_t *message, const char *channel, void *co
 static void on_health(const lcm_recv_buf_t *message, const char *channel, void *context) {
   (void)channel;
   watch_health(context, message->data, message->data_size, wm_monotonic_ns());
+}
+
+static void on_refused(const lcm_recv_buf_t *message, const char *channel, void *context) {
+  (void)channel;
+  watch_refused(context, message->data, message->data_size);
 }
 
 static void on_innovation(const lcm_recv_buf_t *message, const char *channel, void *context) {
@@ -81,6 +94,35 @@ static void show(lcm_t *lcm, double duration_s) {
     watch_print(&seen, wm_monotonic_ns(), stdout);
     (void)fflush(stdout);
   }
+}
+
+static wm_status put_metrics(const char *path, char *text, wm_error *err) {
+  FILE *to = fmemopen(text, METRICS_MAX_BYTES, "w");
+  if (!to) return wm_fail(err, WM_IO, "%s: no memory for metrics", path);
+  watch_metrics(&seen, wm_monotonic_ns(), to);
+  const long bytes = ftell(to);
+  if (fclose(to) != 0 || bytes < 0) return wm_fail(err, WM_IO, "%s: the metrics are too long", path);
+  return replace_file(path, &(file_part){text, (size_t)bytes}, 1, err);
+}
+
+// Until the end of `duration_s` (0: none) or a signal; a reader never sees a part. The file goes with the program: what
+// it said is true no more.
+static int write_metrics(lcm_t *lcm, const char *path, double duration_s) {
+  wm_time_ns now_ns = wm_monotonic_ns(), next_ns = now_ns + WM_NS_PER_S;
+  const wm_time_ns end_ns = duration_s > 0 ? now_ns + wm_ns_from_seconds(duration_s) : INT64_MAX;
+  wm_error err = {0};
+  char *text = malloc(METRICS_MAX_BYTES);
+  wm_status status = text ? WM_OK : wm_fail(&err, WM_IO, "%s: no memory for metrics", path);
+  while (status == WM_OK && !atomic_load(&stop) && now_ns < end_ns && lcm_handle_timeout(lcm, 100) >= 0) {
+    now_ns = wm_monotonic_ns();
+    if (now_ns < next_ns) continue;
+    next_ns = now_ns + METRICS_EVERY_NS;
+    status = put_metrics(path, text, &err);
+  }
+  free(text);
+  if (status != WM_OK) return complain(&err);
+  (void)unlink(path);
+  return EXIT_DONE;
 }
 
 // With --foxglove, the Python package's program takes all options. Returns where it is not asked for, or not installed.
@@ -120,14 +162,18 @@ static int write_log(lcm_t *lcm, const char *prefix, const char *path, double du
 }
 
 int command_watch(int argc, char *const *argv) {
-  const char *url = "", *prefix = "WAYMARK_", *log_path = NULL, *why;
+  const char *url = "", *prefix = "WAYMARK_", *log_path = NULL, *metrics_path = NULL, *why;
   double duration_s = 0;
   int help = 0;
   const char *web = NULL;
-  const option options[] = {
-      {"--url", OPTION_TEXT, &url},      {"--prefix", OPTION_TEXT, &prefix}, {"--duration", OPTION_F64, &duration_s},
-      {"--log", OPTION_TEXT, &log_path}, {"--web", OPTION_TEXT, &web},       {"--help", OPTION_FLAG, &help},
-      {"-h", OPTION_FLAG, &help}};
+  const option options[] = {{"--url", OPTION_TEXT, &url},
+                            {"--prefix", OPTION_TEXT, &prefix},
+                            {"--duration", OPTION_F64, &duration_s},
+                            {"--metrics", OPTION_TEXT, &metrics_path},
+                            {"--log", OPTION_TEXT, &log_path},
+                            {"--web", OPTION_TEXT, &web},
+                            {"--help", OPTION_FLAG, &help},
+                            {"-h", OPTION_FLAG, &help}};
   wm_error err = {0};
   size_t words;
   char channel[96];
@@ -163,9 +209,15 @@ int command_watch(int argc, char *const *argv) {
   (void)lcm_subscribe(lcm, channel, on_pose, &seen);
   (void)snprintf(channel, sizeof channel, "%.80sHEALTH", prefix);
   (void)lcm_subscribe(lcm, channel, on_health, &seen);
+  (void)snprintf(channel, sizeof channel, "%.80sREFUSED", prefix);
+  (void)lcm_subscribe(lcm, channel, on_refused, &seen);
   (void)snprintf(channel, sizeof channel, "%.80sINNOVATION", prefix);
   (void)lcm_subscribe(lcm, channel, on_innovation, &seen);
-  show(lcm, duration_s);
+  int code = EXIT_DONE;
+  if (metrics_path)
+    code = write_metrics(lcm, metrics_path, duration_s);
+  else
+    show(lcm, duration_s);
   lcm_destroy(lcm);
-  return EXIT_DONE;
+  return code;
 }

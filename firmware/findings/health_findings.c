@@ -52,7 +52,7 @@ static void about_lateness(const wm_source_health *s, wm_findings *out) {
   f->size = s->received > 0 ? (double)s->late / (double)s->received : 0;
 }
 
-static void about_losses(const wm_source_health *s, wm_findings *out) {
+static void about_losses(const wm_source_health *s, const char *reason, wm_findings *out) {
   const struct {
     wm_finding_id id;
     uint64_t count;
@@ -71,11 +71,15 @@ static void about_losses(const wm_source_health *s, wm_findings *out) {
                 "were dropped by the kernel or the device because they were not read in time", NULL},
                {WM_FOUND_DEVICE_TROUBLE, s->bus_errors, "error frames on the bus",
                 "look at wiring, termination (60 ohms) and bit rate: `ip -d -s link show`"}};
-  for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++)
-    if (kinds[i].count > 0)
-      wm_find(out, kinds[i].id, WM_SEVERITY_NOTE, s->name, kinds[i].fix, "%" PRIu64 " of %" PRIu64 " %s",
-              kinds[i].count, s->received, kinds[i].what)
-          ->size = s->received > 0 ? (double)kinds[i].count / (double)s->received : 0;
+  for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++) {
+    if (kinds[i].count == 0) continue;
+    const int is_refused = kinds[i].id == WM_FOUND_ROWS_SKIPPED;  // these are not among those received
+    const uint64_t all = s->received + (is_refused ? s->malformed + s->not_finite : 0);
+    wm_find(out, kinds[i].id, WM_SEVERITY_NOTE, s->name, kinds[i].fix, "%" PRIu64 " of %" PRIu64 " %s%s%s",
+            kinds[i].count, all, kinds[i].what, is_refused && reason[0] ? "; the first: " : "",
+            is_refused ? reason : "")
+        ->size = all > 0 ? (double)kinds[i].count / (double)all : 0;
+  }
 }
 
 static void about_silence(const wm_source_health *s, wm_findings *out) {
@@ -88,10 +92,13 @@ static void about_silence(const wm_source_health *s, wm_findings *out) {
         ->size = (double)s->silent_ns * 1e-9;
 }
 
-static void about_device(const wm_source_health *s, wm_findings *out) {
+static void about_device(const wm_source_health *s, const char *reason, wm_findings *out) {
   if (s->device == WM_DEVICE_NONE || s->device == WM_DEVICE_WORKS) return;
-  wm_find(out, WM_FOUND_DEVICE_TROUBLE, WM_SEVERITY_BAD, s->name, NULL, "its device is %s",
-          wm_device_state_name(s->device));
+  if (s->device == WM_DEVICE_ABSENT && reason[0])
+    wm_find(out, WM_FOUND_DEVICE_TROUBLE, WM_SEVERITY_BAD, s->name, reason, "nothing that came from it is usable");
+  else
+    wm_find(out, WM_FOUND_DEVICE_TROUBLE, WM_SEVERITY_BAD, s->name, NULL, "its device is %s",
+            wm_device_state_name(s->device));
 }
 
 wm_severity wm_refused_severity(uint64_t refused, uint64_t updates) {
@@ -201,9 +208,9 @@ void wm_health_findings(const wm_health *health, wm_findings *out) {
     const wm_source_health *s = &health->sources[i];
     about_refused(s, out);
     about_lateness(s, out);
-    about_losses(s, out);
+    about_losses(s, health->refused_because[i], out);
     about_silence(s, out);
-    about_device(s, out);
+    about_device(s, health->refused_because[i], out);
   }
   about_state(health, out);
   about_motion(health->motion_health, out);

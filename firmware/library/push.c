@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Data into a session, poses out of it: the calls of a run's cycle, driven by the caller's clock.
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "library/session.h"
@@ -113,8 +114,11 @@ static wm_status check_times(wm_time_ns t_ns, wm_time_ns arrival_ns, wm_error *e
   return status == WM_OK && arrival_ns != WM_TIME_NONE ? check_time("arrival_ns", arrival_ns, err) : status;
 }
 
-static void count_refused(pushed_source *source, wm_status status) {
+// The first one's text is kept, for the health.
+static void count_refused(pushed_source *source, wm_status status, const wm_error *err) {
   wm_source_counts *counts = &source->base.counts;
+  if (!counts->first_problem[0] && err)
+    (void)snprintf(counts->first_problem, sizeof counts->first_problem, "%.255s", err->text);
   *(status == WM_NOT_FINITE || status == WM_OUT_OF_RANGE ? &counts->not_finite : &counts->malformed) += 1;
 }
 
@@ -125,7 +129,7 @@ static wm_status deliver(session *self, pushed_source *source, wm_time_ns arriva
   wm_status status =
       check_ahead(self, arrival_ns == WM_TIME_NONE ? "t_ns" : "arrival_ns", source->event.arrival_ns, err);
   if (status != WM_OK) {
-    count_refused(source, WM_BAD_DATA);
+    count_refused(source, WM_BAD_DATA, err);
     return wm_fail_in(err, "%s", source->base.name);
   }
   status = open_readers(self, t_ns, err);
@@ -163,7 +167,7 @@ wm_status session_push_row(session *self, uint32_t source, wm_time_ns t_ns, wm_t
   for (size_t i = 0; i < WM_STREAM_NUMBERS_MAX; i++) row.number[i] = i < count ? numbers[i] : (double)NAN;
   status = wm_stream_event(to->stream, &row, wm_site_imu(wm_recording_site(self->robot)), &to->event, err);
   if (status == WM_OK) return deliver(self, to, arrival_ns, err);
-  count_refused(to, status);
+  count_refused(to, status, err);
   return wm_fail_in(err, "%s", to->base.name);
 }
 
@@ -183,7 +187,7 @@ wm_status session_push_event(session *self, uint32_t source, const wm_event *eve
   set_sensor(&to->event, to->sensor);
   status = pushed_source_check(to, &to->event, self->assembly.setup.sensor_count, err);
   if (status == WM_OK) return deliver(self, to, event->arrival_ns, err);
-  count_refused(to, status);
+  count_refused(to, status, err);
   return status;
 }
 

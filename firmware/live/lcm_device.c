@@ -1,21 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "live/lcm_device.h"
 
-#include <math.h>
 #include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "live/lcm_stamp.h"
 #include "live/lcm_subscriber.h"
 #include "rt/clock.h"
 #include "waymark/foreign_clock.h"
 #include "waymark/lcm_streams.h"
 
-// A stamp on this computer's clock is never later than its arrival; a sender that stamps the end of an interval rounds.
-#define AHEAD_MAX_NS (10 * WM_NS_PER_MS)
-// An older stamp is of another clock: no queue of a sender holds so much.
-#define BEHIND_MAX_NS (10 * WM_NS_PER_S)
 // Smallest delay over a network, of which foreign_clock has no knowledge: Ethernet 0.2 ms, WiFi 1 to 3 ms.
 #define NETWORK_UNCERTAINTY_NS (2 * WM_NS_PER_MS)
 // Messages that may come at once, as seconds of rate_max_hz: a sender or a network that was held up.
@@ -48,18 +44,15 @@ static int is_within_rate(lcm_device *self, wm_time_ns now_ns) {
 static const char *stamp(lcm_device *self, char *text, size_t capacity) {
   wm_stream_row *row = &self->row;
   wm_source_counts *counts = self->counts;
-  if (row->t_ns <= 0) return "t_ns is not above 0: when was it true?";
-  if (self->config.clock == WM_LCM_CLOCK_SENDER) {
+  if (self->config.clock == WM_LCM_CLOCK_SENDER && row->t_ns > 0) {
     row->t_ns = foreign_clock_map(&self->sender, row->t_ns, row->arrival_ns, 0);
     counts->stamp_uncertainty_ns = foreign_clock_uncertainty(&self->sender) + NETWORK_UNCERTAINTY_NS;
     return NULL;
   }
-  const double ahead_s = wm_seconds_between(row->arrival_ns, row->t_ns);
-  if (row->t_ns - row->arrival_ns <= AHEAD_MAX_NS && row->arrival_ns - row->t_ns <= BEHIND_MAX_NS) return NULL;
-  (void)snprintf(
-      text, capacity,
-      "t_ns is %.3g s %s this computer's CLOCK_MONOTONIC; `clock: sender` follows a clock of the sender's own",
-      fabs(ahead_s), ahead_s > 0 ? "ahead of" : "behind");
+  const char *why = lcm_stamp_fault(row->t_ns, row->arrival_ns, text, capacity);
+  if (why != text) return why;
+  const size_t used = strlen(text);
+  (void)snprintf(text + used, capacity - used, "; `clock: sender` follows a clock of the sender's own");
   return text;
 }
 
@@ -74,10 +67,12 @@ static void take(lcm_device *self, const lcm_recv_buf_t *message, const char *ch
   const char *why = wm_lcm_read_row(self->config.stream, message->data, message->data_size, &self->row);
   self->row.arrival_ns = now_ns;
   if (!why) why = stamp(self, text, sizeof text);
-  if (why)
-    wm_source_refuse(counts, channel, why);
-  else
+  if (!why) {
     self->has_row = 1;
+    return;
+  }
+  if (!counts->first_problem[0]) counts->news++;  // the device's note changes
+  wm_source_refuse(counts, channel, why);
 }
 
 static void on_message(const lcm_recv_buf_t *message, const char *channel, void *context) {
@@ -107,6 +102,8 @@ static unsigned note(const wm_row_device *base, unsigned state, int has_come, ch
     (void)snprintf(text, room, "%s comes on %s", type, where);
   else if (state == WM_DEVICE_STALLED)
     (void)snprintf(text, room, "no usable %s on %s any more: is its sender still there?", type, where);
+  else if (self->counts->first_problem[0])
+    (void)snprintf(text, room, "no usable %s on %s yet: what comes is refused", type, where);
   else
     (void)snprintf(text, room, "no usable %s on %s yet: does its sender run?", type, where);
   return state;

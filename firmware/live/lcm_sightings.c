@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "live/lcm_stamp.h"
 #include "live/lcm_subscriber.h"
 #include "rt/clock.h"
 #include "waymark/lcm_messages.h"
@@ -27,6 +28,8 @@ static void on_sightings(const lcm_recv_buf_t *message, const char *channel, voi
   self->next = self->said_count = 0;
   const char *why =
       wm_lcm_read_sightings(message->data, message->data_size, name, &self->t_ns, self->said, &self->said_count);
+  const wm_time_ns now_ns = wm_monotonic_ns();
+  if (!why) why = lcm_stamp_fault(self->t_ns, now_ns, text, sizeof text);
   if (why) {
     self->said_count = 0;
     wm_source_refuse(&self->base.counts, channel, why);
@@ -41,7 +44,7 @@ static void on_sightings(const lcm_recv_buf_t *message, const char *channel, voi
     return;
   }
   for (size_t i = 0; i < self->said_count; i++) self->said[i].sensor = sensor;
-  self->arrival_ns = wm_monotonic_ns();
+  self->arrival_ns = now_ns;
 }
 
 static void subscribe(lcm_subscriber *subscriber) {

@@ -82,6 +82,12 @@ void lcm_sink_health(lcm_sink *self, const wm_health *health) {
   publish(self, "HEALTH", wm_lcm_health(health, self->bytes, sizeof self->bytes));
 }
 
+void lcm_sink_refused(lcm_sink *self, const wm_health *health) {
+  for (uint32_t i = 0; i < health->source_count; i++)
+    if (health->refused_because[i][0])
+      publish(self, "REFUSED", wm_lcm_refused(health, i, self->bytes, sizeof self->bytes));
+}
+
 void lcm_sink_landmarks(lcm_sink *self, wm_time_ns t_ns) {
   const wm_setup *setup = &self->assembly->setup;
   for (size_t first = 0; first < setup->landmark_count; first += WM_LCM_LANDMARKS_MAX)

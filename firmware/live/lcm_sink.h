@@ -35,6 +35,8 @@ void lcm_sink_open(lcm_sink *self, int is_on, const char *url, const char *prefi
 void lcm_sink_pose(lcm_sink *self, const wm_published *published, wm_time_ns sent_ns);
 void lcm_sink_innovation(lcm_sink *self, const wm_innovation *innovation);
 void lcm_sink_health(lcm_sink *self, const wm_health *health);
+// One message a source whose data were refused.
+void lcm_sink_refused(lcm_sink *self, const wm_health *health);
 // Collects sightings and sends them at the next stamp or sensor; other events are not sent.
 void lcm_sink_event(lcm_sink *self, const wm_event *event);
 void lcm_sink_landmarks(lcm_sink *self, wm_time_ns t_ns);

@@ -43,6 +43,9 @@ typedef struct live_source {
   _Atomic uint64_t looks[WM_LOOK_COUNT];
   _Atomic int64_t stamp_uncertainty_ns;
   atomic_uint device;  // wm_device_state
+  // Why its first unusable datum was refused: stays as it is once has_reason is set.
+  char reason[WM_HEALTH_REASON_MAX];
+  atomic_int has_reason;
   // Last reported; of the source's thread.
   uint8_t said_device;
   uint32_t said_news;

@@ -92,6 +92,8 @@ static void add_source_counts(live *run, wm_health *health) {
     to->stamp_uncertainty_ns = atomic_load_explicit(&from->stamp_uncertainty_ns, memory_order_relaxed);
     for (int k = 0; k < WM_LOOK_COUNT; k++) to->looks[k] = atomic_load_explicit(&from->looks[k], memory_order_relaxed);
     to->device = (uint8_t)atomic_load_explicit(&from->device, memory_order_relaxed);
+    if (atomic_load_explicit(&from->has_reason, memory_order_acquire))
+      memcpy(health->refused_because[i], from->reason, sizeof from->reason);
   }
 }
 
@@ -163,6 +165,7 @@ static void take_healths(live *run) {
     add_source_counts(run, &health);
     live_publish_health(run, &health);
     lcm_sink_health(&self->lcm, &health);
+    lcm_sink_refused(&self->lcm, &health);
     char status[NOTIFY_STATUS_BYTES];
     describe(&health, status);
     notify_status(&self->notify, status);

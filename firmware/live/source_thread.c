@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Puts a source's events into its ring: a recording's when due, a device's on arrival. Text goes to the disk thread:
 // a blocked standard error must not stop a source.
+#include <stdio.h>
 #include <string.h>
 
 #include "live/live.h"
@@ -40,6 +41,11 @@ static void share_counts(live_source *self) {
   atomic_store_explicit(&self->bus_errors, counts.bus_errors, memory_order_relaxed);
   atomic_store_explicit(&self->stamp_uncertainty_ns, counts.stamp_uncertainty_ns, memory_order_relaxed);
   atomic_store_explicit(&self->device, counts.device, memory_order_relaxed);
+  if (counts.first_problem[0] && !atomic_load_explicit(&self->has_reason, memory_order_relaxed)) {
+    (void)snprintf(self->reason, sizeof self->reason, "%s", counts.first_problem);
+    atomic_store_explicit(&self->has_reason, 1, memory_order_release);
+    live_queue_line(&self->lines, "%s: refused: %s", self->reader->source->name, self->reason);
+  }
   for (int i = 0; i < WM_LOOK_COUNT; i++) atomic_store_explicit(&self->looks[i], counts.looks[i], memory_order_relaxed);
 }
 

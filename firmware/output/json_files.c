@@ -86,7 +86,7 @@ static void put_looks(FILE *f, const wm_source_health *s) {
   if (before[2] == '\0') (void)fputs("}", f);
 }
 
-static void put_source(FILE *f, const wm_source_health *s) {
+static void put_source(FILE *f, const wm_source_health *s, const char *reason) {
   (void)fputs("    ", f);
   string(f, s->name);
   (void)fprintf(f, ": {\"received\": %" PRIu64 ", \"fused\": %" PRIu64 ", ", s->received, s->fused);
@@ -97,6 +97,10 @@ static void put_source(FILE *f, const wm_source_health *s) {
                 ", \"out_of_order\": %" PRIu64 ", \"ignored\": %" PRIu64 ", \"frozen\": %" PRIu64,
                 s->late, s->dropped, s->lost, s->duplicates, s->future, s->malformed, s->not_finite, s->out_of_order,
                 s->ignored, s->frozen);
+  if (reason[0]) {
+    (void)fputs(", \"refused_because\": ", f);
+    string(f, reason);
+  }
   put_looks(f, s);
   if (s->device != WM_DEVICE_NONE)
     (void)fprintf(f,
@@ -232,7 +236,7 @@ wm_status wm_write_health_json(const char *dir, const wm_assembly *assembly, con
   }
   (void)fputs("],\n  \"sources\": {\n", f);
   for (uint32_t i = 0; i < h->source_count; i++) {
-    put_source(f, &h->sources[i]);
+    put_source(f, &h->sources[i], h->refused_because[i]);
     (void)fputs(i + 1 < h->source_count ? ",\n" : "\n", f);
   }
   (void)fputs("  },\n  \"findings\": ", f);

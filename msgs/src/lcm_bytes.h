@@ -10,6 +10,12 @@
 static inline int room(size_t length) { return length > INT32_MAX ? INT32_MAX : (int)length; }
 static inline size_t written(int bytes) { return bytes > 0 ? (size_t)bytes : 0; }
 
+// Whether a message is of the type of another one, by its first eight bytes: then it is too short where it can't be
+// read.
+static inline int is_beginning(const void *message, size_t length, const uint8_t *right) {
+  return length >= sizeof(int64_t) && memcmp(message, right, sizeof(int64_t)) == 0;
+}
+
 // A name, cut where it has to be, padded with zeros.
 static inline void put_name(uint8_t *out, size_t capacity, const char *name) {
   const size_t length = strnlen(name, capacity - 1);

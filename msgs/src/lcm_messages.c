@@ -9,6 +9,7 @@
 #include "waymark_innovation_t.h"
 #include "waymark_landmarks_t.h"
 #include "waymark_pose_t.h"
+#include "waymark_refused_t.h"
 
 _Static_assert(sizeof(((waymark_source_health_t *)0)->rejected) / sizeof(int64_t) == WM_VERDICT_COUNT,
                "a verdict each");
@@ -111,6 +112,15 @@ static void put_all_calibration(waymark_health_t *m, const wm_health *h) {
       if (is_first == (pass == 0)) put_calibration(m, c->name, c->value, c->sigma);
     }
   if (!fits) put_calibration(m, WM_LCM_CALIBRATION_LEFT, count - (double)room, (double)NAN);
+}
+
+size_t wm_lcm_refused(const wm_health *h, uint32_t index, void *out, size_t capacity) {
+  const wm_source_health *s = &h->sources[index];
+  waymark_refused_t m = {
+      .t_ns = h->t_ns, .run_id = (int64_t)h->run_id, .count = (int64_t)(s->malformed + s->not_finite)};
+  put_name(m.source, sizeof m.source, s->name);
+  put_name(m.reason, sizeof m.reason, h->refused_because[index]);
+  return written(waymark_refused_t_encode(out, 0, room(capacity), &m));
 }
 
 size_t wm_lcm_health(const wm_health *h, void *out, size_t capacity) {

@@ -7,6 +7,7 @@
 #include "waymark_health_t.h"
 #include "waymark_innovation_t.h"
 #include "waymark_pose_t.h"
+#include "waymark_refused_t.h"
 
 // Names come from any sender and go to a terminal: control characters (C0, DEL, and C1 in UTF-8) become '?'.
 static void take_name(char *out, size_t capacity, const uint8_t *name, size_t length) {
@@ -133,5 +134,14 @@ const char *wm_lcm_read_innovation(const void *message, size_t length, wm_innova
                          .nis = m.nis,
                          .gate = m.gate,
                          .gate_dof = (uint8_t)m.gate_dof};
+  return NULL;
+}
+
+const char *wm_lcm_read_refused(const void *message, size_t length, char source[WM_HEALTH_NAME_MAX],
+                                char reason[WM_HEALTH_REASON_MAX]) {
+  waymark_refused_t m;
+  if (waymark_refused_t_decode(message, 0, room(length), &m) < 0) return "is not a refused_t of this version";
+  take_name(source, WM_HEALTH_NAME_MAX, m.source, sizeof m.source);
+  take_name(reason, WM_HEALTH_REASON_MAX, m.reason, sizeof m.reason);
   return NULL;
 }

@@ -51,8 +51,15 @@ const char *wm_lcm_read_sightings(const void *message, size_t length, char *sens
                                   size_t *count) {
   waymark_observations_t m;
   *count = 0;
-  if (waymark_observations_t_decode(message, 0, room(length), &m) < 0)
-    return "is not an observations_t of this version";
+  if (waymark_observations_t_decode(message, 0, room(length), &m) < 0) {
+    static const waymark_observations_t kNone;
+    uint8_t right[sizeof m + sizeof(int64_t)];
+    const int bytes = waymark_observations_t_encode(right, 0, sizeof right, &kNone);
+    return bytes > 0 && is_beginning(message, length, right) ? "is shorter than observations_t of this version: the "
+                                                               "name has 32 bytes, padded with zeros, and each list "
+                                                               "64 numbers"
+                                                             : "is not an observations_t of this version";
+  }
   if (m.t_ns <= 0) return "t_ns is not above 0: when was it seen, on the robot's monotonic clock?";
   if (m.count < 0 || m.count > WM_LCM_OBSERVATIONS_MAX) return "count is not in 0 to 64";
   _Static_assert(sizeof m.sensor >= WM_NAME_MAX, "a name fits");

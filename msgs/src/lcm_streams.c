@@ -15,7 +15,7 @@ typedef union any_message {
 
 // A message is its stamp, then the numbers of the stream's columns in their order.
 typedef struct stream_type {
-  const char *stream, *type, *not_it;
+  const char *stream, *type, *not_it, *too_short;
   size_t bytes;  // of the message in memory
   int (*decode)(const void *from, int length, any_message *to);
   int (*encode)(void *to, int length, const any_message *from);
@@ -31,9 +31,14 @@ typedef struct stream_type {
   _Static_assert(offsetof(waymark_##name##_t, t_ns) == 0 &&                                                  \
                      sizeof(waymark_##name##_t) <= sizeof(int64_t) + WM_STREAM_NUMBERS_MAX * sizeof(double), \
                  "a stamp, and numbers behind it");
-#define TYPE(name)                                                                                        \
-  {#name,         #name "_t",   "does not match " #name "_t of this version", sizeof(waymark_##name##_t), \
-   decode_##name, encode_##name},
+#define TYPE(name)                                                            \
+  {#name,                                                                     \
+   #name "_t",                                                                \
+   "does not match " #name "_t of this version",                              \
+   "is shorter than " #name "_t of this version: are all its numbers there?", \
+   sizeof(waymark_##name##_t),                                                \
+   decode_##name,                                                             \
+   encode_##name},
 
 WM_STREAM_TYPES(FUNCTIONS)
 
@@ -65,7 +70,13 @@ const char *wm_lcm_stream_type(const char *stream) {
 const char *wm_lcm_read_row(const char *stream, const void *message, size_t length, wm_stream_row *out) {
   any_message m;
   const stream_type *type = find(stream);
-  if (!type || type->decode(message, room(length), &m) < 0) return type ? type->not_it : "is of no stream";
+  if (!type) return "is of no stream";
+  if (type->decode(message, room(length), &m) < 0) {
+    const any_message none = {0};
+    uint8_t right[sizeof m + sizeof(int64_t)];
+    const int bytes = type->encode(right, sizeof right, &none);
+    return bytes > 0 && is_beginning(message, length, right) ? type->too_short : type->not_it;
+  }
   const size_t bytes = type->bytes - sizeof(int64_t);
   memset(out, 0, sizeof *out);
   memcpy(&out->t_ns, &m, sizeof(int64_t));

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import tempfile
 
+ROOT = pathlib.Path(__file__).resolve().parents[2]
 BUILD = pathlib.Path(sys.argv[1]).resolve()
 
 
@@ -17,7 +18,7 @@ def declared(component):
     """{package: least version} of one component, from CPack's own file."""
     text = (BUILD / "CPackConfig.cmake").read_text()
     said = re.search(rf'set\(CPACK_DEBIAN_{component}_PACKAGE_DEPENDS "(.*)"\)', text).group(1)
-    return dict(re.match(r"(\S+) \([>=]+ (.*)\)", item).groups() for item in said.split(", "))
+    return {item.split(" ")[0]: (re.search(r"\([>=]+ (.*)\)", item) or ["", "0"])[1] for item in said.split(", ")}
 
 
 def needed(programs):
@@ -30,6 +31,15 @@ def needed(programs):
         sys.exit(f"dpkg-shlibdeps: {done.stderr}")
     items = done.stdout.strip().removeprefix("shlibs:Depends=").split(", ")
     return {item.split(" ")[0]: (re.search(r"\(>= (.*)\)", item) or ["", "0"])[1] for item in items}
+
+
+def of_service():
+    """Packages with the programs that the unit starts beside waymark's own; all but essential ones have to be declared."""
+    unit = (ROOT / "config/waymark.service").read_text()
+    programs = {path for path in re.findall(r"^Exec\w+=[-+@!:]*(/\S+)", unit, re.MULTILINE) if not path.startswith("/usr/bin/waymark")}
+    owners = {subprocess.run(["dpkg", "-S", path], capture_output=True, text=True, check=True).stdout.split(":")[0] for path in programs}
+    return {p: "0" for p in owners
+            if subprocess.run(["dpkg-query", "-W", "-f=${Essential}", p], capture_output=True, text=True, check=True).stdout != "yes"}
 
 
 def older(a, b):
@@ -49,16 +59,18 @@ def main():
     components += [(name, [program]) for name, program in (("SIM", simulate), ("ROS2", bridge), ("LIBRARY", library)) if program.exists()]
     for component, programs in components:
         says, needs = declared(component), needed(programs)
+        if component == "RUNTIME":
+            needs |= of_service()
         says.pop("waymark", None)
         for package, version in needs.items():
             if package not in says:
-                print(f"{component}: {package} (>= {version}) is linked and not declared")
+                print(f"{component}: {package} (>= {version}) is linked or started and not declared")
                 offences += 1
             elif older(says[package], version):
                 print(f"{component}: {package} (>= {says[package]}) is declared, {version} is needed")
                 offences += 1
         for package in says.keys() - needs.keys():
-            print(f"{component}: {package} is declared and not linked")
+            print(f"{component}: {package} is declared, not linked and not started")
             offences += 1
         print(f"{component}: {len(needs)} packages: {', '.join(sorted(needs))}")
     return 1 if offences else 0

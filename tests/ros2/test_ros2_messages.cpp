@@ -134,6 +134,20 @@ TEST(test_stamps) {
   TEST_ASSERT_EQUAL_INT64(1'500'000'000, from_time(to_time(1'500'000'000)));
 }
 
+TEST(test_a_pose_of_a_desk_with_another_clock_is_of_now) {
+  const int64_t now_ns = 100 * WM_NS_PER_S;
+  for (const int64_t off_ns : {-9 * WM_NS_PER_S, -50 * WM_NS_PER_MS, int64_t{0}, 50 * WM_NS_PER_MS, 9 * WM_NS_PER_S}) {
+    int64_t t_ns = 1;
+    TEST_ASSERT_FALSE(given_now(now_ns + off_ns, now_ns, &t_ns).has_value());
+    TEST_ASSERT_EQUAL_INT64(0, t_ns);
+  }
+  int64_t t_ns = 1;
+  TEST_ASSERT_FALSE(given_now(0, now_ns, &t_ns).has_value());  // without a stamp
+  TEST_ASSERT_EQUAL_INT64(0, t_ns);
+  TEST_ASSERT_TRUE(given_now(now_ns - 11 * WM_NS_PER_S, now_ns, &t_ns)->find("11 s behind") != std::string::npos);
+  TEST_ASSERT_TRUE(given_now(now_ns + 3600 * WM_NS_PER_S, now_ns, &t_ns)->find("3600 s ahead of") != std::string::npos);
+}
+
 TEST(test_silence_is_a_stale_diagnostic) {
   Diagnostics texts;
   static wm_health health{};

@@ -220,7 +220,9 @@ Fault Bridge::send_row(const char *stream, const char *channel, const Time &stam
 Fault Bridge::take_initialpose(const PoseStamped &message) {
   wm_set_pose pose{};
   if (Fault fault = set_pose_of(message, wishes_.frames.map, &pose)) return fault;
-  const int64_t t_ns = monotonic_stamp(message.header.stamp, utc_offset_ns());
+  int64_t t_ns = 0;
+  if (Fault fault = given_now(monotonic_stamp(message.header.stamp, utc_offset_ns()), clock_ns(CLOCK_MONOTONIC), &t_ns))
+    return fault;
   return publish("SET_POSE", wm_lcm_set_pose(&pose, t_ns, bytes_, sizeof bytes_));
 }
 

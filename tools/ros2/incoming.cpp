@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <initializer_list>
 #include <limits>
 
@@ -41,6 +42,17 @@ Fault read(const RosPose &from, Eigen::Isometry3d *out) {
 int64_t monotonic_stamp(const Time &stamp, int64_t utc_offset_ns) {
   const int64_t utc_ns = from_time(stamp);
   return utc_ns == 0 ? 0 : utc_ns - utc_offset_ns;
+}
+
+Fault given_now(int64_t t_ns, int64_t now_ns, int64_t *out) {
+  constexpr int64_t kMost_ns = 10 * WM_NS_PER_S;
+  *out = 0;
+  if (t_ns == 0 || (t_ns - now_ns <= kMost_ns && now_ns - t_ns <= kMost_ns)) return std::nullopt;
+  char text[160];
+  (void)std::snprintf(text, sizeof text,
+                      "its stamp is %.0f s %s this computer's clock: set the clocks (NTP), or send a stamp of 0",
+                      std::fabs(static_cast<double>(t_ns - now_ns) * 1e-9), t_ns > now_ns ? "ahead of" : "behind");
+  return text;
 }
 
 Fault set_pose_of(const PoseStamped &message, const std::string &map_frame, wm_set_pose *out) {

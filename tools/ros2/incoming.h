@@ -20,6 +20,9 @@ using Fault = std::optional<std::string>;
 [[nodiscard]] int64_t monotonic_stamp(const Time &stamp, int64_t utc_offset_ns);
 
 // `t_ns` 0: now. Without a covariance the sigmas are those of RViz's tool.
+// The stamp of a pose that a person gives: 0, which is now for a run, where it is within 10 s of `now_ns`: the desk's
+// clock is another one. A fault beyond: then one of the clocks is wrong, or the message is old.
+[[nodiscard]] Fault given_now(int64_t t_ns, int64_t now_ns, int64_t *out);
 [[nodiscard]] Fault set_pose_of(const PoseStamped &message, const std::string &map_frame, wm_set_pose *out);
 // Speeds of the twist, which is in the frame child_frame_id.
 [[nodiscard]] Fault motion_of(const Odometry &message, wm_stream_row *out);

@@ -3,9 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <memory>
+#include <new>
 #include <nlohmann/json.hpp>
 
 extern "C" {
+#include "cli/watch/metrics.h"
 #include "findings/findings.h"
 }
 
@@ -73,6 +78,7 @@ Json source_json(const wm_source_health &s) {
 
 void Live::take(const std::string &what, const void *message, size_t length, int64_t now_ns) {
   if (what == "POSE") take_pose(message, length, now_ns);
+  if (what == "REFUSED") watch_refused(&seen_, message, length);
   if (what == "HEALTH") watch_health(&seen_, message, length, now_ns);
   if (what == "INNOVATION") take_innovation(message, length);
   if (what == "OBSERVATIONS") take_sightings(message, length, now_ns);
@@ -334,6 +340,18 @@ std::string Live::state(int64_t now_ns, const Has &has) const {
   const bool are_old = now_ns - std::max(particles_.heard_ns, hypotheses_.heard_ns) >= kPlacesShown_ns;
   if (has.places != places_version_ || are_old) out["places"] = places_json(now_ns);
   return out.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+std::string Live::metrics(int64_t now_ns) const {
+  char *text = nullptr;
+  size_t bytes = 0;
+  FILE *to = open_memstream(&text, &bytes);
+  if (to == nullptr) throw std::bad_alloc();
+  watch_metrics(&seen_, now_ns, to);
+  const bool is_whole = std::fclose(to) == 0;
+  const std::unique_ptr<char, decltype(&std::free)> held(text, std::free);
+  if (!is_whole || !held) throw std::bad_alloc();
+  return {held.get(), bytes};
 }
 
 }  // namespace wm::tools

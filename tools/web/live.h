@@ -37,6 +37,8 @@ class Live {
 
   // The state at `now_ns` on this computer's monotonic clock, in one line.
   [[nodiscard]] std::string state(int64_t now_ns, const Has &has) const;
+  // Metrics in Prometheus' text format.
+  [[nodiscard]] std::string metrics(int64_t now_ns) const;
   // The pose that the run had at a stamp; empty where it had none.
   [[nodiscard]] std::optional<Pose> pose_at_stamp(int64_t t_ns) const;
   // All landmarks: the map's and the robot's own.

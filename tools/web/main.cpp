@@ -50,7 +50,7 @@ void on_message(const lcm_recv_buf_t *message, const char *channel, void *contex
 
 void listen_to(lcm_t *lcm, Shown *shown) {
   for (const char *what :
-       {"POSE", "HEALTH", "INNOVATION", "OBSERVATIONS", "LANDMARKS", "MAP", "PARTICLES", "HYPOTHESES"}) {
+       {"POSE", "HEALTH", "INNOVATION", "OBSERVATIONS", "LANDMARKS", "MAP", "PARTICLES", "HYPOTHESES", "REFUSED"}) {
     // The channel is a pattern there: a prefix is meant letter by letter.
     std::string pattern;
     for (const char c : shown->prefix + what)
@@ -78,6 +78,10 @@ WebAnswer answer(const WebRequest &request, Shown *shown, Pictures *pictures, co
                   request.number("places", 0)};
     const std::lock_guard<std::mutex> hold(shown->lock);
     return json(std::make_shared<const std::string>(shown->live.state(wm_monotonic_ns(), has)));
+  }
+  if (request.path == "/metrics") {
+    const std::lock_guard<std::mutex> hold(shown->lock);
+    return file("text/plain; version=0.0.4; charset=utf-8", shown->live.metrics(wm_monotonic_ns()));
   }
   if (request.path == "/picture.json") {
     auto picture = pictures->newest(request.number("source", 0), request.number("number", -1));

@@ -24,11 +24,34 @@ void watch_pose(watch *self, const void *message, size_t length, wm_time_ns now_
   self->pose_at_ns = now_ns;
 }
 
+void watch_refused(watch *self, const void *message, size_t length) {
+  char source[WM_HEALTH_NAME_MAX], reason[WM_HEALTH_REASON_MAX];
+  if (wm_lcm_read_refused(message, length, source, reason)) {
+    self->not_understood++;
+    return;
+  }
+  watch_reason *to = self->reasons;
+  const watch_reason *end = self->reasons + WM_HEALTH_SOURCES_MAX;
+  while (to < end && to->source[0] && strcmp(to->source, source) != 0) to++;
+  if (to == end) return;  // a run has no more sources
+  memcpy(to->source, source, sizeof source);
+  memcpy(to->reason, reason, sizeof reason);
+}
+
+// A health message has no texts.
+static void add_reasons(watch *self) {
+  for (uint32_t i = 0; i < self->health.source_count; i++)
+    for (const watch_reason *from = self->reasons; from < self->reasons + WM_HEALTH_SOURCES_MAX; from++)
+      if (from->source[0] && strcmp(from->source, self->health.sources[i].name) == 0)
+        memcpy(self->health.refused_because[i], from->reason, sizeof from->reason);
+}
+
 void watch_health(watch *self, const void *message, size_t length, wm_time_ns now_ns) {
   if (wm_lcm_read_health(message, length, &self->health)) {
     self->not_understood++;
     return;
   }
+  add_reasons(self);
   self->found.count = self->found.dropped = 0;
   wm_health_findings(&self->health, &self->found);
   self->has_health = 1;

@@ -9,6 +9,11 @@
 #include "waymark/health.h"
 #include "waymark/pose.h"
 
+// Why data of a source are refused.
+typedef struct watch_reason {
+  char source[WM_HEALTH_NAME_MAX], reason[WM_HEALTH_REASON_MAX];
+} watch_reason;
+
 typedef struct watch {
   wm_published pose;
   wm_health health;
@@ -19,10 +24,12 @@ typedef struct watch {
   double nis;  // mean squared innovation by its own variance, of about the last hundred; 1 is expected
   uint64_t innovations;
   uint64_t not_understood;  // messages of another version
+  watch_reason reasons[WM_HEALTH_SOURCES_MAX];
 } watch;
 
 void watch_pose(watch *self, const void *message, size_t length, wm_time_ns now_ns);
 void watch_health(watch *self, const void *message, size_t length, wm_time_ns now_ns);
+void watch_refused(watch *self, const void *message, size_t length);
 void watch_innovation(watch *self, const void *message, size_t length);
 // Whether the observations agree with the estimator's covariance, in words.
 const char *watch_consistency(const watch *self);

@@ -21,6 +21,7 @@ extern "C" {
 #define WM_HEALTH_COUNTERS_MAX 16
 #define WM_HEALTH_NAME_MAX 48
 #define WM_HEALTH_HOST_MAX 64
+#define WM_HEALTH_REASON_MAX 256
 #define WM_STATUS_COUNT (WM_INTERNAL + 1)
 
 // A live source's device. A recording has none.
@@ -93,6 +94,7 @@ typedef struct wm_health {
   wm_calibration_value more_calibration[WM_HEALTH_CALIBRATION_MAX];
   uint32_t alarm_count;
   wm_alarm alarms[WM_ALARMS_MAX];
+  char refused_because[WM_HEALTH_SOURCES_MAX][WM_HEALTH_REASON_MAX];  // of each source's first unusable datum; "": none
 } wm_health;
 
 static inline uint32_t wm_health_calibration_count(const wm_health *health) {

@@ -26,6 +26,8 @@ size_t wm_lcm_pose(const wm_published *published, wm_time_ns sent_ns, void *out,
 // Name of the last calibration value of a message that has no room for all: how many are left out.
 #define WM_LCM_CALIBRATION_LEFT "calibration.left_out"
 size_t wm_lcm_health(const wm_health *health, void *out, size_t capacity);
+// Why data of the source `index` were refused: health->refused_because.
+size_t wm_lcm_refused(const wm_health *health, uint32_t index, void *out, size_t capacity);
 // Messages to the robot: NULL and *out (t_ns 0: now; arrival unset), or a text with the fault. Constant cost.
 const char *wm_lcm_read_set_pose(const void *message, size_t length, wm_event *out);
 const char *wm_lcm_read_reset(const void *message, size_t length, wm_event *out);
@@ -37,6 +39,9 @@ const char *wm_lcm_read_sightings(const void *message, size_t length, char *sens
 // Messages of a run, for viewers: NULL, or a text with the fault.
 const char *wm_lcm_read_pose(const void *message, size_t length, wm_published *out);
 const char *wm_lcm_read_health(const void *message, size_t length, wm_health *out);
+// A refused_t: the source's name and the reason, each terminated.
+const char *wm_lcm_read_refused(const void *message, size_t length, char source[WM_HEALTH_NAME_MAX],
+                                char reason[WM_HEALTH_REASON_MAX]);
 const char *wm_lcm_read_innovation(const void *message, size_t length, wm_innovation *out);
 // A message to the robot (`t_ns` 0: now).
 size_t wm_lcm_set_pose(const wm_set_pose *pose, wm_time_ns t_ns, void *out, size_t capacity);

@@ -236,6 +236,19 @@ TEST(rubbish_and_other_types_are_refused) {
   TEST_ASSERT_EQUAL_UINT64(2, source->counts.malformed);
 }
 
+// Whole but for its end, as a sender makes it whose lists or names are too short.
+TEST(a_short_message_is_called_short) {
+  uint8_t message[200];
+  begin_motion();
+  const wm_stream_row row = {.t_ns = wm_monotonic_ns()};
+  const size_t length = wm_lcm_row("motion", &row, message, sizeof message);
+  TEST_ASSERT_GREATER_THAN_size_t(8, length);
+  lcm_publish(lcm, "T_MOTION", message, (unsigned)length - 1);
+  assert_refused("T_MOTION: is shorter than motion_t of this version: are all its numbers there?");
+  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(source->counts.device_note, "what comes is refused"), source->counts.device_note);
+  TEST_ASSERT_EQUAL_UINT32(1, source->counts.news);  // said once
+}
+
 TEST(stamps_of_another_clock_are_refused) {
   static const struct {
     wm_time_ns off_ns;

@@ -519,6 +519,7 @@ TEST(test_one_stamp_far_ahead_makes_nothing_late) {
   ok(waymark_health(started, &health, sizeof health, &err));
   TEST_ASSERT_EQUAL_UINT64(0, health.sources[0].late);
   TEST_ASSERT_EQUAL_UINT64(19, health.sources[0].malformed);  // none is left out without a count
+  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(health.refused_because[0], "60.0"), health.refused_because[0]);
 }
 
 TEST(test_after_a_pause_data_are_taken_again) {

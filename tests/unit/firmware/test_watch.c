@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "cli/watch/metrics.h"
 #include "cli/watch/watch.h"
 #include "common/suite.h"
 #include "waymark/lcm_messages.h"
@@ -12,7 +13,7 @@ static watch seen;
 static wm_health health;
 static wm_published pose;
 static uint8_t bytes[WM_LCM_MESSAGE_MAX];
-static char why[240], shown[4000];
+static char why[240], shown[20000];
 
 void setUp(void) {
   memset(&seen, 0, sizeof seen);
@@ -147,4 +148,76 @@ TEST(innovations_give_a_verdict) {
   i.observed = 0;
   for (int n = 0; n < 2000; n++) watch_innovation(&seen, bytes, wm_lcm_innovation(&i, bytes, sizeof bytes));
   TEST_ASSERT_EQUAL_STRING("observations are further off than the covariance allows", watch_consistency(&seen));
+}
+
+TEST(refused_data_have_their_reason) {
+  char source[WM_HEALTH_NAME_MAX], reason[WM_HEALTH_REASON_MAX];
+  health.sources[0].malformed = 235;
+  health.sources[0].device = WM_DEVICE_ABSENT;
+  (void)snprintf(health.refused_because[0], sizeof health.refused_because[0], "T_CAN: t_ns is 3600 s ahead\033[2J");
+  size_t length = wm_lcm_refused(&health, 0, bytes, sizeof bytes);
+  TEST_ASSERT_NULL(wm_lcm_read_refused(bytes, length, source, reason));
+  TEST_ASSERT_EQUAL_STRING("can", source);
+  TEST_ASSERT_EQUAL_STRING("T_CAN: t_ns is 3600 s ahead?[2J", reason);  // no control character reaches a terminal
+  TEST_ASSERT_NOT_NULL(wm_lcm_read_refused(bytes, length - 1, source, reason));
+  watch_refused(&seen, bytes, length);
+  watch_refused(&seen, "rubbish", 7);
+  TEST_ASSERT_EQUAL_UINT64(1, seen.not_understood);
+  (void)state_of_health();
+  FILE *f = fmemopen(shown, sizeof shown, "w");
+  watch_print(&seen, 10 * WM_NS_PER_S, f);
+  (void)fclose(f);
+  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(shown, "235 of 235 could not be read; the first: T_CAN: t_ns is 3600 s ahead"),
+                               shown);
+  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(shown, "nothing that came from it is usable"), shown);
+  for (int i = 0; i < 100; i++) {  // any number of senders
+    (void)snprintf(health.sources[0].name, WM_HEALTH_NAME_MAX, "%d", i);
+    watch_refused(&seen, bytes, wm_lcm_refused(&health, 0, bytes, sizeof bytes));
+  }
+}
+
+static const char *metrics_at(wm_time_ns now_ns) {
+  FILE *f = fmemopen(shown, sizeof shown, "w");
+  watch_metrics(&seen, now_ns, f);
+  TEST_ASSERT_LESS_THAN((long)sizeof shown, ftell(f));
+  (void)fclose(f);
+  return shown;
+}
+
+TEST(a_run_is_metrics) {
+  TEST_ASSERT_EQUAL_STRING("# HELP waymark_up 1 where a run is heard.\n# TYPE waymark_up gauge\nwaymark_up 0\n",
+                           metrics_at(0));
+  pose.now.covariance[wm_cov_index(0, 0)] = 0.0009, pose.now.covariance[wm_cov_index(1, 1)] = 0.0016;
+  watch_pose(&seen, bytes, wm_lcm_pose(&pose, 0, bytes, sizeof bytes), 10 * WM_NS_PER_S);
+  (void)snprintf(health.sources[1].name, WM_HEALTH_NAME_MAX, "a\"b\\c");
+  health.deadlines_missed = 12;
+  health.sources[0].received = UINT64_C(9007199254740993);  // whole, beyond what a double holds
+  health.lost_probability = (double)NAN;
+  (void)snprintf(health.host, sizeof health.host, "robot-7");
+  health.pid = 42, health.run_id = 0xabc;
+  (void)state_of_health();
+  const char *const lines[] = {"\nwaymark_up 1\n",
+                               "\nwaymark_state{state=\"tracking\"} 1\n",
+                               "\nwaymark_state{state=\"lost\"} 0\n",
+                               "\nwaymark_pose_sigma_meters 0.05\n",
+                               "\nwaymark_pose_age_seconds 1\n",
+                               "\n# TYPE waymark_deadlines_missed_total counter\nwaymark_deadlines_missed_total 12\n",
+                               "\nwaymark_lost_probability NaN\n",
+                               "\nwaymark_reckoning_left_meters 41.6\n",
+                               "\nwaymark_source_received_total{source=\"can\"} 9007199254740993\n",
+                               "\nwaymark_source_rejected_total{source=\"a\\\"b\\\\c\",verdict=\"gate\"} 7\n",
+                               "\nwaymark_source_device{source=\"can\",state=\"works\"} 1\n",
+                               "\nwaymark_run_info{host=\"robot-7\",pid=\"42\",run=\"0000000000000abc\"} 1\n"};
+  const char *text = metrics_at(11 * WM_NS_PER_S);
+  for (size_t i = 0; i < sizeof lines / sizeof lines[0]; i++)
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, lines[i]), lines[i]);
+  for (const char *at = text; (at = strstr(at, "# TYPE ")) != NULL; at++) {  // each name once
+    char name[80];
+    TEST_ASSERT_EQUAL(1, sscanf(at, "# TYPE %70s", name));
+    (void)strcat(name, " ");
+    const char *again = strstr(at + 7 + strlen(name), name);
+    TEST_ASSERT_TRUE_MESSAGE(!again || strncmp(again - 7, "# TYPE ", 7) != 0, name);
+  }
+  TEST_ASSERT_NOT_NULL(strstr(metrics_at(13 * WM_NS_PER_S), "waymark_up 0"));  // a run that fell silent
+  TEST_ASSERT_NULL(strstr(shown, "waymark_state"));
 }

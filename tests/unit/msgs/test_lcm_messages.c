@@ -140,6 +140,27 @@ TEST(counts_of_sightings_beyond_the_room_are_refused) {
   }
 }
 
+// As a sender makes it whose name is not padded, or whose lists are short; and another type.
+TEST(short_sightings_are_called_short) {
+  char sensor[WM_NAME_MAX];
+  wm_time_ns t_ns;
+  size_t count = 99;
+  static wm_sighting read[WM_LCM_OBSERVATIONS_MAX];
+  static const waymark_observations_t kNone;
+  const int length = waymark_observations_t_encode(bytes, 0, sizeof bytes, &kNone);
+  const char *why = wm_lcm_read_sightings(bytes, (size_t)length - 27, sensor, &t_ns, read, &count);
+  TEST_ASSERT_EQUAL_STRING(
+      "is shorter than observations_t of this version: the name has 32 bytes, padded with zeros, and each list 64 "
+      "numbers",
+      why);
+  TEST_ASSERT_EQUAL_size_t(0, count);
+  bytes[0] ^= 1;
+  TEST_ASSERT_EQUAL_STRING("is not an observations_t of this version",
+                           wm_lcm_read_sightings(bytes, (size_t)length, sensor, &t_ns, read, &count));
+  TEST_ASSERT_EQUAL_STRING("is not an observations_t of this version",
+                           wm_lcm_read_sightings(bytes, 0, sensor, &t_ns, read, &count));
+}
+
 // By the table: what travels arrives, the rest is absent.
 TEST(each_number_of_a_sighting_arrives) {
   wm_event sent = {.t_ns = 1, .kind = WM_EVENT_SIGHTING, .as.sighting = {.landmark_id = 7}};

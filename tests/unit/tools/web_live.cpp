@@ -89,6 +89,17 @@ TEST(names_of_strangers_are_text) {
   TEST_ASSERT_TRUE(state(live)["health"]["sources"][0]["name"].is_string());
 }
 
+TEST(a_run_is_metrics) {
+  Live live(kNowhere);
+  TEST_ASSERT_TRUE(live.metrics(kSecond).find("\nwaymark_up 0\n") != std::string::npos);
+  const Bytes health = health_bytes("lidar\"");
+  live.take("HEALTH", health.data(), health.size(), kSecond);
+  const std::string text = live.metrics(kSecond);
+  TEST_ASSERT_TRUE(text.find("\nwaymark_up 1\n") != std::string::npos);
+  TEST_ASSERT_TRUE(text.find("\nwaymark_source_late_total{source=\"lidar\\\"\"} 3\n") != std::string::npos);
+  TEST_ASSERT_EQUAL('\n', text.back());
+}
+
 // A browser that takes what is new each time has what the server has.
 TEST(the_trail_is_bounded_and_whole) {
   Live live(kNowhere);

@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
+// Stamps of messages on this computer's monotonic clock.
+#ifndef WAYMARK_LIVE_LCM_STAMP_H
+#define WAYMARK_LIVE_LCM_STAMP_H
+
+#include <stddef.h>
+
+#include "waymark/time.h"
+
+// NULL, or why a stamp can't be of a message that arrives now; in `text` where it has figures.
+const char *lcm_stamp_fault(wm_time_ns t_ns, wm_time_ns arrival_ns, char *text, size_t capacity);
+
+#endif
