@@ -94,30 +94,36 @@ static void add_cause(const wm_health *h, char *why, size_t why_bytes) {
   add(why, why_bytes, name, wm_cause_text(h->cause));
 }
 
-// Every source with a fault.
-static void list_troubles(const wm_health *h, char *why, size_t why_bytes) {
+// Every source with a fault or in silence; returns how many faults there are. Silence is none: a sensor may be there
+// only in places. Where it is the motion's, no fresh motion comes.
+static int list_troubles(const watch *self, char *why, size_t why_bytes) {
+  const wm_health *h = &self->health;
+  int faults = 0;
   for (uint32_t i = 0; i < h->source_count; i++) {
     const wm_source_health *s = &h->sources[i];
     if (s->device > WM_DEVICE_WORKS)
-      add(why, why_bytes, s->name, wm_device_state_name(s->device));
+      add(why, why_bytes, s->name, wm_device_state_name(s->device)), faults++;
     else if (s->stale)
       add(why, why_bytes, s->name, s->received ? "silent" : "never spoke");
   }
-  if (h->cause) add_cause(h, why, why_bytes);
-  if (h->motion_health) add(why, why_bytes, "motion sensor", "broken");
-  if (h->other_runs > 0) add(why, why_bytes, "another run", "on the same channels");
+  if (h->cause) add_cause(h, why, why_bytes), faults++;
+  if (self->has_pose && (self->pose.status_flags & WM_PUB_MOTION_STALE))
+    add(why, why_bytes, "motion", "stale"), faults++;
+  if (h->motion_health) add(why, why_bytes, "motion sensor", "broken"), faults++;
+  if (h->other_runs > 0) add(why, why_bytes, "another run", "on the same channels"), faults++;
+  return faults;
 }
 
 const char *watch_state(const watch *self, wm_time_ns now_ns, char *why, size_t why_bytes) {
   why[0] = '\0';
   if (!self->has_health || now_ns - self->health_at_ns > SILENT_NS) return self->has_health ? "silent" : "waiting";
-  list_troubles(&self->health, why, why_bytes);
+  const int faults = list_troubles(self, why, why_bytes);
   switch (self->health.state) {
     case WM_STATE_SEARCHING: return why[0] ? "waiting for sensors" : "searching";
     case WM_STATE_LOST: return "lost";
     case WM_STATE_DEGRADED: return "degraded";
-    case WM_STATE_TRACKING: return why[0] ? "degraded" : "tracking";
-    default: return why[0] ? "degraded" : "dead reckoning";
+    case WM_STATE_TRACKING: return faults ? "degraded" : "tracking";
+    default: return faults ? "degraded" : "dead reckoning";
   }
 }
 

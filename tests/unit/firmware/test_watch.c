@@ -52,6 +52,23 @@ TEST(the_state_says_what_is_wrong) {
   TEST_ASSERT_EQUAL_STRING("silent", watch_state(&seen, 20 * WM_NS_PER_S, why, sizeof why));
 }
 
+TEST(a_source_that_is_there_only_in_places_is_no_fault) {
+  health.sources[1].stale = 1;
+  TEST_ASSERT_EQUAL_STRING("tracking", state_of_health());
+  TEST_ASSERT_EQUAL_STRING("edges:front never spoke", why);
+  health.state = WM_STATE_DEAD_RECKONING;
+  health.sources[1].received = 5;
+  TEST_ASSERT_EQUAL_STRING("dead reckoning", state_of_health());
+  TEST_ASSERT_EQUAL_STRING("edges:front silent", why);
+  // The motion's silence is one.
+  health.state = WM_STATE_TRACKING;
+  health.sources[0].stale = health.sources[0].received = 1;
+  pose.status_flags = WM_PUB_MOTION_STALE;
+  watch_pose(&seen, bytes, wm_lcm_pose(&pose, 0, bytes, sizeof bytes), 10 * WM_NS_PER_S);
+  TEST_ASSERT_EQUAL_STRING("degraded", state_of_health());
+  TEST_ASSERT_EQUAL_STRING("can silent, edges:front silent, motion stale", why);
+}
+
 TEST(a_message_is_read_as_it_was_sent) {
   wm_health read;
   wm_published read_pose;
