@@ -12,6 +12,7 @@
 #include "cli/commands.h"
 #include "cli/options.h"
 #include "fusion/assembly.h"
+#include "fusion/choice.h"
 #include "fusion/pipeline.h"
 #include "live/robot.h"
 #include "rt/arena.h"
@@ -222,8 +223,18 @@ static void ended(void *context, const wm_assembly *assembly, const wm_run_repor
   if (may_have_a_cause(self->found, before) && !self->is_quick) ask_for_causes(self);
 }
 
-static void check_recording(const wm_config *config, const causes_question *question, int is_quick,
-                            wm_findings *found) {
+// Where the configuration names no estimator: which one it is, and what is wrong with its parameters.
+static wm_status choose_estimator(wm_config *config, wm_recording *recording, wm_findings *found, wm_error *err) {
+  if (config->estimator) return WM_OK;
+  const wm_status status = wm_choose_estimator(config, recording, NULL, NULL, err);
+  if (status != WM_OK) return status;
+  fact("estimator    %s (%s); chosen: %s\n", config->estimator->name, config->estimator->about,
+       config->estimator_because);
+  check_config(config, found);
+  return WM_OK;
+}
+
+static void check_recording(wm_config *config, const causes_question *question, int is_quick, wm_findings *found) {
   static checked self;
   static wm_run_report report;
   wm_error err = {0};
@@ -234,6 +245,12 @@ static void check_recording(const wm_config *config, const causes_question *ques
       wm_recording_open(question->recording, &config->overrides, take_note, found, &self.recording, &err);
   if (status != WM_OK) {
     wm_find_error(found, "recording", &err);
+    return;
+  }
+  status = choose_estimator(config, self.recording, found, &err);
+  if (status != WM_OK) {
+    wm_find_error(found, "config", &err);
+    wm_recording_close(self.recording);
     return;
   }
   progress_line progress;
@@ -262,7 +279,7 @@ static wm_status take_memory(wm_assembly *assembly, wm_arena *arena, wm_error *e
   return status == WM_OK ? wm_vision_start(assembly->vision, err) : status;
 }
 
-static void check_devices(const wm_config *config, wm_findings *found) {
+static void check_devices(wm_config *config, wm_findings *found) {
   static wm_assembly assembly;
   static const source_facts kNone;
   wm_error err = {0};
@@ -273,6 +290,12 @@ static void check_devices(const wm_config *config, wm_findings *found) {
     return;
   }
   wm_arena arena = {0};
+  status = choose_estimator(config, recording, found, &err);
+  if (status != WM_OK) {
+    wm_find_error(found, "config", &err);
+    wm_recording_close(recording);
+    return;
+  }
   status = wm_assemble(config, recording, 1, &assembly, &err);
   check_setup(&assembly, recording, status, found);
   if (status == WM_OK) status = take_memory(&assembly, &arena, &err);
@@ -330,11 +353,14 @@ int command_check(int argc, char *const *argv) {
   }
   tells_facts = !as_json;
   wm_config config;
-  if (wm_config_load(words[0], &config, &err) != WM_OK) {
+  if (wm_config_load_undecided(words[0], &config, &err) != WM_OK) {
     wm_find_error(&found, "config", &err);
     return tell(&found);
   }
-  fact("config       %s: estimator %s (%s)\n", words[0], config.estimator->name, config.estimator->about);
+  if (config.estimator)
+    fact("config       %s: estimator %s (%s)\n", words[0], config.estimator->name, config.estimator->about);
+  else
+    fact("config       %s: estimator by sources and maps\n", words[0]);
   wm_status status = override_path(config.overrides.landmarks, landmarks, &err);
   if (status == WM_OK) status = override_path(config.overrides.calibration, calibration, &err);
   if (status == WM_OK) status = override_path(config.overrides.map, map, &err);
@@ -342,7 +368,7 @@ int command_check(int argc, char *const *argv) {
     wm_config_free(&config);
     return complain(&err);
   }
-  check_config(&config, &found);
+  if (config.estimator || (count == 1 && wm_devices_count(&config.devices) == 0)) check_config(&config, &found);
   if (count > 1)
     check_recording(&config, &(causes_question){words[0], words[1], landmarks, calibration, map, apply_to}, is_quick,
                     &found);

@@ -81,7 +81,7 @@ int command_doctor(int argc, char *const *argv) {
   }
   if (count == 0) return look(NULL, seconds, as_json);
   wm_config config;
-  if (wm_config_load(words[0], &config, &err) != WM_OK) {
+  if (wm_config_load_undecided(words[0], &config, &err) != WM_OK) {
     (void)complain(&err);
     return EXIT_USAGE;
   }

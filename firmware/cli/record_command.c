@@ -67,7 +67,7 @@ int command_record(int argc, char *const *argv) {
   (void)sigaction(SIGINT, &action, NULL);
   (void)sigaction(SIGTERM, &action, NULL);
   wm_config config;
-  if (wm_config_load(config_path, &config, &err) != WM_OK) {
+  if (wm_config_load_undecided(config_path, &config, &err) != WM_OK) {
     (void)complain(&err);
     return EXIT_USAGE;
   }

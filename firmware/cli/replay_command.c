@@ -9,6 +9,7 @@
 #include <wm_version.h>
 #include "cli/commands.h"
 #include "cli/options.h"
+#include "fusion/choice.h"
 #include "output/event_log.h"
 #include "rt/clock.h"
 #include "waymark/codec.h"
@@ -87,11 +88,11 @@ static void tell_unused(void *context, const wm_assembly *assembly, wm_status st
 static int replay_recording(const arguments *args) {
   wm_error err = {0};
   wm_config config;
-  if (wm_config_load(args->config, &config, &err) != WM_OK) {
+  if (wm_config_load_undecided(args->config, &config, &err) != WM_OK) {
     (void)complain(&err);
     return EXIT_USAGE;
   }
-  wm_config_each_warning(&config, print_note, NULL);
+  if (config.estimator) wm_config_each_warning(&config, print_note, NULL);
   if (args->lost) {
     config.has_initial_pose = 1;
     wm_start_init(&config.initial_pose);
@@ -101,6 +102,7 @@ static int replay_recording(const arguments *args) {
   if (status == WM_OK) status = override_path(config.overrides.calibration, args->calibration, &err);
   if (status == WM_OK) status = override_path(config.overrides.map, args->map, &err);
   if (status == WM_OK) status = wm_recording_open(args->what, &config.overrides, print_warning, NULL, &recording, &err);
+  if (status == WM_OK) status = wm_choose_estimator(&config, recording, print_note, NULL, &err);
   if (status == WM_OK && !args->force) status = put_run_aside(args->out, wm_recording_name(recording), &err);
   int code = EXIT_DONE;
   if (status == WM_OK) {

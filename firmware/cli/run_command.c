@@ -9,6 +9,7 @@
 
 #include "cli/commands.h"
 #include "cli/options.h"
+#include "fusion/choice.h"
 #include "live/record.h"
 #include "live/robot.h"
 #include "live/run.h"
@@ -108,9 +109,9 @@ static void without_robot(wm_config *config, int resumes) {
 static wm_status open_all(const arguments *args, opened *out, wm_error *err) {
   wm_config *config = &out->config;
   memset(out, 0, sizeof *out);
-  wm_status status = wm_config_load(args->config, config, err);
+  wm_status status = wm_config_load_undecided(args->config, config, err);
   if (status != WM_OK) return err->status = WM_BAD_CONFIG;  // also for a missing file
-  wm_config_each_warning(config, print_note, NULL);
+  if (config->estimator) wm_config_each_warning(config, print_note, NULL);
   if (args->recording) without_robot(config, args->resumes);
   status = override_path(config->overrides.landmarks, args->landmarks, err);
   if (status == WM_OK) status = override_path(config->overrides.calibration, args->calibration, err);
@@ -119,6 +120,7 @@ static wm_status open_all(const arguments *args, opened *out, wm_error *err) {
     status = args->recording
                  ? wm_recording_open(args->recording, &config->overrides, print_warning, NULL, &out->recording, err)
                  : wm_robot_open(config, print_warning, NULL, &out->recording, err);
+  if (status == WM_OK) status = wm_choose_estimator(config, out->recording, print_note, NULL, err);
   if (status != WM_OK) close_all(out);
   return status;
 }

@@ -78,7 +78,7 @@ int command_stamps(int argc, char *const *argv) {
     return EXIT_USAGE;
   }
   wm_config config;
-  if (wm_config_load(words[0], &config, &err) != WM_OK) {
+  if (wm_config_load_undecided(words[0], &config, &err) != WM_OK) {
     (void)complain(&err);
     return EXIT_USAGE;
   }

@@ -26,13 +26,14 @@ static wm_status check_format(const wm_yaml_node *root, wm_error *err) {
   return status;
 }
 
-static wm_status read_estimator(const wm_yaml_node *root, wm_config *out, wm_error *err) {
+static wm_status read_estimator(const wm_yaml_node *root, int may_be_undecided, wm_config *out, wm_error *err) {
   const char *names[CONFIG_SECTIONS_MAX + 1] = {NULL};
   size_t count;
   const wm_estimator *const *all = wm_estimators(&count);
   for (size_t i = 0; i < count && i < CONFIG_SECTIONS_MAX; i++) names[i] = all[i]->name;
   wm_yaml_node node = wm_yaml_get(root, "estimator");
   int32_t chosen;
+  if (!wm_yaml_there(&node) && may_be_undecided) return WM_OK;
   wm_status status = wm_yaml_choice(&node, names, &chosen, err);
   if (status == WM_OK) out->estimator = all[chosen];
   return status;
@@ -195,7 +196,8 @@ static wm_status read_texts(const wm_yaml_node *root, wm_config *out, wm_error *
 }
 
 static wm_status allocate(wm_config *out, wm_error *err) {
-  const wm_param_table *table = &out->estimator->params;
+  static const wm_param_table kNone;  // undecided
+  const wm_param_table *table = out->estimator ? &out->estimator->params : &kNone;
   out->estimator_params = calloc(1, table->bytes + 1);
   out->motion = calloc(1, wm_motion_params_table.bytes + 1);
   out->sightings = calloc(1, wm_sighting_params_table.bytes + 1);
@@ -207,13 +209,14 @@ static wm_status allocate(wm_config *out, wm_error *err) {
   return WM_OK;
 }
 
-static wm_status read_all(const wm_yaml_node *root, int files_must_be_there, wm_config *out, wm_error *err) {
+static wm_status read_all(const wm_yaml_node *root, int files_must_be_there, int may_be_undecided, wm_config *out,
+                          wm_error *err) {
   if (!wm_yaml_is_map(root))
     return wm_yaml_fail(root, err, "a map that begins with 'format: waymark-config/1' is needed");
   wm_params_defaults(&wm_runtime_params_table, &out->runtime);
   wm_status status = check_format(root, err);
   if (status == WM_OK) status = check_top(root, out, err);
-  if (status == WM_OK) status = read_estimator(root, out, err);
+  if (status == WM_OK) status = read_estimator(root, may_be_undecided, out, err);
   if (status == WM_OK) status = allocate(out, err);
   if (status == WM_OK) status = read_sections(root, out, err);
   if (status == WM_OK) status = config_read_sources(root, out, err);
@@ -224,15 +227,15 @@ static wm_status read_all(const wm_yaml_node *root, int files_must_be_there, wm_
   return status == WM_OK ? read_start(root, out, err) : status;
 }
 
-static wm_status parse(const char *text, size_t length, const char *path, int files_must_be_there, wm_config *out,
-                       wm_error *err) {
+static wm_status parse(const char *text, size_t length, const char *path, int files_must_be_there, int may_be_undecided,
+                       wm_config *out, wm_error *err) {
   memset(out, 0, sizeof *out);
   snprintf(out->path, sizeof out->path, "%s", path);
   wm_yaml *doc;
   wm_status status = wm_yaml_parse(text, length, path, &doc, err);
   if (status != WM_OK) return status;
   wm_yaml_node root = wm_yaml_root(doc);
-  status = read_all(&root, files_must_be_there, out, err);
+  status = read_all(&root, files_must_be_there, may_be_undecided, out, err);
   wm_yaml_free(doc);
   char *kept = malloc(length + 1);
   if (status != WM_OK || !kept) {
@@ -243,16 +246,20 @@ static wm_status parse(const char *text, size_t length, const char *path, int fi
   memcpy(kept, text, length);
   kept[length] = '\0';
   out->text = kept;
-  out->text_length = length;
+  out->text_length = out->stated_length = length;
   return WM_OK;
 }
 
 wm_status wm_config_parse(const char *text, size_t length, const char *path, wm_config *out, wm_error *err) {
-  return parse(text, length, path, 1, out, err);
+  return parse(text, length, path, 1, 0, out, err);
+}
+
+wm_status wm_config_parse_undecided(const char *text, size_t length, const char *path, wm_config *out, wm_error *err) {
+  return parse(text, length, path, 1, 1, out, err);
 }
 
 wm_status wm_config_parse_logged(const char *text, size_t length, const char *path, wm_config *out, wm_error *err) {
-  const wm_status status = parse(text, length, path, 0, out, err);
+  const wm_status status = parse(text, length, path, 0, 0, out, err);
   if (status == WM_OK || !err) return status;
   const wm_error inside = *err;
   return wm_fail(err, status, "the event log's copy of %s", inside.text);
@@ -267,7 +274,7 @@ static int has_moved(const char *path, char moved[WM_PATH_MAX]) {
   return length > 0 && length < WM_PATH_MAX && access(path, F_OK) != 0 && access(moved, R_OK) == 0;
 }
 
-wm_status wm_config_load(const char *path, wm_config *out, wm_error *err) {
+static wm_status load(const char *path, int may_be_undecided, wm_config *out, wm_error *err) {
   char *text, moved[WM_PATH_MAX];
   size_t length;
   memset(out, 0, sizeof *out);
@@ -275,11 +282,62 @@ wm_status wm_config_load(const char *path, wm_config *out, wm_error *err) {
   const char *file = from_elsewhere ? moved : path;
   wm_status status = wm_text_read_file(file, CONFIG_BYTES_MAX, &text, &length, err);
   if (status != WM_OK) return status;
-  status = wm_config_parse(text, length, file, out, err);
+  status = parse(text, length, file, 1, may_be_undecided, out, err);
   free(text);
   const size_t used = strlen(out->warnings);
   if (from_elsewhere)
     (void)snprintf(out->warnings + used, sizeof out->warnings - used, "%s: has moved to %s, write that\n", path, moved);
+  return status;
+}
+
+wm_status wm_config_load(const char *path, wm_config *out, wm_error *err) { return load(path, 0, out, err); }
+
+wm_status wm_config_load_undecided(const char *path, wm_config *out, wm_error *err) { return load(path, 1, out, err); }
+
+// What `next` has read with its estimator; all else stays. Takes over, and leaves `next` to be freed.
+static void take_estimator(wm_config *self, wm_config *next) {
+  void *const params = self->estimator_params;
+  wm_motion_params *const motion = self->motion;
+  wm_sighting_params *const sightings = self->sightings;
+  char *const text = self->text;
+  self->estimator = next->estimator;
+  self->estimator_params = next->estimator_params;
+  self->motion = next->motion;
+  self->sightings = next->sightings;
+  self->text = next->text;
+  self->text_length = next->text_length;
+  memcpy(self->warnings, next->warnings, sizeof self->warnings);
+  next->estimator_params = params;
+  next->motion = motion;
+  next->sightings = sightings;
+  next->text = text;
+}
+
+wm_status wm_config_decide(wm_config *config, const wm_estimator *estimator, const char *because, wm_error *err) {
+  const size_t capacity = config->stated_length + WM_NAME_MAX + 16;
+  char *text = malloc(capacity);
+  wm_config *next = malloc(sizeof *next);
+  wm_status status = WM_OK;
+  if (!text || !next) {
+    status = wm_fail(err, WM_IO, "%s: no memory to read it", config->path);
+  } else {
+    memcpy(text, config->text, config->stated_length);
+    const int added =
+        snprintf(text + config->stated_length, capacity - config->stated_length, "\nestimator: %s\n", estimator->name);
+    status = parse(text, config->stated_length + (size_t)added, config->path, 0, 0, next, NULL);
+    if (status != WM_OK)  // the file's end takes no further key: it is in braces, or ends with `...`
+      status = wm_fail(err, WM_BAD_CONFIG,
+                       "%s: estimator: is left out, and can't be added at the file's end; write "
+                       "`estimator: %s`",
+                       config->path, estimator->name);
+  }
+  if (status == WM_OK) {
+    take_estimator(config, next);
+    (void)snprintf(config->estimator_because, sizeof config->estimator_because, "%s", because);
+    wm_config_free(next);
+  }
+  free(text);
+  free(next);
   return status;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A configuration names an estimator and its parameters. Calibration, landmarks, DBC and start pose of a robot or
-// recording come from the recording's folder unless the configuration names others. Read once at start.
+// A configuration names an estimator and its parameters, or leaves the estimator to sources and maps
+// (wm_choose_estimator). Calibration, landmarks, DBC and start pose of a robot or recording come from the recording's
+// folder unless the configuration names others. Read once at start.
 //
 //   format: waymark-config/1
 //   estimator: landmark_ekf
@@ -96,8 +97,10 @@ typedef struct wm_config {
   char path[WM_PATH_MAX];
   char *text;  // the file as read, for the event log
   size_t text_length;
-  const wm_estimator *estimator;
-  void *estimator_params;  // estimator->params.bytes bytes
+  const wm_estimator *estimator;  // NULL until wm_config_decide, where the file names none
+  void *estimator_params;         // estimator->params.bytes bytes
+  char estimator_because[160];    // why the program chose it; "": the file names it
+  size_t stated_length;           // of the text, without the estimator that wm_config_decide has added
   wm_motion_params *motion;
   wm_sighting_params *sightings;
   wm_runtime_params runtime;
@@ -125,6 +128,12 @@ typedef struct wm_config {
 // Each mistake is reported with file, line, key, value and what is allowed ("did you mean"). Allocates.
 wm_status wm_config_load(const char *path, wm_config *out, wm_error *err);
 wm_status wm_config_parse(const char *text, size_t length, const char *path, wm_config *out, wm_error *err);
+// As wm_config_load and wm_config_parse; `estimator:` may be left out, and is to be decided before anything runs.
+wm_status wm_config_load_undecided(const char *path, wm_config *out, wm_error *err);
+wm_status wm_config_parse_undecided(const char *text, size_t length, const char *path, wm_config *out, wm_error *err);
+// Takes an estimator for a file that names none, and reads its parameters. The text, which goes into event logs, names
+// it from then on. `because` is kept. Files and start that others have set since stay. May be called again.
+wm_status wm_config_decide(wm_config *config, const wm_estimator *estimator, const char *because, wm_error *err);
 // As wm_config_parse, for the text in an event log: the files that it names needn't be on this computer.
 wm_status wm_config_parse_logged(const char *text, size_t length, const char *path, wm_config *out, wm_error *err);
 void wm_config_free(wm_config *config);

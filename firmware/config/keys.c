@@ -13,7 +13,9 @@
 
 const config_key kConfigKeys[] = {
     {"format", "text", "needed", "`waymark-config/1`."},
-    {"estimator", "text", "needed", "Name of the estimator; its parameters stand under the key of its name."},
+    {"estimator", "text", "by sources and maps",
+     "Name of the estimator; its parameters stand under the key of its name. Left out, the program chooses "
+     "(docs/estimators.md), and reports which."},
     {"sources", "list", "none", "Settings of sources, in the order that holds at equal stamps. See below."},
     {"calibration", "file", "the recording's", "calibration.yaml to take instead of the recording's."},
     {"landmarks", "file", "the recording's", "landmarks.csv to take instead of the recording's."},

@@ -32,18 +32,22 @@ static wm_unused *leave_to_others(wm_assembly *self, const char *name, uint32_t 
 }
 
 // A source that the estimator can't use is not opened: it would only hold the watermark back.
-static int is_left_out(wm_assembly *self, const wm_source *source, const wm_source_config *wanted) {
+static int is_left_out(wm_assembly *self, const wm_source *source, const wm_source_config *wanted, int is_listed) {
   const uint32_t takes = self->config->estimator->takes | WM_MOTION_EVENTS;
   if (wanted->use && (source->kinds & takes)) return 0;
-  if (wanted->use)
-    leave_to_others(self, source->name, source->kinds)->is_device = source->is_live;
-  else
+  if (wanted->use) {
+    wm_unused *one = leave_to_others(self, source->name, source->kinds);
+    one->is_device = source->is_live;
+    one->is_listed = (uint8_t)is_listed;
+  } else {
     (void)snprintf(leave_out(self, source->name, WM_UNUSED_WANTED)->text, sizeof self->unused[0].text, "%s",
                    "`use: false` in the configuration");
+  }
   return 1;
 }
 
-// What the configuration binds to this run has a use: a device or a detector that is for nothing is a mistake.
+// What the configuration binds to this run has a use: a device, a detector or an entry of `sources` that is for nothing
+// is a mistake. A recording may hold more than an estimator takes.
 static wm_status check_bound(const wm_assembly *self, wm_error *err) {
   for (size_t i = 0; i < self->unused_count; i++) {
     const wm_unused *one = &self->unused[i];
@@ -55,6 +59,11 @@ static wm_status check_bound(const wm_assembly *self, wm_error *err) {
                      "%s: devices: '%s' is for nothing: %s; leave it out, take another estimator, or write "
                      "`sources: [{name: %s, use: false}]`",
                      self->config->path, one->name, one->text, one->name);
+    if (one->is_listed && wm_assembly_observes(self))
+      return wm_fail(err, WM_BAD_CONFIG,
+                     "%s: sources: '%s' is for nothing: %s; leave its entry out, take another estimator, or write "
+                     "`use: false` there",
+                     self->config->path, one->name, one->text);
   }
   return WM_OK;
 }
@@ -65,7 +74,7 @@ static void add_source(wm_assembly *self, wm_source *source) {
   wm_config_source(self->config, source->name, &wanted, &rank);
   if ((size_t)rank == self->config->source_count && source->lateness_max_ms > 0)
     wanted.lateness_max_ms = source->lateness_max_ms, wanted.lateness_is_stated = 1;
-  if (is_left_out(self, source, &wanted)) return;
+  if (is_left_out(self, source, &wanted, (size_t)rank < self->config->source_count)) return;
   wm_time_ns lateness_ns = ns_from_ms(wanted.lateness_max_ms);
   wm_time_ns horizon_ns = ns_from_ms(self->config->runtime.merge_horizon_ms);
   wm_assembled_source *s = &self->sources[self->source_count++];

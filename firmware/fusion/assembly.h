@@ -35,7 +35,7 @@ typedef enum wm_unused_why {
 
 typedef struct wm_unused {
   wm_unused_why why;
-  uint8_t is_device, is_detector;  // of the configuration
+  uint8_t is_device, is_detector, is_listed;  // of the configuration: `devices`, `vision`, `sources`
   char name[WM_SOURCE_NAME_MAX];
   char text[128];  // "the estimator 'slam' doesn't take it; landmark_ekf does"
 } wm_unused;

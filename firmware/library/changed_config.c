@@ -47,7 +47,7 @@ wm_status changed_config_parse(const char *text, size_t length, const char *path
   }
   if (status == WM_OK) status = parse(changed, length, path, out, err);
   free(changed);
-  if (status == WM_OK && note) wm_config_each_warning(out, note, context);
+  if (status == WM_OK && note && out->estimator) wm_config_each_warning(out, note, context);
   return status;
 }
 
@@ -58,7 +58,7 @@ wm_status changed_config_load(const char *path, const char *changes, waymark_not
   memset(out, 0, sizeof *out);
   wm_status status = wm_text_read_file(path, CONFIG_BYTES_MAX, &text, &length, err);
   if (status != WM_OK) return status;
-  status = changed_config_parse(text, length, path, changes, wm_config_parse, note, context, out, err);
+  status = changed_config_parse(text, length, path, changes, wm_config_parse_undecided, note, context, out, err);
   free(text);
   return status;
 }

@@ -5,6 +5,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
+#include "fusion/choice.h"
 #include "library/changed_config.h"
 #include "library/session.h"
 #include "replay/replay.h"
@@ -58,7 +59,11 @@ static wm_status replay_recording(waymark_replay_options *options, wm_config *co
   if (status == WM_OK) status = override(files->calibration, options->calibration, err);
   if (status == WM_OK) status = override(files->map, options->map, err);
   if (status == WM_OK) status = wm_recording_open(options->input, files, pass_warning, options, &recording, err);
-  if (status != WM_OK) return status;
+  if (status == WM_OK) status = wm_choose_estimator(config, recording, options->note, options->context, err);
+  if (status != WM_OK) {
+    wm_recording_close(recording);
+    return status;
+  }
   const wm_replay_watch watch = watch_of(options);
   const wm_replay_options how = {.out_dir = options->out,
                                  .watch = &watch,
@@ -81,8 +86,9 @@ static wm_status replay_log(waymark_replay_options *options, wm_log_reader *log,
           : changed_config_parse(head->config_text, head->config_length, head->config_path, options->changes,
                                  wm_config_parse_logged, options->note, options->context, &config, err);
   if (status != WM_OK) return status;
+  if (!config.estimator) status = wm_config_decide(&config, wm_estimator_find(head->estimator), "the event log's", err);
   wm_map *map = NULL;
-  if (head->map_hash)
+  if (status == WM_OK && head->map_hash)
     status = wm_map_load(options->map ? options->map : head->map_path, pass_warning, options, &map, err);
   if (status == WM_OK) {
     const wm_replay_watch watch = watch_of(options);

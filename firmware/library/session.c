@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include <wm_version.h>
+#include "fusion/choice.h"
 #include "library/changed_config.h"
 #include "waymark/yaml.h"
 
@@ -228,7 +229,8 @@ static wm_status take_memory(session *self, wm_error *err) {
 
 wm_status session_start(session *self, wm_error *err) {
   if (self->has_started) return wm_fail(err, WM_BAD_USAGE, "waymark_start: this session has started already");
-  wm_status status = wm_assemble(&self->config, self->robot, self->options.seed, &self->assembly, err);
+  wm_status status = wm_choose_estimator(&self->config, self->robot, self->options.note, self->options.context, err);
+  if (status == WM_OK) status = wm_assemble(&self->config, self->robot, self->options.seed, &self->assembly, err);
   if (status == WM_OK) status = take_memory(self, err);
   if (status == WM_OK && self->out[0]) status = wm_run_folder_open(self->out, &self->assembly, &self->folder, err);
   if (status == WM_OK && self->folder) self->file = wm_run_folder_output(self->folder);

@@ -198,6 +198,8 @@ wm_status wm_write_health_json(const char *dir, const wm_assembly *assembly, con
   string(f, assembly->recording);
   (void)fputs(",\n  \"estimator\": ", f);
   string(f, assembly->config->estimator->name);
+  (void)fputs(",\n  \"estimator_because\": ", f);  // "": the configuration names it
+  string(f, assembly->config->estimator_because);
   if (assembly->decoder[0]) {
     (void)fputs(",\n  \"decoder\": ", f);
     string(f, assembly->decoder);

@@ -20,7 +20,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 
 CONFIG_HEAD = """# Configuration
 
-A configuration names an estimator and its parameters. What belongs to a robot or a place (calibration, landmarks, DBC,
+A configuration names an estimator and its parameters, or leaves the choice to sources and maps. What belongs to a robot or a place (calibration, landmarks, DBC,
 start pose) comes from the recording's folder unless the configuration says otherwise, so that one configuration serves
 every recording of its kind. It is YAML, read once at start; a mistake stops with file, line, key, what is there and what
 is allowed ([errors.md](errors.md) shows them). A key that isn't given has its default; an unknown key is an error.

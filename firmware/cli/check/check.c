@@ -61,7 +61,8 @@ static void note_warning(void *context, const char *line) {
 }
 
 static int keeps_a_map(const wm_config *config) {
-  static wm_setup bare;  // of no sensor: whether anything is kept does not depend on them
+  static wm_setup bare;              // of no sensor: whether anything is kept does not depend on them
+  if (!config->estimator) return 1;  // nothing has chosen one
   const wm_keeper *keeper = wm_keeper_of(config->estimator);
   wm_setup_init(&bare);
   bare.motion = config->motion;

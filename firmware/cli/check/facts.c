@@ -96,6 +96,8 @@ void facts_json(const drive_facts *self, FILE *to) {
   (void)fputs("{\n    ", to);
   wm_json_string(to, "estimator", self->assembly->config->estimator->name);
   (void)fputs(", ", to);
+  wm_json_string(to, "estimator_because", self->assembly->config->estimator_because);
+  (void)fputs(", ", to);
   wm_json_string(to, "recording", self->assembly->recording);
   (void)fprintf(to, ", \"duration_s\": %.6g", self->recorded_s);
   json_sources(self, to);

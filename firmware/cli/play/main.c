@@ -239,7 +239,7 @@ static wm_status work(const arguments *a, wm_error *err) {
     return WM_OK;
   }
   if (status == WM_OK && a->config) {
-    status = wm_config_load(a->config, &config, err);
+    status = wm_config_load_undecided(a->config, &config, err);
     if (status != WM_OK) err->status = WM_BAD_CONFIG;
   }
   if (status == WM_OK) status = play_recording(a, a->config ? &config : NULL, a->faults ? &faults : NULL, err);

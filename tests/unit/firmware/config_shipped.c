@@ -18,7 +18,7 @@ static void each_of(const char *folder) {
     wm_error err = {0};
     if (!end || strcmp(end, ".yaml") != 0) continue;
     snprintf(path, sizeof path, "%s/%s", folder, entry->d_name);
-    TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_config_load(path, &config, &err), err.text);
+    TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_config_load_undecided(path, &config, &err), err.text);
     TEST_ASSERT_EQUAL_STRING("", config.warnings);
     wm_config_free(&config);
     read++;
