@@ -3,7 +3,9 @@
 """The same recordings through builds for several machines: a table of how far their trajectories are from the first
 build's, as Markdown; exit code 1 if any differs where it must not.
 
-    bits.py [--only PART] [--data DIR] [BUILD...]      (build build-jetson-tx1 build-odroid-xu4)
+    bits.py [--only PART] [--worlds] [--data DIR] [BUILD...]      (build build-jetson-tx1 build-odroid-xu4)
+
+BUILD@ROOT is a build with the libraries of another system (tests/systems/bits.sh unpacks them). --worlds leaves recorded drives out.
 
 Each case is replayed raw and from the first build's event log; "same" is: trajectory.csv, innovations.csv, published.csv
 and the map of a run, byte by byte. Else the largest difference of any number in trajectory.csv, and in which column.
@@ -130,6 +132,7 @@ def replay_all(case, builds, recording, work):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--only", default="", help="cases whose configuration's or recording's name has this")
+    parser.add_argument("--worlds", action="store_true", help="simulated drives alone")
     parser.add_argument("--data", default=os.environ.get("WM_DATA_DIR", ROOT / "../shared/data"), type=pathlib.Path)
     parser.add_argument("builds", nargs="*", default=[ROOT / "build", ROOT / "build-jetson-tx1", ROOT / "build-odroid-xu4"])
     args = parser.parse_args()
@@ -145,7 +148,7 @@ def main():
         work, made = pathlib.Path(work), {}
         for number, case in enumerate(CASES):
             config, name, span, *options = case
-            if args.only not in config and args.only not in name:
+            if (args.only not in config and args.only not in name) or (args.worlds and not name.startswith("world:")):
                 continue
             recording = recording_of(name, builds, args.data, made, work)
             if not recording.is_dir():

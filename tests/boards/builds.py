@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A build of ours and how its programs are started here: as they are, or under qemu-user with the sysroot's libraries."""
+"""A build of ours and how its programs are started here: as they are, under qemu-user with the sysroot's libraries, or (FOLDER@ROOT)
+with all libraries of another system, whose root is unpacked in ROOT."""
 import pathlib
 import re
 
@@ -7,7 +8,8 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 
 
 class Build:
-    def __init__(self, folder):
+    def __init__(self, named):
+        folder, _, root = str(named).partition("@")
         self.folder = pathlib.Path(folder).resolve()
         cache = self.folder / "CMakeCache.txt"
         if not cache.exists():
@@ -18,6 +20,8 @@ class Build:
         self.arch = arch or "x86-64"
         self.sysroot = (ROOT / ".cache/sysroot" / arch).resolve() if arch else None
         self.qemu = {"arm64": "qemu-aarch64", "armhf": "qemu-arm"}.get(arch)
+        if root:
+            self.board, self.sysroot = pathlib.Path(root).name, pathlib.Path(root).resolve()
 
     def is_older_than_its_sources(self, program):
         """True if a source of the runtime was written after `program` was linked: builds of unlike sources say nothing."""
@@ -28,5 +32,10 @@ class Build:
 
     def command(self, program, *words, emulator_options=()):
         """The words to start `program` (a path inside the build) with."""
-        start = [self.qemu, *emulator_options, "-L", self.sysroot] if self.qemu else []
+        start = []
+        if self.qemu:
+            start = [self.qemu, *emulator_options, "-L", self.sysroot]
+        elif self.sysroot:  # by that system's own loader, of the same processor
+            libraries = self.sysroot / "usr/lib/x86_64-linux-gnu"
+            start = [libraries / "ld-linux-x86-64.so.2", "--library-path", libraries]
         return [str(word) for word in (*start, self.folder / program, *words)]

@@ -14,9 +14,11 @@ import sys
 import warnings
 from pathlib import Path
 
+from expected import marked
+
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs/conventions.md"
-GROUNDS = ("tags", "lenses", "pictures", "rotations", "graphs", "geodesy", "receivers", "buses", "imus", "filters", "tables_of_data", "files", "robots")
+GROUNDS = ("tags", "lenses", "pictures", "rotations", "graphs", "geodesy", "receivers", "buses", "drives", "links", "imus", "filters", "tables_of_data", "files", "robots")
 HEAD = ["| what is asked | what it does | version | what Waymark does |", "| --- | --- | --- | --- |"]
 
 
@@ -25,7 +27,7 @@ def measured(ground):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         rows = importlib.import_module(ground).rows()
-    return HEAD + ["| " + " | ".join(row) + " |" for row in rows]
+    return HEAD + ["| " + " | ".join((marked(row[0]), *row[1:])) + " |" for row in rows]
 
 
 def main():

@@ -1,0 +1,120 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Our use of others' packages with the newest release that the registry has, and the tables of docs/conventions.md with releases before theirs.
+
+    releases.py [--build FOLDER] [USE...]      (build; all of USES and BEFORE)
+
+Of each use: pinned and newest version, the tests that hold it (by ctest, with the Python of .cache/releases in place of the judges'), and their result.
+A package that has no newer release is held by ./dev test already; it is named. What can't be had is said. Exit code 1: a test fails with a newest
+release. 77: nothing could be tried."""
+import argparse
+import os
+import pathlib
+import re
+import subprocess
+import sys
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+PINNED = ROOT / "tests/judges/requirements.in"
+VENV = ROOT / ".cache/releases/newest"
+# Use, packages, tests of ours that use them (names of ctest).
+USES = [
+    ("export", "MCAP files of `waymark export`", ("mcap", "mcap-ros2-support", "numpy"), "python_package"),
+    ("import", "bags for `waymark import`", ("rosbags", "numpy", "pillow"), "python_bags python_bag_containers python_bag_cameras python_bag_clocks"),
+    ("foxglove", "`waymark watch --foxglove`, `waymark.Live`", ("foxglove-sdk", "websockets", "lcm"), "python_live"),
+    ("arrays", "recordings and runs as arrays", ("numpy", "pyyaml"), "python_arrays python_nan python_inputs"),
+    ("native", "`libwaymark.so` in Python", ("cffi", "numpy"), "python_native python_estimators"),
+    ("types", "types of the Python package", ("mypy", "types-cffi", "types-pyyaml"), "python_types"),
+    ("ros2", "a listener of `waymark ros2`", ("cyclonedds", "rosbags"), "run_ros2"),
+    ("can", "judges of DBC files and logs", ("cantools", "python-can"), "can_judge"),
+    ("wheel", "the wheel of the Python package", ("hatchling",), "python_wheel_installed"),
+    ("hil", "JUnit files of `waymark hil`", ("junitparser",), "hil_judging"),
+    ("prose", "the documents' prose", ("markdown-it-py", "proselint"), "docs_prose"),
+]
+# Releases before those of tests/conventions/requirements.txt, and the grounds that show what changed between them.
+BEFORE = [
+    ("opencv4", ("opencv-contrib-python-headless<5",), "tags lenses pictures"),
+    ("gtsam42", ("gtsam<4.3",), "lenses graphs"),
+    ("apriltag", ("pupil-apriltags<1.0.4.post11",), "tags"),
+    ("mcap-foxglove", ("mcap<1.6", "foxglove-sdk<0.30"), "files"),
+]
+
+
+def words(*command, **options):
+    return subprocess.run([str(word) for word in command], capture_output=True, text=True, check=False, cwd=ROOT, **options)
+
+
+def install(folder, requirements, *options):
+    """None, or why the packages can't be had."""
+    if not (folder / "bin/python").exists():
+        subprocess.run([sys.executable, "-m", "venv", folder], check=True)
+    done = words(folder / "bin/python", "-m", "pip", "-q", "--disable-pip-version-check", "install", "--upgrade", "--only-binary", ":all:", *options, *requirements)
+    return None if done.returncode == 0 else ([line for line in done.stderr.splitlines() if line.startswith("ERROR")] or ["pip failed"])[0]
+
+
+def versions(folder):
+    listed = words(folder / "bin/python", "-m", "pip", "--disable-pip-version-check", "list", "--format=freeze").stdout
+    return dict(line.lower().split("==") for line in listed.splitlines() if "==" in line)
+
+
+def newest(uses, build):
+    pinned = dict(re.findall(r"^([\w-]+)==(\S+)", PINNED.read_text(), re.M))
+    # One at a time, so that one package that can't be had hides no other.
+    missing = {}
+    for name in sorted({package for _, _, packages, _ in uses for package in packages} | set(pinned)):
+        if why := install(VENV, [name]):
+            missing[name] = why
+    (VENV / "judges.sha256").write_text("newest releases\n")
+    there = versions(VENV)
+    print("| use | packages: pinned, newest | tests | result |\n| --- | --- | --- | --- |", flush=True)
+    bad = tried = 0
+    for _, use, packages, tests in uses:
+        cells = [f"{name} {pinned.get(name, '?')}, {'not to be had: ' + missing[name] if name in missing else there.get(name, '?')}" for name in packages]
+        if all(pinned.get(name) == there.get(name) for name in packages):
+            print(f"| {use} | {'; '.join(cells)} | {tests} | nothing newer |", flush=True)
+            continue
+        done = words("ctest", "--test-dir", build, "--output-on-failure", "-R", f"^({tests.replace(' ', '|')})$", env={**os.environ, "WM_JUDGES": str(VENV)})
+        passed, skipped = done.stdout.count("   Passed"), done.stdout.count("***Skipped")
+        tried += passed > 0
+        result = f"{passed} passed" + (f", {skipped} skipped" if skipped else "") if done.returncode == 0 else "FAILED"
+        if done.returncode:
+            bad += 1
+            print(done.stdout[-4000:], file=sys.stderr)
+        print(f"| {use} | {'; '.join(cells)} | {tests} | {result} |", flush=True)
+    return bad, tried
+
+
+def before(rows):
+    """The grounds' tables by an older release, which lies before the other packages in Python's path."""
+    base = ROOT / ".cache/conventions"
+    if not (base / "bin/python").exists():
+        print("releases before those of docs/conventions.md: not tried; tests/conventions/run.sh --setup first")
+        return
+    for name, requirements, grounds in rows:
+        folder = ROOT / ".cache/releases" / name
+        if why := install(folder, requirements, "--no-deps"):
+            print(f"{name}: {', '.join(requirements)} can't be had: {why}")
+            continue
+        sites = [next((place / "lib").glob("python3*/site-packages")) for place in (folder, base)]
+        done = words(folder / "bin/python", "tests/conventions/tables.py", *grounds.split(), env={**os.environ, "PYTHONPATH": ":".join(map(str, sites)), "PROJ_NETWORK": "OFF", "TZ": "UTC"})
+        changed = [line for line in done.stdout.splitlines() if re.match(r"[-+]\|", line)]
+        had = ", ".join(f"{key} {value}" for key, value in versions(folder).items() if key not in ("pip", "setuptools"))
+        print(f"== {had}: {len(changed) // 2} rows of {grounds} differ (- newer, + this)" if done.stdout else f"== {had}: does not run with the others' versions: {done.stderr.strip().splitlines()[-1]}")
+        print(*changed, sep="\n", end="\n" if changed else "", flush=True)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--build", default=ROOT / "build", type=pathlib.Path)
+    parser.add_argument("chosen", nargs="*", metavar="USE", help=", ".join([use[0] for use in USES] + [row[0] for row in BEFORE]))
+    args = parser.parse_args()
+    unknown = set(args.chosen) - {row[0] for row in USES + BEFORE}
+    if unknown:
+        parser.error(f"{', '.join(sorted(unknown))}: none of the uses")
+    bad, tried = newest([row for row in USES if not args.chosen or row[0] in args.chosen], args.build)
+    before([row for row in BEFORE if not args.chosen or row[0] in args.chosen])
+    return 1 if bad else 0 if tried or args.chosen else 77
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,169 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# bits.sh [--compile] [SYSTEM...]: do the systems that Waymark is built on give the same bits? SYSTEM is e.g. debian-13-arm64; all of the table by default.
+# Unpacks each system's libraries below .cache/systems (by mmdebstrap, 0.3 to 1.3 GB each; nothing of it is installed), then compares
+# - what their libjpeg-turbo makes of the same pictures, with SIMD and without (jpegs.c), and their libav of the same videos (videos.c);
+# - replays of simulated drives and their event logs by this build, with that system's libraries in place of this one's (tests/boards/bits.py);
+# - with --compile: the same by a daemon that the system's own compiler made there (an hour each on two cores).
+# Exit code 1: a difference. 77: a system can't be had here, which is said, and the others are the same.
+set -euo pipefail
+cd "$(dirname "$(readlink -f "$0")")/../.."
+[ "$(id -u)" -eq 0 ] || exec sudo bash "$0" "$@"
+mkdir -p .cache/systems
+systems=$(readlink -f .cache/systems)
+here=$PWD
+debian=http://deb.debian.org/debian ubuntu=http://archive.ubuntu.com/ubuntu ports=http://ports.ubuntu.com/ubuntu-ports
+# Name, suite, archive, components, libstdc++ that its compiler links.
+table="debian-12-amd64 bookworm $debian main 12
+debian-13-amd64 trixie $debian main 14
+ubuntu-22.04-amd64 jammy $ubuntu main,universe 11
+ubuntu-24.04-amd64 noble $ubuntu main,universe 13
+debian-12-arm64 bookworm $debian main 12
+debian-13-arm64 trixie $debian main 14
+ubuntu-22.04-arm64 jammy $ports main,universe 11
+ubuntu-24.04-arm64 noble $ports main,universe 13"
+libraries=libc6-dev,libeigen3-dev,libyaml-dev,liblcm-dev,nlohmann-json3-dev,libcli11-dev,libturbojpeg0-dev,libpng-dev,zlib1g-dev,libapriltag-dev,libavformat-dev,libavcodec-dev,libavutil-dev,libswscale-dev
+compilers=ninja-build,gcc,g++,g++-aarch64-linux-gnu,python3,python3-yaml,pkg-config,liblcm-bin,dash,bash,coreutils,sed,grep,findutils
+
+say() { printf '\033[1m== %s\033[0m\n' "$*"; }
+
+unpack() { # NAME SUITE ARCHIVE COMPONENTS LIBSTDCXX
+  local root=$systems/$1 arch=${1##*-} keyring=() packages=$libraries,libstdc++-$5-dev folder
+  [ -e "$root/.complete" ] && return
+  [ "$arch" = arm64 ] || packages+=,$compilers
+  if [[ $1 == ubuntu* ]]; then # its keys are a package of Debian 13
+    [ -e "$systems/debian-13-amd64/.complete" ] || unpack $(grep '^debian-13-amd64' <<<"$table")
+    keyring=(--keyring="$systems/debian-13-amd64/usr/share/keyrings/ubuntu-archive-keyring.gpg")
+  fi
+  [ "$1" = debian-13-amd64 ] && packages+=,ubuntu-keyring
+  rm -rf "$root" "$root.new"
+  say "unpacking $1"
+  mmdebstrap --variant=extract --architectures="$arch" "${keyring[@]}" --include="$packages" "$2" "$root.new" \
+    "deb $3 $2 ${4//,/ }" "deb $3 $2-updates ${4//,/ }" >"$root.log" 2>&1 || { rm -rf "$root.new"; return 1; }
+  # One /usr, also where a maintainer script would have made it.
+  for folder in bin sbin lib lib64; do
+    if [ -d "$root.new/$folder" ] && [ ! -L "$root.new/$folder" ]; then
+      mkdir -p "$root.new/usr/$folder"
+      cp -a "$root.new/$folder/." "$root.new/usr/$folder/"
+      rm -rf "${root:?}.new/$folder"
+    fi
+    [ -e "$root.new/$folder" ] || { mkdir -p "$root.new/usr/$folder" && ln -s "usr/$folder" "$root.new/$folder"; }
+  done
+  mv "$root.new" "$root"
+  touch "$root/.complete"
+}
+
+loaded() { # NAME PROGRAM... : a program with that system's libraries
+  local root=$systems/$1
+  shift
+  case "$root" in
+    *-arm64) qemu-aarch64 -L "$root" "$@" ;;
+    *) "$root/usr/lib/x86_64-linux-gnu/ld-linux-x86-64.so.2" --library-path "$root/usr/lib/x86_64-linux-gnu" "$@" ;;
+  esac
+}
+
+versions() { # NAME : of what decodes and computes there
+  local folder pc=()
+  folder=$(echo "$systems/$1"/usr/lib/*-linux-gnu)
+  for name in libturbojpeg libpng libavcodec libswscale apriltag yaml-0.1; do
+    pc+=("$name $(sed -n 's/^Version: //p' "$folder/pkgconfig/$name.pc" 2>/dev/null)")
+  done
+  printf '%s; ' "${pc[@]}"
+}
+
+compile() { # NAME : the daemon by that system's compiler, in NAME-build
+  local root=$systems/$1 arch=${1##*-} out=$systems/$1-build
+  local tools=$systems/${1%-*}-amd64 options=(-DWM_TESTS=OFF -DWM_RENDER=OFF -DWM_LIBCAMERA=OFF -DWM_ROS2=OFF -DWM_CALIBRATE=OFF -DWM_LIBAV=OFF)
+  # CMake of one version for all: Ubuntu 22.04's is too old.
+  [ -x "$systems/cmake/bin/cmake" ] || { python3 -m venv "$systems/cmake" && "$systems/cmake/bin/pip" -q --disable-pip-version-check install --require-hashes -r tests/systems/cmake.txt; } || return 1
+  local cmake
+  cmake=$(echo "$systems"/cmake/lib/python3*/site-packages/cmake/data/bin/cmake)
+  if [ "$arch" = arm64 ]; then options+=("-DCMAKE_TOOLCHAIN_FILE=$here/toolchain/arm64.cmake"); else options+=(-DCMAKE_C_COMPILER=gcc -DCMAKE_CXX_COMPILER=g++); fi
+  mkdir -p "$out"
+  say "compiling in $1"
+  unshare --mount --pid --fork --kill-child bash -euc '
+    root=$1 here=$2 sysroot=$3
+    mkdir -p "$root$here" "$root/dev"
+    mount --rbind "$here" "$root$here"
+    [ -z "$sysroot" ] || { mkdir -p "$root$here/.cache/sysroot/arm64"; mount --bind "$sysroot" "$root$here/.cache/sysroot/arm64"; }
+    mount -t proc proc "$root/proc"
+    mount -t tmpfs tmpfs "$root/tmp"
+    for device in null urandom; do : >>"$root/dev/$device"; mount --bind "/dev/$device" "$root/dev/$device"; done
+    shift 3
+    exec nice chroot "$root" env -i HOME=/root PATH=/usr/sbin:/usr/bin:/sbin:/bin LC_ALL=C.UTF-8 bash -euc "$@"' \
+    bash "$tools" "$here" "$([ "$arch" = amd64 ] || echo "$root")" \
+    '"$1" -G Ninja -S "$2" -B "$3" -DCMAKE_BUILD_TYPE=RelWithDebInfo "${@:4}" && "$1" --build "$3" --target waymark' \
+    bash "$cmake" "$here" "$out" "${options[@]}" >"$out/compile.log" 2>&1 || { tail -20 "$out/compile.log" >&2; return 1; }
+}
+
+is_compiled="" chosen=()
+for word in "$@"; do if [ "$word" = --compile ]; then is_compiled=1; else chosen+=("$word"); fi; done
+[ ${#chosen[@]} -gt 0 ] || mapfile -t chosen < <(cut -d' ' -f1 <<<"$table")
+[ -x build/bin/waymark-simulate ] || { echo "skipped: there is no build (./dev build)"; exit 77; }
+code=0 there=()
+for name in "${chosen[@]}"; do
+  row=$(grep "^$name " <<<"$table") || { echo "bits.sh: '$name' is none of: $(cut -d' ' -f1 <<<"$table" | xargs)" >&2; exit 2; }
+  if unpack $row; then there+=("$name"); else
+    echo "$name can't be had: $(grep -m1 -E '^(E|Err|W):' "$systems/$name.log" || tail -1 "$systems/$name.log")"
+    code=77
+  fi
+done
+
+say "pictures"
+mkdir -p build/systems
+gcc -O1 -o build/systems/jpegs tests/systems/jpegs.c -lturbojpeg
+build/systems/jpegs >build/systems/here.txt
+for name in "${there[@]}"; do
+  program=build/systems/jpegs
+  if [[ $name == *-arm64 ]]; then
+    program=build/systems/jpegs-arm64
+    aarch64-linux-gnu-gcc -O1 -idirafter /usr/include -o $program tests/systems/jpegs.c "$systems/$name/usr/lib/aarch64-linux-gnu/libturbojpeg.so" -Wl,--allow-shlib-undefined
+  fi
+  for simd in 0 1; do
+    JSIMD_FORCENONE=$simd loaded "$name" $program >"build/systems/$name.txt" || true
+    if diff build/systems/here.txt "build/systems/$name.txt" >build/systems/diff; then
+      echo "$name, SIMD $([ $simd = 1 ] && echo off || echo on): $(wc -l <build/systems/here.txt) results are the same ($(versions "$name"))"
+    else
+      echo "$name, SIMD $([ $simd = 1 ] && echo off || echo on): other results (< here, > there)"
+      cat build/systems/diff
+      code=1
+    fi
+  done
+done
+
+say "videos"
+libav=(-lavformat -lavcodec -lavutil -lswscale)
+gcc -O1 -o build/systems/videos tests/systems/videos.c "${libav[@]}"
+for codec in libx264 mpeg4; do build/systems/videos make "build/systems/clip.$codec" "$codec" 2>/dev/null; done
+for name in "${there[@]}"; do
+  [[ $name == *-amd64 ]] || { echo "$name: videos are left out"; continue; } # compiled there, as each libav has its own interface
+  root=$systems/$name
+  mkdir -p "$root/tmp"
+  cp tests/systems/videos.c "$root/tmp/"
+  chroot "$root" gcc -O1 -w -o /tmp/videos /tmp/videos.c "${libav[@]}" -Wl,--allow-shlib-undefined
+  for codec in libx264 mpeg4; do
+    here_line=$(build/systems/videos "build/systems/clip.$codec")
+    there_line=$(LD_LIBRARY_PATH='' "$root/usr/lib/x86_64-linux-gnu/ld-linux-x86-64.so.2" \
+      --library-path "$root/usr/lib/x86_64-linux-gnu:$root/usr/lib/x86_64-linux-gnu/pulseaudio:$root/usr/lib/x86_64-linux-gnu/blas:$root/usr/lib/x86_64-linux-gnu/lapack" \
+      "$root/tmp/videos" "build/systems/clip.$codec") || there_line="no result"
+    if [ "$here_line" = "$there_line" ]; then echo "$name: the same, $there_line"; else
+      echo "$name: here $here_line, there $there_line"
+      code=1
+    fi
+  done
+done
+
+builds=()
+for name in "${there[@]}"; do
+  if [[ $name == *-amd64 ]]; then builds+=("build@$systems/$name"); elif [ -x build-arm64/bin/waymark ]; then builds+=("build-arm64@$systems/$name"); fi
+  if [ -n "$is_compiled" ]; then
+    if compile "$name"; then builds+=("$systems/$name-build@$systems/$name"); else
+      echo "$name: does not compile"
+      code=1
+    fi
+  fi
+done
+say "replays"
+[ -x build-arm64/bin/waymark ] || echo "replays on arm64 are left out: ./dev board arm64 build makes their daemon"
+python3 tests/boards/bits.py --worlds build "${builds[@]}" || code=1
+exit $code
