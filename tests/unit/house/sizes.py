@@ -135,8 +135,9 @@ def compared(now, ceilings, file):
         count, ceiling = now[name], ceilings[name][1]
         is_far = abs(count - ceiling) > TOLERANCE * ceiling
         if count > ceiling:
-            yield (f"{name}: {count}, the ceiling is {ceiling}. Take out as much as came in"
-                   + (f", or write {count} into {file} with the reason behind it, after a #" if is_far else f" before it is {TOLERANCE:.0%} more"), is_far)
+            much = f"{name}: {count}, the ceiling is {ceiling}. Take out as much as came in"
+            yield (f"{much}, or write {count} into {file} with the reason behind it, after a #" if is_far else
+                   f"{much}: from {TOLERANCE:.0%} above the ceiling on this test fails", is_far)
         elif is_far:
             yield f"{name}: {count}, the ceiling is {ceiling}. Lower it: sizes.py . {file} --lower", True
 
