@@ -36,12 +36,18 @@ def call(*command):
     return done.stdout
 
 
-def cheaper(text, size, rate):
-    """The scenario with one ray a pixel and fewer, perhaps smaller pictures."""
-    text = re.sub(r"samples: \d+", "samples: 1", text)
-    size = f"size: [{size.replace('x', ', ')}], " if size else ""
-    cameras = ", ".join(f"{{name: {name}, {size}rate_hz: {rate:g}}}" for name in ("left", "right"))
-    return text.replace("pictures:\n", f"cameras: [{cameras}]\n\npictures:\n", 1)
+def cheaper(a, *cameras):
+    """The scenario with one ray a pixel and fewer, perhaps smaller pictures: kept beside the drives that are made of it."""
+    a.cache.mkdir(parents=True, exist_ok=True)
+    text = re.sub(r"samples: \d+", "samples: 1", a.scenario.read_text())
+    size = f"size: [{a.size.replace('x', ', ')}], " if a.size else ""
+    entries = ", ".join(f"{{name: {name}, {size}rate_hz: {a.rate:g}}}" for name in cameras)
+    wanted = text.replace("pictures:\n", f"cameras: [{entries}]\n\npictures:\n", 1)
+    scenario = a.cache / a.scenario.name
+    if scenario.exists() and scenario.read_text() != wanted:
+        sys.exit(f"{a.cache}: holds drives of another scenario, size or rate; name another --cache")
+    scenario.write_text(wanted)
+    return scenario
 
 
 def render(a, scenario, seed, folder):
@@ -284,12 +290,7 @@ def main():
     p.add_argument("--one", action="store_true", help="also with the one landmark alone that is seen most")
     p.add_argument("--rendered-only", action="store_true", help="those of the seeds that are in the cache")
     a = p.parse_args()
-    a.cache.mkdir(parents=True, exist_ok=True)
-    scenario = a.cache / a.scenario.name
-    wanted = cheaper(a.scenario.read_text(), a.size, a.rate)
-    if scenario.exists() and scenario.read_text() != wanted:
-        sys.exit(f"{a.cache}: holds drives of another scenario, size or rate; name another --cache")
-    scenario.write_text(wanted)
+    scenario = cheaper(a, "left", "right")
     rows = []
     done = {}
     if a.rows and a.rows.exists():

@@ -12,26 +12,12 @@ that are in the cache are reused: stop it and go on at will; another detector wa
 go to waymark-montecarlo (--trials kidnap, --diagram lost.svg, --csv looks.csv, --each ...)."""
 import argparse
 import pathlib
-import re
 import shutil
 import subprocess
 import sys
 import time
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
-
-
-def call(*command):
-    done = subprocess.run([str(c) for c in command], capture_output=True, text=True)
-    if done.returncode != 0:
-        sys.exit(f"{' '.join(str(c) for c in command)}: {done.returncode}\n{done.stdout}{done.stderr}")
-
-
-def cheaper(text, size, rate):
-    """The scenario with one ray a pixel and smaller and fewer pictures."""
-    text = re.sub(r"samples: \d+", "samples: 1", text)
-    camera = f"{{name: front, size: [{size.replace('x', ', ')}], rate_hz: {rate:g}}}"
-    return text.replace("pictures:\n", f"cameras: [{camera}]\n\npictures:\n", 1)
+from landmarks import ROOT, call, cheaper
 
 
 def make_drive(a, scenario, seed, folder):
@@ -62,12 +48,7 @@ def main():
     if "--" in own:
         own, rest = own[: own.index("--")], own[own.index("--") + 1 :]
     a = p.parse_args(own)
-    a.cache.mkdir(parents=True, exist_ok=True)
-    scenario = a.cache / a.scenario.name
-    wanted = cheaper(a.scenario.read_text(), a.size, a.rate)
-    if scenario.exists() and scenario.read_text() != wanted:
-        sys.exit(f"{a.cache}: holds drives of another scenario, size or rate; name another --cache")
-    scenario.write_text(wanted)
+    scenario = cheaper(a, "front")
     seeds = range(a.first_seed, a.first_seed + a.drives)
     missing = [s for s in seeds if not (a.cache / str(s) / "events.wmlog").exists()]
     begun = time.monotonic()
