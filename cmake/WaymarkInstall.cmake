@@ -44,7 +44,7 @@ if(TARGET waymark-web) # a robot's page comes from the robot
 endif()
 
 # ── the desk's ───────────────────────────────────────────────────────────────────────────────────────────────────────
-foreach(tool detect diff eval import init map reference report suggest)
+foreach(tool detect diff eval import init map reference report)
   if(TARGET waymark-${tool}) # not everything is there for every architecture
     install(TARGETS waymark-${tool} DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT tools)
     wm_install_compressed(${WM_PACKAGE_DIR}/man/waymark-${tool}.1 waymark-${tool}.1 man/man1 tools)

@@ -173,13 +173,18 @@ def steering_ratio(rng):
     return {"calibration.yaml": value(r"steering_ratio: 12.0", f"steering_ratio: {12 * f:.4f}")}, "wheels.steering_ratio", [1 / f]
 
 
+def setting(rng):
+    f = rng.choice((10, 0.1))
+    return {"config": lambda w: w.replace("sightings:\n", f"sightings:\n  noise: {{range_factor: {f}}}\n")}, "setting sightings.noise.range_factor", [1.0]
+
+
 def none(rng):
     return {}, None, []
 
 
 PLANTED = [(landmarks_robot, m) for m in (none, map_scale, clock, yaw, place, tick, track, ranges, exchange, lag, bearings, gyro)]
 PLANTED += [(satellites_robot, m) for m in (none, antenna, small_antenna, receiver, mirrored, turn_rate)]
-PLANTED += [(landmarks_robot, m) for m in (wheels_swapped, byte_order)]
+PLANTED += [(landmarks_robot, m) for m in (wheels_swapped, byte_order, setting)]
 PLANTED += [(tags_robot, m) for m in (none, tag_size, tilt, tag_yaw, tags_exchanged, tags_scaled, camera_late)]
 PLANTED += [(fork_robot, m) for m in (none, steering_ratio)]
 
@@ -208,14 +213,18 @@ def judge(options, robot, mistake, seed, folder):
     recording, made, fixed = folder / "right", folder / "made", folder / "fixed"
     robot(recording, seed)
     changes, name, size = mistake(random.Random(f"{mistake.__name__} {seed}"))
+    edit_of_config = changes.pop("config", None)
     if changes:
         replays.copy_changed(recording, made, changes)
     made = made if changes else recording
-    config = options.source_dir / "config/robot.yaml"
+    right = config = options.source_dir / "config/robot.yaml"
+    if edit_of_config:
+        config = folder / "robot.yaml"
+        config.write_text(edit_of_config(right.read_text()))
     begun = time.monotonic()
     done = subprocess.run([options.bin_dir / "waymark", "causes", config, made, "--json", "--apply", fixed], capture_output=True, text=True)
     row = {"robot": robot.__name__, "planted": mistake.__name__, "seed": seed, "size": size, "seconds": round(time.monotonic() - begun, 1)}
-    row["right_m"], row["made_m"] = (error_m(options, config, r, recording) for r in (recording, made))
+    row["right_m"], row["made_m"] = error_m(options, right, recording, recording), error_m(options, config, made, recording)
     limit_m = RIGHT_FACTOR * row["right_m"] + RIGHT_M
     row["is_harmless"] = name is not None and row["made_m"] <= limit_m
     row["is_good"] = not row["is_harmless"] and name is not None and checked(options, config, made) == "good"

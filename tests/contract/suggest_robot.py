@@ -10,6 +10,7 @@ import os
 import pathlib
 import random
 import re
+import subprocess
 import sys
 import tempfile
 
@@ -77,8 +78,29 @@ def check_truth_is_not_read(bin_dir, folder, recording):
     assert outputs[0] == outputs[1], "the suggestion changes where truth is not there"
 
 
+def check_refusals(bin_dir, folder):
+    for words, said in (((folder / "nowhere",), "no folder of a run"), ((folder / "nowhere.yaml", folder), "nowhere.yaml"),
+                        ((folder / "config.yaml", folder / "good", "--only", "speed"), "no parameter that is searched begins so")):
+        done = subprocess.run([bin_dir / "waymark-suggest", *words], capture_output=True, text=True)
+        assert done.returncode == 2 and said in done.stderr, (words, done.returncode, done.stderr)
+
+
+def check_file(bin_dir, folder, recording):
+    """The new file has the new value and all that the old one had; names of files are found from its folder, and it is measured."""
+    old, new = folder / "old.yaml", folder / "elsewhere" / "new.yaml"
+    new.parent.mkdir()
+    old.write_text(RIGHT.replace("motion:", "# a comment\nlandmarks: loud/landmarks.csv\nmotion:"))
+    promise = json.loads(replays.command(bin_dir / "waymark-suggest", old, recording, "--only", "sightings.noise.range_factor", "--out", new, "--json"))
+    assert "# a comment" in new.read_text() and "../loud/landmarks.csv" in new.read_text(), new.read_text()
+    found = json.loads(replays.command(bin_dir / "waymark-suggest", old, recording, "--against", new, "--json"))
+    apart = math.log(found["gain"]["next"]["times_as_likely"] / promise["promise"]["next"]["times_as_likely"])
+    assert abs(apart) < math.log(1.1), (promise["promise"], found["gain"])
+
+
 def main():
     bin_dir = pathlib.Path(sys.argv[1]).resolve()
+    if not replays.has_causes(bin_dir):
+        return 77
     small_robot.DURATION_S = DURATION_S
     with tempfile.TemporaryDirectory() as scratch:
         folder = pathlib.Path(scratch)
@@ -95,6 +117,8 @@ def main():
         values, out = suggested(bin_dir, folder, loud, RIGHT, "sightings.noise,motion.noise.ticks")
         print("sigma of ranges x 3:", values, out["halves"], out["share"])
         between(values, "sightings.noise.range_factor", 0.25, 0.45)
+        check_file(bin_dir, folder, loud)
+        check_refusals(bin_dir, folder)
 
         values, out = suggested(bin_dir, folder, robot, RIGHT.replace(f"ticks_per_sqrt_m: {SLIP}", f"ticks_per_sqrt_m: {0.3 * SLIP}"),
                                 "motion.noise.ticks,sightings.noise")

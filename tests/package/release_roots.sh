@@ -22,7 +22,7 @@ apt-get -qq install -y --no-install-recommends /out/*.deb gcc libc6-dev pkg-conf
 echo "== $((SECONDS - begin)) s: apt install of $(ls /out/*.deb | wc -l) packages"
 mkdir /src && tar -C /src -xzf /out/waymark-*.tar.gz && cd /src/waymark-*
 waymark --version
-for command in init check simulate replay eval report diff map calibrate detect suggest web batch compare mine import ros2; do
+for command in init check simulate replay eval report diff map calibrate detect web batch compare mine import ros2; do
   waymark "$command" --help >/dev/null || { echo "waymark $command --help failed"; exit 1; }
 done
 waymark simulate config/worlds/crossing.yaml --no-video --out /tmp/drive >/dev/null

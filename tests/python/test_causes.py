@@ -38,6 +38,11 @@ class Changes(unittest.TestCase):
         self.assertIn("mounting: {rpy_deg: [0, 0, 90], xyz_m:", self.value(("sensors", "front", "mounting", "rpy_deg"), "[0, 0, 90]"))
         self.assertIn("gnss: {mounting: {xyz_m: [1, 0, 0]}}\nsensors:", self.value(("gnss", "mounting", "xyz_m"), "[1, 0, 0]"))
 
+    def test_a_dotted_key_is_the_same_value(self):
+        dotted = changes.Value("f", ("motion", "noise", "speed_mps"), "0.1")
+        self.assertEqual(dotted.apply(b"motion:\n  noise.speed_mps: 0.02  # by eye\n"), b"motion:\n  noise.speed_mps: 0.1  # by eye\n")
+        self.assertEqual(dotted.apply(b"motion.noise:\n  speed_mps: 0.02\n"), b"motion.noise:\n  speed_mps: 0.1\n")
+
     def test_stamps_stay_whole_and_other_sensors_stay(self):
         table = b"t_ns,sensor,range_m\n1700000000000000001,a,2.5\n1700000000000000002,b,\n"
         self.assertEqual(changes.column("f", "t_ns", 1, -10**9).apply(table).splitlines()[1], b"1699999999000000001,a,2.5")

@@ -96,6 +96,8 @@ class Replays(unittest.TestCase):
         np.testing.assert_array_equal(np.sort(seen["t_ns"]), np.sort(table["t_ns"]))
         np.testing.assert_array_equal(np.sort(seen["range_m"]), np.sort(table["range_m"]))
         self.assertEqual(log.kinds(), ["quantities", "sighting"])
+        stamps = np.concatenate([log.events(kind)["t_ns"] for kind in log.kinds()])
+        self.assertEqual(log.span(), (stamps.min(), stamps.max()))
         with self.assertRaisesRegex(ValueError, "quantities"):
             log.events("sonar")
 

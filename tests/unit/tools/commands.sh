@@ -138,10 +138,6 @@ grep -q '^0,marker,0,0,.*,159.5..,119.5..$' "$dir/found/detections/camera-aprilt
 [ -s "$dir/found/drawn/camera-apriltag/marker.png" ] || { echo "FAIL: no drawn marker.png"; failures=$((failures + 1)); }
 [ ! -e "$dir/families/drawn/camera-apriltag-tag36h11" ] || { echo "FAIL: drawings of a family that is not there"; failures=$((failures + 1)); }
 
-# Suggestions.
-expect 0 'recordings/tuesday --against' "$bin/waymark-suggest" --help
-expect 2 'no folder of a run' "$bin/waymark-suggest" "$dir/nowhere"
-expect 2 'nowhere.yaml' "$bin/waymark-suggest" "$dir/nowhere.yaml" "$dir/rec"
 
 # The reference trajectory.
 expect 0 'waymark replay recordings/corridor' "$bin/waymark-reference" --help

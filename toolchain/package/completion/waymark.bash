@@ -4,7 +4,7 @@ _waymark() {
   local word=${COMP_WORDS[COMP_CWORD]} command=${COMP_WORDS[1]:-} words= more=
   COMPREPLY=()
   if [ "$COMP_CWORD" -eq 1 ]; then
-    mapfile -t COMPREPLY < <(compgen -W 'run replay record watch check doctor stamps causes batch calibrate compare detect diff eval hil import init map mine play reference report simulate suggest web --help --version' -- "$word")
+    mapfile -t COMPREPLY < <(compgen -W 'run replay record watch check doctor stamps causes suggest batch calibrate compare detect diff eval hil import init map mine play reference report simulate web --help --version' -- "$word")
     return
   fi
   case $command in
@@ -32,6 +32,7 @@ _waymark() {
     "doctor") words='--json --seconds' ;;
     "stamps") words='' ;;
     "causes") words='--help --landmarks --calibration --map --apply --json' ;;
+    "suggest") words='--help --out --against --only --from --to --minutes --json' ;;
     "batch") words='--help --out --jobs --part --list' ;;
     "calibrate") words='--help --name --model --size --lens --out --config --run --camera --map --chessboard --aprilgrid --charuco --dictionary --square --second --second-name --floor --tag --gap --every --most --picture' ;;
     "compare") words='--help --out --json --alpha --tolerate --no-reports' ;;
@@ -47,7 +48,6 @@ _waymark() {
     "reference") words='--help --map --range --particles --passes --seed' ;;
     "report") words='--help --out --svg --style' ;;
     "simulate") words='--help --out --seed --landmarks --laps --duration --no-video --frame --png --camera --contact-sheet --perfect' ;;
-    "suggest") words='--help --out --against --only --from --to --minutes --json' ;;
     "web") words='--help --recording --map --listen --url --prefix --pictures --duration' ;;
   esac
   if [[ $word == -* ]]; then

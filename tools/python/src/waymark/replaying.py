@@ -162,6 +162,19 @@ class EventLog:
         """Kinds of its events: "quantities", "sighting", "points" ..."""
         return sorted(self._raw)
 
+    def span(self) -> tuple[int, int]:
+        """First and last stamp of all its events, ns; zeros without any."""
+        whole = dtype("wm_event")
+        fields = {kind: np.dtype({"names": ["t_ns"], "formats": ["i8"], "offsets": [_offset(whole, "t_ns")], "itemsize": self._size(kind)}) for kind in self._raw}
+        stamps = np.concatenate([np.zeros(0, np.int64), *(np.frombuffer(bytes(raw), fields[kind])["t_ns"] for kind, raw in self._raw.items())])
+        return (int(stamps.min()), int(stamps.max())) if len(stamps) else (0, 0)
+
+    @staticmethod
+    def _size(kind: str) -> int:
+        """Bytes that are kept of an event."""
+        whole = dtype("wm_event")
+        return int(whole.itemsize) if kind == "points" else _offset(whole, "as") + 96
+
     def events(self, kind: str) -> Array:
         """The events of a kind in their order, with fields t_ns, arrival_ns, seq, source and those of the kind's struct."""
         whole = dtype("wm_event")
@@ -169,7 +182,7 @@ class EventLog:
         if kind not in (whole["as"].names or ()):
             raise ValueError(f"'{kind}' is not a kind of events with values; this log has {', '.join(self.kinds())}")
         body, offset = whole["as"][kind], _offset(whole, "as")
-        size = whole.itemsize if kind == "points" else offset + 96
+        size = self._size(kind)
         heads = ("t_ns", "arrival_ns", "seq", "source")
         layout: Any = {
             "names": [*heads, *(body.names or ())], "itemsize": size,

@@ -144,11 +144,11 @@ class Value(Edit):
     def apply(self, before: bytes) -> bytes:
         text = before.decode()
         node, walked = yaml.compose(text, yaml.SafeLoader), 0
-        for step in self.path:
-            below = _child(node, step)
+        while walked < len(self.path):
+            below, steps = _child(node, self.path[walked:])
             if below is None:
                 break
-            node, walked = below, walked + 1
+            node, walked = below, walked + steps
         if walked == len(self.path) and node is not None:
             return (text[:node.start_mark.index] + self.text + text[_end(text, node):]).encode()
         return _inserted(text, node, self.path[walked:], self.text, self.file).encode()
@@ -169,12 +169,12 @@ def _end(text: str, node: yaml.Node) -> int:
     return end
 
 
-def _child(node: yaml.Node | None, step: str | int) -> yaml.Node | None:
-    if isinstance(node, yaml.SequenceNode) and isinstance(step, int) and step < len(node.value):
-        return node.value[step]  # type: ignore[no-any-return]
-    if isinstance(node, yaml.MappingNode):
-        return next((value for key, value in node.value if key.value == step), None)
-    return None
+def _child(node: yaml.Node | None, path: tuple[str | int, ...]) -> tuple[yaml.Node | None, int]:
+    """What a node has at the first steps of a path, and how many: keys may be dotted."""
+    if isinstance(node, yaml.SequenceNode) and isinstance(path[0], int) and path[0] < len(node.value):
+        return node.value[path[0]], 1
+    keys = {key.value: value for key, value in node.value} if isinstance(node, yaml.MappingNode) else {}
+    return next(((keys[key], steps) for steps in range(1, len(path) + 1) if (key := ".".join(map(str, path[:steps]))) in keys), (None, 0))
 
 
 def _inserted(text: str, node: yaml.Node | None, path: tuple[str | int, ...], value: str, file: str) -> str:

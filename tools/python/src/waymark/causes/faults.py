@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from ..native import WaymarkError
+from ..replaying import parameters
 from . import motion_faults
 from .changes import CONFIG, Edit, Mirrored, Sorted, Value, column, degrees, identities, numbers, stretched, swapped
 from .fault import DEG, LENGTHS, NEAR, Clock, Fault, Size, discrete, factor_words
@@ -23,12 +25,13 @@ CLOCKS_S = tuple(sign * s for s in (0.15, 0.4, 0.8, 1.2, 1.6, 2.0, 2.5, 3.0, 3.5
 """The last ones: leap seconds of GPS, of TAI."""
 DRIFTS = (-0.01, 0.01, 0.02, 0.03, 0.04, 0.05)  # of a clock that is too fast, or of a lag that grows, s/s
 CRUMB = 0.03  # of a map's breadth
+SETTING_FAR = 4.0  # times a default, or a part of it: nearer ones are a matter of tuning, which `waymark suggest` does
 FAMILIES = ("tag36h11", "tag25h9", "tag16h5", "tagStandard41h12")
 
 
 def all_faults(robot: Robot) -> list[Fault]:
     """Every row that this robot has something of; first what it has few of: a long list may not be tried to its end."""
-    found = [*_maps(robot), *motion_faults.all_of(robot), *_markers(robot), *_satellites(robot)]
+    found = [*_settings(robot), *_maps(robot), *motion_faults.all_of(robot), *_markers(robot), *_satellites(robot)]
     common = {source.file: source for source in robot.sources if sum(other.file == source.file for other in robot.sources) > 1}
     for one in (Source(source.kind, file) for file, source in common.items()):  # a mistake of the whole file
         found += [*_clocks(robot, one), *_values(robot, one)]
@@ -37,6 +40,19 @@ def all_faults(robot: Robot) -> list[Fault]:
         if source.kind not in ("heading", "points", "stereo"):
             found += _mountings(robot, source)
     return found
+
+
+def _settings(robot: Robot) -> Iterator[Fault]:
+    """Numbers of the configuration that are far from their defaults."""
+    try:
+        known = parameters(robot.files.read(CONFIG).decode("utf-8", "replace"))
+    except (WaymarkError, ValueError):
+        return
+    for key, number in known.items():
+        value, usual = number["value"], number["initial"]
+        if usual > 0 and value > 0 and abs(math.log(value / usual)) >= math.log(SETTING_FAR):
+            yield discrete(f"setting {key}", lambda _, k=key, u=usual: [Value(CONFIG, tuple(k.split(".")), f"{u:.6g}")],
+                           lambda _, k=key, v=value, u=usual: f"{k} is {v / u:.3g} times its default")
 
 
 # ── clocks ───────────────────────────────────────────────────────────────────────────────────────────────────────────
@@ -244,10 +260,11 @@ def _maps(robot: Robot) -> Iterator[Fault]:
 
 # ── markers, lenses, satellites ──────────────────────────────────────────────────────────────────────────────────────
 
-def _calibrated(name: str, path: tuple[str, ...], value: float, grid: Sequence[float], words: str, file: str = "calibration.yaml") -> Fault:
+def _calibrated(name: str, path: tuple[str, ...], value: float, grid: Sequence[float], words: str, file: str = "calibration.yaml",
+                settled: Callable[[Size, dict[str, float]], Size] = lambda size, states: size) -> Fault:
     return Fault(name, tuple((f,) for f in grid), lambda s: [Value(file, path, f"{value * s[0]:.6g}")],
                  lambda s: f"{words} is {factor_words(s[0])}", step=(0.04,), smallest=(0.004,), is_log=True, named=LENGTHS,
-                 is_possible=lambda s: abs(math.log(s[0])) > 0.01)
+                 is_possible=lambda s: abs(math.log(s[0])) > 0.01, settled=settled)
 
 
 def _markers(robot: Robot) -> Iterator[Fault]:
@@ -257,7 +274,8 @@ def _markers(robot: Robot) -> Iterator[Fault]:
     # The white frame taken for the edge, or the reverse: 8 of 10 cells.
     if sees_tags and size and any(source.kind == "corners" or source.detector for source in robot.sources):
         yield _calibrated("size of the markers", ("vision", "apriltag", "size_m") if mine else ("markers", "size_m"), size,
-                          (0.8, 1.25, *NEAR, 0.5, 2, *LENGTHS), "the markers' size", CONFIG if mine else "calibration.yaml")
+                          (0.8, 1.25, *NEAR, 0.5, 2, *LENGTHS), "the markers' size", CONFIG if mine else "calibration.yaml",
+                          lambda s, states: (s[0] / next((v for name, v in states.items() if name.endswith(".range_scale")), 1.0),))
     family = (robot.calibration.get("markers") or {}).get("family")
     if any(source.detector == "apriltag" for source in robot.sources):
         for other in FAMILIES:

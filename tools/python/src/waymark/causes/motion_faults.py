@@ -17,6 +17,7 @@ SPEEDS = (-1.0, 1 / 3.6, 3.6, 0.44704, 0.1, 10.0)
 TURNS = (-1.0, DEG, 1 / DEG, -DEG, 0.1, 10.0)
 # What wheels can be: of a toy and of a mine's lorry.
 LIMITS = {"radius_m": (0.01, 2.5), "ticks_per_turn": (1, 1e7), "track_m": (0.06, 6), "wheelbase_m": (0.06, 12), "steering_ratio": (0.5, 40)}
+STEERED = ("wheelbase_m", "steering_ratio")  # alike in gentle turns
 UPRIGHT = 0.94  # cos of 20 degrees: a floor is no steeper
 
 
@@ -30,7 +31,7 @@ def all_of(robot: Robot) -> Iterator[Fault]:
     yield from _twists(robot)
     yield from _imu(robot)
     if {"steering_wheel", "road_wheel", "steering_actuator"} & set(bound) or robot.has("steering.csv"):
-        yield from _numbers(robot, ("wheelbase_m", "steering_ratio"))
+        yield from _numbers(robot, STEERED)
 
 
 def _wheel(robot: Robot, key: str, factor: float) -> list[list[Edit]]:
@@ -49,6 +50,7 @@ def _numbers(robot: Robot, keys: Sequence[str]) -> Iterator[Fault]:
         if value:
             yield Fault(f"wheels.{key}", tuple((f,) for f in (0.5, 2, 0.1, 10, 0.01, 0.001, *NEAR)), lambda s, k=key: _wheel(robot, k, s[0])[0],
                         lambda s, k=key: f"wheels.{k} is {factor_words(s[0])}", step=(0.08,), smallest=(0.01,), is_log=True,
+                        group="along the way of a steered turn" if key in STEERED else "",
                         is_possible=lambda s, v=value, a=low, b=high: a <= v * s[0] <= b and abs(math.log(s[0])) > 0.02)
 
 

@@ -190,7 +190,8 @@ class Search:
         gains = {c.fault.name: self._score(c.drive, until_s) - least for c in ordered}
         most = max(gains.values(), default=0.0)
         updates = max([1, int(now.seen[:part].sum()), *(int(c.drive.seen[:part].sum()) for c in ordered)]) / 2
-        return [c for c in ordered if most >= FIT_GAIN_MIN * updates and gains[c.fault.name] >= REACH * most]
+        rivals = ordered[0].fault.family() if ordered else ""  # of the best row: their sizes are fitted, too, before one of them is named
+        return [c for c in ordered if most >= FIT_GAIN_MIN * updates and (gains[c.fault.name] >= REACH * most or c.fault.family() == rivals)]
 
     def _whole(self, fit_s: float) -> float:
         return 0.0 if self.cost * self.duration_s * 30 < self.left_s() else fit_s
