@@ -32,7 +32,7 @@ wm_verdict update(planar_filter *filter, innovation &&prepared, const residual *
   sparse_row rows[planar_filter::kRows];
   planar_filter::update_options options;
   options.kept_from = kPoseStates;
-  options.kept_to = g.soft && policy.doubtful ? policy.held_to : kPoseStates;
+  options.kept_to = policy.holds || (g.soft && policy.doubtful) ? policy.held_to : kPoseStates;
   for (int i = 0; i < count; i++) {
     rows[i] = r[i].row;
     options.added_noise[i] = r[i].noise * (g.noise_scale - 1.0);

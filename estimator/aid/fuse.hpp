@@ -17,6 +17,7 @@ struct fuse_policy {
   bool unproven = false;  // the pose's covariance may be too small: the gate is at 99 %, not to falsify the calibration
   bool doubtful = false;  // several observations misfit: beyond the soft gate the pose alone is corrected
   bool widens = false;    // and its covariance grows
+  bool holds = false;     // the pose alone is corrected, below the soft gate, too
   bool learns = false;    // the noise adapts to the observation
   int held_to = kPoseStates;  // the states from the pose's on up to this one are considered in doubt [Schmidt1966]
 };

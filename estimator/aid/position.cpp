@@ -10,16 +10,6 @@ namespace {
 // A delay is linear in the path while its sigma is less: a robot begins to drive in a tenth of a second.
 constexpr double kLinearDelay_s = 0.1;
 
-observation observation_now(const planar_motion &filter, int key) {
-  observation out{};
-  out.t_ns = filter.now_ns();
-  out.key = key;
-  out.sensor = filter.odom();
-  out.travelled_m = filter.travelled_m();
-  out.turned_rad = filter.turned_rad();
-  return out;
-}
-
 }  // namespace
 
 int position_aid::count_states(const wm_position_params &p) {

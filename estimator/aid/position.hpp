@@ -4,10 +4,10 @@
 #ifndef WAYMARK_ESTIMATOR_AID_POSITION_HPP
 #define WAYMARK_ESTIMATOR_AID_POSITION_HPP
 
+#include "aid/observation.hpp"
 #include "aid/residual.hpp"
 #include "filters/core/receiver_error.hpp"
 #include "filters/planar/past_pose.hpp"
-#include "filters/relocalize/pose_search.hpp"
 
 namespace wm {
 

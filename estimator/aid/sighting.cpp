@@ -64,16 +64,6 @@ int error_slots(const wm_setup &setup) {
 
 constexpr int kTagHeadingKey = -16;  // of an observed heading, less the landmark's index
 
-observation observation_now(const planar_filter &filter, int key) {
-  observation out{};
-  out.t_ns = filter.now_ns();
-  out.key = key;
-  out.sensor = filter.odom();
-  out.travelled_m = filter.travelled_m();
-  out.turned_rad = filter.turned_rad();
-  return out;
-}
-
 }  // namespace
 
 sighting_aid::arrays sighting_aid::place(memory_layout *layout, const wm_setup &setup) {
@@ -140,9 +130,32 @@ double sighting_aid::yaw_sigma(int landmark) const {
   return stated > 0.0 && stated < kPi ? stated : kSurveyed_rad;
 }
 
-wm_verdict sighting_aid::look(const planar_filter &filter, const wm_sighting &s, bool tracking, view *out) const {
+wm_status sighting_aid::check(const wm_event &event, wm_innovation *record) const {
+  const bool is_marker = event.kind == WM_EVENT_MARKER;
+  const wm_marker &m = event.as.marker;
+  const wm_sighting &s = event.as.sighting;
+  const bool has_bearing = is_marker || !std::isnan(s.bearing_rad);
+  *record = record_of(event, has_bearing ? WM_RESIDUAL_BEARING : WM_RESIDUAL_RANGE);
+  record->sensor = is_marker ? m.sensor : s.sensor;
+  record->landmark_id = is_marker ? m.id : s.landmark_id;
+  record->observed = is_marker ? atan2(m.p_m[1], m.p_m[0]) : has_bearing ? s.bearing_rad : s.range_m;
+  return is_marker ? check_marker(m, setup_->sensor_count) : check_sighting(s, setup_->sensor_count);
+}
+
+wm_verdict sighting_aid::look(const wm_event &event, const planar_filter &filter, bool tracking, view *out,
+                              wm_innovation *record) const {
+  const bool is_marker = event.kind == WM_EVENT_MARKER;
+  if (!is_marker) out->s = event.as.sighting;
+  const wm_verdict verdict =
+      is_marker ? look_at(event.as.marker, filter, tracking, out) : look_at(filter, tracking, out);
+  if (is_marker) record->observed = out->s.bearing_rad;
+  if (verdict == WM_FUSED) record->landmark_id = setup_->landmarks[out->landmark].id;
+  return verdict;
+}
+
+wm_verdict sighting_aid::look_at(const planar_filter &filter, bool tracking, view *out) const {
+  const wm_sighting &s = out->s;
   const mounted_sensor &seen_by = sensor_[s.sensor];
-  out->s = &s;
   out->yaw_rad = out->yaw_variance = std::nan("");
   out->reading = read_sighting(s, seen_by, params());
   if (!out->reading.bearing && !out->reading.range) return WM_REJECTED_BY_CONFIG;
@@ -162,8 +175,7 @@ wm_verdict sighting_aid::look(const planar_filter &filter, const wm_sighting &s,
 
 // Its place in the sensor's frame gives bearing and range, of a steep sensor about the vertical. The range is along the
 // line of sight where the map has the marker's height, else on the floor, as expect() has it.
-wm_verdict sighting_aid::look(const planar_filter &filter, const wm_marker &m, bool tracking, wm_sighting *s,
-                              view *out) const {
+wm_verdict sighting_aid::look_at(const wm_marker &m, const planar_filter &filter, bool tracking, view *out) const {
   const mounted_sensor &seen_by = sensor_[m.sensor];
   const auto read = [&](bool second) {
     return read_tag(m, second, seen_by, errors_of(filter, m.sensor), params(), markers_);
@@ -172,12 +184,12 @@ wm_verdict sighting_aid::look(const planar_filter &filter, const wm_marker &m, b
   const double *v = seen_by.is_steep ? tag.nominal : m.p_m;
   const int landmark = find(m.id);
   const bool has_height = landmark >= 0 && finite(setup_->landmarks[landmark].p_m[2]);
-  *s = wm_sighting_without_numbers();
-  s->sensor = m.sensor;
-  s->landmark_id = m.id;
-  s->bearing_rad = atan2(v[1], v[0]);
-  s->range_m = std::sqrt(square(v[0]) + square(v[1]) + (has_height ? square(v[2]) : 0.0));
-  const wm_verdict verdict = look(filter, *s, false, out);
+  wm_sighting &s = out->s = wm_sighting_without_numbers();
+  s.sensor = m.sensor;
+  s.landmark_id = m.id;
+  s.bearing_rad = atan2(v[1], v[0]);
+  s.range_m = std::sqrt(square(v[0]) + square(v[1]) + (has_height ? square(v[2]) : 0.0));
+  const wm_verdict verdict = look_at(filter, false, out);
   if (verdict != WM_FUSED) return verdict;
   out->reading.bearing_sigma_rad = std::sqrt(tag.noise[1]) / larger(tag.floor_m, kNear_m);
   out->reading.range_sigma_m = std::sqrt(tag.noise[0]);
@@ -193,7 +205,7 @@ wm_verdict sighting_aid::look(const planar_filter &filter, const wm_marker &m, b
 
 // The one landmark that a sighting without identity fits: within half the gate, and no other within the gate.
 int sighting_aid::find_nearest(const planar_filter &filter, const view &at) const {
-  const wm_sighting &s = *at.s;
+  const wm_sighting &s = at.s;
   const mounted_sensor &seen_by = sensor_[s.sensor];
   const sensor_errors errors = errors_of(filter, s.sensor);
   int best = -1, fitting = 0;
@@ -229,7 +241,7 @@ int sighting_aid::find_nearest(const planar_filter &filter, const view &at) cons
 expected_sighting sighting_aid::expect(const planar_filter &filter, const view &at) const {
   const unsigned components =
       kBearing | (at.reading.range ? kRange : 0u) | (at.elevation ? kElevation : 0u) | components_;
-  return wm::expect(sensor_[at.s->sensor], errors_of(filter, at.s->sensor), at.past.pose,
+  return wm::expect(sensor_[at.s.sensor], errors_of(filter, at.s.sensor), at.past.pose,
                     setup_->landmarks[at.landmark].p_m, components);
 }
 
@@ -270,7 +282,7 @@ void sighting_aid::decay_tilt(planar_filter *filter) {
 // body's tilt. An error that is a state adds to the expectation, another one to the noise.
 void sighting_aid::add_errors(const view &at, const lent_slots &lent, const row_of &of, const planar_filter &filter,
                               residual *r) const {
-  const int sensor = at.s->sensor;
+  const int sensor = at.s.sensor;
   const double *by = of.by;
   add_past_pose(&r->row, by, at.past, slots_.at(sensor, kTimeOffset));
   slots_.add_to(&r->row, sensor, by);
@@ -318,15 +330,15 @@ void sighting_aid::put_row(const view &at, const lent_slots &lent, const row_of 
 
 // A marker's direction as it is expected in levelled axes along the sensor's yaw.
 double sighting_aid::expected_yaw(const planar_filter &filter, const view &at) const {
-  const int sensor = at.s->sensor;
+  const int sensor = at.s.sensor;
   const double from_rad = at.past.pose.heading_rad + sensor_[sensor].yaw_rad + errors_of(filter, sensor)[kYaw];
   return wrap(setup_->landmarks[at.landmark].yaw_rad - from_rad);
 }
 
 void sighting_aid::put_heading(const view &at, planar_row *row) const {
   const double by[3] = {0.0, 0.0, -1.0};
-  add_past_pose(row, by, at.past, slots_.at(at.s->sensor, kTimeOffset));
-  row->add(slots_.at(at.s->sensor, kYaw), -1.0);
+  add_past_pose(row, by, at.past, slots_.at(at.s.sensor, kTimeOffset));
+  row->add(slots_.at(at.s.sensor, kYaw), -1.0);
 }
 
 // Of its heading alone: its two poses stand at the same place.
@@ -363,7 +375,7 @@ void sighting_aid::put_heading_row(const view &at, const lent_slots &lent, const
 
 int sighting_aid::put_rows(const view &at, const expected_sighting &e, const wm_innovation &record,
                            planar_filter *filter, residual rows[3]) {
-  const wm_sighting &s = *at.s;
+  const wm_sighting &s = at.s;
   const noise_adaption &noise = filter->noise();
   const lent_slots lent = lend_states(s.sensor, at.landmark, filter);
   if (at.elevation) decay_tilt(filter);
@@ -395,9 +407,20 @@ int sighting_aid::put_rows(const view &at, const expected_sighting &e, const wm_
   return count;
 }
 
+fuse_result sighting_aid::fuse(const view &at, const expected_sighting &e, const wm_innovation &record,
+                               const fuse_policy &policy, planar_filter *filter, residual rows[kRows], int *count,
+                               record_list records) {
+  *count = put_rows(at, e, record, filter, rows) - at.elevation;
+  const double volume = clutter_volume(at.reading) * (finite(at.yaw_rad) ? kTwoPi : 1.0);
+  later_row elevation(*filter, &rows[at.elevation ? *count : 0]);
+  const fuse_result done = wm::fuse(filter, rows, *count, volume, policy, records);
+  if (at.elevation) (void)elevation.fuse(filter, policy, done.verdict == WM_FUSED, records);
+  return done;
+}
+
 observation sighting_aid::observe_heading(const view &at, const sensor_errors &errors,
                                           const planar_filter &filter) const {
-  const int sensor = at.s->sensor;
+  const int sensor = at.s.sensor;
   observation seen = observation_now(filter, kTagHeadingKey - at.landmark);
   seen.kind = kObservedHeading;
   seen.sensor = compose(seen.sensor, at.past.step);
@@ -407,7 +430,7 @@ observation sighting_aid::observe_heading(const view &at, const sensor_errors &e
 }
 
 observation sighting_aid::observe(const view &at, const sensor_errors &errors, const planar_filter &filter) const {
-  const wm_sighting &s = *at.s;
+  const wm_sighting &s = at.s;
   const mounted_sensor &seen_by = sensor_[s.sensor];
   const wm_landmark &target = setup_->landmarks[at.landmark];
   const double *sigma = params().states.sigma;

@@ -5,6 +5,8 @@
 #ifndef WAYMARK_ESTIMATOR_AID_SIGHTING_HPP
 #define WAYMARK_ESTIMATOR_AID_SIGHTING_HPP
 
+#include "aid/fuse.hpp"
+#include "aid/observation.hpp"
 #include "aid/residual.hpp"
 #include "aid/tag.hpp"
 #include "filters/core/landmark_params.h"
@@ -12,7 +14,6 @@
 #include "filters/core/state_pool.hpp"
 #include "filters/planar/past_pose.hpp"
 #include "filters/planar/planar_filter.hpp"
-#include "filters/relocalize/pose_search.hpp"
 #include "maps/landmark_index.hpp"
 #include "sensors/sighting.hpp"
 
@@ -20,6 +21,7 @@ namespace wm {
 
 class sighting_aid {
  public:
+  static constexpr int kRows = planar_filter::kRows;
   static constexpr int kErrorSlots = 24, kMapSlots = 24;  // most of correlated.slots and states.map_slots
   // Pose, sensor, time-correlated error, landmark, tilt.
   static_assert(kPoseStates + kSensorStates + 2 + 3 + 2 <= planar_row::kMax);
@@ -41,7 +43,7 @@ class sighting_aid {
 
   // A sighting of a landmark of the map, and the robot when it was taken.
   struct view {
-    const wm_sighting *s;
+    wm_sighting s;  // of a marker: what it is as a sighting
     sighting_reading reading;
     bool elevation;  // fused
     int landmark;    // index in the map
@@ -49,15 +51,17 @@ class sighting_aid {
     // A marker's direction in levelled axes along the sensor's yaw, where it is fused; NaN: it is not.
     double yaw_rad, yaw_variance;
   };
-  // Whether a sighting is to be fused (WM_FUSED), and with which landmark. `tracking`: by the pose a sighting without
-  // identity may be associated, and one of a marker's two poses chosen.
-  wm_verdict look(const planar_filter &filter, const wm_sighting &s, bool tracking, view *out) const;
-  // The same of a marker that check_tag() lets pass. *s: what it is as a sighting.
-  wm_verdict look(const planar_filter &filter, const wm_marker &m, bool tracking, wm_sighting *s, view *out) const;
+  // Whether the event's sighting or marker is in order. *record: what is known of it.
+  wm_status check(const wm_event &event, wm_innovation *record) const;
+  // Whether it is to be fused (WM_FUSED), and with which landmark. `tracking`: by the pose a sighting without identity
+  // may be associated, and one of a marker's two poses chosen.
+  wm_verdict look(const wm_event &event, const planar_filter &filter, bool tracking, view *out,
+                  wm_innovation *record) const;
   expected_sighting expect(const planar_filter &filter, const view &at) const;
-  // Bearing, then range or elevation, then a marker's heading. Returns how many.
-  int put_rows(const view &at, const expected_sighting &e, const wm_innovation &record, planar_filter *filter,
-               residual rows[3]);
+  // Gate, update and records. *rows, *count: bearing, range, a marker's heading; the elevation is fused behind them
+  // and says nothing of the pose, since a larger tilt than stated must not make the robot lost.
+  fuse_result fuse(const view &at, const expected_sighting &e, const wm_innovation &record, const fuse_policy &policy,
+                   planar_filter *filter, residual rows[kRows], int *count, record_list records);
   // For the search of a pose, with all errors as sigmas. `errors`: the sensor's.
   observation observe(const view &at, const sensor_errors &errors, const planar_filter &filter) const;
   // The robot's heading by a marker's: at.yaw_rad is a number.
@@ -92,6 +96,11 @@ class sighting_aid {
     const int slot = slots_.at(sensor, kTimeOffset);
     return slot < 0 ? 0.0 : filter.value(slot);
   }
+  wm_verdict look_at(const planar_filter &filter, bool tracking, view *out) const;
+  wm_verdict look_at(const wm_marker &m, const planar_filter &filter, bool tracking, view *out) const;
+  // Bearing, then range or elevation, then a marker's heading. Returns how many.
+  int put_rows(const view &at, const expected_sighting &e, const wm_innovation &record, planar_filter *filter,
+               residual rows[kRows]);
   double expected_yaw(const planar_filter &filter, const view &at) const;
   void put_heading(const view &at, planar_row *row) const;
   double heading_nis(const planar_filter &filter, const view &at, const tag_reading &tag) const;

@@ -4,36 +4,12 @@
 namespace wm {
 namespace {
 
-constexpr double kFarthest_m = 1e4;      // beyond, a number is an error of the sender
 constexpr double kLeastLength_m = 1e-6;  // below, a marker is in the camera itself
 
 double number_or(double a, double b) { return finite(a) ? a : b; }
 double zero_if_absent(double a) { return std::isnan(a) ? 0.0 : a; }
 
 }  // namespace
-
-wm_status check_tag(const wm_marker &m, size_t sensor_count) {
-  const bool two = m.poses == 2;
-  const double lengths[] = {m.p_m[0],
-                            m.p_m[1],
-                            m.p_m[2],
-                            two ? m.other_p_m[0] : 0.0,
-                            two ? m.other_p_m[1] : 0.0,
-                            two ? m.other_p_m[2] : 0.0,
-                            zero_if_absent(m.along_sigma_m)};
-  const double angles[] = {m.yaw_rad, two ? m.other_yaw_rad : 0.0, zero_if_absent(m.yaw_sigma_rad),
-                           zero_if_absent(m.bloom_px)};
-  bool all_finite = true, in_range = m.sensor < sensor_count && !(m.along_sigma_m <= 0.0) && !(m.yaw_sigma_rad <= 0.0);
-  for (double n : lengths) {
-    all_finite &= finite(n);
-    in_range &= std::fabs(n) <= kFarthest_m;
-  }
-  for (double a : angles) {
-    all_finite &= finite(a);
-    in_range &= std::fabs(a) <= kMaxAngle_rad;
-  }
-  return !all_finite ? WM_NOT_FINITE : in_range ? WM_OK : WM_OUT_OF_RANGE;
-}
 
 // sensor.axis is (Ry(pitch) Rx(roll))', its columns are the sensor's axes.
 tag_reading read_tag(const wm_marker &m, bool second, const mounted_sensor &sensor, const sensor_errors &errors,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Coded markers as a sensor reads them: validation, place in levelled axes, noise, and which of two poses.
+// Coded markers as a sensor reads them: place in levelled axes, noise, and which of two poses.
 #ifndef WAYMARK_ESTIMATOR_AID_TAG_HPP
 #define WAYMARK_ESTIMATOR_AID_TAG_HPP
 
@@ -7,8 +7,6 @@
 #include "sensors/sighting.hpp"
 
 namespace wm {
-
-wm_status check_tag(const wm_marker &m, size_t sensor_count);
 
 // A marker in levelled axes along the sensor's yaw.
 struct tag_reading {

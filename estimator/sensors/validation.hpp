@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Validation of sightings, positions, headings and stated poses, the same for every filter. WM_NOT_FINITE,
+// Validation of sightings, markers, positions, headings and stated poses, the same for every filter. WM_NOT_FINITE,
 // WM_OUT_OF_RANGE: the datum cannot be a measurement.
 #ifndef WAYMARK_ESTIMATOR_SENSORS_VALIDATION_HPP
 #define WAYMARK_ESTIMATOR_SENSORS_VALIDATION_HPP
@@ -15,6 +15,7 @@ namespace wm {
 inline constexpr double kMaxRange_m = 1e6, kMaxSigma = 1e6;  // beyond, a number is an error of the sender
 inline constexpr double kMaxAngle_rad = 100.0;               // unwrapped angles may have turned a few times
 
+inline constexpr double kMaxMarker_m = 1e4;           // the same of a marker's place in the sensor's frame
 inline constexpr double kMaxPosition_m = 1e7;         // beyond, a coordinate is an error of the sender
 inline constexpr double kMaxHeadingSigma_rad = 10.0;  // of a stated pose; pi is an unknown heading
 inline constexpr double kUnitNorm = 0.01;             // a quaternion's squared length may differ from 1 by this
@@ -52,6 +53,31 @@ inline wm_status check_heading(const wm_heading &h) {
   if (!finite(h.heading_rad) || !finite(h.sigma_rad)) return WM_NOT_FINITE;
   const bool possible = std::fabs(h.heading_rad) <= kMaxAngle_rad && h.sigma_rad > 0.0 && h.sigma_rad < kMaxAngle_rad;
   return possible ? WM_OK : WM_OUT_OF_RANGE;
+}
+
+inline double absent_as_zero(double a) { return std::isnan(a) ? 0.0 : a; }
+
+inline wm_status check_marker(const wm_marker &m, size_t sensor_count) {
+  const bool two = m.poses == 2;
+  const double lengths[] = {m.p_m[0],
+                            m.p_m[1],
+                            m.p_m[2],
+                            two ? m.other_p_m[0] : 0.0,
+                            two ? m.other_p_m[1] : 0.0,
+                            two ? m.other_p_m[2] : 0.0,
+                            absent_as_zero(m.along_sigma_m)};
+  const double angles[] = {m.yaw_rad, two ? m.other_yaw_rad : 0.0, absent_as_zero(m.yaw_sigma_rad),
+                           absent_as_zero(m.bloom_px)};
+  bool all_finite = true, in_range = m.sensor < sensor_count && !(m.along_sigma_m <= 0.0) && !(m.yaw_sigma_rad <= 0.0);
+  for (double n : lengths) {
+    all_finite &= finite(n);
+    in_range &= std::fabs(n) <= kMaxMarker_m;
+  }
+  for (double a : angles) {
+    all_finite &= finite(a);
+    in_range &= std::fabs(a) <= kMaxAngle_rad;
+  }
+  return !all_finite ? WM_NOT_FINITE : in_range ? WM_OK : WM_OUT_OF_RANGE;
 }
 
 // `coordinates`: 2 in the plane, 3 in space.

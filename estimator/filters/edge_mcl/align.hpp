@@ -43,7 +43,7 @@ struct normal_equations {
 // Errors of a camera's mounting that are estimated with a hypothesis: pitch, roll, height, in sigmas of the filter's
 // calibration. Yaw is left out: it is equivalent to the heading.
 inline constexpr int kMountingErrors = 3, kMountingCameras = 2, kMountingAll = kMountingErrors * kMountingCameras;
-inline constexpr int kMountingError[kMountingErrors] = {kPitch, kRoll, kHeight};
+inline constexpr int kMountingError[kMountingErrors] = {kCameraPitch, kCameraRoll, kCameraHeight};
 
 // A point of an edge on the floor, in base_link.
 struct floor_edge {

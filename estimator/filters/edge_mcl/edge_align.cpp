@@ -367,17 +367,16 @@ void edge_mcl::find_minima(const wm_points &points, const prediction &prior, min
 }
 
 // Probability of each minimum, and by how much every state differs there from the best one.
-void edge_mcl::compare_minima(const minima &found, const prediction &prior,
-                              double off[minima::kCapacity][kMaxEdgeStates], double *probability) const {
+void edge_mcl::compare_minima(const minima &found, const prediction &prior, double *off, double *probability) const {
   double total = 0.0;
   for (int k = 0; k < found.count; k++) total += probability[k] = exp(found.cost[0] - found.cost[k]);
   for (int k = 0; k < found.count; k++) {
     probability[k] /= total;
     const align_vector scaled = prior.inverse * difference_of(found.at[k], found.at[0]);
     for (int i = 0; i < filter_.states(); i++) {
-      off[k][i] = 0.0;
+      double &by = off[k * filter_.states() + i] = 0.0;
       for (int r = 0; r < kAlignStates; r++)
-        if (prior.mean.state[r] >= 0) off[k][i] += filter_.covariance(i, prior.mean.state[r]) * scaled[r];
+        if (prior.mean.state[r] >= 0) by += filter_.covariance(i, prior.mean.state[r]) * scaled[r];
     }
   }
 }
@@ -482,11 +481,11 @@ bool edge_mcl::align(const wm_points &points, int camera, normal_equations *scan
   }
   aligned_m_[by] = way;
   aligned_ns_[by] = filter_.now_ns();
-  double off[minima::kCapacity][kMaxEdgeStates], probability[minima::kCapacity];
+  double *off = &off_[0], probability[minima::kCapacity];
   compare_minima(found, before, off, probability);
   if (!fuse_information(*scan, found.at[0])) record->verdict = (uint8_t)WM_REJECTED_NUMERIC;
   for (int k = 1; k < found.count; k++)
-    if (probability[k] > kLeastProbability) filter_.add_chance(probability[k], off[k]);
+    if (probability[k] > kLeastProbability) filter_.add_chance(probability[k], off + k * filter_.states());
   return true;
 }
 

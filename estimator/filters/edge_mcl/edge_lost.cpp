@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Lost or not, and relocalization.
+#include "filters/core/recovery.hpp"
 #include "filters/edge_mcl/edge_mcl.hpp"
 #include "math/arc.hpp"
 
@@ -46,7 +47,7 @@ constexpr double kFoundCovariance[3][3] = {{kFoundSigma_m * kFoundSigma_m, 0, 0}
 // Odds of all hypotheses but the tracked one. While searching there is no tracked pose to hold them against.
 double edge_mcl::lost_log_odds() const {
   const double elsewhere = life_.searching() ? 0.0 : others_.searched_odds();
-  return log(exp(fit_.log_odds()) + others_.aliased_odds() + elsewhere);
+  return log(exp(fit_.log_odds()) + others_.aliased_odds() + elsewhere) + landmark_log_bayes();
 }
 
 void edge_mcl::update_lost(const normal_equations &scan, double dt_s) {
@@ -72,6 +73,7 @@ void edge_mcl::update_state(double log_bayes_factor) {
     life_.confirmed();
     tentative_ = false;
   } else if (odds > kLostLogOdds) {
+    if (tentative_) refuted_ns_ = filter_.now_ns();
     tentative_ = false;
   }
 }
@@ -106,6 +108,7 @@ void edge_mcl::on_motion_gap() {
 void edge_mcl::lose() {
   life_.lose(filter_.now_ns());
   rollback_.restore(&filter_);
+  if (has_landmarks_) landmarks_.release(&filter_);
   forget_walls();
 }
 
@@ -176,15 +179,22 @@ void edge_mcl::decide() {
 
 void edge_mcl::adopt(int hypothesis) {
   const wm_pose2 pose = others_[hypothesis].pose;
-  if (life_.tracking()) lose();
-  fit_.set_log_odds(0.0);
-  suspicious_ = tentative_ = true;
-  const wm_pose2 way = between(filter_.pose(), pose);
-  if (!same_pose(wm_pose2{}, way, kSame_m, kSame_rad)) life_.jumped();
+  begin_tentative(pose);
   others_.adopt(hypothesis);
   others_.forget_aliased_odds();
-  odometry_.clear();
   filter_.set_pose(pose, kFoundCovariance);
+}
+
+// The robot is taken to be there; later data confirm it.
+void edge_mcl::begin_tentative(const wm_pose2 &pose) {
+  if (life_.tracking()) lose();
+  fit_.set_log_odds(0.0);
+  landmark_fit_.begin(kFoundWrong);
+  // Landmarks that contradicted the pose before have not moved.
+  for (size_t i = 0; has_landmarks_ && i < setup_->landmark_count; i++) records_[i] = {};
+  suspicious_ = tentative_ = true;
+  if (!same_pose(wm_pose2{}, between(filter_.pose(), pose), kSame_m, kSame_rad)) life_.jumped();
+  odometry_.clear();
 }
 
 // Moments of all hypotheses about the published pose; while lost, the rest of the probability is spread over the map.

@@ -17,20 +17,48 @@ namespace {
 constexpr double kMotionGap_s = 1.0;      // between two motion messages, beyond which the way is unknown; not swept
 constexpr double kUnknownSigma_m = 0.03;  // of a point without a sigma and a camera: a pixel at 4 m
 
-const char *const kReads[] = {"!motion.noise.adapt", "motion.", nullptr};
+const char *const kReads[] = {"!motion.noise.adapt", "motion.", "sightings.", nullptr};
+
+bool has_landmarks(const wm_setup &setup) { return setup.landmark_count > 0 && setup.sensor_count > 0; }
+
+int count_states(const wm_edge_mcl_params &params, const wm_setup &setup) {
+  const int cameras = setup.rig ? static_cast<int>(setup.rig->camera_count) : 0;
+  int each_camera = 0;
+  for (int k = 0; k <= kCameraTime; k++) each_camera += params.sigma[k] > 0.0;
+  return kPoseStates + planar_filter::count_motion_states(setup.motion->states, setup.motion->model) +
+         (params.sigma[kEdgeOffset] > 0.0) + each_camera * cameras +
+         (has_landmarks(setup) ? sighting_aid::count_states(params.landmarks, setup) : 0) +
+         (params.wall_sigma_m > 0.0) * wall_list::kCapacity;
+}
 
 }  // namespace
 
-size_t edge_mcl::bytes(const wm_edge_mcl_params &, const wm_setup &setup, const char **why) {
-  const size_t map = edge_map::bytes_or_reason(setup.map, why);
-  if (map == 0) return 0;
+edge_mcl::arrays edge_mcl::place(memory_layout *layout, const wm_edge_mcl_params &params, const wm_setup &setup) {
+  const int states = count_states(params, setup);
+  arrays out{};
+  out.filter = layout->take<double>(planar_filter::doubles(states));
+  out.off = layout->take<double>(static_cast<size_t>(minima::kCapacity * states));
+  if (has_landmarks(setup)) {
+    out.records = layout->take<landmark_record>(setup.landmark_count);
+    out.landmarks = sighting_aid::place(layout, setup);
+  }
+  out.map = layout->take<uint8_t>(edge_map::bytes(*setup.map));
+  out.search = layout->take<uint8_t>(place_search::bytes(*setup.map));
+  return out;
+}
+
+size_t edge_mcl::bytes(const wm_edge_mcl_params &params, const wm_setup &setup, const char **why) {
+  if (edge_map::bytes_or_reason(setup.map, why) == 0) return 0;
   if (setup.rig && setup.rig->camera_count > kCamerasMax) {
     *why = "edge_mcl takes at most 2 cameras";
     return 0;
   }
+  if (has_landmarks(setup) && setup.sensor_count > kMaxSensors) {
+    *why = "edge_mcl takes at most 16 sensors";
+    return 0;
+  }
   memory_layout layout(nullptr, sizeof(edge_mcl));
-  layout.take<uint8_t>(map);
-  layout.take<uint8_t>(place_search::bytes(*setup.map));
+  place(&layout, params, setup);
   return layout.bytes();
 }
 
@@ -39,26 +67,31 @@ void edge_mcl::init(const wm_edge_mcl_params &params, const wm_setup &setup) {
   setup_ = &setup;
   params_ = params;
   const int cameras = setup.rig ? static_cast<int>(setup.rig->camera_count) : 0;
-  int each_camera = 0;
-  for (int k = 0; k <= kCameraTime; k++) each_camera += params.sigma[k] > 0.0;
-  const wm_motion_states &motion = setup.motion->states;
-  filter_.init(setup, motion,
-               kPoseStates + planar_filter::count_motion_states(motion, setup.motion->model) +
-                   (params.sigma[kEdgeOffset] > 0.0) + each_camera * cameras +
-                   (params.wall_sigma_m > 0.0) * wall_list::kCapacity);
+  memory_layout layout(this, sizeof *this);
+  const arrays behind = place(&layout, params, setup);
+  filter_.init(setup, setup.motion->states, count_states(params, setup), behind.filter);
+  off_.set(behind.off);
   const auto add = [&](int row) { return params.sigma[row] > 0.0 ? filter_.add_state(0.0, params.sigma[row]) : -1; };
   edge_state_ = add(kEdgeOffset);
   camera_count_ = cameras;
   for (int c = 0; c < camera_count_; c++) camera_[c].init(setup.rig->cameras[c]);
   slots_.init(camera_count_, [&](int, int row) { return add(row); });
-  memory_layout layout(this, sizeof *this);
-  map_.init(*setup.map, layout.take<uint8_t>(edge_map::bytes(*setup.map)));
-  search_.init(map_, layout.take<uint8_t>(place_search::bytes(*setup.map)));
+  map_.init(*setup.map, behind.map);
+  search_.init(map_, behind.search);
+  has_landmarks_ = has_landmarks(setup);
+  if (has_landmarks_) {
+    landmarks_.init(params.landmarks, params.markers, setup, behind.landmarks);
+    landmarks_.add_calibration(&filter_);
+    records_.set(behind.records);
+    std::memset(behind.records, 0, setup.landmark_count * sizeof(landmark_record));
+  }
   others_.init(map_);
   fit_.init(params);
   watched_ns_ = driven_ns_ = WM_TIME_NONE;
   life_ = lifecycle();
+  calibration_states_ = filter_.states();
   rollback_.begin(filter_, kPoseStates, filter_.states());
+  if (has_landmarks_) landmarks_.add_lent(&filter_);
   wall_state_ = params.wall_sigma_m > 0.0 ? filter_.states() : -1;
   for (int k = 0; wall_state_ >= 0 && k < wall_list::kCapacity; k++) filter_.add_state(0.0, params.wall_sigma_m);
   start_again(start_is_known(setup.start));
@@ -75,6 +108,7 @@ void edge_mcl::start_again(bool known) {
   forget_walls();
   watched_m_ = filter_.travelled_m() + filter_.turned_rad();
   fit_.reset(known);
+  begin_landmarks();
   others_.clear(filter_.pose(), filter_.odom());
   aliases_m_ = filter_.travelled_m();
   nominal_ = map_searched_ = tentative_ = false;
@@ -87,7 +121,7 @@ wm_status edge_mcl::predict(const wm_event &motion) {
   const double silent_s = driven_ns_ == WM_TIME_NONE ? 0.0 : wm_seconds_between(driven_ns_, motion.t_ns);
   driven_ns_ = motion.t_ns;
   if (watched_ns_ == WM_TIME_NONE) watched_ns_ = motion.t_ns;
-  filter_.move(motion);
+  if (filter_.move(motion) && has_landmarks_) landmarks_.slots().begin_lag(*setup_, &filter_);
   if (silent_s > kMotionGap_s) on_motion_gap();
   return status;
 }
@@ -95,6 +129,8 @@ wm_status edge_mcl::predict(const wm_event &motion) {
 wm_status edge_mcl::correct(const wm_event &event, record_list records) {
   switch (event.kind) {
     case WM_EVENT_POINTS: return take_points(event, records);
+    case WM_EVENT_SIGHTING:
+    case WM_EVENT_MARKER: return take_landmark(event, records);
     case WM_EVENT_SET_POSE:
     case WM_EVENT_RESET: return take_pose(event);
     case WM_EVENT_LOOKED: {
@@ -122,6 +158,7 @@ wm_status edge_mcl::take_points(const wm_event &event, record_list records) {
   // Of the first scan: since the motion began; 0 where nothing came before it.
   const double dt = watched_ns_ == WM_TIME_NONE ? 0.0 : wm_seconds_between(watched_ns_, event.t_ns);
   watched_ns_ = event.t_ns;
+  if (has_landmarks_) landmark_fit_.forget(event.t_ns);
 
   const int camera = camera_of(points);
   place_scan(points, camera);
@@ -222,6 +259,7 @@ void edge_mcl::list_calibration(calibration_list *list) const {
         c, setup_->rig->cameras[c].name, filter_, [](int k) { return kNames[k]; }, list);
   if (edge_state_ >= 0)
     list->add("edges", kNames[kEdgeOffset], filter_.value(edge_state_), std::sqrt(filter_.variance(edge_state_)));
+  if (has_landmarks_) landmarks_.slots().list(*setup_, filter_, list);
 }
 
 size_t edge_mcl::list_counters(wm_counter *out, size_t capacity) const {
@@ -254,7 +292,7 @@ size_t edge_mcl::list_hypotheses(wm_hypothesis *out, size_t capacity) const {
 const wm_estimator wm_edge_mcl_estimator = wm::estimator_of<wm::edge_mcl, wm_edge_mcl_params>(
     "edge_mcl",
     "Kalman filter that aligns edges on the floor with a raster map's lines, calibrates cameras and motion "
-    "sensors, and finds the pose when lost.",
-    WM_EVENT_BIT(WM_EVENT_POINTS) | WM_EVENT_BIT(WM_EVENT_LOOKED) | WM_EVENT_BIT(WM_EVENT_SET_POSE) |
-        WM_EVENT_BIT(WM_EVENT_RESET),
+    "sensors, and finds the pose when lost. Sightings and coded markers of known landmarks beside.",
+    WM_EVENT_BIT(WM_EVENT_POINTS) | WM_EVENT_BIT(WM_EVENT_SIGHTING) | WM_EVENT_BIT(WM_EVENT_MARKER) |
+        WM_EVENT_BIT(WM_EVENT_LOOKED) | WM_EVENT_BIT(WM_EVENT_SET_POSE) | WM_EVENT_BIT(WM_EVENT_RESET),
     wm_edge_mcl_params_table, wm::kReads);

@@ -5,6 +5,8 @@
 #ifndef WAYMARK_ESTIMATOR_EDGE_MCL_HPP
 #define WAYMARK_ESTIMATOR_EDGE_MCL_HPP
 
+#include "aid/sighting.hpp"
+#include "filters/core/landmark_evidence.hpp"
 #include "filters/core/lifecycle.hpp"
 #include "filters/core/record_list.hpp"
 #include "filters/core/rollback.hpp"
@@ -17,12 +19,14 @@
 #include "filters/edge_mcl/place_search.hpp"
 #include "filters/planar/planar_filter.hpp"
 #include "waymark/estimator.h"
+#include "waymark/internal/memory/layout.hpp"
 
 namespace wm {
 
-// Pose, motion, the table's (all but the last row for each camera), and walls.
-inline constexpr int kMaxEdgeStates =
-    kPoseStates + kCalibrationCount + 2 + kMountingCameras * (kCameraStates - 1) + 1 + wall_list::kCapacity;
+// Motion, the table's (all but the last row for each camera), and sensors of landmarks.
+inline constexpr int kMaxEdgeCalibration =
+    kCalibrationCount + 2 + kMountingCameras * (kCameraStates - 1) + 1 + kMaxSensors * kSensorStates;
+static_assert(kMaxSensors * kSensorStates <= kMaxSensorStates);
 
 class edge_mcl {
  public:
@@ -87,6 +91,17 @@ class edge_mcl {
   };
 
   wm_status take_points(const wm_event &event, record_list records);
+  // edge_landmarks.cpp: sightings and coded markers of a given map's landmarks, where the robot has one.
+  wm_status take_landmark(const wm_event &event, record_list records);
+  void note_landmark(const sighting_aid::view &at, double log_bayes, const residual *bearing);
+  fuse_policy landmark_policy(bool usable) const;
+  double landmark_log_bayes() const;
+  void begin_landmarks();
+  bool search_by_landmarks();
+  wm_time_ns searched_since(wm_time_ns now_ns) const;
+  int landmarks_that_fit(wm_time_ns since_ns) const;
+  void adopt_found(const search_result &found);
+  travelled_pose2 odometry() const { return {filter_.odom(), filter_.travelled_m(), filter_.turned_rad()}; }
   wm_status take_pose(const wm_event &event);
   void start_again(bool known);
 
@@ -111,8 +126,7 @@ class edge_mcl {
                  normal_equations *e) const;
   static void narrow(const sin_cos &axis, const align_vector &shared, double variance, double to, prediction *part);
   void find_minima(const wm_points &points, const prediction &prior, minima *out) const;
-  void compare_minima(const minima &found, const prediction &prior, double off[minima::kCapacity][kMaxEdgeStates],
-                      double *probability) const;
+  void compare_minima(const minima &found, const prediction &prior, double *off, double *probability) const;
   void describe(const normal_equations &scan, const alignment &a, wm_innovation *record) const;
   bool fuse_information(const normal_equations &e, const alignment &a);
   void update_walls(const wm_points &points, int camera);
@@ -130,12 +144,22 @@ class edge_mcl {
   void decide();
   void update_aliases(double dt_s);
   void adopt(int hypothesis);
+  void begin_tentative(const wm_pose2 &pose);
   void add_hypotheses_spread(wm_estimate *out) const;
   void lose();
 
+  struct arrays {
+    double *filter, *off;
+    landmark_record *records;
+    sighting_aid::arrays landmarks;
+    uint8_t *map, *search;
+  };
+  static arrays place(memory_layout *layout, const wm_edge_mcl_params &params, const wm_setup &setup);
+
   const wm_setup *setup_;
   wm_edge_mcl_params params_;
-  planar_filter_of<kMaxEdgeStates> filter_;
+  planar_filter filter_;
+  relative_array<double> off_;  // by how much each state differs at each minimum
   edge_map map_;
   floor_points scan_;  // those on a line with their neighbours, in now's base_link
   scan_point points_[WM_POINTS_MAX];
@@ -148,8 +172,15 @@ class edge_mcl {
   int camera_count_;
   state_slots<kCamerasMax, kCameraTime + 1> slots_;
   int edge_state_;
-  int64_t wall_state_;                    // the first of them, -1: off; 64 bits: no padding
-  rollback<kMaxEdgeStates, 2> rollback_;  // calibration while the scans fitted: being lost is noticed within 2 s
+  int64_t wall_state_;                         // the first of them, -1: off; 64 bits: no padding
+  rollback<kMaxEdgeCalibration, 2> rollback_;  // calibration while the scans fitted: being lost is noticed within 2 s
+  sighting_aid landmarks_;
+  relative_array<landmark_record> records_;
+  landmark_evidence landmark_fit_;
+  pose_search landmarks_seen_;
+  wm_time_ns refuted_ns_;       // when scans refuted a pose that landmarks found
+  int64_t has_landmarks_;       // 64 bits: no padding
+  int64_t calibration_states_;  // pose and calibration; walls and lent states come behind
   lifecycle life_;
   wm_pose2 scan_odom_;  // odometry at the last scan
   wm_time_ns watched_ns_, driven_ns_;

@@ -16,6 +16,9 @@ static const wm_param kParams[] = {
             "errors "
             "of the map. Of 0.015 to 0.025 each is right for flats whose map is exact and with a wall 0.1 m off. 0: "
             "off."),
+    LANDMARK_TILT_ROWS(landmarks),
+    LANDMARK_SLOTS_ROW(landmarks),
+    MARKER_ROWS(markers),
     F64("points.pixel_px", pixel_px, 0.5, 0.01, 10,
         "Sigma of an edge in the picture, pixels, where the detector gives none in metres."),
     F64("points.sigma_m", point_sigma_m, 0.012, 0.001, 1, "Sigma of a point besides: map and edge, m."),

@@ -4,6 +4,8 @@
 
 #include <stdint.h>
 
+#include "filters/core/landmark_params.h"
+#include "filters/core/marker_params.h"
 #include "waymark/internal/filters/edge_mcl/camera_states.h"
 #include "waymark/params.h"
 
@@ -22,7 +24,9 @@ typedef struct wm_edge_mcl_params {
   double systematic_xy_m, systematic_heading_rad;
 
   double lost_explained, lost_margin, lost_beyond_weight, kidnapped_per_s;
-  int32_t search_poses;
+  wm_landmark_params landmarks;
+  wm_marker_params markers;
+  int32_t search_poses, unused;
   double dead_reckoning_after_s;
 } wm_edge_mcl_params;
 

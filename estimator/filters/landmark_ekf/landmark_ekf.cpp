@@ -95,9 +95,7 @@ void landmark_ekf::start_again() {
   const wm_start &start = setup_->start;
   begin_life(start_is_known(start));
   if (life_.tracking()) return;
-  observation seen = observation_at(filter_.now_ns(), -1, filter_.odom());
-  seen.travelled_m = filter_.travelled_m();
-  seen.turned_rad = filter_.turned_rad();
+  observation seen = observation_now(filter_, -1);
   const bool place = finite(start.p_m[0]) && finite(start.p_m[1]), heading = finite(start.heading_rad);
   const double sigma_xy = given_or_default(start.sigma_xy_m);
   const double sigma_heading = given_or_default(start.sigma_heading_rad);

@@ -48,7 +48,6 @@ class landmark_ekf {
   wm_status fuse_heading(const wm_event &event, record_list records);
   wm_status take_pose(const wm_event &event);
 
-  void buffer(const sighting_aid::view &at, bool has_heading);
   first_sightings::row row_at_prior(const residual &r, int sensor) const;
   void restart_calibration(int sensor, const double prior[kSensorStates]);
   void test_calibration(const sighting_aid::view &at, const residual *rows, int count);
@@ -57,12 +56,14 @@ class landmark_ekf {
   fuse_policy policy(bool usable) const;
   // Returns the log Bayes factor of "anywhere in clutter_volume" against "as expected".
   double fuse(residual *rows, int count, double clutter_volume, bool usable, record_list records);
+  double took(const fuse_result &done);
 
   sensor_errors remembered_errors_of(int sensor) const;
 
   // Relocalization (recovery.cpp).
-  observation observation_at(wm_time_ns t_ns, int key, const wm_pose2 &sensor_in_odom) const;
-  void buffer_observation(const observation &seen);
+  void buffer(const observation &seen) {
+    if (params_.recover) observations_.add(seen);
+  }
   void note(wm_time_ns t_ns, int key, double log_bayes, double angle_rad = NAN, double normalised = NAN);
   travelled_pose2 odometry() const { return {filter_.odom(), filter_.travelled_m(), filter_.turned_rad()}; }
   bool needs_search(wm_time_ns t_ns, bool by_bearing);

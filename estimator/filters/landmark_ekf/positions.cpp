@@ -17,7 +17,7 @@ wm_status landmark_ekf::fuse_position(const wm_event &event, record_list records
   filter_.move_to(event.t_ns);
   if (!params_.gnss.use_position) return reject(records, record, WM_REJECTED_BY_CONFIG);
   const position_aid::view at = positions_.look(p, &filter_);
-  buffer_observation(positions_.observe(p, at, filter_));
+  buffer(positions_.observe(p, at, filter_));
   if (life_.searching()) {
     search_now(event.t_ns);
     return reject(records, record, WM_REJECTED_SEARCHING);
@@ -39,7 +39,7 @@ wm_status landmark_ekf::fuse_heading(const wm_event &event, record_list records)
   if (status != WM_OK) return status;
   filter_.move_to(event.t_ns);
   if (!params_.gnss.use_heading) return reject(records, r.record, WM_REJECTED_BY_CONFIG);
-  buffer_observation(positions_.observe(h, filter_));
+  buffer(positions_.observe(h, filter_));
   if (life_.searching()) {
     search_now(event.t_ns);
     return reject(records, r.record, WM_REJECTED_SEARCHING);

@@ -33,22 +33,6 @@ sensor_errors landmark_ekf::remembered_errors_of(int sensor) const {
   return aid_.slots().errors(sensor, [&](int slot) { return rollback_.value(generation, slot); });
 }
 
-observation landmark_ekf::observation_at(wm_time_ns t_ns, int key, const wm_pose2 &sensor_in_odom) const {
-  observation seen{};
-  seen.t_ns = t_ns;
-  seen.key = key;
-  seen.sensor = sensor_in_odom;
-  return seen;
-}
-
-void landmark_ekf::buffer_observation(const observation &seen) {
-  if (!params_.recover) return;
-  observation kept = seen;
-  kept.travelled_m = filter_.travelled_m();
-  kept.turned_rad = filter_.turned_rad();
-  observations_.add(kept);
-}
-
 void landmark_ekf::note(wm_time_ns t_ns, int key, double log_bayes, double angle_rad, double normalised) {
   if (!params_.recover) return;
   evidence_.note(t_ns, key, log_bayes, angle_rad, normalised, key >= 0 ? &records_[static_cast<size_t>(key)] : nullptr);
@@ -183,9 +167,7 @@ bool landmark_ekf::needs_search(wm_time_ns t_ns, bool by_bearing) {
   }
   if (vague_ns_ == WM_TIME_NONE) {
     vague_ns_ = t_ns;
-    observation &place = vague_[0] = observation_at(t_ns, -1, filter_.odom());
-    place.travelled_m = filter_.travelled_m();
-    place.turned_rad = filter_.turned_rad();
+    observation &place = vague_[0] = observation_now(filter_, -1);
     observation &toward = vague_[1] = place;
     place.kind = kObservedPosition;
     place.place_m[0] = filter_.value(kX);

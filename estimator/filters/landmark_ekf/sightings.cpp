@@ -13,15 +13,8 @@ constexpr double kWidenEvery_s = 1.0;  // the pose's covariance in doubt; not sw
 
 // A sighting, or a marker whose place is known.
 wm_status landmark_ekf::fuse_landmark(const wm_event &event, record_list records) {
-  const bool is_marker = event.kind == WM_EVENT_MARKER;
-  wm_sighting s = is_marker ? wm_sighting_without_numbers() : event.as.sighting;
-  const bool has_bearing = is_marker || !std::isnan(s.bearing_rad);
-  wm_innovation record = record_of(event, has_bearing ? WM_RESIDUAL_BEARING : WM_RESIDUAL_RANGE);
-  record.sensor = is_marker ? event.as.marker.sensor : s.sensor;
-  record.landmark_id = is_marker ? event.as.marker.id : s.landmark_id;
-  record.observed = has_bearing ? s.bearing_rad : s.range_m;
-  wm_status status =
-      is_marker ? check_tag(event.as.marker, setup_->sensor_count) : check_sighting(s, setup_->sensor_count);
+  wm_innovation record;
+  wm_status status = aid_.check(event, &record);
   if (status != WM_OK) return refuse(records, record, status);
   status = filter_.check_time(event.t_ns);
   if (status != WM_OK) return status;
@@ -29,13 +22,13 @@ wm_status landmark_ekf::fuse_landmark(const wm_event &event, record_list records
 
   sighting_aid::view at;
   const bool tracking = life_.tracking();
-  const wm_verdict verdict =
-      is_marker ? aid_.look(filter_, event.as.marker, tracking, &s, &at) : aid_.look(filter_, s, tracking, &at);
-  record.observed = has_bearing ? s.bearing_rad : s.range_m;
+  const wm_verdict verdict = aid_.look(event, filter_, tracking, &at, &record);
   if (verdict != WM_FUSED) return reject(records, record, verdict);
-  record.landmark_id = setup_->landmarks[at.landmark].id;
+  // A tracked pose is not doubted by one marker's heading: that one may have been turned.
   const bool has_heading = finite(at.yaw_rad);
-  buffer(at, has_heading && !tracking);
+  const sensor_errors errors = remembered_errors_of(at.s.sensor);
+  buffer(aid_.observe(at, errors, filter_));
+  if (has_heading && !tracking) buffer(aid_.observe_heading(at, errors, filter_));
   if (needs_search(event.t_ns, at.reading.bearing)) {
     search_now(event.t_ns);
     return reject(records, record, WM_REJECTED_SEARCHING);
@@ -47,14 +40,10 @@ wm_status landmark_ekf::fuse_landmark(const wm_event &event, record_list records
     if (why == WM_REJECTED_OUT_OF_RANGE) note(event.t_ns, at.landmark, landmark_evidence::max_log_bayes_factor());
     return reject(records, record, why);
   }
-  residual rows[3];
-  const int count = aid_.put_rows(at, e, record, &filter_, rows) - at.elevation;
+  residual rows[sighting_aid::kRows];
+  int count;
   const bool usable = !records_[static_cast<size_t>(at.landmark)].moved && !evidence_.biased(at.landmark, event.t_ns);
-  const double volume = clutter_volume(at.reading) * (has_heading ? kTwoPi : 1.0);
-  // A larger tilt than stated must not make the robot lost.
-  later_row elevation(filter_, &rows[at.elevation ? count : 0]);
-  const double log_bayes = fuse(rows, count, volume, usable, records);
-  if (at.elevation) (void)elevation.fuse(&filter_, policy(true), rows[0].record.verdict == WM_FUSED, records);
+  const double log_bayes = took(aid_.fuse(at, e, record, policy(usable), &filter_, rows, &count, records));
   if (usable) test_calibration(at, rows, count - has_heading);
   if (at.reading.bearing)
     note(event.t_ns, at.landmark, log_bayes, rows[0].innovation,
@@ -62,14 +51,6 @@ wm_status landmark_ekf::fuse_landmark(const wm_event &event, record_list records
   else
     note(event.t_ns, at.landmark, log_bayes);
   return WM_OK;
-}
-
-// For the search. A tracked pose is not doubted by one marker's heading: that one may have moved.
-void landmark_ekf::buffer(const sighting_aid::view &at, bool has_heading) {
-  if (!params_.recover) return;
-  const sensor_errors errors = remembered_errors_of(at.s->sensor);
-  observations_.add(aid_.observe(at, errors, filter_));
-  if (has_heading) observations_.add(aid_.observe_heading(at, errors, filter_));
 }
 
 // A row that the gate refused, with the sensor's states at their prior's mean.
@@ -94,7 +75,7 @@ first_sightings::row landmark_ekf::row_at_prior(const residual &r, int sensor) c
 
 // Where the last sightings of a sensor contradict its states and fit their prior, the states begin again.
 void landmark_ekf::test_calibration(const sighting_aid::view &at, const residual *rows, int count) {
-  const int sensor = at.s->sensor;
+  const int sensor = at.s.sensor;
   if (rows[0].record.verdict == WM_FUSED) return first_.fused(sensor);
   if (!life_.tracking()) return;
   first_sightings::row refused[2];
@@ -135,7 +116,10 @@ fuse_policy landmark_ekf::policy(bool usable) const {
 }
 
 double landmark_ekf::fuse(residual *rows, int count, double clutter_volume, bool usable, record_list records) {
-  const fuse_result done = wm::fuse(&filter_, rows, count, clutter_volume, policy(usable), records);
+  return took(wm::fuse(&filter_, rows, count, clutter_volume, policy(usable), records));
+}
+
+double landmark_ekf::took(const fuse_result &done) {
   if (done.widened) inflated_ns_ = filter_.now_ns();
   if (done.verdict == WM_FUSED) life_.fused(filter_.now_ns());
   return done.log_bayes;

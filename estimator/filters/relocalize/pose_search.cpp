@@ -571,6 +571,7 @@ search_result pose_search::find(wm_time_ns since_ns, const travelled_pose2 &odom
   const placement &p = list.best[best];
   const support own = p.cost < kFailed_cost ? support_of(all, p) : support{};
   out.agreeing = own.observations;
+  out.landmarks = own.landmarks;
   if (!is_supported(all, own, limits)) return out;
   // The covariance is by all but the heights: by them one landmark would do, and it may be a false detection.
   double inverse[3][3];

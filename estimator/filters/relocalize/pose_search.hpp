@@ -53,6 +53,7 @@ struct search_result {
   wm_pose2 pose;  // base_link in map, now
   double covariance[3][3];
   int used, agreeing;  // observations
+  int landmarks;       // of which at least half of the observations agree
 };
 
 struct search_limits {

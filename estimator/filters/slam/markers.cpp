@@ -23,7 +23,7 @@ wm_status slam::fuse_marker(const wm_event &event, record_list records) {
   context at{m.sensor, m.id, {}, record_of(event, WM_RESIDUAL_X), records};
   at.record.sensor = m.sensor;
   at.record.landmark_id = m.id;
-  wm_status status = check_tag(m, setup_->sensor_count);
+  wm_status status = check_marker(m, setup_->sensor_count);
   if (status != WM_OK) return refuse(records, at.record, status);
   status = begin_observation(event.t_ns);
   if (status != WM_OK) return status;

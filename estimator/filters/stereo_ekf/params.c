@@ -86,6 +86,7 @@ static const wm_param kParams[] = {
         "Sigma of one coordinate of a point in a picture, px. 0: calibration.yaml's stereo.sigma_px, or 0.5 without "
         "that."),
     POSITION_NOISE_ROWS(gnss),
+    MARKER_PLACE_ROWS(markers),
     F64("gate.soft", gate_soft, 7, 1, 1e6,
         "Normalised innovation squared of one row above which its variance is inflated, as for a distribution with "
         "long "

@@ -5,6 +5,7 @@
 
 #include <stdint.h>
 
+#include "filters/core/marker_params.h"
 #include "filters/core/position_params.h"
 #include "waymark/params.h"
 
@@ -32,6 +33,7 @@ typedef struct wm_stereo_ekf_params {
   double twist_lag_sigma;
   double accelerometer_bias_sigma, accelerometer_bias_walk;
   wm_position_params gnss;
+  wm_marker_params markers;
   // noise of one row
   double pixel_px;
   double accelerometer_mps2;

@@ -222,6 +222,7 @@ wm_status stereo_ekf::correct(const wm_event &event, record_list records) {
   switch (event.kind) {
     case WM_EVENT_STEREO: return fuse_stereo(event, records);
     case WM_EVENT_SIGHTING: return fuse_sighting(event, records);
+    case WM_EVENT_MARKER: return fuse_marker(event, records);
     case WM_EVENT_POSITION: return fuse_position(event, records);
     case WM_EVENT_HEADING: return fuse_heading(event, records);
     case WM_EVENT_SET_POSE:
@@ -281,8 +282,8 @@ void stereo_ekf::list_calibration(calibration_list *list) const {
 const wm_estimator wm_stereo_ekf_estimator = wm::estimator_of<wm::stereo_ekf, wm_stereo_ekf_params>(
     "stereo_ekf",
     "Extended Kalman filter in six degrees of freedom: points in a stereo pair's pictures, known or found on the way, "
-    "ranges to beacons, depth, heading, velocity. Finds the pose when lost.",
-    WM_EVENT_BIT(WM_EVENT_STEREO) | WM_EVENT_BIT(WM_EVENT_SIGHTING) | WM_EVENT_BIT(WM_EVENT_POSITION) |
-        WM_EVENT_BIT(WM_EVENT_HEADING) | WM_EVENT_BIT(WM_EVENT_LOOKED) | WM_EVENT_BIT(WM_EVENT_SET_POSE) |
-        WM_EVENT_BIT(WM_EVENT_RESET),
+    "ranges to beacons, coded markers, depth, heading, velocity. Finds the pose when lost.",
+    WM_EVENT_BIT(WM_EVENT_STEREO) | WM_EVENT_BIT(WM_EVENT_SIGHTING) | WM_EVENT_BIT(WM_EVENT_MARKER) |
+        WM_EVENT_BIT(WM_EVENT_POSITION) | WM_EVENT_BIT(WM_EVENT_HEADING) | WM_EVENT_BIT(WM_EVENT_LOOKED) |
+        WM_EVENT_BIT(WM_EVENT_SET_POSE) | WM_EVENT_BIT(WM_EVENT_RESET),
     wm_stereo_ekf_params_table, wm::kReads);

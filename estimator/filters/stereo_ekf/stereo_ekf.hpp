@@ -112,6 +112,7 @@ class stereo_ekf {
   wm_status fuse_stereo(const wm_event &event, record_list records);
   wm_status fuse_known_point(const wm_event &event, int known, const wm_innovation &blank, record_list records);
   wm_status fuse_sighting(const wm_event &event, record_list records);
+  wm_status fuse_marker(const wm_event &event, record_list records);
   wm_status fuse_position(const wm_event &event, record_list records);
   wm_status fuse_heading(const wm_event &event, record_list records);
   void fuse_twist(const wm_event &motion);
@@ -132,6 +133,7 @@ class stereo_ekf {
   bool point_rows(const wm_stereo &seen, const vec3 &place, double place_sigma_m, int slot, const past_pose &past,
                   row_block *out) const;
   bool sighting_rows(const wm_sighting &s, int landmark, int slot, row_block *out) const;
+  bool marker_rows(const wm_marker &m, int landmark, int slot, row_block *out) const;
   void depth_rows(const wm_position &p, row_block *out) const;
   void position_rows(const wm_position &p, int last, row_block *out) const;
   bool heading_rows(const wm_heading &h, row_block *out) const;

@@ -9,11 +9,11 @@
 // ROW(state, key, unit, name, sigma, most, text); the states that move points come first, the shared one last.
 // clang-format off
 #define WM_CAMERA_STATES(ROW) \
-  ROW(kPitch, "pitch", "_rad", "pitch_rad", 0.01, 0.5, \
+  ROW(kCameraPitch, "pitch", "_rad", "pitch_rad", 0.01, 0.5, \
       "Start sigma of each camera's pitch about calibration.yaml's, rad. 0.1 degrees are 7 cm of floor at 4 m. 0: off.") \
-  ROW(kRoll, "roll", "_rad", "roll_rad", 0.01, 0.5, "The same of its roll about the view, rad. 0: off.") \
+  ROW(kCameraRoll, "roll", "_rad", "roll_rad", 0.01, 0.5, "The same of its roll about the view, rad. 0: off.") \
   ROW(kCameraYaw, "yaw", "_rad", "yaw_rad", 0.01, 0.5, "The same of its yaw, rad. 0: off.") \
-  ROW(kHeight, "height", "_m", "height_m", 0.01, 0.5, "The same of its height above the floor, m. 0: off.") \
+  ROW(kCameraHeight, "height", "_m", "height_m", 0.01, 0.5, "The same of its height above the floor, m. 0: off.") \
   ROW(kCameraTime, "time_offset", "_s", "time_offset_s", 0.03, 0.3, \
       "Start sigma of each camera's time offset, s: its pictures are that much older than their stamps. 0: off.") \
   ROW(kEdgeOffset, "edge_offset", "_m", "offset_m", 0.01, 0.3, \

@@ -52,9 +52,9 @@ struct floor_camera {
                              {-v[1], v[0], 0.0}};
     double turned[3];
     for (int i = 0; i < 3; i++)
-      turned[i] = v[i] + error[kPitch] * by[0][i] + error[kRoll] * by[1][i] + error[kCameraYaw] * by[2][i];
+      turned[i] = v[i] + error[kCameraPitch] * by[0][i] + error[kCameraRoll] * by[1][i] + error[kCameraYaw] * by[2][i];
     const double down = -turned[2];
-    const double height = height_m + error[kHeight];
+    const double height = height_m + error[kCameraHeight];
     if (!(down > 0.02 * height_m) || !(height > 0.0)) return false;
     const double stretch = height / down;
     out->x = x_m + turned[0] * stretch;
@@ -64,8 +64,8 @@ struct floor_camera {
       out->x_by[k] = stretch * by[k][0] + turned[0] * stretch_by;
       out->y_by[k] = stretch * by[k][1] + turned[1] * stretch_by;
     }
-    out->x_by[kHeight] = turned[0] / down;
-    out->y_by[kHeight] = turned[1] / down;
+    out->x_by[kCameraHeight] = turned[0] / down;
+    out->y_by[kCameraHeight] = turned[1] / down;
     return true;
   }
 };
