@@ -28,7 +28,7 @@ int count_states(const wm_edge_mcl_params &params, const wm_setup &setup) {
   return kPoseStates + planar_filter::count_motion_states(setup.motion->states, setup.motion->model) +
          (params.sigma[kEdgeOffset] > 0.0) + each_camera * cameras +
          (has_landmarks(setup) ? sighting_aid::count_states(params.landmarks, setup) : 0) +
-         (params.wall_sigma_m > 0.0) * wall_list::kCapacity;
+         position_aid::count_states(params.gnss) + (params.wall_sigma_m > 0.0) * wall_list::kCapacity;
 }
 
 }  // namespace
@@ -94,6 +94,8 @@ void edge_mcl::init(const wm_edge_mcl_params &params, const wm_setup &setup) {
   if (has_landmarks_) landmarks_.add_lent(&filter_);
   wall_state_ = params.wall_sigma_m > 0.0 ? filter_.states() : -1;
   for (int k = 0; wall_state_ >= 0 && k < wall_list::kCapacity; k++) filter_.add_state(0.0, params.wall_sigma_m);
+  positions_.init(params.gnss, setup, &filter_, [this](double value, double) { return filter_.add_state(value, 0.0); });
+  filter_.set_correlated_position(positions_.error_state());
   start_again(start_is_known(setup.start));
 }
 
@@ -131,6 +133,8 @@ wm_status edge_mcl::correct(const wm_event &event, record_list records) {
     case WM_EVENT_POINTS: return take_points(event, records);
     case WM_EVENT_SIGHTING:
     case WM_EVENT_MARKER: return take_landmark(event, records);
+    case WM_EVENT_POSITION: return take_position(event, records);
+    case WM_EVENT_HEADING: return take_heading(event, records);
     case WM_EVENT_SET_POSE:
     case WM_EVENT_RESET: return take_pose(event);
     case WM_EVENT_LOOKED: {
@@ -158,7 +162,7 @@ wm_status edge_mcl::take_points(const wm_event &event, record_list records) {
   // Of the first scan: since the motion began; 0 where nothing came before it.
   const double dt = watched_ns_ == WM_TIME_NONE ? 0.0 : wm_seconds_between(watched_ns_, event.t_ns);
   watched_ns_ = event.t_ns;
-  if (has_landmarks_) landmark_fit_.forget(event.t_ns);
+  if (has_landmarks_ || positions_.is_awake()) landmark_fit_.forget(event.t_ns);
 
   const int camera = camera_of(points);
   place_scan(points, camera);
@@ -259,6 +263,7 @@ void edge_mcl::list_calibration(calibration_list *list) const {
         c, setup_->rig->cameras[c].name, filter_, [](int k) { return kNames[k]; }, list);
   if (edge_state_ >= 0)
     list->add("edges", kNames[kEdgeOffset], filter_.value(edge_state_), std::sqrt(filter_.variance(edge_state_)));
+  if (positions_.is_awake()) positions_.list(filter_, list);
   if (has_landmarks_) landmarks_.slots().list(*setup_, filter_, list);
 }
 
@@ -292,7 +297,9 @@ size_t edge_mcl::list_hypotheses(wm_hypothesis *out, size_t capacity) const {
 const wm_estimator wm_edge_mcl_estimator = wm::estimator_of<wm::edge_mcl, wm_edge_mcl_params>(
     "edge_mcl",
     "Kalman filter that aligns edges on the floor with a raster map's lines, calibrates cameras and motion "
-    "sensors, and finds the pose when lost. Sightings and coded markers of known landmarks beside.",
+    "sensors, and finds the pose when lost. Sightings and coded markers of known landmarks, positions and headings "
+    "beside.",
     WM_EVENT_BIT(WM_EVENT_POINTS) | WM_EVENT_BIT(WM_EVENT_SIGHTING) | WM_EVENT_BIT(WM_EVENT_MARKER) |
-        WM_EVENT_BIT(WM_EVENT_LOOKED) | WM_EVENT_BIT(WM_EVENT_SET_POSE) | WM_EVENT_BIT(WM_EVENT_RESET),
+        WM_EVENT_BIT(WM_EVENT_POSITION) | WM_EVENT_BIT(WM_EVENT_HEADING) | WM_EVENT_BIT(WM_EVENT_LOOKED) |
+        WM_EVENT_BIT(WM_EVENT_SET_POSE) | WM_EVENT_BIT(WM_EVENT_RESET),
     wm_edge_mcl_params_table, wm::kReads);

@@ -5,6 +5,7 @@
 #ifndef WAYMARK_ESTIMATOR_EDGE_MCL_HPP
 #define WAYMARK_ESTIMATOR_EDGE_MCL_HPP
 
+#include "aid/position.hpp"
 #include "aid/sighting.hpp"
 #include "filters/core/landmark_evidence.hpp"
 #include "filters/core/lifecycle.hpp"
@@ -103,6 +104,11 @@ class edge_mcl {
   void adopt_found(const search_result &found);
   travelled_pose2 odometry() const { return {filter_.odom(), filter_.travelled_m(), filter_.turned_rad()}; }
   wm_status take_pose(const wm_event &event);
+  // edge_positions.cpp
+  wm_status take_position(const wm_event &event, record_list records);
+  wm_status take_heading(const wm_event &event, record_list records);
+  bool is_found_by(const observation &seen);
+  void fuse_given(residual *rows, int count, int key, double clutter_volume, record_list records);
   void start_again(bool known);
 
   int camera_of(const wm_points &points) const;
@@ -176,6 +182,7 @@ class edge_mcl {
   rollback<kMaxEdgeCalibration, 2> rollback_;  // calibration while the scans fitted: being lost is noticed within 2 s
   sighting_aid landmarks_;
   relative_array<landmark_record> records_;
+  position_aid positions_;
   landmark_evidence landmark_fit_;
   pose_search landmarks_seen_;
   wm_time_ns refuted_ns_;       // when scans refuted a pose that landmarks found

@@ -6,6 +6,7 @@
 
 #include "filters/core/landmark_params.h"
 #include "filters/core/marker_params.h"
+#include "filters/core/position_params.h"
 #include "waymark/internal/filters/edge_mcl/camera_states.h"
 #include "waymark/params.h"
 
@@ -20,6 +21,7 @@ typedef struct wm_edge_mcl_params {
   double sigma[WM_CAMERA_ROWS];  // at the start, of each state; 0: not a state
   double wall_sigma_m;           // the same of each wall's offset
 
+  wm_position_params gnss;
   double pixel_px, point_sigma_m, common_px, range_max_m, gate_m;
   double systematic_xy_m, systematic_heading_rad;
 
