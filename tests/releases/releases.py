@@ -59,11 +59,9 @@ def versions(folder):
 
 def newest(uses, build):
     pinned = dict(re.findall(r"^([\w-]+)==(\S+)", PINNED.read_text(), re.M))
-    # One at a time, so that one package that can't be had hides no other.
-    missing = {}
-    for name in sorted({package for _, _, packages, _ in uses for package in packages} | set(pinned)):
-        if why := install(VENV, [name]):
-            missing[name] = why
+    missing, names = {}, sorted({package for _, _, packages, _ in uses for package in packages} | set(pinned))
+    if install(VENV, names):  # then one at a time, so that one that can't be had hides no other
+        missing = {name: why for name in names if (why := install(VENV, [name]))}
     (VENV / "judges.sha256").write_text("newest releases\n")
     there = versions(VENV)
     print("| use | packages: pinned, newest | tests | result |\n| --- | --- | --- | --- |", flush=True)

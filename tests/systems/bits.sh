@@ -63,8 +63,8 @@ loaded() { # NAME PROGRAM... : a program with that system's libraries
 }
 
 versions() { # NAME : of what decodes and computes there
-  local folder pc=()
-  folder=$(echo "$systems/$1"/usr/lib/*-linux-gnu)
+  local folder=$systems/$1/usr/lib/x86_64-linux-gnu pc=()
+  [[ $1 == *-amd64 ]] || folder=$systems/$1/usr/lib/aarch64-linux-gnu
   for name in libturbojpeg libpng libavcodec libswscale apriltag yaml-0.1; do
     pc+=("$name $(sed -n 's/^Version: //p' "$folder/pkgconfig/$name.pc" 2>/dev/null)")
   done
