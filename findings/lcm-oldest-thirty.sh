@@ -8,6 +8,7 @@ pip_packages lcm==1.5.3
 seen='default: 0 to 29 of 0 to 99
 capacity 200: 0 to 99 of 0 to 99'
 cat >"$work/late.py" <<'EOT'
+import time
 import lcm
 sender = lcm.LCM("udpm://239.255.76.67:7667?ttl=0")
 for name, capacity in (("default", None), ("capacity 200", 200)):
@@ -17,6 +18,7 @@ for name, capacity in (("default", None), ("capacity 200", 200)):
         subscription.set_queue_capacity(capacity)
     for k in range(100):
         sender.publish("POSE", bytes([k]))
+    time.sleep(2)  # the pause: LCM's own thread receives meanwhile
     while reader.handle_timeout(500):
         pass
     print(f"{name}: {got[0]} to {got[-1]} of 0 to 99")

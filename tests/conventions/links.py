@@ -64,7 +64,7 @@ def _lcm():
         link.subscribe(channel, lambda _, data: got.append(bytes(data)))
         time.sleep(0.05)
         send()
-        time.sleep(0.1)
+        time.sleep(1)  # all of it waits in the subscriber's queue
         while link.handle_timeout(200):
             pass
         return got
