@@ -79,6 +79,8 @@ class Replays(unittest.TestCase):
         speed = found["motion.noise.speed_mps"]
         self.assertEqual((speed["value"], speed["initial"], speed["min"]), (0.5, 0.02, 0.0))
         self.assertFalse([key for key in found if key.split(".")[0] not in ("motion", "sightings", "landmark_ekf")])
+        with self.assertRaisesRegex(waymark.WaymarkError, "estimator: is missing"):
+            waymark.parameters("format: waymark-config/1\n")
         with self.assertRaisesRegex(waymark.WaymarkError, "sped_mps"):
             waymark.parameters("format: waymark-config/1\nestimator: landmark_ekf\nmotion: {noise: {sped_mps: 0.5}}\n")
 

@@ -104,6 +104,8 @@ def _occasion(options: argparse.Namespace, scratch: Path) -> tuple[Occasion, Sco
         raise Refused(f"{log.estimator}: no observation is compared with a prediction in this run, so that nothing measures a gain")
     scores.run = dataclasses.replace(scores.run, reference=reference)
     text = config.read_text() if config else log.config
+    if "estimator" not in (yaml.safe_load(text) or {}):
+        text = f"{text.rstrip()}\nestimator: {log.estimator}\n"  # which the sources chose
     return Occasion(str(options.config), text, log.recording, log.estimator, scores.run, reference), scores
 
 
@@ -217,7 +219,7 @@ def _compare(options: argparse.Namespace, occasion: Occasion, scores: Scores) ->
     text = options.against.read_text()
     of_configuration(text)  # refuses one that can't be read
     other = (yaml.safe_load(text) or {}).get("estimator")
-    if other != occasion.estimator:
+    if other not in (None, occasion.estimator):
         raise Refused(f"{options.against}: its estimator is {other}, not {occasion.estimator}")
     before = scores.with_states({}, has_halves=True)
     scores.run = dataclasses.replace(scores.run, config=options.against)
