@@ -5,6 +5,7 @@ wm_test(run_live SOURCES test_live.c small_recording.c USES wm_live pthread LABE
 wm_test(run_devices SOURCES test_devices.c small_recording.c USES wm_live pthread LABELS threads WAITS)
 target_include_directories(run_devices PRIVATE ${CMAKE_SOURCE_DIR}/drivers/can)
 wm_script_test(run_service COMMAND bash ${CMAKE_CURRENT_SOURCE_DIR}/service.sh)
+wm_script_test(run_metrics COMMAND bash ${CMAKE_CURRENT_SOURCE_DIR}/metrics.sh ${CMAKE_BINARY_DIR}/bin LABELS release-only desk WAITS)
 wm_script_test(run_service_net COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/service_net.py LABELS release-only WAITS)
 wm_script_test(run_doctor COMMAND bash ${CMAKE_CURRENT_SOURCE_DIR}/doctor.sh $<TARGET_FILE:waymark> ${CMAKE_SOURCE_DIR}/config/etc)
 wm_script_test(run_command_line COMMAND bash ${CMAKE_CURRENT_SOURCE_DIR}/cli.sh)

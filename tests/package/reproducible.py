@@ -21,7 +21,7 @@ BUILD = pathlib.Path(sys.argv[1]).resolve()
 # Packages of programs, of a library, of headers and of scripts. The others are made by the same rules.
 COMPONENTS = ("runtime", "library", "dev", "fleet")
 COMPILED = ("msgs/src/status.c", "firmware/library/entry.c", "estimator/filters/registry.c")
-NOT_INSTALLED = re.compile(r"\.(o|d|ninja)$|/CMakeFiles/|/packages/|/tests/|/_CPack_Packages/|/Testing/")
+NOT_INSTALLED = re.compile(r"\.(o|d|ninja)$|/CMakeFiles/|/packages/|/tests/.*(?<!\.cmake)$|/_CPack_Packages/|/Testing/|/bin/waymark-montecarlo")
 
 
 def files_of(folder):
