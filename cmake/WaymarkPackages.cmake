@@ -164,4 +164,5 @@ endforeach()
 # The same sources give the same bytes, whenever, wherever and by whomever they are packed.
 set(CPACK_PROJECT_CONFIG_FILE ${CMAKE_SOURCE_DIR}/cmake/source_date.cmake)
 set(CPACK_PRE_BUILD_SCRIPTS ${CMAKE_SOURCE_DIR}/cmake/staged.cmake)
+set(CPACK_POST_BUILD_SCRIPTS ${CMAKE_SOURCE_DIR}/cmake/packed.cmake)
 include(CPack)
