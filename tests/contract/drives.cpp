@@ -347,13 +347,19 @@ void dive::add_picture(const placed &vehicle, double t_s, unsigned happens) {
   }
 }
 
-void dive::add_beacons(const placed &vehicle, double t_s) {
+void dive::add_beacons(const placed &vehicle, double t_s, bool marked) {
   for (int i = 0; i < 3; i++) {
     const double beacon[3] = {6.0 * std::cos(2.1 * i), 4 + 6.0 * std::sin(2.1 * i), 0.5};
     double to[3], body[3] = {}, length = 0;
     for (int k = 0; k < 3; k++) to[k] = beacon[k] - vehicle.p[k], length += to[k] * to[k];
     for (int r = 0; r < 3; r++)
       for (int k = 0; k < 3; k++) body[r] += vehicle.R[k][r] * to[k];
+    if (marked) {
+      for (double &b : body) b += 0.02 * normal();
+      add_marker(1, i, body, 0.0, t_s + 0.001 * i, false);
+      events_.back().as.marker.id = 900 + i;
+      continue;
+    }
     wm_sighting &s = add(WM_EVENT_SIGHTING, t_s + 0.001 * i)->as.sighting;
     s = wm_sighting_without_numbers();
     s.sensor = 1;
@@ -423,7 +429,7 @@ dive::dive(unsigned happens, double seconds) {
            (glitch ? 20 : 0.14) + 0.003 * normal()}};
     const bool blind = (happens & kBlind) && t > 0.4 * seconds && t < 0.7 * seconds;
     if (i % 2 == 0 && !blind) add_picture(vehicle, t + 0.002, happens);
-    if (i % 10 == 5) add_beacons(vehicle, t + 0.01);
+    if (i % 10 == 5) add_beacons(vehicle, t + 0.01, (happens & kMarked) != 0);
     if (i % 10 == 7)
       add(WM_EVENT_POSITION, t + 0.01)->as.position = {
           {static_cast<double>(NAN), static_cast<double>(NAN), vehicle.p[2] + 0.02 * normal()},

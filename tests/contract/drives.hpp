@@ -40,6 +40,7 @@ enum happens : unsigned {
   kGlitches = 1u << 11,    // single samples of the motion that no robot can follow
   kImu = 1u << 12,         // dives: rates and specific force besides the twists
   kReceiver = 1u << 13,    // dives: positions of a receiver, which is late and loses its best solution half way
+  kMarked = 1u << 14,      // dives: the beacons are coded markers
 };
 
 // A robot, its place and what its sensors gave. Not to be copied: the setup points into it.
@@ -96,7 +97,7 @@ class dive : public scene {
   };
   placed swim(double t_s, bool carried) const;
   void add_picture(const placed &vehicle, double t_s, unsigned happens);
-  void add_beacons(const placed &vehicle, double t_s);
+  void add_beacons(const placed &vehicle, double t_s, bool marked);
   void add_imu(double t_s);
 };
 

@@ -173,7 +173,7 @@ using drives::kBearings, drives::kRanges, drives::kElevations, drives::kNameless
     drives::kMarkers, drives::kPoints, drives::kRenamed;
 using drives::kCarriedOff, drives::kNoStart, drives::kSilence, drives::kOutliers, drives::kOneMoved, drives::kDepth,
     drives::kNoMap, drives::kBlind, drives::kReflections, drives::kFewBeacons, drives::kWrongStart, drives::kGlitches,
-    drives::kImu, drives::kReceiver;
+    drives::kImu, drives::kReceiver, drives::kMarked;
 
 std::vector<scenario> scenarios() {
   const unsigned kAll = kBearings | kRanges | kPositions | kHeadings;
@@ -415,6 +415,14 @@ std::vector<scenario> scenarios() {
        10,
        {{"markers.heading_most_rad", 0.014}},
        {"markers."}},
+      {"edge_mcl",
+       "positions and headings",
+       motion::twist,
+       kPoints | kPositions | kHeadings,
+       kOutliers,
+       10,
+       {{"states.gnss_time_offset_sigma_s", 0.1}, {"correlated.gnss_m", 0.5}},
+       {"states.gnss", "states.heading", "noise.gnss", "correlated.gnss", "use."}},
       {"edge_mcl", "carried off", motion::twist, kPoints, kCarriedOff, 14, {}, {"lost."}},
       {"edge_mcl", "no start", motion::twist, kPoints, kNoStart, 14, {}, {"search."}},
       {"pf_edges", "tracking", motion::twist, kPoints, kSilence, 10, {}},
@@ -455,6 +463,7 @@ std::vector<dive_scenario> dive_scenarios() {
       {"samples that no vehicle can follow", kGlitches, 10, {}},
       {"no start", kNoStart, 8, {}},
       {"a receiver", kReceiver | kNoMap, 10, {{"slam.points", 0}}},
+      {"coded markers", kMarked | kNoMap, 10, {{"slam.points", 0}}},
       {"an IMU", kImu, 10, {{"states.accelerometer_bias_sigma_mps2", 0.2}}},
   };
 }

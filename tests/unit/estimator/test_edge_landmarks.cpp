@@ -166,6 +166,49 @@ TEST(sightings_count_too) {
   TEST_ASSERT_EQUAL(WM_REJECTED_UNKNOWN_ID, records[0].verdict);
 }
 
+// GIVEN the same corridor WHEN a receiver gives positions, and a compass that is 2 degrees off headings THEN the place
+// along it is known to 3 cm; without a start the two find the pose, and the scans confirm it.
+TEST(positions_and_headings_count_beside_scans) {
+  for (const bool is_known : {true, false}) {
+    if (!is_known) setup.start = {WM_TIME_NONE, {NAN, NAN, NAN}, {NAN, NAN, NAN, NAN}, NAN, NAN, NAN};
+    filter f;
+    drive d;
+    int fused = 0, heard = 0;
+    for (int i = 0; i < 90; i++) {
+      d.go(f, 0.1, 1.0, 0);
+      wm_innovation records[4];
+      size_t count = 0;
+      const wm_event at = make::position(d.t, d.truth.x_m + 0.02 * d.noise(), d.truth.y_m + 0.02 * d.noise(), 0.02);
+      TEST_ASSERT_EQUAL(WM_OK, f.ops->correct(f.state, &at, records, 4, &count));
+      const wm_event towards = make::heading(d.t, d.truth.heading_rad + 0.035, 0.02);
+      count = 0;
+      TEST_ASSERT_EQUAL(WM_OK, f.ops->correct(f.state, &towards, records, 4, &count));
+      heard++, fused += records[0].verdict == WM_FUSED;
+    }
+    TEST_ASSERT_EQUAL(WM_STATE_TRACKING, f.estimate().state);
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.03, d.error_of(f));
+    TEST_ASSERT_LESS_THAN_DOUBLE(9.21, nees_of(f, d));
+    TEST_ASSERT_GREATER_THAN((is_known ? 0.95 : 0.6) * heard, fused);
+  }
+}
+
+// GIVEN a tracked pose WHEN the receiver jumps by 5 m THEN it is refused, and the pose stays.
+TEST(a_receiver_that_jumps_moves_no_robot) {
+  filter f;
+  drive d;
+  for (int i = 0; i < 60; i++) {
+    d.go(f, 0.1, 1.0, 0);
+    const double off_m = i < 30 ? 0.0 : 5.0;
+    const wm_event e = make::position(d.t, d.truth.x_m + off_m, d.truth.y_m, 0.02);
+    wm_innovation records[4];
+    size_t count = 0;
+    TEST_ASSERT_EQUAL(WM_OK, f.ops->correct(f.state, &e, records, 4, &count));
+    if (i >= 30) TEST_ASSERT_EQUAL(WM_REJECTED_GATE, records[0].verdict);
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.1, d.error_of(f));
+  }
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, f.estimate().state);
+}
+
 }  // namespace
 
 void setUp(void) {
