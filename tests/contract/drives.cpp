@@ -300,13 +300,13 @@ scene::scene(motion by, unsigned sees, unsigned happens, double seconds) {
     const truth &then = at(t - 0.1);
     if (i % 20 == 10 && (sees & kPositions)) {
       const double off = (happens & kOutliers) && i % 100 == 50 ? 20 : 0;
-      add(WM_EVENT_POSITION, seen_s)->as.position = {
+      add(WM_EVENT_POSITION, seen_s + 0.002)->as.position = {
           {then.x_m + 0.3 + off + 0.4 * normal(), then.y_m - 0.2 + 0.4 * normal(), static_cast<double>(NAN)},
           i % 40 == 10 ? 0.005 : 0.5,
           static_cast<double>(NAN)};
     }
     if (i % 40 == 20 && (sees & kHeadings))
-      add(WM_EVENT_HEADING, seen_s)->as.heading = {wrapped(at(t).heading_rad + 0.05 * normal()), 0.05};
+      add(WM_EVENT_HEADING, seen_s + 0.002)->as.heading = {wrapped(at(t).heading_rad + 0.05 * normal()), 0.05};
   }
 }
 
