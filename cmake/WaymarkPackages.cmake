@@ -29,7 +29,7 @@ set(cameras "")
 if(WM_LIBCAMERA AND LIBCAMERA_FOUND)
   set(cameras ", libcamera0.0.3 (>= 0.0.3)")
 endif()
-set(packed "zlib1g (>= 1:1.1.4)") # of the desk's text files
+set(packed "zlib1g (>= 1:1.1.4)") # text files that are packed
 set(page "")
 if(TARGET waymark-web)
   set(page ", libmicrohttpd12 (>= 0.9.75-2), ${packed}")
@@ -52,7 +52,7 @@ endif()
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_NAME waymark)
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_SECTION misc)
 set(used "iproute2, procps") # by the service: `ip route`, `kill`
-set(CPACK_DEBIAN_RUNTIME_PACKAGE_DEPENDS "${base}, ${pictures}, liblcm1 (>= 1.3.1)${cameras}${page}, ${used}")
+set(CPACK_DEBIAN_RUNTIME_PACKAGE_DEPENDS "${base}, ${pictures}, ${packed}, liblcm1 (>= 1.3.1)${cameras}${page}, ${used}")
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_SUGGESTS "waymark-tools, can-utils, v4l-utils, liblcm-bin")
 set(CPACK_DEBIAN_RUNTIME_DESCRIPTION "localization of a robot on its own computer
 Estimates the pose of a robot from cameras, CAN and other sensors on its
@@ -124,7 +124,7 @@ if(TARGET wm_shared)
   string(APPEND CPACK_DEBIAN_DEV_PACKAGE_DEPENDS ", libwaymark0 (= ${PROJECT_VERSION}-1)")
   set(CPACK_DEBIAN_LIBRARY_PACKAGE_NAME libwaymark0)
   set(CPACK_DEBIAN_LIBRARY_PACKAGE_SECTION libs)
-  set(CPACK_DEBIAN_LIBRARY_PACKAGE_DEPENDS "${base}, ${pictures}")
+  set(CPACK_DEBIAN_LIBRARY_PACKAGE_DEPENDS "${base}, ${pictures}, ${packed}")
   set(CPACK_DEBIAN_LIBRARY_DESCRIPTION "localization of a robot in a program of its own
 The runtime of waymark as a shared library with a stable C interface: a
 program pushes odometry, CAN frames, observations and pictures, and takes
