@@ -12,7 +12,9 @@ cd "$(dirname "$(readlink -f "$0")")/../.."
 mkdir -p .cache/systems
 systems=$(readlink -f .cache/systems)
 here=$PWD
-debian=http://deb.debian.org/debian ubuntu=http://archive.ubuntu.com/ubuntu ports=http://ports.ubuntu.com/ubuntu-ports
+# Archives: this machine's own of Debian; Ubuntu's and that of its ports as the environment names them. "-": none is known.
+debian=${WM_DEBIAN_ARCHIVE:-$(awk '/^URIs/{print $2; exit}' /etc/apt/sources.list.d/debian.sources 2>/dev/null)}
+debian=${debian:--} ubuntu=${WM_UBUNTU_ARCHIVE:--} ports=${WM_UBUNTU_PORTS:--}
 # Name, suite, archive, components, libstdc++ that its compiler links.
 table="debian-12-amd64 bookworm $debian main 12
 debian-13-amd64 trixie $debian main 14
@@ -30,6 +32,7 @@ say() { printf '\033[1m== %s\033[0m\n' "$*"; }
 unpack() { # NAME SUITE ARCHIVE COMPONENTS LIBSTDCXX
   local root=$systems/$1 arch=${1##*-} keyring=() packages=$libraries,libstdc++-$5-dev folder
   [ -e "$root/.complete" ] && return
+  [ "$3" != - ] || { say "$1: no archive: name it by WM_DEBIAN_ARCHIVE, WM_UBUNTU_ARCHIVE, WM_UBUNTU_PORTS"; return 1; }
   [ "$arch" = arm64 ] || packages+=,$compilers
   if [[ $1 == ubuntu* ]]; then # its keys are a package of Debian 13
     [ -e "$systems/debian-13-amd64/.complete" ] || unpack $(grep '^debian-13-amd64' <<<"$table")
