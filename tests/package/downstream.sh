@@ -45,7 +45,7 @@ echo "a part alone, and one that is not"
 find_part() { # COMPONENT [CMAKE_OPTION...]
   printf 'cmake_minimum_required(VERSION 3.13)\nproject(part C)\nfind_package(waymark REQUIRED COMPONENTS %s)\n' "$1" >"$dir/part.txt"
   mkdir -p "$dir/part" && cp "$dir/part.txt" "$dir/part/CMakeLists.txt" && rm -rf "$dir/part-build"
-  cmake -G Ninja -S "$dir/part" -B "$dir/part-build" -DCMAKE_PREFIX_PATH="$usr" "${@:2}" 2>&1
+  cmake -G Ninja -DCMAKE_MAKE_PROGRAM="$(command -v ninja)" -DCMAKE_C_COMPILER="$(command -v cc)" -S "$dir/part" -B "$dir/part-build" -DCMAKE_PREFIX_PATH="$usr" "${@:2}" 2>&1
 }
 no_lcm=(-DCMAKE_FIND_USE_CMAKE_SYSTEM_PATH=OFF -DCMAKE_FIND_USE_SYSTEM_ENVIRONMENT_PATH=OFF)
 find_part session "${no_lcm[@]}" >"$dir/part.log" || { cat "$dir/part.log"; exit 1; }
