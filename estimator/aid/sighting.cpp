@@ -92,6 +92,7 @@ void sighting_aid::init(const wm_landmark_params &landmarks, const wm_marker_par
   map_.clear();
   tilt_state_ = -1;
   tilt_ns_ = WM_TIME_NONE;
+  unused_ = 0;
 }
 
 void sighting_aid::add_calibration(planar_filter *filter) {

@@ -37,7 +37,7 @@ edge_mcl::arrays edge_mcl::place(memory_layout *layout, const wm_edge_mcl_params
   const int states = count_states(params, setup);
   arrays out{};
   out.filter = layout->take<double>(planar_filter::doubles(states));
-  out.off = layout->take<double>(static_cast<size_t>(minima::kCapacity * states));
+  out.off = layout->take<double>(static_cast<size_t>(minima::kCapacity) * static_cast<size_t>(states));
   if (has_landmarks(setup)) {
     out.records = layout->take<landmark_record>(setup.landmark_count);
     out.landmarks = sighting_aid::place(layout, setup);

@@ -184,20 +184,27 @@ void joint_state::move_map(const wm_pose2 &by) {
   take_calibration(state_.mean());
 }
 
+// By how much a turn of the map about a point moves a state, per rad.
+double joint_state::turned_by(const double about_m[2], int state) const {
+  const int velocity = has_velocity() ? motion_state_[kVelocityX] : states();  // none
+  if (state == velocity) return -value(state + 1);
+  if (state == velocity + 1) return value(state - 1);
+  switch (axis_of(state)) {
+    case 0: return about_m[1] - value(state + 1);
+    case 1: return value(state - 1) - about_m[0];
+    case 2: return 1.0;
+    default: return 0.0;
+  }
+}
+
 void joint_state::add_frame_error(const double about_m[2], double turn_sigma_rad, double white_m, double lasting_m,
                                   int error_state) {
-  state_.add_spread(square(turn_sigma_rad), [&](int j) {
-    const int axis = axis_of(j);
-    if (has_velocity() && j == motion_state_[kVelocityX]) return -value(j + 1);
-    if (has_velocity() && j == motion_state_[kVelocityX] + 1) return value(j - 1);
-    return axis == 0 ? about_m[1] - value(j + 1) : axis == 1 ? value(j - 1) - about_m[0] : axis == 2 ? 1.0 : 0.0;
-  });
+  state_.add_spread(square(turn_sigma_rad), [&](int j) { return turned_by(about_m, j); });
   for (int k = 0; k < 2; k++) {
+    const int own = error_state < 0 ? -1 : error_state + k;
     state_.add_spread(square(white_m), [&](int j) { return axis_of(j) == k ? 1.0 : 0.0; });
-    if (error_state >= 0) forget(error_state + k, 0.0, 0.0);
-    state_.add_spread(square(lasting_m), [&](int j) {
-      return axis_of(j) == k ? 1.0 : error_state >= 0 && j == error_state + k ? -1.0 : 0.0;
-    });
+    if (own >= 0) forget(own, 0.0, 0.0);
+    state_.add_spread(square(lasting_m), [&](int j) { return axis_of(j) == k ? 1.0 : j == own ? -1.0 : 0.0; });
   }
 }
 

@@ -141,6 +141,7 @@ class joint_state : public planar_motion {
 
   void wander(double dt_s);
   int axis_of(int state) const;
+  double turned_by(const double about_m[2], int state) const;
   void turn_pair(int state, double half_tangent, double sine);
 
   joint_layout layout_;
