@@ -88,11 +88,10 @@ wm_status slam::fuse_position(const wm_event &event, record_list records) {
   status = begin_observation(event.t_ns);
   if (status != WM_OK) return status;
   if (!params_.gnss.use_position) return reject(records, record, WM_REJECTED_BY_CONFIG);
-  if (!positions_.is_awake()) {
-    positions_.wake(&joint_);
-    follow_scale();
-  }
+  if (!positions_.is_awake()) positions_.wake(&joint_);
+  const bool is_first = !positions_.has_position();
   const position_aid::view at = positions_.look(p, &joint_);
+  if (is_first) follow_scale();  // positions measure the map's scale
   if (is_placing(p, at) || search_by(positions_.observe(p, at, joint_)))
     return reject(records, record, WM_REJECTED_SEARCHING);
   residual rows[2];
