@@ -25,7 +25,8 @@ void fit_evidence::init(const wm_edge_mcl_params &params) {
   lost_margin_ = params.lost_margin;
   lost_beyond_ = params.lost_beyond_weight;
   kidnapped_per_s_ = params.kidnapped_per_s;
-  usual_ = mean_explained_ = params.lost_explained;
+  mean_explained_ = true_share_ = params.lost_explained;
+  false_points_ = kFalsePoints;
   averaged_s_ = 0.0;
   mean_shortfall_ = kStartShortfall;
   mean_beyond_ = kStartBeyond;
@@ -44,8 +45,9 @@ double fit_evidence::explained_by(const normal_equations &scan) const {
 // them, less their usual fraction, lost.beyond_weight times. The two sides of a beam model (S. Thrun, W. Burgard, D.
 // Fox, "Probabilistic Robotics", 2005, 6.3).
 double fit_evidence::log_bayes_factor(const normal_equations &scan, double explained) const {
-  const double own = usual_ - lost_margin_ - kShortfalls * mean_shortfall_;
-  const double threshold = expected_edges(scan.seen) * (own > lost_explained_ ? own : lost_explained_);
+  const double edges = expected_edges(scan.seen);
+  const double own = usual(scan.seen) - edges * (lost_margin_ + kShortfalls * mean_shortfall_);
+  const double threshold = larger(own, edges * lost_explained_);
   const double beyond = (double)scan.beyond / scan.seen, rest = 1.0 - explained - beyond;
   const double misfit = beyond + kHidden * (rest > 0.0 ? rest : 0.0);
   const double factor = kGain * (threshold - 1.0 + misfit), unusual = beyond - kShortfalls * mean_beyond_;
@@ -66,11 +68,13 @@ double fit_evidence::add(const normal_equations &scan, double dt_s, double way) 
 }
 
 void fit_evidence::learn(const normal_equations &scan, double dt_s) {
-  const double explained = explained_by(scan), edges = expected_edges(scan.seen);
-  usual_ += dt_s / kUsual_s * (explained - edges * usual_);
+  const double explained = explained_by(scan);
+  const double fresh = dt_s < kUsual_s ? dt_s / kUsual_s : 1.0;
+  true_share_ += fresh * (explained - true_share_);
+  false_points_ += fresh * (scan.seen * (1.0 - explained) - false_points_);
   averaged_s_ = averaged_s_ + dt_s < kMean_s ? averaged_s_ + dt_s : kMean_s;
   if (!(averaged_s_ > 0.0)) return;
-  const double weight = dt_s / averaged_s_, lack = usual_ - explained / edges;
+  const double weight = dt_s / averaged_s_, lack = (usual(scan.seen) - explained) / expected_edges(scan.seen);
   mean_explained_ += weight * (explained - mean_explained_);
   mean_beyond_ += weight * ((double)scan.beyond / scan.seen - mean_beyond_);
   mean_shortfall_ += weight * ((lack > 0.0 ? lack : 0.0) - mean_shortfall_);

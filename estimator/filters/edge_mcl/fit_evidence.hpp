@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Evidence that the pose is wrong, by the fraction of a scan that the map explains from it. Scans are held against the
-// drive's own mean and its shortfalls: floors with glare or tape explain less everywhere.
+// Evidence that the pose is wrong, by the fraction of a scan that the map explains from it. Scans are held against what
+// the drive's own number of false points leaves of them, and its shortfalls: glare and tape are on every floor of some
+// buildings, and on none of others.
 #ifndef WAYMARK_ESTIMATOR_EDGE_MCL_FIT_EVIDENCE_HPP
 #define WAYMARK_ESTIMATOR_EDGE_MCL_FIT_EVIDENCE_HPP
 
@@ -35,14 +36,16 @@ class fit_evidence {
 
  private:
   double explained_by(const normal_equations &scan) const;
+  // The fraction of so many points that the map usually explains.
+  double usual(int points) const { return points / (points + false_points_ / true_share_); }
   double log_bayes_factor(const normal_equations &scan, double explained) const;
 
   evidence odds_;
   double lost_explained_, lost_margin_, lost_beyond_, kidnapped_per_s_;
   double explained_;
-  double usual_;                         // fraction explained of the points that can be edges, over 10 s
+  double false_points_, true_share_;     // unexplained points of a scan, and its fraction explained, over 10 s
   double mean_explained_, averaged_s_;   // over the last minute, and over how much of it
-  double mean_beyond_, mean_shortfall_;  // fraction of points beyond an edge; lack against usual_
+  double mean_beyond_, mean_shortfall_;  // fraction of points beyond an edge; lack against usual()
 };
 
 }  // namespace wm
