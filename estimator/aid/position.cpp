@@ -12,7 +12,8 @@ constexpr double kLinearDelay_s = 0.1;
 
 }  // namespace
 
-int position_aid::count_states(const wm_position_params &p) {
+int position_aid::count_states(const wm_setup &setup) {
+  const wm_position_params p = position_params_of(setup);
   return (p.time_offset_sigma_s > 0.0) + 2 * (p.antenna_sigma_m != 0.0) + (p.heading_bias_sigma_rad > 0.0) +
          2 * (p.correlated_m != 0.0);
 }

@@ -17,16 +17,16 @@ inline constexpr double kClutterPlace_m = 200.0;
 class position_aid {
  public:
   static constexpr int kStates = 6;  // at most
-  static int count_states(const wm_position_params &params);
+  static int count_states(const wm_setup &setup);
   // add(value, sigma) appends a state to the filter and returns its index.
   template <class Add>
-  void init(const wm_position_params &params, const wm_setup &setup, planar_motion *filter, Add add) {
+  void init(const wm_setup &setup, planar_motion *filter, Add add) {
     const auto pair_of = [&add](double sigma) {
       const int first = sigma > 0.0 ? add(0.0, sigma) : -1;
       if (first >= 0) add(0.0, sigma);
       return first;
     };
-    params_ = params;
+    const wm_position_params &params = params_ = position_params_of(setup);
     time_ = params.time_offset_sigma_s > 0.0 ? add(0.0, params.time_offset_sigma_s) : -1;
     error_ = pair_of(std::fabs(params.correlated_m));  // below 0: the first position sets its variance
     if (error_ >= 0) filter->noise().begin_correlated(square(params.correlated_m));
@@ -38,6 +38,7 @@ class position_aid {
     has_heading_ = has_position_ = is_awake_ = unused_ = 0;
     receiver_.begin();
   }
+  const wm_position_params &params() const { return params_; }
   int error_state() const { return error_; }  // of the time-correlated error's first axis; -1: none
   bool has_position() const { return has_position_ != 0; }
   // For a filter whose states wait with variance 0 for the first position or heading, since they cost time.

@@ -53,8 +53,9 @@ int place_states(const wm_sighting_params &p) { return p.use_elevation ? 3 : 2; 
 int map_states(const wm_setup &setup) { return place_states(*setup.sightings) + has_yaw(setup); }
 
 // No more slots than the map has landmarks, and pairs of a sensor and a landmark.
-int map_slots(const wm_landmark_params &p, const wm_setup &setup) {
-  return p.map_slots < static_cast<int>(setup.landmark_count) ? p.map_slots : static_cast<int>(setup.landmark_count);
+int map_slots(const wm_setup &setup) {
+  const int wanted = setup.sightings->map_slots, most = static_cast<int>(setup.landmark_count);
+  return wanted < most ? wanted : most;
 }
 int error_slots(const wm_setup &setup) {
   const size_t pairs = setup.landmark_count * setup.sensor_count;
@@ -70,17 +71,15 @@ sighting_aid::arrays sighting_aid::place(memory_layout *layout, const wm_setup &
   return {layout->take<int>(setup.landmark_count), layout->take<wm_time_ns>(setup.landmark_count)};
 }
 
-int sighting_aid::count_states(const wm_landmark_params &p, const wm_setup &setup) {
+int sighting_aid::count_states(const wm_setup &setup) {
   const wm_sighting_params &s = *setup.sightings;
   return sensor_slots::count(setup) + error_slots(setup) * correlated_slot_of(s).width +
-         map_states(setup) * map_slots(p, setup) + 2 * (s.use_elevation && p.tilt_sigma_rad > 0.0);
+         map_states(setup) * map_slots(setup) + 2 * (s.use_elevation && s.tilt_sigma_rad > 0.0);
 }
 
-void sighting_aid::init(const wm_landmark_params &landmarks, const wm_marker_params &markers, const wm_setup &setup,
-                        const arrays &behind) {
+void sighting_aid::init(const wm_setup &setup, const arrays &behind) {
   setup_ = &setup;
-  landmarks_ = landmarks;
-  markers_ = markers;
+  markers_ = marker_params_of(setup);
   yaw_offset_ = has_yaw(setup) ? place_states(params()) : -1;
   for (size_t i = 0; i < setup.sensor_count; i++) sensor_[i].init(setup.sensors[i]);
   components_ = params().states.sigma[WM_SENSOR_ROW_kAngleScale] > 0.0 ? kAngleScaled : 0u;
@@ -106,20 +105,19 @@ void sighting_aid::add_lent(planar_filter *filter) {
     errors_.add(filter->states());
     for (int k = 0; k < error_.width; k++) filter->add_state(0.0, 0.0);
   }
-  for (int i = 0; i < map_slots(landmarks_, *setup_); i++) {
+  for (int i = 0; i < map_slots(*setup_); i++) {
     map_.add(filter->states());
     for (int k = 0; k < map_states(*setup_); k++) filter->add_state(0.0, 0.0);
   }
   if (!has_tilt()) return;
-  tilt_state_ = filter->add_state(0.0, landmarks_.tilt_sigma_rad);
-  filter->add_state(0.0, landmarks_.tilt_sigma_rad);
+  tilt_state_ = filter->add_state(0.0, params().tilt_sigma_rad);
+  filter->add_state(0.0, params().tilt_sigma_rad);
 }
 
 void sighting_aid::release(planar_filter *filter) {
   errors_.release_all();
   map_.release_all();
-  for (int k = 0; k < 2 && tilt_state_ >= 0; k++)
-    filter->forget(tilt_state_ + k, 0.0, square(landmarks_.tilt_sigma_rad));
+  for (int k = 0; k < 2 && tilt_state_ >= 0; k++) filter->forget(tilt_state_ + k, 0.0, square(params().tilt_sigma_rad));
 }
 
 double sighting_aid::map_sigma(int landmark) const {
@@ -274,8 +272,8 @@ sighting_aid::lent_slots sighting_aid::lend_states(int sensor, int landmark, pla
 void sighting_aid::decay_tilt(planar_filter *filter) {
   if (tilt_state_ < 0) return;
   const wm_time_ns t_ns = filter->now_ns();
-  const double left = tilt_ns_ == WM_TIME_NONE ? 1.0 : decay_over(tilt_ns_, t_ns, landmarks_.tilt_tau_s);
-  for (int k = 0; k < 2; k++) decay_state(filter, tilt_state_ + k, left, square(landmarks_.tilt_sigma_rad));
+  const double left = tilt_ns_ == WM_TIME_NONE ? 1.0 : decay_over(tilt_ns_, t_ns, params().tilt_tau_s);
+  for (int k = 0; k < 2; k++) decay_state(filter, tilt_state_ + k, left, square(params().tilt_sigma_rad));
   tilt_ns_ = t_ns;
 }
 
@@ -451,7 +449,7 @@ observation sighting_aid::observe(const view &at, const sensor_errors &errors, c
     seen.tangent = ray.tangent;
     seen.height_m = target.p_m[2] - seen_by.z_m;
     seen.sigma_tangent =
-        (1.0 + square(ray.tangent)) * std::sqrt(square(s.elevation_sigma_rad) + square(landmarks_.tilt_sigma_rad) +
+        (1.0 + square(ray.tangent)) * std::sqrt(square(s.elevation_sigma_rad) + square(params().tilt_sigma_rad) +
                                                 square(tilt_sigma) + square(scale_sigma));
     seen.sigma_height_m = map_sigma(at.landmark);
   }

@@ -9,7 +9,6 @@
 #include "aid/observation.hpp"
 #include "aid/residual.hpp"
 #include "aid/tag.hpp"
-#include "filters/core/landmark_params.h"
 #include "filters/core/sensor_slots.hpp"
 #include "filters/core/state_pool.hpp"
 #include "filters/planar/past_pose.hpp"
@@ -33,9 +32,8 @@ class sighting_aid {
   };
   static arrays place(memory_layout *layout, const wm_setup &setup);
   // The states of add_calibration() and of add_lent().
-  static int count_states(const wm_landmark_params &params, const wm_setup &setup);
-  void init(const wm_landmark_params &params, const wm_marker_params &markers, const wm_setup &setup,
-            const arrays &behind);
+  static int count_states(const wm_setup &setup);
+  void init(const wm_setup &setup, const arrays &behind);
   void add_calibration(planar_filter *filter);  // the sensors' errors
   void add_lent(planar_filter *filter);         // the other states
   // The lent states are nobody's again.
@@ -91,7 +89,7 @@ class sighting_aid {
     double error_size;
   };
   const wm_sighting_params &params() const { return *setup_->sightings; }
-  bool has_tilt() const { return params().use_elevation && landmarks_.tilt_sigma_rad > 0.0; }
+  bool has_tilt() const { return params().use_elevation && params().tilt_sigma_rad > 0.0; }
   double time_offset(const planar_filter &filter, int sensor) const {
     const int slot = slots_.at(sensor, kTimeOffset);
     return slot < 0 ? 0.0 : filter.value(slot);
@@ -115,7 +113,6 @@ class sighting_aid {
                   residual *r) const;
 
   const wm_setup *setup_;
-  wm_landmark_params landmarks_;
   wm_marker_params markers_;
   mounted_sensor sensor_[kMaxSensors];
   sensor_slots slots_;

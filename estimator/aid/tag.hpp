@@ -3,7 +3,7 @@
 #ifndef WAYMARK_ESTIMATOR_AID_TAG_HPP
 #define WAYMARK_ESTIMATOR_AID_TAG_HPP
 
-#include "filters/core/marker_params.h"
+#include "sensors/shared_params.hpp"
 #include "sensors/sighting.hpp"
 
 namespace wm {

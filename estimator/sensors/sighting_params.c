@@ -47,6 +47,13 @@ static const wm_param kParams[] = {
     // clang-format off
     WM_SENSOR_STATES(ONE, TWO)
     // clang-format on
+    F64("states.tilt_sigma_rad", tilt_sigma_rad, 0.007, 0, 1,
+        "Sigma of the robot's roll and pitch on its springs and on the ground, rad: 0.4 degrees for a car that brakes, "
+        "bends or is loaded on one side. States with use.elevation, else unused."),
+    F64("states.tilt_tau_s", tilt_tau_s, 2, 0.01, 1e6, "Time after which such a tilt has fallen to 1/e, s."),
+    I32("states.map_slots", map_slots, 16, 0, 24,
+        "Landmarks (the last seen ones) whose error on the map, by their sigma_m, is carried as states. That of a "
+        "landmark beyond them counts as noise, the larger the more often it is seen."),
     I32("correlated.slots", correlated_slots, 16, 0, 24,
         "Pairs of sensor and landmark (the last seen ones) whose time-correlated error is carried as Gauss-Markov "
         "states. 0: no error is time-correlated."),

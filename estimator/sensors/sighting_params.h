@@ -19,6 +19,8 @@ struct wm_sighting_params {
   double bearing_sigma_factor, range_sigma_factor;
   double range_sigma_rel, lateral_sigma_m, map_sigma_min_m;
   wm_sensor_states states;
+  double tilt_sigma_rad, tilt_tau_s;  // of the body, with elevations
+  int32_t map_slots;
   int32_t correlated_slots;
   double correlated_bearing_rad, correlated_lateral_m, correlated_range_m, correlated_range_rel, correlated_tau_s;
   double gate_soft, gate_hard;

@@ -39,14 +39,45 @@ static wm_status read_estimator(const wm_yaml_node *root, int may_be_undecided, 
   return status;
 }
 
+const wm_shared_section wm_config_shared[WM_CONFIG_SHARED] = {
+    [WM_CONFIG_MOTION] = {"motion", "motion.", "For every estimator: the motion sensors, and their calibration states.",
+                          &wm_motion_params_table, offsetof(wm_config, motion)},
+    [WM_CONFIG_SIGHTINGS] = {"sightings", "sightings.",
+                             "For every estimator that takes sightings of landmarks: their noise, the sensors' "
+                             "calibration states, time-correlated errors and gates.",
+                             &wm_sighting_params_table, offsetof(wm_config, sightings)},
+    [WM_CONFIG_POSITIONS] = {"positions", "positions.",
+                             "For every estimator that takes positions (GNSS) and headings (compass, two antennas): "
+                             "their noise, the receiver's states, time-correlated errors.",
+                             &wm_position_params_table, offsetof(wm_config, positions)},
+    [WM_CONFIG_MARKERS] = {"markers", "markers.", "For every estimator that takes coded markers (tags): their noise.",
+                           &wm_marker_params_table, offsetof(wm_config, markers)},
+};
+
+void *wm_config_params(const wm_config *config, int i) {
+  void *out;
+  memcpy(&out, (const char *)config + wm_config_shared[i].offset, sizeof out);
+  return out;
+}
+
+static void set_params(wm_config *config, int i, void *params) {
+  memcpy((char *)config + wm_config_shared[i].offset, &params, sizeof params);
+}
+
+void wm_config_give_params(const wm_config *config, wm_setup *setup) {
+  setup->motion = config->motion;
+  setup->sightings = config->sightings;
+  setup->positions = config->positions;
+  setup->markers = config->markers;
+}
+
 // Opens the shared sections with these structs of theirs.
-static void open_shared(config_shared *self, wm_motion_params *motion, wm_sighting_params *sightings,
-                        const wm_estimator *reader) {
+static void open_shared(config_shared *self, void *const params[WM_CONFIG_SHARED], const wm_estimator *reader) {
   memset(self, 0, sizeof *self);
   self->reader = reader;
-  self->of[CONFIG_MOTION] = (config_filling){.prefix = "motion.", .table = &wm_motion_params_table, .out = motion};
-  self->of[CONFIG_SIGHTINGS] =
-      (config_filling){.prefix = "sightings.", .table = &wm_sighting_params_table, .out = sightings};
+  for (int i = 0; i < WM_CONFIG_SHARED; i++)
+    self->of[i] =
+        (config_filling){.prefix = wm_config_shared[i].prefix, .table = wm_config_shared[i].table, .out = params[i]};
 }
 
 static wm_status fill_estimator(const wm_yaml_node *section, const wm_estimator *estimator, void *out,
@@ -60,17 +91,18 @@ static wm_status fill_estimator(const wm_yaml_node *section, const wm_estimator 
 // Sections of other estimators are checked, too: they may be chosen later.
 static wm_status check_other_estimator(const wm_yaml_node *section, const wm_estimator *estimator, wm_config *out,
                                        wm_error *err) {
-  const wm_param_table *tables[] = {&estimator->params, &wm_motion_params_table, &wm_sighting_params_table};
-  void *scratch[3] = {NULL};
+  void *scratch[WM_CONFIG_SHARED + 1] = {NULL};  // the last: the estimator's own
   wm_status status = WM_OK;
-  for (int i = 0; i < 3; i++) {
-    scratch[i] = calloc(1, tables[i]->bytes + 1);
+  for (int i = 0; i <= WM_CONFIG_SHARED; i++) {
+    const wm_param_table *table = i < WM_CONFIG_SHARED ? wm_config_shared[i].table : &estimator->params;
+    scratch[i] = calloc(1, table->bytes + 1);
     if (!scratch[i]) status = wm_fail(err, WM_IO, "%s: no memory to read it", wm_yaml_file(section));
   }
   config_shared shared;
-  open_shared(&shared, scratch[1], scratch[2], NULL);
-  if (status == WM_OK) status = fill_estimator(section, estimator, scratch[0], &shared, out->warnings, err);
-  for (int i = 0; i < 3; i++) free(scratch[i]);
+  open_shared(&shared, scratch, NULL);
+  if (status == WM_OK)
+    status = fill_estimator(section, estimator, scratch[WM_CONFIG_SHARED], &shared, out->warnings, err);
+  for (int i = 0; i <= WM_CONFIG_SHARED; i++) free(scratch[i]);
   return status;
 }
 
@@ -83,22 +115,29 @@ static wm_status check_motion(const wm_yaml_node *section, const wm_config *conf
   return wm_yaml_fail(&node, err, "%s", clash);
 }
 
+static int shared_section(const char *key) {  // -1: none of them
+  for (int i = 0; i < WM_CONFIG_SHARED; i++)
+    if (strcmp(key, wm_config_shared[i].name) == 0) return i;
+  return -1;
+}
+
 static wm_status read_section(const wm_yaml_node *value, const char *key, config_shared *shared, wm_config *out,
                               wm_error *err) {
   const wm_estimator *estimator = wm_estimator_find(key);
   if (estimator && estimator == out->estimator)
     return fill_estimator(value, estimator, out->estimator_params, shared, out->warnings, err);
   if (estimator) return check_other_estimator(value, estimator, out, err);
-  if (strcmp(key, "sightings") == 0)
-    return config_fill(value, &shared->of[CONFIG_SIGHTINGS], "", shared, out->warnings, err);
-  if (strcmp(key, "motion") != 0) return WM_OK;
-  wm_status status = config_fill(value, &shared->of[CONFIG_MOTION], "", shared, out->warnings, err);
-  return status == WM_OK ? check_motion(value, out, err) : status;
+  const int of = shared_section(key);
+  if (of < 0) return WM_OK;
+  wm_status status = config_fill(value, &shared->of[of], "", shared, out->warnings, err);
+  return status == WM_OK && of == WM_CONFIG_MOTION ? check_motion(value, out, err) : status;
 }
 
 static wm_status read_sections(const wm_yaml_node *root, wm_config *out, wm_error *err) {
   config_shared shared;
-  open_shared(&shared, out->motion, out->sightings, out->estimator);
+  void *params[WM_CONFIG_SHARED];
+  for (int i = 0; i < WM_CONFIG_SHARED; i++) params[i] = wm_config_params(out, i);
+  open_shared(&shared, params, out->estimator);
   wm_status status = WM_OK;
   for (size_t i = 0; status == WM_OK && i < wm_yaml_count(root); i++) {
     const char *key;
@@ -109,7 +148,7 @@ static wm_status read_sections(const wm_yaml_node *root, wm_config *out, wm_erro
   return status;
 }
 
-// All keys at the top: sections of estimators, motion and sightings are read by read_sections.
+// All keys at the top: sections of estimators and those that they share are read by read_sections.
 static wm_status check_top(const wm_yaml_node *root, wm_config *out, wm_error *err) {
   static const char *const kGroups[] = {"merge", "publish", "commands", "realtime", "start", "black_box", NULL};
   for (size_t i = 0; i < wm_yaml_count(root); i++) {
@@ -117,7 +156,7 @@ static wm_status check_top(const wm_yaml_node *root, wm_config *out, wm_error *e
     int line, known = 0;
     wm_yaml_node value = wm_yaml_value(root, i, &key, &line);
     for (size_t k = 0; kConfigKeys[k].key; k++) known |= strcmp(kConfigKeys[k].key, key) == 0;
-    if (known || strcmp(key, "motion") == 0 || strcmp(key, "sightings") == 0 || wm_estimator_find(key)) continue;
+    if (known || shared_section(key) >= 0 || wm_estimator_find(key)) continue;
     for (size_t g = 0; kGroups[g]; g++) {
       if (strcmp(kGroups[g], key) != 0) continue;
       char prefix[16];
@@ -199,13 +238,14 @@ static wm_status allocate(wm_config *out, wm_error *err) {
   static const wm_param_table kNone;  // undecided
   const wm_param_table *table = out->estimator ? &out->estimator->params : &kNone;
   out->estimator_params = calloc(1, table->bytes + 1);
-  out->motion = calloc(1, wm_motion_params_table.bytes + 1);
-  out->sightings = calloc(1, wm_sighting_params_table.bytes + 1);
-  if (!out->estimator_params || !out->motion || !out->sightings)
-    return wm_fail(err, WM_IO, "%s: no memory to read it", out->path);
+  if (!out->estimator_params) return wm_fail(err, WM_IO, "%s: no memory to read it", out->path);
   wm_params_defaults(table, out->estimator_params);
-  wm_params_defaults(&wm_motion_params_table, out->motion);
-  wm_params_defaults(&wm_sighting_params_table, out->sightings);
+  for (int i = 0; i < WM_CONFIG_SHARED; i++) {
+    void *const params = calloc(1, wm_config_shared[i].table->bytes + 1);
+    if (!params) return wm_fail(err, WM_IO, "%s: no memory to read it", out->path);
+    wm_params_defaults(wm_config_shared[i].table, params);
+    set_params(out, i, params);
+  }
   return WM_OK;
 }
 
@@ -297,19 +337,18 @@ wm_status wm_config_load_undecided(const char *path, wm_config *out, wm_error *e
 // What `next` has read with its estimator; all else stays. Takes over, and leaves `next` to be freed.
 static void take_estimator(wm_config *self, wm_config *next) {
   void *const params = self->estimator_params;
-  wm_motion_params *const motion = self->motion;
-  wm_sighting_params *const sightings = self->sightings;
   char *const text = self->text;
   self->estimator = next->estimator;
   self->estimator_params = next->estimator_params;
-  self->motion = next->motion;
-  self->sightings = next->sightings;
   self->text = next->text;
   self->text_length = next->text_length;
   memcpy(self->warnings, next->warnings, sizeof self->warnings);
   next->estimator_params = params;
-  next->motion = motion;
-  next->sightings = sightings;
+  for (int i = 0; i < WM_CONFIG_SHARED; i++) {
+    void *const own = wm_config_params(self, i);
+    set_params(self, i, wm_config_params(next, i));
+    set_params(next, i, own);
+  }
   next->text = text;
 }
 
@@ -344,16 +383,16 @@ wm_status wm_config_decide(wm_config *config, const wm_estimator *estimator, con
 void wm_config_free(wm_config *config) {
   free(config->text);
   free(config->estimator_params);
-  free(config->motion);
-  free(config->sightings);
+  for (int i = 0; i < WM_CONFIG_SHARED; i++) {
+    free(wm_config_params(config, i));
+    set_params(config, i, NULL);
+  }
   for (size_t i = 0; i < config->vision_count; i++) {
     free(config->vision[i].params);
     for (size_t k = 0; k < config->vision[i].cascade_count; k++) wm_cascade_free(&config->vision[i].cascades[k]);
   }
   config->text = NULL;
   config->estimator_params = NULL;
-  config->motion = NULL;
-  config->sightings = NULL;
   config->vision_count = 0;
 }
 

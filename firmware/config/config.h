@@ -21,7 +21,7 @@
 //   start: {saved_pose: FILE, ...}
 //   black_box: {folder: FOLDER, ...}
 //   motion: {...}                  # wm_motion_params_table
-//   sightings: {...}               # wm_sighting_params_table
+//   sightings: {...}               # wm_sighting_params_table; likewise positions, markers
 //   vision: {edges: {cameras: [front], ...}}   # detectors on pictures, with their tables
 //   vision: {cascade: {classes: [{file: FILE, height_m: 0.9}]}}
 //   landmark_ekf: {...}            # the estimator's own table
@@ -93,6 +93,16 @@ typedef struct wm_vision_config {
   int line;
 } wm_vision_config;
 
+// A section that estimators share, and the offset in wm_config of the pointer to its struct.
+typedef struct wm_shared_section {
+  const char *name, *prefix, *about;  // "motion", "motion."
+  const wm_param_table *table;
+  size_t offset;
+} wm_shared_section;
+
+enum { WM_CONFIG_MOTION = 0, WM_CONFIG_SIGHTINGS, WM_CONFIG_POSITIONS, WM_CONFIG_MARKERS, WM_CONFIG_SHARED };
+extern const wm_shared_section wm_config_shared[WM_CONFIG_SHARED];
+
 typedef struct wm_config {
   char path[WM_PATH_MAX];
   char *text;  // the file as read, for the event log
@@ -103,6 +113,8 @@ typedef struct wm_config {
   size_t stated_length;           // of the text, without the estimator that wm_config_decide has added
   wm_motion_params *motion;
   wm_sighting_params *sightings;
+  wm_position_params *positions;
+  wm_marker_params *markers;
   wm_runtime_params runtime;
   int32_t lateness_is_stated;  // merge.lateness_max_ms
   wm_recording_overrides overrides;
@@ -137,6 +149,10 @@ wm_status wm_config_decide(wm_config *config, const wm_estimator *estimator, con
 // As wm_config_parse, for the text in an event log: the files that it names needn't be on this computer.
 wm_status wm_config_parse_logged(const char *text, size_t length, const char *path, wm_config *out, wm_error *err);
 void wm_config_free(wm_config *config);
+// The struct of shared section `i`.
+void *wm_config_params(const wm_config *config, int i);
+// The setup's parameters are those of the configuration, which must live as long.
+void wm_config_give_params(const wm_config *config, wm_setup *setup);
 // Calls `say` with each line of config->warnings, without its line feed.
 void wm_config_each_warning(const wm_config *config, void (*say)(void *context, const char *line), void *context);
 // The settings of the source `name` ("sightings:laser" takes those of "sightings"), and its rank in the config's order.

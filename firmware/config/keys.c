@@ -154,13 +154,12 @@ const config_key kConfigCameraDeviceKeys[] = {
 
 size_t config_sections(config_section out[CONFIG_SECTIONS_MAX]) {
   out[0] = (config_section){"runtime", "", "", &wm_runtime_params_table};
-  out[1] = (config_section){"motion", "For every estimator: the motion sensors, and their calibration states.",
-                            "motion.", &wm_motion_params_table};
-  out[2] = (config_section){"sightings",
-                            "For every estimator that takes sightings of landmarks: their noise, the sensors' "
-                            "calibration states, time-correlated errors and gates.",
-                            "sightings.", &wm_sighting_params_table};
-  size_t count = 3, estimators;
+  for (int i = 0; i < WM_CONFIG_SHARED; i++) {
+    const wm_shared_section *const s = &wm_config_shared[i];
+    out[1 + i] = (config_section){s->name, s->about, "", s->table};
+    snprintf(out[1 + i].prefix, sizeof out[1 + i].prefix, "%s", s->prefix);
+  }
+  size_t count = 1 + WM_CONFIG_SHARED, estimators;
   const wm_estimator *const *all = wm_estimators(&estimators);
   for (size_t i = 0; i < estimators && count < CONFIG_SECTIONS_MAX; i++, count++) {
     out[count] = (config_section){all[i]->name, all[i]->about, "", &all[i]->params};
@@ -339,7 +338,7 @@ static void warn_if_not_read(const reading *self, const config_filling *of, cons
                              const wm_param *param) {
   char key[KEY_MAX], text[200];
   const wm_estimator *reader = self->shared ? self->shared->reader : NULL;
-  if (!reader || of < self->shared->of || of >= self->shared->of + CONFIG_SHARED) return;
+  if (!reader || of < self->shared->of || of >= self->shared->of + WM_CONFIG_SHARED) return;
   snprintf(key, sizeof key, "%s%s", of->prefix, param->key);
   if (wm_estimator_reads(reader, key)) return;
   int used = snprintf(text, sizeof text, "estimator %s does not take it", reader->name);
@@ -378,7 +377,7 @@ static int new_place(const reading *self, const wm_param_old *old, const char *t
   if (!old->new_key) return -1;
   snprintf(key, sizeof key, "%.*s%s", (int)strcspn(old->new_key, "*"), old->new_key, tail);
   if (*key != '/') return find(self->own->table, key);
-  for (int i = 0; self->shared && i < CONFIG_SHARED; i++) {
+  for (int i = 0; self->shared && i < WM_CONFIG_SHARED; i++) {
     *to = &self->shared->of[i];
     const size_t n = strlen((*to)->prefix);
     if (strncmp(key + 1, (*to)->prefix, n) == 0) return find((*to)->table, key + 1 + n);

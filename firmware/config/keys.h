@@ -31,8 +31,8 @@ typedef struct config_section {
   const wm_param_table *table;
 } config_section;
 
-#define CONFIG_SECTIONS_MAX 32  // tables: runtime, motion, sightings, estimators, detectors
-// All tables: the runtime's, motion's, each registered estimator's and detector's. Returns how many there are.
+#define CONFIG_SECTIONS_MAX 32  // tables: runtime, shared ones, estimators, detectors
+// All tables: the runtime's, the shared ones, each registered estimator's and detector's. Returns how many there are.
 size_t config_sections(config_section out[CONFIG_SECTIONS_MAX]);
 
 // "FILE:LINE: KEY: unknown key" with the nearest known key. WM_BAD_CONFIG.
@@ -49,11 +49,9 @@ typedef struct config_filling {
   char is_old[CONFIG_PARAMS_MAX];
 } config_filling;
 
-enum { CONFIG_MOTION = 0, CONFIG_SIGHTINGS, CONFIG_SHARED };
-
 // The shared sections. They stay open while the estimator's section is read, which may hold former keys of theirs.
 typedef struct config_shared {
-  config_filling of[CONFIG_SHARED];
+  config_filling of[WM_CONFIG_SHARED];
   const wm_estimator *reader;  // a warning is due for parameters that it does not read; NULL: values are not kept
 } config_shared;
 

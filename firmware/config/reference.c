@@ -103,6 +103,6 @@ void wm_config_reference(FILE *to) {
   for (size_t i = 1; i < count; i++) {
     int is_vision = strncmp(sections[i].prefix, "vision.", 7) == 0;
     fprintf(to, "\n## `%s%s`\n\n%s\n\n", is_vision ? "vision." : "", sections[i].name, sections[i].about);
-    print_table(to, &sections[i], i <= CONFIG_SHARED);
+    print_table(to, &sections[i], i <= WM_CONFIG_SHARED);
   }
 }

@@ -167,8 +167,7 @@ wm_status wm_assemble(const wm_config *config, wm_recording *recording, uint64_t
   out->calibration_text = wm_site_calibration_text(wm_recording_site(recording), &out->calibration_length);
 
   wm_setup *setup = &out->setup;
-  setup->motion = config->motion;
-  setup->sightings = config->sightings;
+  wm_config_give_params(config, setup);
   setup->wheels = *wm_site_wheels(wm_recording_site(recording));
   setup->sensors = wm_site_sensors(wm_recording_site(recording), &setup->sensor_count);
   setup->landmarks = wm_site_landmarks(wm_recording_site(recording), &setup->landmark_count);

@@ -29,8 +29,9 @@ wm_status waymark_parameters(const char *text, take_fn take, void *context, wm_e
   if (!text || !take) return wm_fail(err, WM_BAD_USAGE, "waymark_parameters: a text and a function are needed");
   const wm_status status = wm_config_parse_logged(text, strlen(text), "configuration", &config, err);
   if (status != WM_OK) return status;
-  each(config.estimator, "motion", &wm_motion_params_table, config.motion, take, context);
-  each(config.estimator, "sightings", &wm_sighting_params_table, config.sightings, take, context);
+  for (int i = 0; i < WM_CONFIG_SHARED; i++)
+    each(config.estimator, wm_config_shared[i].name, wm_config_shared[i].table, wm_config_params(&config, i), take,
+         context);
   each(NULL, config.estimator->name, &config.estimator->params, config.estimator_params, take, context);
   wm_config_free(&config);
   return WM_OK;

@@ -398,10 +398,10 @@ static int is_skid_track(const wm_assembly *assembly, const wm_calibration_value
   return 0;
 }
 
-// A factor of noise against the stated sigma: of a position's only a share counts as new (noise.gnss_factor).
+// A factor of noise against the stated sigma: of a position's only a share counts as new (positions.noise.factor).
 static double judged_value(const wm_assembly *assembly, const wm_calibration_value *c) {
   if (strcmp(c->name, "noise.place_factor") != 0) return c->value;
-  return c->value * fmin(parameter(assembly->config, "noise.gnss_factor"), 1.0);
+  return c->value * fmin(number_of(&wm_position_params_table, assembly->config->positions, "noise.factor"), 1.0);
 }
 
 // A state of calibration that ended where no tape measure and no data sheet would put it.

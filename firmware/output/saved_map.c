@@ -19,6 +19,15 @@
 
 // ── what it belongs to ──────────────────────────────────────────────────────────────────────────────────────────────
 
+static int is_default(const wm_param *param, const char *value) {
+  double real;
+  int32_t whole;
+  if (param->type == WM_PARAM_F64) return memcpy(&real, value, sizeof real), real == param->initial;
+  memcpy(&whole, value, sizeof whole);
+  return whole == (int32_t)param->initial;
+}
+
+// Of those that are not the defaults: a later version has parameters that this one does not know.
 static uint64_t hash_params(uint64_t hash, const wm_param_table *table, const void *values, const char *prefix,
                             const wm_estimator *reader) {
   for (size_t i = 0; i < table->count; i++) {
@@ -26,9 +35,10 @@ static uint64_t hash_params(uint64_t hash, const wm_param_table *table, const vo
     char key[160];
     (void)snprintf(key, sizeof key, "%s%s", prefix, param->key);
     if (reader && !wm_estimator_reads(reader, key)) continue;
+    const char *const value = (const char *)values + param->offset;
+    if (is_default(param, value)) continue;
     hash = wm_hash(hash, key, strlen(key) + 1);
-    const size_t bytes = param->type == WM_PARAM_F64 ? sizeof(double) : sizeof(int32_t);
-    hash = wm_hash(hash, (const char *)values + param->offset, bytes);
+    hash = wm_hash(hash, value, param->type == WM_PARAM_F64 ? sizeof(double) : sizeof(int32_t));
   }
   return hash;
 }
@@ -37,8 +47,10 @@ wm_map_identity wm_map_identity_of(const wm_config *config, const wm_setup *setu
   const wm_estimator *e = config->estimator;
   wm_map_identity out = {.configuration = wm_hash(0, e->name, strlen(e->name) + 1)};
   out.configuration = hash_params(out.configuration, &e->params, config->estimator_params, "", NULL);
-  out.configuration = hash_params(out.configuration, &wm_motion_params_table, setup->motion, "motion.", e);
-  out.configuration = hash_params(out.configuration, &wm_sighting_params_table, setup->sightings, "sightings.", e);
+  for (int i = 0; i < WM_CONFIG_SHARED; i++) {
+    const wm_shared_section *const s = &wm_config_shared[i];
+    out.configuration = hash_params(out.configuration, s->table, wm_config_params(config, i), s->prefix, e);
+  }
   uint8_t bytes[WM_RIG_ENCODED_MAX];
   uint64_t hash = wm_landmarks_hash(setup->landmarks, setup->landmark_count);
   hash = wm_hash(hash, bytes, wm_wheels_encode(&setup->wheels, bytes, sizeof bytes));

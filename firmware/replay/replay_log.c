@@ -27,9 +27,7 @@ typedef struct log_replay {
 static void assemble(log_replay *self, const wm_config *config, const wm_log_head *head, const wm_raster *map) {
   wm_assembly *a = &self->assembly;
   a->config = config;
-  a->setup = (wm_setup){.motion = config->motion,
-                        .sightings = config->sightings,
-                        .wheels = head->wheels,
+  a->setup = (wm_setup){.wheels = head->wheels,
                         .sensors = head->sensors,
                         .sensor_count = head->sensor_count,
                         .landmarks = head->landmarks,
@@ -38,6 +36,7 @@ static void assemble(log_replay *self, const wm_config *config, const wm_log_hea
                         .map = map,
                         .start = head->start,
                         .seed = head->seed};
+  wm_config_give_params(config, &a->setup);
   a->kept = head->kept;
   a->kept_bytes = head->kept_bytes;
   a->map_path = head->map_path;

@@ -62,10 +62,7 @@ auto first_lasting(const Looks &looks, double lasting_s, const Is &is) -> declty
 // The estimator of a configuration with its memory. Keeps references to all that it is made of.
 class Filter {
  public:
-  explicit Filter(const wm_config &config) : config_(config) {
-    setup_.motion = config.motion;
-    setup_.sightings = config.sightings;
-  }
+  explicit Filter(const wm_config &config) : config_(config) { wm_config_give_params(&config, &setup_); }
   wm_status init(wm_error *err) {
     const char *why = "";
     const size_t bytes = ops().state_bytes(config_.estimator_params, &setup_, &why);

@@ -47,8 +47,7 @@ wm_rig rig_of(const sim::Scenario &scenario) {
 wm_setup setup_of(const sim::Scenario &scenario, const wm_config &config, const sim::Recording &recording,
                   const wm_rig *rig) {
   wm_setup out{};
-  out.motion = config.motion;
-  out.sightings = config.sightings;
+  wm_config_give_params(&config, &out);
   out.wheels = scenario.robot.wheels;
   out.rig = rig;
   out.start = recording.start;

@@ -115,14 +115,13 @@ int main(void) {
   if (!events || wm_config_parse(kConfig, strlen(kConfig), "bench", &config, &err) != WM_OK) return 2;
   static wm_assembly assembly;
   assembly.config = &config;
-  assembly.setup = (wm_setup){.motion = config.motion,
-                              .sightings = config.sightings,
-                              .sensors = &sensor,
+  assembly.setup = (wm_setup){.sensors = &sensor,
                               .sensor_count = 1,
                               .landmarks = landmarks,
                               .landmark_count = SEEN,
                               .seed = 1,
                               .start = {.t_ns = 0, .sigma_xy_m = 0.05, .sigma_heading_rad = 0.05}};
+  wm_config_give_params(&config, &assembly.setup);
   sensor.max_range_m = INFINITY;
   wm_wheels *wheels = &assembly.setup.wheels;  // unknown: it is driven by twists
   wheels->radius_m = wheels->ticks_per_turn = wheels->track_m = wheels->wheelbase_m = wheels->steering_ratio = NAN;

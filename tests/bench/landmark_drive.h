@@ -29,9 +29,8 @@ inline const std::vector<setting> kCalibrationStates = {
 // What switches off all that is estimated beside the pose: calibration, slots of errors in time and of the map, factors
 // of noise.
 inline std::vector<setting> pose_alone() {
-  std::vector<setting> out = {{"correlated.slots", 0}, {"states.map_slots", 0}, {"correlated.gnss_m", 0}};
-  for (const wm_param_table *table :
-       {&wm_motion_params_table, &wm_sighting_params_table, &wm_estimator_find("landmark_ekf")->params})
+  std::vector<setting> out = {{"correlated.slots", 0}, {"states.map_slots", 0}, {"correlated.sigma_m", 0}};
+  for (const wm_param_table *table : {&wm_motion_params_table, &wm_sighting_params_table, &wm_position_params_table})
     for (size_t i = 0; i < table->count; i++) {
       const char *key = table->params[i].key;
       const bool is_state = std::strncmp(key, "states.", 7) == 0 && std::strstr(key, "_sigma");
@@ -46,9 +45,11 @@ class landmark_drive {
       : range_(range),
         motion_(wm_motion_params_table.bytes),
         sightings_(wm_sighting_params_table.bytes),
+        positions_(wm_position_params_table.bytes),
         params_(ekf_->params.bytes) {
     fill(wm_motion_params_table, settings, &motion_);
     fill(wm_sighting_params_table, settings, &sightings_);
+    fill(wm_position_params_table, settings, &positions_);
     fill(ekf_->params, settings, &params_);
     std::strcpy(sensor_.name, "eye");
     sensor_.bearing_sigma_rad = 0.02;
@@ -58,6 +59,7 @@ class landmark_drive {
       landmarks_[i] = {i, {6 * std::cos(1.57 * i), 6 * std::sin(1.57 * i), 0}, 0.01, kAbsent, {}, 0};
     setup_.motion = reinterpret_cast<const wm_motion_params *>(motion_.data());
     setup_.sightings = reinterpret_cast<const wm_sighting_params *>(sightings_.data());
+    setup_.positions = reinterpret_cast<const wm_position_params *>(positions_.data());
     setup_.wheels = {kAbsent, kAbsent, kAbsent, kAbsent, kAbsent, kAbsent, 0, {}, {}};
     setup_.sensors = &sensor_;
     setup_.sensor_count = 1;
@@ -130,7 +132,7 @@ class landmark_drive {
   static constexpr double kAbsent = std::numeric_limits<double>::quiet_NaN();
   const wm_estimator *ekf_ = wm_estimator_find("landmark_ekf");
   bool range_;
-  std::vector<char> motion_, sightings_, params_;
+  std::vector<char> motion_, sightings_, positions_, params_;
   wm_sensor sensor_{};
   wm_landmark landmarks_[4];
   wm_setup setup_{};  // the estimator reads it as long as it lives

@@ -131,9 +131,11 @@ void scene::begin(unsigned happens) {
   }
 }
 
-const wm_setup &scene::setup(const wm_motion_params *motion, const wm_sighting_params *sightings) {
-  setup_.motion = motion;
-  setup_.sightings = sightings;
+const wm_setup &scene::setup(const wm_setup &params) {
+  setup_.motion = params.motion;
+  setup_.sightings = params.sightings;
+  setup_.positions = params.positions;
+  setup_.markers = params.markers;
   return setup_;
 }
 

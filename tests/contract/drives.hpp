@@ -50,7 +50,8 @@ class scene {
   scene(const scene &) = delete;
   scene &operator=(const scene &) = delete;
 
-  const wm_setup &setup(const wm_motion_params *motion, const wm_sighting_params *sightings);
+  // With the parameters of this setup.
+  const wm_setup &setup(const wm_setup &params);
   const std::vector<wm_event> &events() const { return events_; }
 
  protected:

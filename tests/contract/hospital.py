@@ -26,7 +26,7 @@ SEAM_M = 3.0         # a loss so near to a seam counts as the seam's
 WRONG_M = 0.25       # confidently wrong: so far off, not lost, and truth outside of the 99 % ellipse
 SETTLED_S = 5.0      # from the start, before which the state is not judged
 EVERY = 5            # rows of the trajectory (100 Hz); each of these is judged
-HEALTHY = 0.01       # share of a drive with all sources in which the state may be degraded, and may not be tracked
+HEALTHY = 0.01       # share of a drive with all sources in which the state may be degraded
 SOURCES = {"all": None, "no tags": "markers", "no floor plan": "points", "no radio": "sightings", "no RTK": "gnss"}
 PLAIN = "format: waymark-config/1\n"
 
@@ -124,8 +124,8 @@ def misses(name, results):
                 out.append(f"{where}: {p['rms_m']:.3f} m, allowed {PARTS[part][2]:.2f} m")
             if p["lost"] > 0:
                 out.append(f"{where}: lost for {100 * p['lost']:.1f} % ({100 * p['seam_lost']:.1f} % at a seam)")
-            if p["degraded"] + p["reckoning"] > HEALTHY:
-                out.append(f"{where}: degraded for {100 * p['degraded']:.1f} %, dead reckoning for {100 * p['reckoning']:.1f} %")
+            if p["degraded"] > HEALTHY:
+                out.append(f"{where}: degraded for {100 * p['degraded']:.1f} %")
     return out
 
 

@@ -476,11 +476,11 @@ void setUp(void) {
   params.resize(estimator->params.bytes + 1);
   wm_params_defaults(&estimator->params, params.data());
   // Everything that may be learnt is switched on, where the estimator has it.
-  const char *sigmas[] = {
-      "states.speed_scale_sigma",    "states.yaw_rate_scale_sigma", "states.yaw_rate_bias_sigma_radps",
-      "states.lag_sigma_s",          "states.sensor_yaw_sigma_rad", "states.sensor_time_offset_sigma_s",
-      "states.range_bias_sigma_m",   "correlated.gnss_m",           "states.rate_bias_sigma_radps",
-      "states.velocity_scale_sigma", "states.rate_scale_sigma"};
+  const char *sigmas[] = {"states.speed_scale_sigma",         "states.yaw_rate_scale_sigma",
+                          "states.yaw_rate_bias_sigma_radps", "states.lag_sigma_s",
+                          "states.sensor_yaw_sigma_rad",      "states.sensor_time_offset_sigma_s",
+                          "states.range_bias_sigma_m",        "states.rate_bias_sigma_radps",
+                          "states.velocity_scale_sigma",      "states.rate_scale_sigma"};
   for (const char *key : sigmas) {
     set_param(estimator->params, params, key, 0.1);
     set_param(wm_motion_params_table, motion_params, key, 0.1);

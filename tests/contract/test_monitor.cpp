@@ -70,12 +70,15 @@ void note(const wm_estimate &e, double t_s, double dt_s, seen *out) {
 
 // `spoil`: changes an event; null: a good drive.
 seen drive(const char *name, drives::scene &scene, const std::vector<parameters::setting> &settings,
-           void (*spoil)(wm_event *)) {
+           void (*spoil)(wm_event *), const std::vector<parameters::setting> &receiver = {}) {
   const wm_estimator &of = *wm_estimator_find(name);
   const parameters::values params(of.params, settings), motion(wm_motion_params_table, {}),
-      sightings(wm_sighting_params_table, {});
-  const wm_setup &setup = scene.setup(static_cast<const wm_motion_params *>(static_cast<const void *>(motion.data())),
-                                      reinterpret_cast<const wm_sighting_params *>(sightings.data()));
+      sightings(wm_sighting_params_table, {}), positions(wm_position_params_table, receiver);
+  wm_setup shared{};
+  shared.motion = static_cast<const wm_motion_params *>(static_cast<const void *>(motion.data()));
+  shared.sightings = reinterpret_cast<const wm_sighting_params *>(sightings.data());
+  shared.positions = reinterpret_cast<const wm_position_params *>(positions.data());
+  const wm_setup &setup = scene.setup(shared);
   const char *why = "";
   const size_t bytes = of.state_bytes(params.data(), &setup, &why);
   TEST_ASSERT_GREATER_THAN_MESSAGE(0, bytes, why);
@@ -457,9 +460,9 @@ void drift(wm_event *e) {
 }
 TEST(positions_far_from_the_way_are_doubt) {
   drives::scene scene(motion::twist, drives::kPositions, 0, kEnd_s);
-  const std::vector<parameters::setting> settings = {{"correlated.gnss_m", 1.0}, {"correlated.gnss_tau_s", 20.0}};
-  const seen good = drive("landmark_ekf", scene, settings, nullptr);
-  const seen bad = drive("landmark_ekf", scene, settings, drift);
+  const std::vector<parameters::setting> receiver = {{"correlated.sigma_m", 1.0}, {"correlated.tau_s", 20.0}};
+  const seen good = drive("landmark_ekf", scene, {}, nullptr, receiver);
+  const seen bad = drive("landmark_ekf", scene, {}, drift, receiver);
   TEST_ASSERT_TRUE(!good.is_lasting);
   TEST_ASSERT_DOUBLE_IS_INF(good.doubted_s);
   TEST_ASSERT_TRUE(bad.is_lasting);

@@ -65,23 +65,32 @@ void add_lists(const wm_estimator &of, const void *state, trace *out) {
   for (size_t i = 0; i < others && i < 256; i++) out->add(places[i].x_m), out->add(places[i].weight);
 }
 
-// An estimator's table and those of the shared sections as one, whose struct is the three structs one behind another.
+// An estimator's table and those of the shared sections as one, whose struct is theirs one behind another.
 class whole_table {
  public:
   explicit whole_table(const wm_estimator &of) {
     append("", of.params);
     motion_at_ = append("motion.", wm_motion_params_table);
     sightings_at_ = append("sightings.", wm_sighting_params_table);
+    positions_at_ = append("positions.", wm_position_params_table);
+    markers_at_ = append("markers.", wm_marker_params_table);
   }
   wm_param_table table() const { return {rows_.data(), rows_.size(), bytes_, nullptr}; }
-  const wm_motion_params *motion(const values &v) const {
-    return reinterpret_cast<const wm_motion_params *>(static_cast<const char *>(v.data()) + motion_at_);
-  }
-  const wm_sighting_params *sightings(const values &v) const {
-    return reinterpret_cast<const wm_sighting_params *>(static_cast<const char *>(v.data()) + sightings_at_);
+  const wm_motion_params *motion(const values &v) const { return at<wm_motion_params>(v, motion_at_); }
+  wm_setup setup(const values &v) const {
+    wm_setup out{};
+    out.motion = motion(v);
+    out.sightings = at<wm_sighting_params>(v, sightings_at_);
+    out.positions = at<wm_position_params>(v, positions_at_);
+    out.markers = at<wm_marker_params>(v, markers_at_);
+    return out;
   }
 
  private:
+  template <class T>
+  static const T *at(const values &v, size_t offset) {
+    return reinterpret_cast<const T *>(static_cast<const char *>(v.data()) + offset);
+  }
   size_t append(const char *prefix, const wm_param_table &table) {
     const size_t at = bytes_;
     for (size_t i = 0; i < table.count; i++) {
@@ -96,13 +105,13 @@ class whole_table {
 
   std::vector<wm_param> rows_;
   std::deque<std::string> keys_;
-  size_t bytes_ = 0, motion_at_, sightings_at_;
+  size_t bytes_ = 0, motion_at_, sightings_at_, positions_at_, markers_at_;
 };
 
 bool run(const wm_estimator &of, const whole_table &tables, drives::scene &scene, const values &params, trace *out) {
   const char *why = "", *key = "";
   if (wm_motion_params_clash(tables.motion(params), &key)) return false;
-  const wm_setup &setup = scene.setup(tables.motion(params), tables.sightings(params));
+  const wm_setup &setup = scene.setup(tables.setup(params));
   const size_t bytes = of.state_bytes(params.data(), &setup, &why);
   if (bytes == 0) return false;
   const block state(std::aligned_alloc(64, (bytes + 63) / 64 * 64));
@@ -160,7 +169,7 @@ const std::vector<setting> kSensorStates = {
 const std::vector<setting> kCorrelated = {
     {"sightings.correlated.slots", 6},        {"sightings.correlated.bearing_rad", 0.01},
     {"sightings.correlated.lateral_m", 0.03}, {"sightings.correlated.range_m", 0.05},
-    {"sightings.correlated.range_rel", 0.01}, {"correlated.gnss_m", 0.5},
+    {"sightings.correlated.range_rel", 0.01}, {"positions.correlated.sigma_m", 0.5},
 };
 
 std::vector<setting> all(std::initializer_list<std::vector<setting>> lists) {
@@ -235,15 +244,15 @@ std::vector<scenario> scenarios() {
        all({kMotionStates,
             kSensorStates,
             kCorrelated,
-            {{"states.map_slots", 4}, {"states.gnss_time_offset_sigma_s", 0.1}}}),
-       {"states.gnss", "noise.gnss", "correlated.", "sightings.correlated.", "use.", "sightings.use."}},
+            {{"sightings.states.map_slots", 4}, {"positions.states.time_offset_sigma_s", 0.1}}}),
+       {"positions.", "sightings.correlated.", "sightings.use."}},
       {"landmark_ekf",
        "markers",
        motion::twist,
        kMarkers,
        kOutliers,
        15,
-       {{"markers.heading_most_rad", 0.014}, {"states.map_slots", 4}},
+       {{"markers.heading_most_rad", 0.014}, {"sightings.states.map_slots", 4}},
        {"markers."}},
       {"landmark_ekf",
        "fixed errors",
@@ -269,10 +278,10 @@ std::vector<scenario> scenarios() {
        15,
        all({kSensorStates,
             {{"sightings.use.elevation", 1},
-             {"states.map_slots", 4},
+             {"sightings.states.map_slots", 4},
              {"sightings.states.sensor_tilt_sigma_rad", 0.02},
              {"sightings.states.sensor_angle_scale_sigma", 0.02}}}),
-       {"states.tilt", "sightings.states.sensor_tilt", "sightings.states.sensor_angle"}},
+       {"sightings.states.tilt", "sightings.states.sensor_tilt", "sightings.states.sensor_angle"}},
       {"landmark_ekf",
        "carried off",
        motion::ticks_and_gyro,
@@ -329,8 +338,8 @@ std::vector<scenario> scenarios() {
        kAll,
        kNoMap | kOutliers,
        20,
-       {{"states.gnss_time_offset_sigma_s", 0.1}, {"correlated.gnss_m", 0.5}},
-       {"states.gnss", "states.heading", "noise.gnss", "correlated.gnss", "use."}},
+       {{"positions.states.time_offset_sigma_s", 0.1}, {"positions.correlated.sigma_m", 0.5}},
+       {"positions."}},
       {"slam", "a map that grows", motion::twist, kBearings | kRanges, kOneMoved, 15, {{"landmarks.map", 1}}},
       {"slam",
        "lines, unscented",
@@ -377,8 +386,8 @@ std::vector<scenario> scenarios() {
        kPoints | kBearings | kRanges,
        kOutliers,
        10,
-       all({kSensorStates, kCorrelated, {{"states.map_slots", 4}}}),
-       {"states.map_slots", "sightings.states.", "sightings.correlated."}},
+       all({kSensorStates, kCorrelated, {{"sightings.states.map_slots", 4}}}),
+       {"sightings.states.map_slots", "sightings.states.", "sightings.correlated."}},
       {"edge_mcl",
        "landmarks, fixed errors",
        motion::twist,
@@ -403,10 +412,11 @@ std::vector<scenario> scenarios() {
        10,
        all({kSensorStates,
             {{"sightings.use.elevation", 1},
-             {"states.map_slots", 4},
+             {"sightings.states.map_slots", 4},
              {"sightings.states.sensor_tilt_sigma_rad", 0.02},
              {"sightings.states.sensor_angle_scale_sigma", 0.02}}}),
-       {"states.tilt", "sightings.use.elevation", "sightings.states.sensor_tilt", "sightings.states.sensor_angle"}},
+       {"sightings.states.tilt", "sightings.use.elevation", "sightings.states.sensor_tilt",
+        "sightings.states.sensor_angle"}},
       {"edge_mcl",
        "markers",
        motion::twist,
@@ -421,8 +431,8 @@ std::vector<scenario> scenarios() {
        kPoints | kPositions | kHeadings,
        kOutliers,
        10,
-       {{"states.gnss_time_offset_sigma_s", 0.1}, {"correlated.gnss_m", 0.5}},
-       {"states.gnss", "states.heading", "noise.gnss", "correlated.gnss", "use."}},
+       {{"positions.states.time_offset_sigma_s", 0.1}, {"positions.correlated.sigma_m", 0.5}},
+       {"positions."}},
       {"edge_mcl", "carried off", motion::twist, kPoints, kCarriedOff, 14, {}, {"lost."}},
       {"edge_mcl", "no start", motion::twist, kPoints, kNoStart, 14, {}, {"search."}},
       {"pf_edges", "tracking", motion::twist, kPoints, kSilence, 10, {}},
@@ -517,9 +527,9 @@ int main(int argc, char **argv) {
     const wm_estimator &of = *estimators[i];
     tables.emplace_back(of);
     const auto reads = [&of](const wm_param &param) {
-      const bool is_shared =
-          std::strncmp(param.key, "motion.", 7) == 0 || std::strncmp(param.key, "sightings.", 10) == 0;
-      return !is_shared || wm_estimator_reads(&of, param.key);
+      bool is_own = false;
+      for (size_t k = 0; k < of.params.count; k++) is_own |= std::strcmp(of.params.params[k].key, param.key) == 0;
+      return is_own || wm_estimator_reads(&of, param.key);
     };
     owners.push_back({of.name, tables.back().table(), stages_of(of, tables.back(), &scenes), reads});
   }

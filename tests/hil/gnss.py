@@ -18,7 +18,7 @@ CONFIG = """format: waymark-config/1
 estimator: landmark_ekf
 motion: {twist: measured}
 sources: [{name: gnss, lateness_max_ms: 300}]
-landmark_ekf: {states: {gnss_time_offset_sigma_s: 0}}   # the device is told the delay
+positions: {states: {time_offset_sigma_s: 0}}   # the device is told the delay
 """
 ORIGIN = (52.5, 13.4, 30.0)  # degrees, metres above the ellipsoid
 GEOID_M = 40.0               # its height there, about

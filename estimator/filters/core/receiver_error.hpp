@@ -4,9 +4,9 @@
 #ifndef WAYMARK_ESTIMATOR_CORE_RECEIVER_ERROR_HPP
 #define WAYMARK_ESTIMATOR_CORE_RECEIVER_ERROR_HPP
 
-#include "filters/core/position_params.h"
 #include "filters/core/state_pool.hpp"
 #include "math/elementary.hpp"
+#include "sensors/shared_params.hpp"
 #include "waymark/estimator.h"
 #include "waymark/time.h"
 

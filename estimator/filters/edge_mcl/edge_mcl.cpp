@@ -17,7 +17,14 @@ namespace {
 constexpr double kMotionGap_s = 1.0;      // between two motion messages, beyond which the way is unknown; not swept
 constexpr double kUnknownSigma_m = 0.03;  // of a point without a sigma and a camera: a pixel at 4 m
 
-const char *const kReads[] = {"!motion.noise.adapt", "motion.", "sightings.", nullptr};
+const char *const kReads[] = {"!motion.noise.adapt",
+                              "!markers.stamp",
+                              "!markers.correlated",
+                              "motion.",
+                              "sightings.",
+                              "positions.",
+                              "markers.",
+                              nullptr};
 
 bool has_landmarks(const wm_setup &setup) { return setup.landmark_count > 0 && setup.sensor_count > 0; }
 
@@ -27,8 +34,8 @@ int count_states(const wm_edge_mcl_params &params, const wm_setup &setup) {
   for (int k = 0; k <= kCameraTime; k++) each_camera += params.sigma[k] > 0.0;
   return kPoseStates + planar_filter::count_motion_states(setup.motion->states, setup.motion->model) +
          (params.sigma[kEdgeOffset] > 0.0) + each_camera * cameras +
-         (has_landmarks(setup) ? sighting_aid::count_states(params.landmarks, setup) : 0) +
-         position_aid::count_states(params.gnss) + (params.wall_sigma_m > 0.0) * wall_list::kCapacity;
+         (has_landmarks(setup) ? sighting_aid::count_states(setup) : 0) + position_aid::count_states(setup) +
+         (params.wall_sigma_m > 0.0) * wall_list::kCapacity;
 }
 
 }  // namespace
@@ -80,7 +87,7 @@ void edge_mcl::init(const wm_edge_mcl_params &params, const wm_setup &setup) {
   search_.init(map_, behind.search);
   has_landmarks_ = has_landmarks(setup);
   if (has_landmarks_) {
-    landmarks_.init(params.landmarks, params.markers, setup, behind.landmarks);
+    landmarks_.init(setup, behind.landmarks);
     landmarks_.add_calibration(&filter_);
     records_.set(behind.records);
     std::memset(behind.records, 0, setup.landmark_count * sizeof(landmark_record));
@@ -94,7 +101,7 @@ void edge_mcl::init(const wm_edge_mcl_params &params, const wm_setup &setup) {
   if (has_landmarks_) landmarks_.add_lent(&filter_);
   wall_state_ = params.wall_sigma_m > 0.0 ? filter_.states() : -1;
   for (int k = 0; wall_state_ >= 0 && k < wall_list::kCapacity; k++) filter_.add_state(0.0, params.wall_sigma_m);
-  positions_.init(params.gnss, setup, &filter_, [this](double value, double) { return filter_.add_state(value, 0.0); });
+  positions_.init(setup, &filter_, [this](double value, double) { return filter_.add_state(value, 0.0); });
   filter_.set_correlated_position(positions_.error_state());
   start_again(start_is_known(setup.start));
 }

@@ -16,7 +16,7 @@ wm_status edge_mcl::take_position(const wm_event &event, record_list records) {
   status = filter_.check_time(event.t_ns);
   if (status != WM_OK) return status;
   filter_.move_to(event.t_ns);
-  if (!params_.gnss.use_position) return reject(records, record, WM_REJECTED_BY_CONFIG);
+  if (!positions_.params().use_position) return reject(records, record, WM_REJECTED_BY_CONFIG);
   if (!positions_.is_awake()) positions_.wake(&filter_);
   const position_aid::view at = positions_.look(p, &filter_);
   if (is_found_by(positions_.observe(p, at, filter_))) return reject(records, record, WM_REJECTED_SEARCHING);
@@ -36,7 +36,7 @@ wm_status edge_mcl::take_heading(const wm_event &event, record_list records) {
   status = filter_.check_time(event.t_ns);
   if (status != WM_OK) return status;
   filter_.move_to(event.t_ns);
-  if (!params_.gnss.use_heading) return reject(records, r.record, WM_REJECTED_BY_CONFIG);
+  if (!positions_.params().use_heading) return reject(records, r.record, WM_REJECTED_BY_CONFIG);
   if (!positions_.is_awake()) positions_.wake(&filter_);
   if (is_found_by(positions_.observe(h, filter_))) return reject(records, r.record, WM_REJECTED_SEARCHING);
   positions_.put_row(h, filter_, &r);

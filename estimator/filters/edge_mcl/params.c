@@ -16,12 +16,6 @@ static const wm_param kParams[] = {
             "errors "
             "of the map. Of 0.015 to 0.025 each is right for flats whose map is exact and with a wall 0.1 m off. 0: "
             "off."),
-    LANDMARK_TILT_ROWS(landmarks),
-    LANDMARK_SLOTS_ROW(landmarks),
-    MARKER_ROWS(markers),
-    POSITION_STATE_ROWS(gnss),
-    POSITION_NOISE_ROWS(gnss),
-    PLANAR_POSITION_ROWS(gnss),
     F64("points.pixel_px", pixel_px, 0.5, 0.01, 10,
         "Sigma of an edge in the picture, pixels, where the detector gives none in metres."),
     F64("points.sigma_m", point_sigma_m, 0.012, 0.001, 1, "Sigma of a point besides: map and edge, m."),
@@ -38,8 +32,8 @@ static const wm_param kParams[] = {
         "Fraction of a scan's points that the map explains at which the scan is evidence neither for nor against being "
         "lost. Of n points n/(n + 60) can be edges; the fraction is taken of these."),
     F64("lost.margin", lost_margin, 0.2, 0, 1,
-        "Margin below the drive's own mean fraction. The threshold is the larger of lost.explained and mean - "
-        "lost.margin - 4 times the mean shortfall."),
+        "Margin below the fraction that the drive's usual number of false points leaves of a scan. The threshold is "
+        "the larger of lost.explained and that fraction less lost.margin and 4 times the mean shortfall."),
     F64("lost.beyond_weight", lost_beyond_weight, 3, 1, 100,
         "Weight of an unexplained point beyond an edge of the map, where a camera at the estimated pose cannot see; "
         "less 4 times their usual fraction. 1: as any other (glass walls, lines on the floor that the map has)."),

@@ -4,9 +4,6 @@
 
 #include <stdint.h>
 
-#include "filters/core/landmark_params.h"
-#include "filters/core/marker_params.h"
-#include "filters/core/position_params.h"
 #include "waymark/internal/filters/edge_mcl/camera_states.h"
 #include "waymark/params.h"
 
@@ -21,13 +18,10 @@ typedef struct wm_edge_mcl_params {
   double sigma[WM_CAMERA_ROWS];  // at the start, of each state; 0: not a state
   double wall_sigma_m;           // the same of each wall's offset
 
-  wm_position_params gnss;
   double pixel_px, point_sigma_m, common_px, range_max_m, gate_m;
   double systematic_xy_m, systematic_heading_rad;
 
   double lost_explained, lost_margin, lost_beyond_weight, kidnapped_per_s;
-  wm_landmark_params landmarks;
-  wm_marker_params markers;
   int32_t search_poses, unused;
   double dead_reckoning_after_s;
 } wm_edge_mcl_params;

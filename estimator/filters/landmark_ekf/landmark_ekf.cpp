@@ -17,11 +17,12 @@ namespace {
 constexpr double kDoubtedStart = 0.1;
 constexpr double kAround_m = 5.0;  // sigma of a lost robot's distance from the landmarks; not swept
 
-const char *const kReads[] = {"motion.", "sightings.", nullptr};
+const char *const kReads[] = {
+    "!markers.stamp", "!markers.correlated", "motion.", "sightings.", "positions.", "markers.", nullptr};
 
-int count_states(const wm_landmark_ekf_params &p, const wm_setup &setup) {
+int count_states(const wm_setup &setup) {
   return kPoseStates + planar_filter::count_motion_states(setup.motion->states, setup.motion->model) +
-         sighting_aid::count_states(p.landmarks, setup) + position_aid::count_states(p.gnss);
+         sighting_aid::count_states(setup) + position_aid::count_states(setup);
 }
 
 // Variance of a place anywhere among the landmarks, each axis, m2.
@@ -38,19 +39,18 @@ double spread_of(const wm_setup &setup) {
 
 }  // namespace
 
-landmark_ekf::arrays landmark_ekf::place(memory_layout *layout, const wm_landmark_ekf_params &params,
-                                         const wm_setup &setup) {
-  return {layout->take<double>(planar_filter::doubles(count_states(params, setup))),
+landmark_ekf::arrays landmark_ekf::place(memory_layout *layout, const wm_setup &setup) {
+  return {layout->take<double>(planar_filter::doubles(count_states(setup))),
           layout->take<landmark_record>(setup.landmark_count), sighting_aid::place(layout, setup)};
 }
 
-size_t landmark_ekf::bytes(const wm_landmark_ekf_params &params, const wm_setup &setup, const char **why) {
+size_t landmark_ekf::bytes(const wm_landmark_ekf_params &, const wm_setup &setup, const char **why) {
   if (setup.sensor_count > kMaxSensors) {
     *why = "landmark_ekf takes at most 16 sensors";
     return 0;
   }
   memory_layout layout(nullptr, sizeof(landmark_ekf));
-  place(&layout, params, setup);
+  place(&layout, setup);
   return layout.bytes();
 }
 
@@ -59,13 +59,13 @@ void landmark_ekf::init(const wm_landmark_ekf_params &params, const wm_setup &se
   setup_ = &setup;
   params_ = params;
   memory_layout layout(this, sizeof *this);
-  const arrays behind = place(&layout, params, setup);
-  filter_.init(setup, setup.motion->states, count_states(params, setup), behind.filter);
+  const arrays behind = place(&layout, setup);
+  filter_.init(setup, setup.motion->states, count_states(setup), behind.filter);
   if (setup.motion->model != WM_MOTION_CONSTANT_VELOCITY) filter_.noise().init(setup.motion->noise_adapt_log_sigma);
   const auto add = [this](double value, double sigma) { return sigma > 0.0 ? filter_.add_state(value, sigma) : -1; };
-  aid_.init(params.landmarks, params.markers, setup, behind.aid);
+  aid_.init(setup, behind.aid);
   aid_.add_calibration(&filter_);
-  positions_.init(params.gnss, setup, &filter_, add);
+  positions_.init(setup, &filter_, add);
   filter_.set_correlated_position(positions_.error_state());
   calibration_states_ = filter_.states();
   aid_.add_lent(&filter_);

@@ -89,7 +89,7 @@ class landmark_ekf {
     sighting_aid::arrays aid;
   };
   const wm_sighting_params &sightings() const { return *setup_->sightings; }
-  static arrays place(memory_layout *layout, const wm_landmark_ekf_params &params, const wm_setup &setup);
+  static arrays place(memory_layout *layout, const wm_setup &setup);
 
   planar_filter filter_;
   sighting_aid aid_;

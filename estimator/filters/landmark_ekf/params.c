@@ -1,15 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "filters/landmark_ekf/params.h"
 
+#include "param_rows.h"
+#include "sensors/position_params.h"
+
 typedef struct wm_landmark_ekf_params params;
 
 static const wm_param kParams[] = {
-    LANDMARK_TILT_ROWS(landmarks),
-    POSITION_STATE_ROWS(gnss),
-    LANDMARK_SLOTS_ROW(landmarks),
-    PLANAR_POSITION_ROWS(gnss),
-    POSITION_NOISE_ROWS(gnss),
-    MARKER_ROWS(markers),
     F64("dead_reckoning_after_s", dead_reckoning_after_s, 2, 0, 3600,
         "Time without a fused observation after which the state is dead reckoning, s."),
     BOOL("recover.on", recover, 1, "Relocalize when the observations show that the pose is wrong."),
@@ -23,12 +20,13 @@ static const wm_param kParams[] = {
 };
 
 static const wm_param_old kOld[] = {
+    POSITION_KEYS_OF_OLD,
+    {"markers.*", "/markers.*", NULL},
     {"gate.associate_unknown", "/sightings.use.unidentified", NULL},
     {"states.*", "/motion.states.*", NULL},
     {"states.*", "/sightings.states.*", NULL},
     {"use.*", "/sightings.use.*", NULL},
     {"noise.*", "/sightings.noise.*", NULL},
-    {"lasting.*", "correlated.*", NULL},
     {"lasting.*", "/sightings.correlated.*", NULL},
     {"gate.*", "/sightings.gate.*", NULL},
     {NULL, NULL, NULL},

@@ -5,9 +5,6 @@
 
 #include <stdint.h>
 
-#include "filters/core/landmark_params.h"
-#include "filters/core/marker_params.h"
-#include "filters/core/position_params.h"
 #include "waymark/params.h"
 
 #ifdef __cplusplus
@@ -15,9 +12,6 @@ extern "C" {
 #endif
 
 typedef struct wm_landmark_ekf_params {
-  wm_landmark_params landmarks;
-  wm_marker_params markers;
-  wm_position_params gnss;
   int32_t recover, unused;
   double dead_reckoning_after_s;
   double recover_window_s, recover_sigma_xy_m, recover_sigma_heading_rad;

@@ -15,7 +15,7 @@ wm_status landmark_ekf::fuse_position(const wm_event &event, record_list records
   status = filter_.check_time(event.t_ns);
   if (status != WM_OK) return status;
   filter_.move_to(event.t_ns);
-  if (!params_.gnss.use_position) return reject(records, record, WM_REJECTED_BY_CONFIG);
+  if (!positions_.params().use_position) return reject(records, record, WM_REJECTED_BY_CONFIG);
   const position_aid::view at = positions_.look(p, &filter_);
   buffer(positions_.observe(p, at, filter_));
   if (life_.searching()) {
@@ -38,7 +38,7 @@ wm_status landmark_ekf::fuse_heading(const wm_event &event, record_list records)
   status = filter_.check_time(event.t_ns);
   if (status != WM_OK) return status;
   filter_.move_to(event.t_ns);
-  if (!params_.gnss.use_heading) return reject(records, r.record, WM_REJECTED_BY_CONFIG);
+  if (!positions_.params().use_heading) return reject(records, r.record, WM_REJECTED_BY_CONFIG);
   buffer(positions_.observe(h, filter_));
   if (life_.searching()) {
     search_now(event.t_ns);

@@ -46,7 +46,7 @@ wm_status slam::fuse_marker(const wm_event &event, record_list records) {
   }
   if (life_.searching()) return reject(records, at.record, WM_REJECTED_SEARCHING);
   if (m.poses == 2)
-    r = choose_pose(m, r, read_marker(m, true), params_.markers,
+    r = choose_pose(m, r, read_marker(m, true), markers_,
                     [&](const tag_reading &one) { return landmark < 0 ? 0.0 : marker_nis(at, landmark, one); });
   if (landmark >= 0) {
     fuse_known_marker(at, m, r, landmark);
@@ -145,16 +145,16 @@ void slam::expect_marker(const context &at, const tag_reading &r, const wm_pose2
   out->innovation[2] = wrap(out->observed[2] - out->expected[2]);
   for (int k = 0; k < 3; k++) {
     out->kind[k] = kKinds[k];
-    out->noise[k] = r.noise[k] + square(by_age[k] * params_.marker_stamp_sigma_s);
+    out->noise[k] = r.noise[k] + square(by_age[k] * markers_.stamp_sigma_s);
   }
-  if (error_state >= 0 && params_.marker_correlated > 0.0) carry_marker_errors(r, error_state, out);
+  if (error_state >= 0 && markers_.correlated > 0.0) carry_marker_errors(r, error_state, out);
 }
 
 // The time-correlated share of the errors along and of the heading is a state of this sensor and marker.
 void slam::carry_marker_errors(const tag_reading &r, int error_state, landmark_rows *out) const {
   for (int k = 0; k < 3; k += 2) {
     const int state = error_state + k / 2;
-    const double size = params_.marker_correlated * std::sqrt(r.noise[k]), error = size * joint_.value(state);
+    const double size = markers_.correlated * std::sqrt(r.noise[k]), error = size * joint_.value(state);
     out->row[k].add(state, size);
     out->noise[k] -= square(size);
     out->expected[k] += error;

@@ -19,17 +19,6 @@ static const wm_param kParams[] = {
     F64("states.sensor_stamp_sigma_s", sensor_stamp_sigma_s, 0, 0, 1,
         "Sigma of the error of each picture's stamp, s: the same for all that is seen in it, independent between "
         "pictures. 0: off."),
-    POSITION_STATE_ROWS(gnss),
-    POSITION_NOISE_ROWS(gnss),
-    PLANAR_POSITION_ROWS(gnss),
-    MARKER_ROWS(markers),
-    F64("markers.stamp_sigma_s", marker_stamp_sigma_s, 0, 0, 1,
-        "Sigma of a picture's stamp as noise of each marker, s; at 1 rad/s it is so many rad across."),
-    F64("markers.correlated", marker_correlated, 0, 0, 0.99,
-        "The time-correlated part of a marker's sigma along the line of sight and in heading (pixels under its "
-        "corners, "
-        "light, its bend), with the time constant sightings.correlated.tau_s; needs sightings.correlated.slots. 0: all "
-        "of it is independent."),
     ENUM("landmarks.map", map, WM_SLAM_MAP_NONE, WM_SLAM_MAP_FROZEN, kMaps,
          "Use of landmarks.csv. none: not used; extend: its landmarks are in the state from the start, with their "
          "covariance, and new ones join; frozen: they are considered, not corrected, and only the robot is located."),
@@ -90,7 +79,8 @@ static const wm_param_old kOld[] = {
     {"states.wheel_difference_walk", NULL, "slam never read it; landmark_ekf and odometry have it"},
     {"markers.on", NULL, "markers are taken wherever a sensor gives them"},
     {"association.unknown", "/sightings.use.unidentified", NULL},
-    {"markers.lasting", "markers.correlated", NULL},
+    {"markers.lasting", "/markers.correlated", NULL},
+    {"markers.*", "/markers.*", NULL},
     {"states.*", "/motion.states.*", NULL},
     {"states.*", "/sightings.states.*", NULL},
     {"use.*", "/sightings.use.*", NULL},

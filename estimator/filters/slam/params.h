@@ -5,8 +5,6 @@
 
 #include <stdint.h>
 
-#include "filters/core/marker_params.h"
-#include "filters/core/position_params.h"
 #include "waymark/params.h"
 
 #ifdef __cplusplus
@@ -21,9 +19,6 @@ enum { WM_SLAM_LINE_UNSCENTED = 0, WM_SLAM_LINE_LINEAR = 1, WM_SLAM_LINE_INVERSE
 typedef struct wm_slam_params {
   double wheel_slip_sigma, wheel_slip_tau_s;  // the wheels' scales wander about their means
   double sensor_stamp_sigma_s;                // of each picture's stamp
-  // coded markers
-  wm_marker_params markers;
-  double marker_stamp_sigma_s, marker_correlated;
   // landmarks
   int32_t map, landmark_capacity;
   int32_t confirm_seen;
@@ -35,7 +30,6 @@ typedef struct wm_slam_params {
   int32_t line_clones, line_poses, line_method;
   int32_t line_rejoin;
   double line_near_m, line_patience_s, line_parallax_rad, line_step_m, line_sigma_rel;
-  wm_position_params gnss;
   int32_t consistency;
   int32_t recover;
   double dead_reckoning_after_s;

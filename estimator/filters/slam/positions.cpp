@@ -33,8 +33,8 @@ void slam::place_map(const wm_pose2 &by, const double about_m[2], double turn_si
 bool slam::is_placing(const wm_position &p, const position_aid::view &at) {
   if (is_placed_) return false;
   const double own_m[2] = {at.past.pose.x_m + at.off_m[0], at.past.pose.y_m + at.off_m[1]};
-  const double white_m = white_sigma_m(p.sigma_xy_m, params_.gnss);
-  const double lasting_m = correlated_sigma_m(p.sigma_xy_m, params_.gnss);
+  const double white_m = white_sigma_m(p.sigma_xy_m, positions_.params());
+  const double lasting_m = correlated_sigma_m(p.sigma_xy_m, positions_.params());
   const double sigma_m = std::sqrt(square(white_m) + square(lasting_m));
   if (is_turned_) {
     is_placed_ = true;
@@ -87,7 +87,7 @@ wm_status slam::fuse_position(const wm_event &event, record_list records) {
   if (status != WM_OK) return refuse(records, record, status);
   status = begin_observation(event.t_ns);
   if (status != WM_OK) return status;
-  if (!params_.gnss.use_position) return reject(records, record, WM_REJECTED_BY_CONFIG);
+  if (!positions_.params().use_position) return reject(records, record, WM_REJECTED_BY_CONFIG);
   if (!positions_.is_awake()) positions_.wake(&joint_);
   const bool is_first = !positions_.has_position();
   const position_aid::view at = positions_.look(p, &joint_);
@@ -109,7 +109,7 @@ wm_status slam::fuse_heading(const wm_event &event, record_list records) {
   if (status != WM_OK) return refuse(records, r.record, status);
   status = begin_observation(event.t_ns);
   if (status != WM_OK) return status;
-  if (!params_.gnss.use_heading) return reject(records, r.record, WM_REJECTED_BY_CONFIG);
+  if (!positions_.params().use_heading) return reject(records, r.record, WM_REJECTED_BY_CONFIG);
   if (!positions_.is_awake()) positions_.wake(&joint_);
   const observation seen = positions_.observe(h, joint_);
   if (!is_turned_) {

@@ -24,14 +24,22 @@ constexpr double kCalibratedYaw_rad = 0.005, kCalibratedOffset_s = 0.02;
 // differs from it by 16 %. Not swept.
 constexpr double kUnknownHeading_rad2 = 1.0;
 
-const char *const kReads[] = {
-    "!motion.states.wheel_difference", "!motion.noise.adapt", "motion.", "!sightings.use.elevation",
-    "!sightings.noise.map_min",        "sightings.",          nullptr};
+const char *const kReads[] = {"!motion.states.wheel_difference",
+                              "!motion.noise.adapt",
+                              "motion.",
+                              "!sightings.use.elevation",
+                              "!sightings.noise.map_min",
+                              "!sightings.states.tilt",
+                              "!sightings.states.map_slots",
+                              "sightings.",
+                              "positions.",
+                              "markers.",
+                              nullptr};
 
 // Markers' errors take two states: along the line of sight, and of the heading.
-correlated_slot error_slot_of(const wm_slam_params &p, const wm_sighting_params &s) {
-  correlated_slot out = correlated_slot_of(s);
-  if (s.correlated_slots > 0 && p.marker_correlated > 0.0) out.width = 2;
+correlated_slot error_slot_of(const wm_setup &setup) {
+  correlated_slot out = correlated_slot_of(*setup.sightings);
+  if (setup.sightings->correlated_slots > 0 && marker_params_of(setup).correlated > 0.0) out.width = 2;
   return out;
 }
 
@@ -43,9 +51,8 @@ int states_that_last(const wm_slam_params &p, const wm_setup &setup) {
 }
 
 int states_before_clones(const wm_slam_params &p, const wm_setup &setup) {
-  const wm_sighting_params &s = *setup.sightings;
   return states_that_last(p, setup) + (p.sensor_stamp_sigma_s > 0.0) * (int)setup.sensor_count +
-         s.correlated_slots * error_slot_of(p, s).width + position_aid::count_states(p.gnss);
+         setup.sightings->correlated_slots * error_slot_of(setup).width + position_aid::count_states(setup);
 }
 
 // Azimuth and inverse distance of a ray, of which there are as many as clones.
@@ -155,9 +162,10 @@ void slam::init(const wm_slam_params &params, const wm_setup &setup) {
     picture_ns_[i] = WM_TIME_NONE;
     bloom_px_[i] = std::nan("");
   }
-  error_ = error_slot_of(params, sightings());
+  error_ = error_slot_of(setup);
   for (int i = 0; i < sightings().correlated_slots && error_.width > 0; i++, next += error_.width) errors_.add(next);
-  positions_.init(params.gnss, setup, &joint_, [&next](double, double) { return next++; });
+  markers_ = marker_params_of(setup);
+  positions_.init(setup, &joint_, [&next](double, double) { return next++; });
   follow_scale();
   life_ = {};
   start_again();

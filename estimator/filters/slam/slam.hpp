@@ -280,7 +280,7 @@ class slam {
   // markers.cpp
   wm_status fuse_marker(const wm_event &event, record_list records);
   tag_reading read_marker(const wm_marker &m, bool second) const {
-    return read_tag(m, second, sensor_[m.sensor], errors_of(m.sensor), sightings(), params_.markers);
+    return read_tag(m, second, sensor_[m.sensor], errors_of(m.sensor), sightings(), markers_);
   }
   planar_observation observation_of(const wm_marker &m, const tag_reading &r) const;
   void expect_known_marker(const context &at, const tag_reading &r, int landmark, int count, landmark_rows *out);
@@ -364,6 +364,7 @@ class slam {
 
   const wm_setup *setup_;
   wm_slam_params params_;
+  wm_marker_params markers_;
   mounted_sensor sensor_[kSlamSensors];
   int32_t nameless_[kSlamSensors];  // sightings, none of them with an identity; -1: one had
   sensor_slots slots_;

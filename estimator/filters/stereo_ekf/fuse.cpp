@@ -168,7 +168,7 @@ wm_status stereo_ekf::fuse_position(const wm_event &event, record_list records) 
     depth_rows(p, &rows);
   } else {
     // Another solution has another error.
-    if (receiver_.move_to(event.t_ns, p.sigma_xy_m, params_.gnss).left == 0.0) filter_.restart_receiver();
+    if (receiver_.move_to(event.t_ns, p.sigma_xy_m, gnss_).left == 0.0) filter_.restart_receiver();
     position_rows(p, there.last, &rows);
   }
   double clutter_volume = 1.0;

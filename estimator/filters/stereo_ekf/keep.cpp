@@ -99,7 +99,7 @@ const char *fault_in_frames(const kept_frames &kept) {
 uint32_t calibration_states(const wm_stereo_ekf_params &params, const wm_setup &setup) {
   const wm_stereo_ekf_params used = stereo_ekf::used_params(params, setup);
   head_model models[kHeadStates];
-  models_of(used, models);
+  models_of(used, setup, models);
   int count = 0;
   for (int k = 0; k < kHeadStates; k++) {
     const bool moves = k == kMovedPlace || k == kMovedTurn || k == kVelocity || k == kRates;

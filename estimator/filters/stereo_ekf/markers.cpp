@@ -37,8 +37,8 @@ bool stereo_ekf::marker_rows(const wm_marker &m, int landmark, int slot, row_blo
   const double distance_m = length(seen), map = slot >= 0 ? 0.0 : map_sigma(known);
   if (!(distance_m > kNearest_m)) return false;
   const mat3 to_map = past.R * matrix_of_rpy(sensor.mounting.rpy_rad);
-  const double own = square(params_.markers.sigma_m) + square(params_.markers.sigma_rel * distance_m) + square(map);
-  const double across_m = distance_m * number_or(sensor.bearing_sigma_rad, params_.markers.bearing_sigma_rad);
+  const double own = square(markers_.sigma_m) + square(markers_.sigma_rel * distance_m) + square(map);
+  const double across_m = distance_m * number_or(sensor.bearing_sigma_rad, markers_.bearing_sigma_rad);
   // A detector that gives the error along the line of sight leaves none to assume.
   const bool is_given = finite(m.along_sigma_m);
   const double assumed_m = is_given ? 0.0 : setup_->sightings->range_sigma_default_m;

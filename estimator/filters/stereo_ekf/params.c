@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "filters/stereo_ekf/params.h"
 
+#include "param_rows.h"
+#include "sensors/position_params.h"
+
 typedef struct wm_stereo_ekf_params params;
 
 static const char *const kPredictions[] = {"twist", "constant_velocity", NULL};
@@ -73,7 +76,6 @@ static const wm_param kParams[] = {
     F64("states.twist_lag_sigma_s", twist_lag_sigma, 0, 0, 0.2,
         "Start sigma of two time offsets, s: by how much the measured velocity and the measured rates are ahead of the "
         "vehicle. With constant_velocity only. 0: off."),
-    POSITION_STATE_ROWS(gnss),
     F64("states.accelerometer_bias_sigma_mps2", accelerometer_bias_sigma, 0, 0, 10,
         "Start sigma of an accelerometer's constant error on each axis, m/s2 (of cheap ones 0.1 to 0.5). Above 0 the "
         "direction of gravity by `imu` corrects roll and pitch, once a second. 0: the accelerometer is not used."),
@@ -85,8 +87,6 @@ static const wm_param kParams[] = {
     F64("noise.pixel_px", pixel_px, 0, 0, 1000,
         "Sigma of one coordinate of a point in a picture, px. 0: calibration.yaml's stereo.sigma_px, or 0.5 without "
         "that."),
-    POSITION_NOISE_ROWS(gnss),
-    MARKER_PLACE_ROWS(markers),
     F64("gate.soft", gate_soft, 7, 1, 1e6,
         "Normalised innovation squared of one row above which its variance is inflated, as for a distribution with "
         "long "
@@ -115,6 +115,8 @@ static const wm_param kParams[] = {
 
 #define CONSTANT "it is a constant of the filter now"
 static const wm_param_old kOld[] = {
+    POSITION_KEYS_OF_OLD,
+    {"markers.*", "/markers.*", NULL},
     {"gap.after_s", NULL, CONSTANT},
     {"gap.v_walk", NULL, CONSTANT},
     {"gap.w_walk", NULL, CONSTANT},

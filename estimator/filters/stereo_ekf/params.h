@@ -5,8 +5,6 @@
 
 #include <stdint.h>
 
-#include "filters/core/marker_params.h"
-#include "filters/core/position_params.h"
 #include "waymark/params.h"
 
 #ifdef __cplusplus
@@ -32,8 +30,6 @@ typedef struct wm_stereo_ekf_params {
   double range_bias_sigma, bearing_bias_sigma;
   double twist_lag_sigma;
   double accelerometer_bias_sigma, accelerometer_bias_walk;
-  wm_position_params gnss;
-  wm_marker_params markers;
   // noise of one row
   double pixel_px;
   double accelerometer_mps2;

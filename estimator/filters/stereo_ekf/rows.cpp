@@ -231,7 +231,7 @@ void stereo_ekf::position_rows(const wm_position &p, int last, row_block *out) c
     const double stated_m = i == 2 ? p.sigma_z_m : p.sigma_xy_m;
     lasting_m[i] = receiver_.sigma_m() * stated_m / p.sigma_xy_m;
     const int row = out->add_row(kKinds[i], p.p_m[i], p.p_m[i] - place[i] - lasting_m[i] * error[i],
-                                 square(white_sigma_m(stated_m, params_.gnss)));
+                                 square(white_sigma_m(stated_m, gnss_)));
     by_end[row][i] = 1.0;
   }
   add_pose_columns(out, past, arm, by_end, by_turn);

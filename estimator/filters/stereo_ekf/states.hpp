@@ -4,6 +4,7 @@
 #ifndef WAYMARK_ESTIMATOR_STEREO_EKF_STATES_HPP
 #define WAYMARK_ESTIMATOR_STEREO_EKF_STATES_HPP
 
+#include "filters/core/receiver_error.hpp"
 #include "filters/stereo_ekf/params.h"
 
 namespace wm {
@@ -158,7 +159,7 @@ constexpr bool is_of_increments(int state) {
   return state == kMovedPlace || state == kMovedTurn || state == kPictureScale || state == kPictureDirection;
 }
 
-inline void models_of(const wm_stereo_ekf_params &params, head_model out[kHeadStates]) {
+inline void models_of(const wm_stereo_ekf_params &params, const wm_setup &setup, head_model out[kHeadStates]) {
   const bool rates = params.prediction == WM_PREDICT_CONSTANT_VELOCITY;
   for (int k = 0; k < kHeadStates; k++) {
     const head_spec &s = kHeadSpecs[k];
@@ -169,10 +170,10 @@ inline void models_of(const wm_stereo_ekf_params &params, head_model out[kHeadSt
                         : kMovedSigma,
               s.walk ? params.*s.walk : 0.0, s.tau_s ? params.*s.tau_s : 0.0};
   }
-  const wm_position_params &gnss = params.gnss;
+  const wm_position_params gnss = position_params_of(setup);
   out[kReceiverError] = {gnss.correlated_m != 0.0 ? 1.0 : 0.0, 0.0, gnss.correlated_tau_s};
   out[kReceiverOffset].sigma = rates ? 0.0 : gnss.time_offset_sigma_s;
-  out[kAntenna].sigma = gnss.antenna_sigma_m;
+  out[kAntenna].sigma = antenna_of(setup, gnss).sigma_m;
 }
 
 }  // namespace wm

@@ -72,7 +72,6 @@ wm_stereo_ekf_params usable(const wm_stereo_ekf_params &params, const stereo_rig
   if (!rig.there && out.points_max > known) out.points_max = known;
   if (!rig.there) out.increments = out.frames_max = 0;
   if (out.points_max == 0) out.frames_max = 0;
-  out.gnss.antenna_sigma_m = antenna_of(setup, params.gnss).sigma_m;
   if (out.camera_rotation_sigma < 0.0) {
     const double lasting = lasting_error_of(params, rig);
     out.camera_rotation_sigma = !rig.there ? 0.0 : lasting > 0.0 ? lasting : kMounting_rad;
@@ -100,6 +99,11 @@ const char *const kReads[] = {"!motion.twist",
                               "sightings.noise.bearing_default",
                               "sightings.noise.range_default",
                               "sightings.noise.map_min",
+                              "!positions.use.",
+                              "!positions.states.heading",
+                              "positions.",
+                              "markers.sigma",
+                              "markers.bearing",
                               nullptr};
 
 }  // namespace
@@ -125,7 +129,7 @@ size_t stereo_ekf::bytes(const wm_stereo_ekf_params &params, const wm_setup &set
 
 stereo_ekf::arrays stereo_ekf::place(memory_layout *layout, const wm_stereo_ekf_params &params, const wm_setup &setup) {
   head_model models[kHeadStates];
-  models_of(params, models);
+  models_of(params, setup, models);
   const int slots = params.points_max + own_map::kCorners * params.frames_max;
   arrays out{};
   out.order = layout->take<int>(setup.landmark_count);
@@ -150,9 +154,11 @@ void stereo_ekf::init(const wm_stereo_ekf_params &params, const wm_setup &setup)
   motion_.init(setup.motion, &setup.wheels, twist_noise_of(params, setup.rig));
   gravity_.init(params.accelerometer_mps2);
   receiver_.begin();
-  antenna_m_ = vec_of(antenna_of(setup, params.gnss).place_m);
+  markers_ = marker_params_of(setup);
+  gnss_ = position_params_of(setup);
+  antenna_m_ = vec_of(antenna_of(setup, gnss_).place_m);
   head_model models[kHeadStates];
-  models_of(params_, models);
+  models_of(params_, setup, models);
   filter_.init(behind.filter, models, params_.points_max + own_map::kCorners * params_.frames_max);
   if (rig_.there) filter_.set_camera_axes(rig_.R_base_optical);
   index_.init(setup.landmarks, setup.landmark_count, behind.order);

@@ -243,6 +243,8 @@ class stereo_ekf {
   uint32_t lost_rates_;  // axes, a bit each
   stereo_rig rig_;
   wm_stereo_ekf_params params_;
+  wm_position_params gnss_;
+  wm_marker_params markers_;
   const wm_setup *setup_;
   landmark_index index_;
   relative_array<landmark_record> records_;  // by landmark

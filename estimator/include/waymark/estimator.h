@@ -24,11 +24,18 @@ extern "C" {
 // estimator that takes them. The fields and their meaning are in wm_sighting_params_table (sensors/sighting_params.c).
 typedef struct wm_sighting_params wm_sighting_params;
 extern const wm_param_table wm_sighting_params_table;
+// `positions:`, of receivers (GNSS) and compasses, and `markers:`, of coded markers; likewise.
+typedef struct wm_position_params wm_position_params;
+extern const wm_param_table wm_position_params_table;
+typedef struct wm_marker_params wm_marker_params;
+extern const wm_param_table wm_marker_params_table;
 
 // What belongs to a robot and a place. Must live, unchanged, as long as the estimator's state.
 typedef struct wm_setup {
   const wm_motion_params *motion;
   const wm_sighting_params *sightings;
+  const wm_position_params *positions;  // NULL: the defaults
+  const wm_marker_params *markers;      // NULL: the defaults
   wm_wheels wheels;
   const wm_sensor *sensors;
   size_t sensor_count;
@@ -58,7 +65,8 @@ typedef struct wm_estimator {
   const char *about;
   uint32_t takes;  // WM_EVENT_BIT of each observation that it takes; motion is always taken
   wm_param_table params;
-  // Parameters of the shared sections `motion` and `sightings` that it reads, as beginnings of their keys
+  // Parameters of the shared sections (motion, sightings, positions, markers) that it reads, as beginnings of their
+  // keys
   // ("sightings.noise."); behind a '!' such that it does not. The first that fits decides; NULL ends the list.
   const char *const *reads;
 

@@ -65,8 +65,7 @@ static int keeps_a_map(const wm_config *config) {
   if (!config->estimator) return 1;  // nothing has chosen one
   const wm_keeper *keeper = wm_keeper_of(config->estimator);
   wm_setup_init(&bare);
-  bare.motion = config->motion;
-  bare.sightings = config->sightings;
+  wm_config_give_params(config, &bare);
   return keeper && keeper->bytes_max(config->estimator_params, &bare) > 0;
 }
 

@@ -11,6 +11,8 @@
 
 #include "filters/landmark_ekf/params.h"
 #include "motion/motion_params.h"
+#include "sensors/marker_params.h"
+#include "sensors/position_params.h"
 #include "sensors/sighting_params.h"
 #include "waymark/estimator.h"
 #include "waymark/event.h"
@@ -122,8 +124,18 @@ inline void exact_motion(wm_motion_params *motion) {
 
 // The shared parameters of sightings; those of motion are each test's.
 inline wm_sighting_params sightings;
+template <class T>
+T defaults_of(const wm_param_table &table) {
+  T out;
+  wm_params_defaults(&table, &out);
+  return out;
+}
+inline wm_position_params positions = defaults_of<wm_position_params>(wm_position_params_table);
+inline wm_marker_params markers = defaults_of<wm_marker_params>(wm_marker_params_table);
 inline void exact_sensors(wm_motion_params *motion) {
   exact_motion(motion);
+  positions = defaults_of<wm_position_params>(wm_position_params_table);
+  markers = defaults_of<wm_marker_params>(wm_marker_params_table);
   wm_params_defaults(&wm_sighting_params_table, &sightings);
   for (double &sigma : sightings.states.sigma) sigma = 0.0;
   sightings.correlated_slots = 0;
@@ -133,12 +145,12 @@ inline void exact_sensors(wm_motion_params *motion) {
 }
 inline void exact_map(wm_landmark_ekf_params *params) {
   wm_params_defaults(&wm_landmark_ekf_params_table, params);
-  params->gnss.time_offset_sigma_s = params->gnss.correlated_m = params->gnss.heading_bias_sigma_rad = 0.0;
-  params->gnss.antenna_sigma_m = 0.0;
-  params->gnss.sigma_factor = params->recover_sigma_xy_m = 1.0;
-  params->gnss.correlated_tau_s = 60.0;
+  positions.time_offset_sigma_s = positions.correlated_m = positions.heading_bias_sigma_rad = 0.0;
+  positions.antenna_sigma_m = 0.0;
+  positions.sigma_factor = params->recover_sigma_xy_m = 1.0;
+  positions.correlated_tau_s = 60.0;
   params->recover_sigma_heading_rad = 0.25;
-  params->landmarks.map_slots = 0;
+  sightings.map_slots = 0;
 }
 
 // A robot of which only its motion and one sensor are known; both must outlive what is started with it.
@@ -146,6 +158,8 @@ inline wm_setup setup(const wm_motion_params &motion, const wm_sensor &sensor) {
   wm_setup s{};
   s.motion = &motion;
   s.sightings = &sightings;
+  s.positions = &positions;
+  s.markers = &markers;
   s.wheels = no_wheels();
   s.sensors = &sensor;
   s.sensor_count = 1;

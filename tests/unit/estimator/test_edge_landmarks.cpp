@@ -217,6 +217,8 @@ void setUp(void) {
   camera = make::sensor("camera", 0.005, 0.01);
   camera.mounting = {{kAhead_m, 0, kUp_m}, {0, 0, 0}};
   setup.sightings = &make::sightings;
+  setup.positions = &make::positions;
+  setup.markers = &make::markers;
   setup.sensors = &camera;
   setup.sensor_count = 1;
   setup.landmarks = kMarkers;

@@ -330,7 +330,7 @@ TEST(test_an_eccentric_turntable_is_found) {
 }
 
 TEST(test_gnss_and_its_delay) {
-  params.gnss.time_offset_sigma_s = 0.5;
+  make::positions.time_offset_sigma_s = 0.5;
   fault.gnss_delay_s = 0.3;
   begin();
   drive(150, kPositions);
@@ -340,8 +340,8 @@ TEST(test_gnss_and_its_delay) {
 
 // RTK is lost for ten seconds: the receiver falls back to a solution that is half a metre off, and states it.
 TEST(test_positions_of_another_solution_have_an_error_of_their_own) {
-  params.gnss.correlated_m = -2;
-  params.gnss.correlated_tau_s = 20;
+  make::positions.correlated_m = -2;
+  make::positions.correlated_tau_s = 20;
   fault.gnss_sigma_m = 0.02;
   begin();
   drive(20, kPositions);
@@ -389,7 +389,7 @@ TEST(test_nameless_sightings_are_of_the_one_that_fits) {
 // than the map.
 TEST(test_a_maps_error_is_not_averaged_away) {
   landmarks[0].sigma_m = landmarks[3].sigma_m = landmarks[6].sigma_m = 0.2;
-  params.landmarks.map_slots = 4;
+  make::sightings.map_slots = 4;
   setup.landmark_count = 1;
   begin();
   for (int i = 0; i < 200; i++) {
@@ -524,7 +524,7 @@ TEST(test_sixteen_fully_calibrated_sensors) {
   for (wm_sensor &s : sensors) s = sensor;
   make::sightings.correlated_slots = 24;
   make::sightings.correlated_bearing_rad = make::sightings.correlated_range_m = 0.1;
-  params.landmarks.map_slots = 16;
+  make::sightings.map_slots = 16;
   make::sightings.map_sigma_min_m = 0.01;
   make::sightings.use_elevation = 1;
   for (double &sigma : make::sightings.states.sigma) sigma = 0.01;

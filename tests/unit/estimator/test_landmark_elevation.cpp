@@ -291,7 +291,7 @@ void setUp(void) {
   make::exact_map(&params);
   make::sightings.use_elevation = 1;
   make::sightings.states.sigma[WM_SENSOR_ROW_kRoll] = 0.0035;
-  params.landmarks.map_slots = 3;
+  make::sightings.map_slots = 3;
   const double places[3][3] = {{8, 0, 2.5}, {3, 5, 1.8}, {2, -6, 3}};
   for (int i = 0; i < 3; i++) landmarks[i] = {10 + i, {places[i][0], places[i][1], places[i][2]}, 0.02, NAN, {}, 0};
   sensor = make::sensor("camera", 0.01, 0.05);

@@ -102,7 +102,7 @@ TEST(test_a_pose_is_found_below_a_ceiling) {
 // and is by the marker to 0.01 with the marker's own 0.01 on the map.
 TEST(test_a_markers_heading_is_fused) {
   landmark = {100, {2.0, 1.0, 0}, 0.001, 1.0, {}, 0.01};
-  params.markers.heading_sigma_rad = 0.01;
+  make::markers.heading_sigma_rad = 0.01;
   setup.start.sigma_xy_m = 1e-4;
   sensor.bearing_sigma_rad = 1.0;  // tells nothing of the heading
   sensor.range_sigma_m = 1.0;
@@ -129,7 +129,7 @@ TEST(test_a_markers_direction_on_the_map_is_one_error) {
   setup.start.sigma_xy_m = 1e-4;
   sensor.bearing_sigma_rad = sensor.range_sigma_m = 1.0;
   for (int32_t slots : {4, 0}) {
-    params.landmarks.map_slots = slots;
+    make::sightings.map_slots = slots;
     Filter filter;
     for (int k = 0; k < 100; k++) {
       wm_event seen = marker(2.0, 1.0);
@@ -153,7 +153,7 @@ TEST(test_a_heading_that_says_nothing_is_left_out) {
     TEST_ASSERT_EQUAL(2, filter.count);
   }
   landmark.yaw_rad = 0.5;
-  params.markers.heading_most_rad = 0.1;
+  make::markers.heading_most_rad = 0.1;
   Filter filter;
   wm_event seen = marker(2.05, 1.02);
   seen.as.marker.yaw_sigma_rad = 0.2;
@@ -246,7 +246,7 @@ void setUp(void) {
   ekf = wm_estimator_find("landmark_ekf");
   make::exact_sensors(&motion);
   make::exact_map(&params);
-  params.markers.sigma_m = 1e-5;
+  make::markers.sigma_m = 1e-5;
   sensor = make::sensor("camera", 0.02, 0.05);
   landmark = {100, {2.05, 1.02, 0}, 0.0, NAN, {}, 0};
   setup = make::setup(motion, sensor);

@@ -122,7 +122,7 @@ void setUp(void) {
   ekf = wm_estimator_find("landmark_ekf");
   make::exact_sensors(&motion);
   make::exact_map(&params);
-  params.landmarks.map_slots = 16;
+  make::sightings.map_slots = 16;
   sensor = make::sensor("eye", 0.02, 0.1);
   setup = make::setup(motion, sensor);
   setup.start = {WM_TIME_NONE, {0, 0, 0}, {0, 0, 0, 1}, 0.0, 0.5, 0.05};

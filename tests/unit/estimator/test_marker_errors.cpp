@@ -85,7 +85,7 @@ double mean_nees() {
 
 TEST(test_errors_that_last_are_not_averaged_away) {
   TEST_ASSERT_GREATER_THAN_DOUBLE(5.0, mean_nees());
-  params.marker_correlated = kLasts_rad / std::sqrt(kFresh_rad * kFresh_rad + kLasts_rad * kLasts_rad);
+  make::markers.correlated = kLasts_rad / std::sqrt(kFresh_rad * kFresh_rad + kLasts_rad * kLasts_rad);
   make::sightings.correlated_slots = 8;
   make::sightings.correlated_tau_s = kLasts_s;
   const double told = mean_nees();
@@ -99,7 +99,7 @@ void setUp(void) {
   slam = wm_estimator_find("slam");
   make::exact_sensors(&motion);
   wm_params_defaults(&slam->params, &params);
-  params.markers.sigma_m = kPlace_m;
+  make::markers.sigma_m = kPlace_m;
   motion.noise_yaw_rate_radps = kGyro_radps * std::sqrt(0.02);
   motion.noise_yaw_rate_rel = 0;
   sensor = make::sensor("camera", NAN, NAN);

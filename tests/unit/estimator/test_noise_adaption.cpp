@@ -43,9 +43,9 @@ struct drive {
     motion.noise_rest_factor = 1.0;
     motion.noise_adapt_log_sigma = adapt_log_sigma;
     make::exact_map(&params);
-    params.gnss.correlated_m = -1.0;
-    params.gnss.correlated_tau_s = kReceiverTau_s;
-    params.gnss.sigma_factor = 0.1;
+    make::positions.correlated_m = -1.0;
+    make::positions.correlated_tau_s = kReceiverTau_s;
+    make::positions.sigma_factor = 0.1;
     if (lasting) {
       make::sightings.correlated_slots = 10;
       make::sightings.correlated_bearing_rad = make::sightings.correlated_range_m = -1.0;

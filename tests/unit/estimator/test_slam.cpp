@@ -75,7 +75,7 @@ TEST(test_a_measured_twist_at_standstill_gives_the_bias) {
 
 TEST(test_coded_markers_give_place_and_heading_at_once) {
   coded = true;
-  params.markers.heading_sigma_rad = 0.01;
+  make::markers.heading_sigma_rad = 0.01;
   begin();
   drive(40);
   size_t found;
@@ -113,7 +113,7 @@ TEST(test_absurd_markers_are_refused_and_change_nothing) {
 
 TEST(test_of_two_poses_the_one_is_taken_that_fits_the_map) {
   coded = true;
-  params.markers.heading_sigma_rad = 0.01;
+  make::markers.heading_sigma_rad = 0.01;
   begin();
   drive(20);
   two_poses = true;
@@ -271,7 +271,7 @@ TEST(test_a_robot_that_was_turned_does_not_turn_its_map) {
     leave_room();
     make_room();
     coded = true;
-    params.markers.heading_sigma_rad = 0.01;
+    make::markers.heading_sigma_rad = 0.01;
     begin();
     drive(30.0);
     truth.heading_rad = wm::wrap(truth.heading_rad + turn_rad);
@@ -294,7 +294,7 @@ TEST(test_bearings_beside_markers_do_not_hide_that_the_robot_was_turned) {
     leave_room();
     make_room();
     coded = true;
-    params.markers.heading_sigma_rad = 0.01;
+    make::markers.heading_sigma_rad = 0.01;
     begin();
     drive(30.0);
     truth.heading_rad = wm::wrap(truth.heading_rad + 0.3);
@@ -323,7 +323,7 @@ TEST(test_bearings_beside_markers_do_not_hide_that_the_robot_was_turned) {
 // Two markers of five or six in view are turned by somebody, alike: the others say that it wasn't the robot.
 TEST(test_markers_that_were_turned_do_not_turn_the_robot) {
   coded = true;
-  params.markers.heading_sigma_rad = 0.01;
+  make::markers.heading_sigma_rad = 0.01;
   begin();
   drive(30.0);
   turned[4] = turned[5] = 0.3;

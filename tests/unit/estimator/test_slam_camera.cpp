@@ -109,7 +109,7 @@ TEST(test_stamps_that_scatter_matter_where_it_turns) {
   for (int i = 0; i < 2; i++) {
     make_room();
     coded = true;
-    params.marker_stamp_sigma_s = 0.2 * i;
+    make::markers.stamp_sigma_s = 0.2 * i;
     begin();
     drive(0.5);
     TEST_ASSERT_EQUAL(WM_RESIDUAL_HEADING, last.residual);

@@ -82,8 +82,8 @@ TEST(test_its_covariance_is_as_large_as_its_error) {
     make_room();
     noise = {(uint64_t)(100 + seed), 1, 0};
     // The simulated receiver is in base_link, in time, and its errors do not last.
-    params.gnss.correlated_m = params.gnss.antenna_sigma_m = params.gnss.time_offset_sigma_s = 0.0;
-    params.gnss.sigma_factor = 1.0;
+    make::positions.correlated_m = make::positions.antenna_sigma_m = make::positions.time_offset_sigma_s = 0.0;
+    make::positions.sigma_factor = 1.0;
     without_a_start();
     drive_with_positions(25, 0.05);
     sum += nees_there();
@@ -147,7 +147,7 @@ TEST(test_a_position_that_is_no_number_or_not_wanted_is_refused) {
   wm_innovation out[WM_INNOVATIONS_PER_EVENT_MAX];
   size_t count = 0;
   TEST_ASSERT_EQUAL(WM_NOT_FINITE, slam->correct(state, &bad, out, WM_INNOVATIONS_PER_EVENT_MAX, &count));
-  params.gnss.use_position = params.gnss.use_heading = 0;
+  make::positions.use_position = make::positions.use_heading = 0;
   begin();
   TEST_ASSERT_EQUAL(WM_REJECTED_BY_CONFIG, see(make::position(now_s, 0.0, 0.0, 0.02)));
   TEST_ASSERT_EQUAL(WM_REJECTED_BY_CONFIG, see(make::heading(now_s, 0.0, 0.02)));

@@ -198,9 +198,9 @@ TEST(test_a_map_under_prints_is_as_large_as_they_say) {
   motion.states.sigma[0] = 0.0;
   for (int i = 0; i < 3; i++) motion.states.sigma[wm::kLeftScale + i] = 0.02;  // left, right, track
   make::sightings.states.sigma[WM_SENSOR_ROW_kRangeScale] = 0.003;
-  params.markers.sigma_m = 0.0015;
-  params.markers.sigma_rel = 0.0;
-  params.markers.heading_sigma_rad = 0.003;
+  make::markers.sigma_m = 0.0015;
+  make::markers.sigma_rel = 0.0;
+  make::markers.heading_sigma_rad = 0.003;
   motion.noise_ticks_per_sqrt_m = 0.001;
   const worn w = drive_under_prints();
   TEST_ASSERT_DOUBLE_WITHIN(0.004, 1.02, w.left * w.range);

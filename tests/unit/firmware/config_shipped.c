@@ -53,13 +53,11 @@ static int is_param(const wm_param_table *table, const char *key) {
 
 // Whether a new key, which may stand in a shared section and end with a `*`, leads to a parameter.
 static int leads_to_param(const wm_param_table *table, const char *key) {
-  static const struct {
-    const char *prefix;
-    const wm_param_table *table;
-  } kShared[] = {{"/motion.", &wm_motion_params_table}, {"/sightings.", &wm_sighting_params_table}};
-  for (size_t i = 0; i < 2; i++)
-    if (strncmp(key, kShared[i].prefix, strlen(kShared[i].prefix)) == 0)
-      return leads_to_param(kShared[i].table, key + strlen(kShared[i].prefix));
+  for (int i = 0; i < WM_CONFIG_SHARED; i++) {
+    const size_t n = strlen(wm_config_shared[i].prefix);
+    if (key[0] == '/' && strncmp(key + 1, wm_config_shared[i].prefix, n) == 0)
+      return leads_to_param(wm_config_shared[i].table, key + 1 + n);
+  }
   const size_t n = strcspn(key, "*");
   for (size_t i = 0; i < table->count; i++)
     if (strncmp(table->params[i].key, key, key[n] == '*' ? n : n + 1) == 0) return 1;
@@ -85,7 +83,6 @@ TEST(old_keys_lead_to_parameters) {
   for (size_t i = 0; i < count; i++) check_old(&estimators[i]->params);
   const wm_detector *const *detectors = wm_detectors(&count);
   for (size_t i = 0; i < count; i++) check_old(&detectors[i]->params);
-  check_old(&wm_motion_params_table);
-  check_old(&wm_sighting_params_table);
+  for (int i = 0; i < WM_CONFIG_SHARED; i++) check_old(wm_config_shared[i].table);
   check_old(&wm_runtime_params_table);
 }

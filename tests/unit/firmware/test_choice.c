@@ -126,9 +126,9 @@ TEST(the_chosen_one_is_said) {
 
 TEST(its_parameters_are_read) {
   wm_config named;
-  const char *text = HEAD "estimator: slam\nsightings: {gate: {hard: 21}}\nslam: {markers: {sigma_m: 0.5}}\n";
+  const char *text = HEAD "estimator: slam\nsightings: {gate: {hard: 21}}\nslam: {landmarks: {confirm_seen: 5}}\n";
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_config_parse(text, strlen(text), "x.yaml", &named, &err), err.text);
-  choose_it(HEAD "sightings: {gate: {hard: 21}}\nslam: {markers: {sigma_m: 0.5}}");
+  choose_it(HEAD "sightings: {gate: {hard: 21}}\nslam: {landmarks: {confirm_seen: 5}}");
   TEST_ASSERT_EQUAL_MEMORY(named.estimator_params, config.estimator_params, named.estimator->params.bytes);
   TEST_ASSERT_EQUAL_MEMORY(named.sightings, config.sightings, wm_sighting_params_table.bytes);
   wm_config_free(&named);
@@ -137,7 +137,7 @@ TEST(its_parameters_are_read) {
 // An event log has the text, and names the estimator.
 TEST(the_text_names_it) {
   wm_config again;
-  choose_it(HEAD "slam: {markers: {sigma_m: 0.5}}");
+  choose_it(HEAD "slam: {landmarks: {confirm_seen: 5}}");
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_config_parse_logged(config.text, config.text_length, "x.yaml", &again, &err),
                             err.text);
   TEST_ASSERT_EQUAL_STRING("slam", again.estimator->name);

@@ -14,8 +14,8 @@ NOISES = {
                "constant_velocity.speed_walk": 0.5, "constant_velocity.turn_walk": 0.5, "states.yaw_rate_bias_walk_radps": 0.0001},
     "sightings": {"noise.bearing_factor": 1, "noise.range_factor": 1, "noise.range_rel": 0.01, "correlated.lateral_m": 0.02, "correlated.range_rel": 0.01,
                   "correlated.tau_s": 2},
-    "landmark_ekf": {"noise.gnss_factor": 0.5, "correlated.gnss_tau_s": 20},
-    "slam": {"markers.sigma_m": 0.002, "markers.sigma_rel": 0.005, "markers.bearing_sigma_rad": 0.001, "markers.heading_sigma_rad": 0.02},
+    "positions": {"noise.factor": 0.5, "correlated.tau_s": 20},
+    "markers": {"sigma_m": 0.002, "sigma_rel": 0.005, "bearing_sigma_rad": 0.001, "heading_sigma_rad": 0.02},
     # No noise.pixel_px: tracks of a street drift alike, and the likelihood shows the noise of one picture alone.
     "stereo_ekf": {"noise.v_mps": 0.03, "noise.w_radps": 0.01, "constant_velocity.v_walk": 2, "constant_velocity.w_walk": 0.5},
     "edge_mcl": {"points.pixel_px": 0.5, "points.sigma_m": 0.012, "points.common_px": 0.6},
@@ -25,13 +25,13 @@ STATES = {
     "motion": ("speed_scale_sigma", "yaw_rate_scale_sigma", "yaw_rate_bias_sigma_radps", "left_scale_sigma", "right_scale_sigma", "track_scale_sigma",
                "steering_offset_sigma_rad", "side_scale_sigma", "rotation_center_sigma_m"),
     "sightings": ("sensor_yaw_sigma_rad", "sensor_time_offset_sigma_s", "range_bias_sigma_m", "range_scale_sigma"),
-    "landmark_ekf": ("gnss_time_offset_sigma_s",),
+    "positions": ("time_offset_sigma_s",),
     "stereo_ekf": ("rate_bias_sigma_radps", "velocity_scale_sigma", "rate_scale_sigma", "twist_axes_sigma_rad", "velocity_direction_sigma_rad",
                    "increment_scale_sigma", "increment_direction_sigma_rad", "time_offset_sigma_s"),
     "edge_mcl": ("pitch_sigma_rad", "yaw_sigma_rad", "time_offset_sigma_s"),
 }
 # Below 0 these are multiples of a stated sigma: their size is searched.
-MULTIPLES = ("sightings.correlated.bearing_rad", "sightings.correlated.range_m", "landmark_ekf.correlated.gnss_m", "sightings.states.range_bias_sigma_m")
+MULTIPLES = ("sightings.correlated.bearing_rad", "sightings.correlated.range_m", "positions.correlated.sigma_m", "sightings.states.range_bias_sigma_m")
 
 
 @dataclass(frozen=True)
