@@ -32,6 +32,7 @@ inline void *state;
 inline wm_random noise;
 inline wm_pose2 truth;
 inline double now_s;
+inline double stretch;      // of speeds and ranges as they are measured, over the true ones
 inline double false_share;  // of sightings that are of nothing
 inline bool hidden, twice, nameless, coded, two_poses, two_heights;
 inline double turned[kCount];      // coded: by how much a print hangs otherwise than it did
@@ -63,6 +64,7 @@ inline void make_room() {
   truth = {2, 0, wm::kHalfPi};
   noise = {42, 1, 0};
   now_s = false_share = 0.0;
+  stretch = 1.0;
   hidden = twice = nameless = coded = two_poses = two_heights = false;
   for (double &by : turned) by = 0.0;
   leans[0] = leans[1] = eccentric[0] = eccentric[1] = 0.0;
@@ -101,7 +103,7 @@ inline wm_marker marker(int32_t id, double x, double y, double z, double yaw_rad
 inline void drive(double seconds, bool range = true) {
   const double v = 0.5, w = 0.25, until = now_s + seconds;
   for (int step = 0; now_s < until; step++) {
-    const wm_event e = make::twist(now_s, v + gauss(0.02), w + gauss(0.01));
+    const wm_event e = make::twist(now_s, stretch * v + gauss(0.02), w + gauss(0.01));
     TEST_ASSERT_EQUAL(WM_OK, slam->predict(state, &e));
     if (step % 10 == 0 && !hidden) {
       const wm_pose2 eye = wm::compose(truth, {0.2, 0, 0});
@@ -113,7 +115,7 @@ inline void drive(double seconds, bool range = true) {
         const bool wrong = wm_random_next_uniform(&noise) < false_share;
         const double error = eccentric[1] * wm::cos(bearing) - eccentric[0] * wm::sin(bearing);
         const double b = wrong ? gauss(0.7) : bearing + error + gauss(0.01);
-        const double r = wrong ? 1.0 + 5.0 * wm_random_next_uniform(&noise) : distance + gauss(0.03);
+        const double r = wrong ? 1.0 + 5.0 * wm_random_next_uniform(&noise) : stretch * distance + gauss(0.03);
         if (coded) {
           wm_event seen = make::empty(now_s, WM_EVENT_MARKER);
           const double x = r * wm::cos(b), y = r * wm::sin(b), z = two_heights && i % 3 == 0 ? 0.6 : 2.2;
@@ -142,7 +144,7 @@ inline void drive(double seconds, bool range = true) {
     truth = wm::compose(truth, {a.x_m, a.y_m, a.turn_rad});
     now_s += dt;
   }
-  const wm_event e = make::twist(now_s, v, w);
+  const wm_event e = make::twist(now_s, stretch * v, w);
   TEST_ASSERT_EQUAL(WM_OK, slam->predict(state, &e));
 }
 

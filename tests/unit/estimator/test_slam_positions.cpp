@@ -117,6 +117,22 @@ TEST(test_from_a_stated_start_positions_hold_the_map) {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.1, worst_landmark_there());
 }
 
+// Speeds and ranges are a tenth too long, and both scales are states: the map alone may have any size.
+TEST(test_positions_measure_the_size_of_a_map_with_a_stated_start) {
+  const wm_pose2 at = there();
+  setup.start = {WM_TIME_NONE, {at.x_m, at.y_m, 0}, {0, 0, 0, 1}, at.heading_rad, 0.05, 0.02};
+  stretch = 1.1;
+  motion.states.sigma[WM_SPEED_SCALE] = make::sightings.states.sigma[WM_SENSOR_ROW_kRangeScale] = 0.1;
+  make::positions.time_offset_sigma_s = make::positions.antenna_sigma_m = make::positions.correlated_m = 0.0;
+  begin();
+  drive_with_positions(60, 0.02);
+  double sigma;
+  const double scale = calibrated("motion.speed_scale", &sigma);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.01, sigma);
+  TEST_ASSERT_DOUBLE_WITHIN(3.0 * sigma, 1.0 / stretch, scale);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.1, worst_landmark_there());
+}
+
 TEST(test_a_standing_robot_waits_for_its_frame) {
   without_a_start();
   for (int i = 0; i < 50; i++) {
