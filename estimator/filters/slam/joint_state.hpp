@@ -73,8 +73,9 @@ class joint_state : public planar_motion {
   // `share`: exponent of the state under a change of the map's scale, +1 or -1. `anchors`: its prior holds the scale.
   void follow_scale(int state, double share, bool anchors);
 
-  // The way's scale is a state: the speed's, or that of both wheels. A scale that wanders about an exact mean is none.
-  bool has_way_scale() const;
+  // The state of the way's scale: the speed's, or the left wheel's where both wheels' are; it changes with the motion's
+  // kind. -1: none. A scale that wanders about an exact mean is none.
+  int way_scale() const;
 
   // ---- time and motion ----
   // True: the lag has become a state.

@@ -7,24 +7,24 @@
 
 namespace wm {
 
-bool joint_state::has_way_scale() const {
+int joint_state::way_scale() const {
   const auto is_free = [this](int side) {
     return motion_state_[kLeftScale + side] >= 0 && (!(slip_.sigma > 0.0) || variance(slip_mean_[side]) > 0.0);
   };
-  return motion_state_[kSpeedScale] >= 0 || (is_free(0) && is_free(1));
+  if (motion_state_[kSpeedScale] >= 0) return motion_state_[kSpeedScale];
+  return is_free(0) && is_free(1) ? motion_state_[kLeftScale] : -1;
 }
 
 bool joint_state::find_scale(bool carries) {
-  const int speed = motion_state_[kSpeedScale], left = motion_state_[kLeftScale];
-  if (!has_way_scale()) return false;  // the way measures the scale
+  const int way = way_scale();
+  if (way < 0) return false;  // the way measures the scale
   carries_scale_ = carries;
-  if (speed >= 0) {
-    scale_state_ = speed;
-    follow_scale(speed, 1.0, true);
+  scale_state_ = way;
+  if (way == motion_state_[kSpeedScale]) {
+    follow_scale(way, 1.0, true);
     follow_scale(motion_state_[kTurnSlowdown], 1.0, false);
     return true;
   }
-  scale_state_ = left;
   const bool wander = slip_.sigma > 0.0;
   for (int side = 0; side < 2; side++) {
     follow_scale(motion_state_[kLeftScale + side], 1.0, !wander);

@@ -332,12 +332,12 @@ void slam::load_map() {
 wm_status slam::predict(const wm_event &motion) {
   const wm_status status = joint_.check_motion(motion);
   if (status != WM_OK) return status;
-  const bool had_scale = joint_.has_way_scale();
+  const int scaled_by = joint_.way_scale();
   const double heading_rad2 = joint_.variance(kHeading);
   if (joint_.move(motion)) slots_.begin_lag(*setup_, &joint_);
   // Beyond that a correction's linearization is wrong: the pose is to be found in the map.
   if (params_.recover && life_.tracking() && joint_.variance(kHeading) > heading_rad2 + kUnknownHeading_rad2) lose();
-  if (joint_.has_way_scale() != had_scale) follow_scale();
+  if (joint_.way_scale() != scaled_by) follow_scale();
   return status;
 }
 

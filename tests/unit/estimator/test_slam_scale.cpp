@@ -28,6 +28,7 @@ wm_sensor sensor;
 double range_factor;  // of the measured depths
 bool is_stated;       // each sighting has its own sigmas
 bool has_covariance;  // of the motion's increments
+bool has_wheels;      // counts from the start on, and a gyro from the second sample on
 void *state;
 
 struct found {
@@ -45,7 +46,7 @@ void make_room() {
   sensor = make::sensor("camera", 0.005, 0.02);
   sensor.range_is_depth = 1;
   range_factor = 1.0;
-  is_stated = has_covariance = false;
+  is_stated = has_covariance = has_wheels = false;
   setup = make::setup(motion, sensor);
   setup.start = {WM_TIME_NONE, {3, 0, 0}, {0, 0, 0, 1}, wm::kHalfPi, 0.05, 0.05};
 }
@@ -65,7 +66,14 @@ found drive(uint64_t seed, double axis_rad) {
     const wm_event e = has_covariance && step > 0
                            ? make::increment((step - 1) * dt, step * dt, {v * dt, 0, w * dt}, covariance)
                            : make::twist(step * dt, v, w);
-    TEST_ASSERT_EQUAL(WM_OK, slam->predict(state, &e));
+    const auto counted = [=](double speed_mps) {
+      return std::floor(step * dt * speed_mps * 100000 / (wm::kTwoPi * 0.1));
+    };
+    const wm_event wheels = make::quantities(
+        step * dt, {{WM_Q_WHEEL_TICKS_LEFT, counted(v - 0.25 * w)}, {WM_Q_WHEEL_TICKS_RIGHT, counted(v + 0.25 * w)}});
+    TEST_ASSERT_EQUAL(WM_OK, slam->predict(state, has_wheels ? &wheels : &e));
+    const wm_event gyro = make::quantities(step * dt, {{WM_Q_YAW_RATE, w + 0.002 * wm_random_next_normal(&noise)}});
+    if (has_wheels && step > 0) TEST_ASSERT_EQUAL(WM_OK, slam->predict(state, &gyro));
     for (int i = 0; step % 4 == 0 && step / 400 % 3 != 1 && i < kCount; i++) {
       const wm::sin_cos at = wm::sincos(wm::kTwoPi * i / kCount);
       const double radius = 4.0 + i % 3, dx = radius * at.cos - truth.x_m, dy = radius * at.sin - truth.y_m;
@@ -117,6 +125,21 @@ TEST(test_a_scale_that_nothing_measures_is_not_learnt) {
   params.consistency = WM_SLAM_PLAIN;
   for (uint64_t seed = 1; seed <= 6; seed++) plain_sigma += drive(seed, 0.0).speed_sigma / 6;
   TEST_ASSERT_LESS_THAN_DOUBLE(0.5 * honest, plain_sigma);
+}
+
+// GIVEN wheels and a gyro that comes later, so that the scale of the way is the wheels' at first and then the speed's,
+// WHEN the map is driven through THEN it has no other size than by the gyro alone.
+TEST(test_a_scale_is_not_learnt_either_where_the_motions_kind_changes) {
+  setup.wheels = {0.1, 100000, 0.5, NAN, NAN, NAN, 0, {}, {}};
+  motion.states.sigma[wm::kSpeedScale] = -kPrior;
+  for (int i = 0; i < 3; i++) motion.states.sigma[wm::kLeftScale + i] = -0.02;
+  has_wheels = true;
+  for (uint64_t seed = 1; seed <= 3; seed++) {
+    const found f = drive(seed, 0.0);
+    TEST_ASSERT_DOUBLE_WITHIN(0.02, 1.0, f.speed * f.range);
+    TEST_ASSERT_DOUBLE_WITHIN(0.03, 1.0, f.speed);
+    TEST_ASSERT_GREATER_THAN_DOUBLE(0.9 * kPrior / std::sqrt(2.0), f.speed_sigma);
+  }
 }
 
 // GIVEN the default and ranges that are 5 % short WHEN the map is driven through THEN the speed's scale, which is
