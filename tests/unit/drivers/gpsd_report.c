@@ -69,6 +69,14 @@ TEST(headings_of_gpsd_322_are_read) {
   TEST_ASSERT_EQUAL_INT64(1711195200 * WM_NS_PER_S, report.time_ns);
 }
 
+// A log batch of gpsd 3.22 to 3.25 has tAcc twice; no broken line, and nothing of it is a fix.
+TEST(reports_that_nobody_reads_are_no_faults) {
+  expect("{\"class\":\"LOG\",\"mode\":3,\"lat\":46.5,\"lon\":6.6,\"tAcc\":125,\"hAcc\":28,\"tAcc\":47}\r");
+  TEST_ASSERT_EQUAL(GPSD_OTHER, report.kind);
+  static const char kCut[] = "{\"class\":\"SKY\",\"satellites\":[{\"PRN\":1";
+  TEST_ASSERT_NOT_NULL(gpsd_report_read(kCut, strlen(kCut), &report));
+}
+
 TEST(broken_lines_are_refused) {
   static const char *const kBroken[] = {
       "",         "[]",         "{",          "{\"class\"", "{\"class\":", "{\"class\":\"TPV", "{\"a\":[1,2",
