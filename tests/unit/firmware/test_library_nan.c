@@ -9,6 +9,8 @@
 
 #include "../drivers/folder.h"
 #include "common/suite.h"
+#include "waymark/event_fields.h"
+#include "waymark/streams.h"
 #include "waymark/waymark.h"
 
 #define STEPS 200  // of 20 ms
@@ -197,3 +199,95 @@ static void refused_or_absent(const char *estimator, const char *left_out) {
 
 TEST(test_landmark_ekf) { refused_or_absent("landmark_ekf", ""); }
 TEST(test_slam) { refused_or_absent("slam", "heading gnss"); }
+
+// An event of a kind whose numbers can all be.
+static wm_event possible(unsigned kind) {
+  wm_event out = {.kind = (uint8_t)kind, .t_ns = STEP_NS};
+  size_t count;
+  const wm_event_field *fields = wm_event_fields(kind, &count);
+  for (const wm_event_field *field = fields; field && field < fields + count; field++) {
+    const double value = field->least > 0 ? 1.0 : 0.0;
+    for (size_t i = 0; field->type == WM_FIELD_F64 && i < field->count; i++)
+      memcpy((char *)&out + field->offset + i * sizeof value, &value, sizeof value);
+  }
+  if (kind == WM_EVENT_MARKER) out.as.marker.poses = 2;
+  if (kind == WM_EVENT_QUANTITIES) out.as.quantities = (wm_quantities){.count = 1, .id = {WM_Q_VEHICLE_SPEED}};
+  if (kind == WM_EVENT_POINTS) {
+    out.as.points.count = 1;
+    out.as.points.sigma_m[0] = 1.0F;
+  }
+  return out;
+}
+
+static void refused(const wm_event *event, int is_needed, const char *name) {
+  TEST_ASSERT_EQUAL_MESSAGE(is_needed ? WM_NOT_FINITE : WM_OK, wm_event_check(event, &err), name);
+  if (is_needed) TEST_ASSERT_NOT_NULL_MESSAGE(strstr(err.text, name), err.text);
+}
+
+// All kinds of events with all their numbers: one that is needed is refused by its name, any other one is absent.
+TEST(test_each_number_of_each_kind) {
+  for (unsigned kind = 1; kind < WM_EVENT_KIND_COUNT; kind++) {
+    const wm_event good = possible(kind);
+    TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_event_check(&good, &err), err.text);
+    size_t count;
+    const wm_event_field *fields = wm_event_fields(kind, &count);
+    for (const wm_event_field *field = fields; field && field < fields + count; field++)
+      for (size_t i = 0; field->type == WM_FIELD_F64 && i < field->count; i++) {
+        wm_event event = good;
+        const double nan_value = (double)NAN;
+        memcpy((char *)&event + field->offset + i * sizeof nan_value, &nan_value, sizeof nan_value);
+        refused(&event, i < field->needed, field->name);
+      }
+  }
+  wm_event event = possible(WM_EVENT_QUANTITIES);
+  event.as.quantities.value[0] = (double)NAN;
+  refused(&event, 1, "vehicle_speed");
+  float *const numbers[] = {event.as.points.x_m, event.as.points.y_m, event.as.points.normal_rad,
+                            event.as.points.sigma_m};
+  static const char *const kNames[] = {"x_m", "y_m", "normal_rad", "sigma_m"};
+  for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++) {
+    event = possible(WM_EVENT_POINTS);
+    numbers[i][0] = NAN;
+    refused(&event, i < 2, kNames[i]);
+  }
+}
+
+// How many numbers of an event are there.
+static size_t numbers_of(const wm_event *event) {
+  size_t count, out = event->kind == WM_EVENT_QUANTITIES ? event->as.quantities.count : 0;
+  const wm_event_field *fields = wm_event_fields(event->kind, &count);
+  for (const wm_event_field *field = fields; field && field < fields + count; field++)
+    for (size_t i = 0; field->type == WM_FIELD_F64 && i < field->count; i++) {
+      double value;
+      memcpy(&value, (const char *)event + field->offset + i * sizeof value, sizeof value);
+      out += !isnan(value);
+    }
+  return out;
+}
+
+static wm_status event_of(const wm_stream *stream, size_t column, double number, wm_event *out) {
+  wm_stream_row row = {.t_ns = STEP_NS, .arrival_ns = STEP_NS};
+  for (size_t i = 0; i < WM_STREAM_NUMBERS_MAX; i++) row.number[i] = 1.0;
+  row.number[column] = number;
+  memset(out, 0, sizeof *out);
+  return wm_stream_event(stream, &row, &(wm_mounting){.xyz_m = {0}}, out, &err);
+}
+
+// All streams with all their columns: a row without a number is refused, or its event has fewer numbers, or the number
+// is in no event.
+TEST(test_each_column_of_each_stream) {
+  for (size_t s = 0; wm_stream_names[s]; s++) {
+    const wm_stream *stream = wm_stream_find(wm_stream_names[s]);
+    for (size_t i = 0; wm_stream_number(stream, i); i++) {
+      const char *name = wm_stream_number(stream, i);
+      wm_event whole, other, lacking;
+      ok(event_of(stream, i, 1.0, &whole));
+      const wm_status status = event_of(stream, i, (double)NAN, &lacking);
+      ok(event_of(stream, i, 0.5, &other));
+      if (status != WM_OK)
+        TEST_ASSERT_TRUE_MESSAGE(status == WM_NOT_FINITE || status == WM_BAD_DATA, err.text);
+      else if (memcmp(&whole, &other, wm_event_bytes(&whole)) != 0)
+        TEST_ASSERT_LESS_THAN_MESSAGE(numbers_of(&whole), numbers_of(&lacking), name);
+    }
+  }
+}

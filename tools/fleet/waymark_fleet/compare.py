@@ -9,7 +9,7 @@ import subprocess
 import sys
 
 from . import compare_page, comparison, html
-from .plan import PlanError, desk_program
+from .plan import PlanError, desk_program, finite
 
 EXAMPLES = """examples:
   waymark compare nightly-monday nightly-tuesday --out monday-tuesday.html
@@ -26,7 +26,7 @@ def parser():
     out.add_argument("after", metavar="AFTER", help="likewise, after the change")
     out.add_argument("--out", metavar="FILE", default="comparison.html", help="the page; comparison.html by default")
     out.add_argument("--json", action="store_true", help="print the verdicts as JSON")
-    out.add_argument("--alpha", metavar="P", type=float, default=comparison.ALPHA, help="rate of false alarms of all figures together; 0.01 by default")
+    out.add_argument("--alpha", metavar="P", type=finite, default=comparison.ALPHA, help="rate of false alarms of all figures together; 0.01 by default")
     out.add_argument("--tolerate", metavar="FIGURE=SIZE", action="append", default=[],
                      help="a change that does not count, as position=0.02; figures: " + ", ".join(figure.name for figure in comparison.FIGURES))
     out.add_argument("--no-reports", action="store_true", help="without the reports of the worst drives")
@@ -40,8 +40,8 @@ def tolerances_of(words):
     for word in words:
         name, _, size = word.partition("=")
         try:
-            out[name] = float(size)
-        except ValueError:
+            out[name] = finite(size)
+        except argparse.ArgumentTypeError:
             raise PlanError(f"--tolerate {word}: write FIGURE=SIZE, as position=0.02") from None
         if name not in known:
             raise PlanError(f"--tolerate {word}: the figures are {', '.join(known)}")

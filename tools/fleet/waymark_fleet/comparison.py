@@ -127,7 +127,7 @@ def difference(figure, before, after):
     if before["status"] != "done" or after["status"] != "done":
         return None
     one, two = figure.value(before), figure.value(after)
-    if one is None or two is None:
+    if one is None or two is None or not math.isfinite(one) or not math.isfinite(two):
         return None
     if not figure.is_ratio:
         return two - one

@@ -12,7 +12,7 @@ import subprocess
 import sys
 
 from . import html, incidents, mine_page
-from .plan import PlanError, desk_program
+from .plan import PlanError, desk_program, finite
 from .sums import Sums, of_text, write_whole
 
 EXAMPLES = """examples:
@@ -31,7 +31,7 @@ def parser():
                                               "Each log of a black box is replayed once.")
     out.add_argument("box", metavar="BOX", nargs="+", help="black boxes, folders that hold some, or event logs")
     out.add_argument("--out", metavar="FOLDER", required=True, help="mine.html, mine.json, and what is known of each log")
-    out.add_argument("--within", metavar="M", type=float, default=2.0, help="incidents so near to the middle one are at one place; 2 m by default")
+    out.add_argument("--within", metavar="M", type=finite, default=2.0, help="incidents so near to the middle one are at one place; 2 m by default")
     out.add_argument("--all", action="store_true", help="also the present logs of black boxes (now.wmlog): doubts that ended well")
     out.add_argument("--jobs", metavar="N", type=int, default=len(os.sched_getaffinity(0)), help="at once; all cores by default")
     out.add_argument("--json", action="store_true", help="print mine.json")

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """A plan: recordings, configurations and programs, of which each combination is a cell."""
+import argparse
 import dataclasses
 import glob
 import json
+import math
 import os
 import pathlib
 import shutil
@@ -17,6 +19,17 @@ _KEYS = {"format", "recordings", "configurations", "programs", "seeds", "replay"
 
 class PlanError(ValueError):
     """A plan or the command line is wrong: where, and what to do."""
+
+
+def finite(text):
+    """A number; the type of an option. NaN and infinity are refused."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f"'{text}' is not a finite number")
+    return value
 
 
 @dataclasses.dataclass(frozen=True)

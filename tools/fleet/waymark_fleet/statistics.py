@@ -14,7 +14,9 @@ _EXACT_AT_MOST = 25
 
 
 def trimmed_mean(values):
-    """Mean without the largest and smallest fifth."""
+    """Mean without the largest and smallest fifth; NaN where one is."""
+    if any(map(math.isnan, values)):
+        return math.nan
     ordered = sorted(values)
     cut = int(TRIM * len(ordered))
     return statistics.fmean(ordered[cut:len(ordered) - cut])
@@ -23,7 +25,7 @@ def trimmed_mean(values):
 def bca_interval(values, statistic=trimmed_mean, seed=1):
     """95 % interval by the bias-corrected and accelerated bootstrap [Efron1987]. The same each time."""
     n, found = len(values), statistic(values)
-    if n < 2 or min(values) == max(values):
+    if n < 2 or min(values) == max(values) or math.isnan(found):
         return found, found
     source = random.Random(seed)
     resampled = sorted(statistic(source.choices(values, k=n)) for _ in range(RESAMPLES))
@@ -46,7 +48,10 @@ def _jackknife(values, statistic):
 
 
 def signed_rank(differences):
-    """Two-sided p of Wilcoxon's signed-rank test [Wilcoxon1945]: differences of 0 are left out; ties have their mean rank."""
+    """Two-sided p of Wilcoxon's signed-rank test [Wilcoxon1945]: differences of 0 are left out; ties have their mean rank.
+    NaN where one is."""
+    if any(map(math.isnan, differences)):
+        return math.nan
     values = sorted((d for d in differences if d != 0), key=abs)
     n = len(values)
     if n == 0:
@@ -85,7 +90,9 @@ def sign_test(more, fewer):
 
 
 def holm(p_values):
-    """p of each test such that all of them together give a false alarm at the stated rate [Holm1979]."""
+    """p of each test such that all of them together give a false alarm at the stated rate [Holm1979]. NaN where one is."""
+    if any(map(math.isnan, p_values)):
+        return [math.nan] * len(p_values)
     order = sorted(range(len(p_values)), key=lambda i: p_values[i])
     out, least = [1.0] * len(p_values), 0.0
     for place, i in enumerate(order):

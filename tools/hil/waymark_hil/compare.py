@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """`waymark hil --compare`: what a change made slower, later or less accurate on the same target."""
 import json
+import math
 import pathlib
 import sys
 
@@ -41,7 +42,7 @@ def judge(before, after, allowed):
     rows = []
     for figure, pair in allowed.items():
         one, two = before["figures"].get(figure), after["figures"].get(figure)
-        if one is None or two is None or pair is None:
+        if pair is None or not all(value is not None and math.isfinite(value) for value in (one, two)):
             continue
         share, least = pair
         series = next((name for name, owner in _SECONDS.items() if owner == figure), None)

@@ -5,6 +5,7 @@ import bisect
 import math
 
 from . import lcm_log
+from .poses import largest
 
 _HEALTH_PERIOD_S = 1.0  # health is sent once a second: a state is seen up to so much later
 # A pose is as good as before when its sigma is at most three times that of before: the filter narrows it further for seconds.
@@ -136,10 +137,6 @@ def _said(checks, group, name, heard, statement):
     checks.add(group, name, good, f"'{statement['value']}' is on the run's standard error {times} times", times, most if most is not None else 1 if least is None else least)
 
 
-def _worst(values):
-    return max(values, default=None)
-
-
 def recovery(fault, others):
     """(s, s): since when the pose is not as usual, and when it has to be again. Faults whose times until then overlap share them: the pose is as
     good as before the first, by the latest of their times."""
@@ -167,13 +164,13 @@ def _pose(checks, group, heard, fault, what, others, ended_s):
             return
         found = None if value is None else f"{value:.3g} {unit}"
         checks.at_most(group, f"pose {name}", value, limit, f"{found or 'no pose to judge'} at most, {limit:g} are allowed ({what})")
-    at_most("position_m", _worst(e[0] for e, _ in errors), "m from the reference")
-    at_most("heading_deg", _worst(e[1] for e, _ in errors), "degrees from the reference")
-    at_most("error_sigmas", _worst(e[0] / max(lcm_log.sigma_m(p), 1e-6) for e, p in errors), "sigma of its error")
-    at_most("sigma_m", _worst(lcm_log.sigma_m(p) for _, p in poses), "m of sigma")
-    at_most("sigma_deg", _worst(math.degrees(math.sqrt(max(0.0, p.covariance[5][5]))) for _, p in poses), "degrees of sigma")
+    at_most("position_m", largest(e[0] for e, _ in errors), "m from the reference")
+    at_most("heading_deg", largest(e[1] for e, _ in errors), "degrees from the reference")
+    at_most("error_sigmas", largest(e[0] / max(lcm_log.sigma_m(p), 1e-6) for e, p in errors), "sigma of its error")
+    at_most("sigma_m", largest(lcm_log.sigma_m(p) for _, p in poses), "m of sigma")
+    at_most("sigma_deg", largest(math.degrees(math.sqrt(max(p.covariance[5][5], 0.0))) for _, p in poses), "degrees of sigma")
     stamps = [from_s, *(t for t, _ in poses), end_s]
-    at_most("gap_max_s", _worst(b - a for a, b in zip(stamps, stamps[1:])), "s between two poses")
+    at_most("gap_max_s", largest(b - a for a, b in zip(stamps, stamps[1:])), "s between two poses")
     if bound.get("rate_hz") is not None:
         rate_hz = len(poses) / max(end_s - from_s, 1e-3)
         checks.add(group, "pose rate_hz", rate_hz >= bound["rate_hz"], f"{rate_hz:.1f} poses a second, {bound['rate_hz']:g} are needed", rate_hz, bound["rate_hz"])
@@ -191,7 +188,7 @@ def _well_again(poses, usual_m, states):
     """When the poses become as good as before, and stay so: the same state or tracking, known motion, a small sigma. None: they do not."""
     since_s = None
     for t, p in poses:
-        if p.status_flags & FLAGS["motion_stale"] or lcm_log.sigma_m(p) > usual_m or p.state not in states:
+        if p.status_flags & FLAGS["motion_stale"] or not lcm_log.sigma_m(p) <= usual_m or p.state not in states:
             since_s = None
             continue
         since_s = t if since_s is None else since_s

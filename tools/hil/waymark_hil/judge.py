@@ -181,7 +181,7 @@ class Judge:
         apart = list(poses.apart_of(live, rows, self.offset_ns))
         judged_s = (until_ns - max(begun_ns, self.start_ns + int(self.facts["from_s"] * 1e9))) * 1e-9
         enough = len(apart) >= min(_MIN_RATE_HZ, 0.6 * self.facts["rate_hz"]) * max(judged_s - 1, 0.1)
-        worst_m, worst_deg = max((m for _, m, _ in apart), default=None), max((d for *_, d in apart), default=None)
+        worst_m, worst_deg = poses.largest(m for _, m, _ in apart), poses.largest(d for *_, d in apart)
         ends = "" if not self.is_broken else "before the log ends" if until_ns == self.log_ends_ns else "before the first fault"
         text = (f"{len(apart)} of {len(self.heard)} poses over LCM, in {max(judged_s, 0):.0f} s {ends}".rstrip()
                 + ("" if worst_m is None else f": at most {worst_m:.4f} m and {worst_deg:.3f} degrees from the replay of what the run saw"))

@@ -71,4 +71,4 @@ def source(health, name):
 
 def sigma_m(pose):
     """One sigma of the position in the plane, m."""
-    return math.sqrt(max(0.0, pose.covariance[0][0] + pose.covariance[1][1]))
+    return math.sqrt(max(pose.covariance[0][0] + pose.covariance[1][1], 0.0))  # in this order NaN stays

@@ -33,7 +33,7 @@ def table(path, has_height=True):
 def between(a, b, t_ns):
     """On the line through two rows: (x, y, heading, z)."""
     part = (t_ns - a[0]) / (b[0] - a[0])
-    turn = 0.0 if math.isnan(a[3] + b[3]) else part * math.remainder(b[3] - a[3], 2 * math.pi)
+    turn = part * math.remainder(b[3] - a[3], 2 * math.pi)
     return a[1] + part * (b[1] - a[1]), a[2] + part * (b[2] - a[2]), a[3] + turn, a[4] + part * (b[4] - a[4])
 
 
@@ -53,10 +53,9 @@ def around(rows, times, t_ns):
 
 
 def away(pose, other):
-    """(m, degrees) from one pose to another; of six degrees of freedom the height counts, too. Without a heading: 0 degrees."""
-    up = pose[4] - other[3]
-    degrees = abs(math.degrees(math.remainder(pose[3] - other[2], 2 * math.pi))) if math.isfinite(pose[3] + other[2]) else 0.0
-    return math.hypot(pose[1] - other[0], pose[2] - other[1], up if math.isfinite(up) else 0.0), degrees
+    """(m, degrees) from a pose to another. What that other one has not, its heading or height, counts as 0."""
+    degrees = 0.0 if math.isnan(other[2]) else abs(math.degrees(math.remainder(pose[3] - other[2], 2 * math.pi)))
+    return math.hypot(pose[1] - other[0], pose[2] - other[1], 0.0 if math.isnan(other[3]) else pose[4] - other[3]), degrees
 
 
 def differences(poses, rows, offset_ns):
@@ -88,6 +87,13 @@ def rms(values):
 
 
 def quantile(values, share):
-    """The value that this share is below; None of nothing."""
+    """The value that this share is below; None of nothing, NaN where one is."""
     values = sorted(values)
+    if any(map(math.isnan, values)):
+        return math.nan
     return values[min(len(values) - 1, int(share * len(values)))] if values else None
+
+
+def largest(values):
+    """The largest value; None of nothing, NaN where one is."""
+    return quantile(values, 1)

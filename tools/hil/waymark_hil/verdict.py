@@ -24,10 +24,8 @@ class Check:
     seconds: float = 0.0
 
     def row(self):
-        """For JSON: numbers that are not finite are null."""
-        def finite(v):
-            return v if v is None or math.isfinite(v) else None
-        return dataclasses.asdict(self) | {"value": finite(self.value), "limit": finite(self.limit)}
+        """For JSON."""
+        return _finite(dataclasses.asdict(self))
 
 
 class Checks(list):
@@ -78,9 +76,18 @@ def junit(checks, name, seconds, said=""):
     return xml.tostring(top, encoding="utf-8", xml_declaration=True)
 
 
+def _finite(value):
+    """For JSON: numbers that are not finite are null."""
+    if isinstance(value, dict):
+        return {key: _finite(part) for key, part in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(part) for part in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
 def write(folder, result, checks, said=""):
     """result.json and junit.xml."""
-    whole = {"format": FORMAT, **result, "verdict": FAILED if checks.failed() else PASSED, "checks": [check.row() for check in checks]}
+    whole = {"format": FORMAT, **_finite(result), "verdict": FAILED if checks.failed() else PASSED, "checks": [check.row() for check in checks]}
     (folder / "result.json").write_text(json.dumps(whole, indent=1, allow_nan=False, default=str), encoding="utf-8")
     (folder / "junit.xml").write_bytes(junit(checks, result["name"], result.get("took_s", 0.0), said))
     return whole

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Motion JPEG in AVI, the video of recordings: the JPEGs as they are."""
 
+import math
 import struct
 from collections.abc import Iterator
 from pathlib import Path
@@ -36,6 +37,8 @@ class AviWriter:
     _LIMIT = 2**32 - 2**20  # of RIFF's 32-bit lengths
 
     def __init__(self, path: str | Path, width: int, height: int, rate_hz: float):
+        if math.isnan(rate_hz):
+            raise ValueError(f"{path}: the rate of its pictures is no number")
         self._path = path
         self._file = Path(path).open("wb")
         self._count = 0

@@ -22,6 +22,7 @@ from .mcapio import place, streams
 from .mcapio.estimates import topic_name
 from .mcapio.streaming import SIGHTINGS, TOPICS, LiveItems
 from .mcapio.writer import Item, is_latched
+from .numbers import finite
 from .ros import Messages
 from .tables import read_table
 
@@ -204,7 +205,7 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--map", metavar="FILE", help="the map.yaml to show, instead of theirs")
     parser.add_argument("--url", help="LCM's, instead of the configuration's")
     parser.add_argument("--prefix", help="of the channels, instead of the configuration's (WAYMARK_)")
-    parser.add_argument("--duration", metavar="S", type=float, default=0, help="seconds, then stop")
+    parser.add_argument("--duration", metavar="S", type=finite, default=0, help="seconds, then stop")
     given = parser.parse_args(argv)
     foxglove.set_log_level("ERROR")
     pictures = None

@@ -163,7 +163,7 @@ class Messages:
         values = np.column_stack([np.reshape(xyz, (-1, 3)), *columns.values()]).astype("<f4")
         fields = [self.make("PointField", name=name, offset=4 * i, datatype=7, count=1) for i, name in enumerate(names)]
         return self.make("PointCloud2", header=self.header(t_ns, frame), height=1, width=len(values), fields=fields,
-                         point_step=4 * len(names), row_step=values.nbytes, data=values.view(np.uint8).ravel(), is_dense=True)
+                         point_step=4 * len(names), row_step=values.nbytes, data=values.view(np.uint8).ravel(), is_dense=bool(np.isfinite(values[:, :3]).all()))
 
     def colour(self, r: float, g: float, b: float, a: float = 1.0) -> Any:
         """A colour of a marker, 0 to 1."""

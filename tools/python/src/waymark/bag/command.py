@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from ..mcapio import streams
+from ..numbers import finite
 from ..recording import RecordingWriter
 from . import gnss, imu, motion, sight, tables
 from .attachments import write_attachments
@@ -123,7 +124,7 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--imu", metavar="TOPIC", help="IMU to take (default: the one that fits the motion)")
     parser.add_argument("--as-is", action="store_true", help="take the IMU as it is, without comparing it with the motion")
     parser.add_argument("--gnss", metavar="TOPIC", help="NavSatFix to take (default: the one with the smallest stated errors)")
-    parser.add_argument("--origin", metavar=("LAT", "LON", "ALT"), type=float, nargs=3, help="of the map (default: the first fix)")
+    parser.add_argument("--origin", metavar=("LAT", "LON", "ALT"), type=finite, nargs=3, help="of the map (default: the first fix)")
     parser.add_argument("--truth", metavar="TOPIC", help="poses that are the truth; `waymark eval` compares with them")
     parser.add_argument("--base", metavar="FRAME", default="base_link", help="the robot's frame in tf (default base_link)")
     parser.add_argument("--tags", choices=("raw", "rectified"), help="whose pixels the corners of tags are (default: as their node reads)")

@@ -133,7 +133,7 @@ def innovations(messages: Messages, table: Table) -> Iterator[Item]:
         difference, variance = table["observed"][i] - table["expected"][i], table["variance"][i]
         if residual in ("bearing", "heading", "elevation"):
             difference = np.remainder(difference + np.pi, 2 * np.pi) - np.pi
-        sigma = float(np.sqrt(variance)) if variance > 0 else 0.0
+        sigma = float(np.sqrt(variance)) if variance >= 0 else float("nan")
         t_ns = table["t_ns"][i]
         yield Item(t_ns, f"/waymark/innovations/{source}/{residual}", "waymark_msgs/msg/Innovation", messages.make(
             "Innovation", header=messages.header(t_ns, topic_name(str(table["sensor"][i]))), landmark=int(table["landmark"][i]),

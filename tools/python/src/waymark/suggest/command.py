@@ -17,6 +17,7 @@ import yaml
 from ..causes.changes import CONFIG, Impossible, Value
 from ..causes.trial import remove, scratch_folder
 from ..native import WaymarkError
+from ..numbers import finite
 from ..replaying import EventLog, replay
 from .drive import AFTER_GAP, GAP_LEAST_S, GAP_MOST_S, GAP_SHARE, NEXT, Run, Score, Scores, Span
 from .parameters import of_configuration
@@ -49,9 +50,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--out", type=Path, metavar="FILE", help="write the suggested configuration to this file")
     parser.add_argument("--against", type=Path, metavar="FILE", help="no search: measure this configuration against CONFIG or RUN's")
     parser.add_argument("--only", default="", metavar="WORDS", help="search parameters that begin so alone, as sightings.noise,motion.states")
-    parser.add_argument("--from", dest="from_s", type=float, default=0.0, metavar="S", help="score from here on, s from the first stamp")
-    parser.add_argument("--to", dest="to_s", type=float, default=0.0, metavar="S", help="only until here, s from the first stamp; 0: to the end")
-    parser.add_argument("--minutes", type=float, default=10.0, help="the search ends after this time; then its result depends on the computer (10)")
+    parser.add_argument("--from", dest="from_s", type=finite, default=0.0, metavar="S", help="score from here on, s from the first stamp")
+    parser.add_argument("--to", dest="to_s", type=finite, default=0.0, metavar="S", help="only until here, s from the first stamp; 0: to the end")
+    parser.add_argument("--minutes", type=finite, default=10.0, help="the search ends after this time; then its result depends on the computer (10)")
     parser.add_argument("--json", action="store_true", help="the figures, for programs")
     return parser
 

@@ -50,7 +50,7 @@ class Parameter:
     def trials(self, at: float, factor: float) -> list[float]:
         """Values to be tried from this one: larger and smaller by a factor, off, on."""
         is_signed = self.is_state or self.is_multiple
-        size = abs(at) if is_signed else at
+        size = abs(self._number(at)) if is_signed else self._number(at)
         if size > 0:
             found = [math.copysign(size * f, at) for f in (factor, 1 / factor)] + [0.0] * self.is_state
         elif self.is_state and self.initial:
@@ -68,7 +68,12 @@ class Parameter:
 
     def _within(self, value: float) -> float:
         """Of three digits: more have no meaning, and a person has to read them."""
-        return min(self.most, max(self.least, float(f"{value:.3g}")))
+        return min(self.most, max(self.least, float(f"{self._number(value):.3g}")))
+
+    def _number(self, value: float) -> float:
+        if not math.isfinite(value):
+            raise ValueError(f"{self.key}: {value} is no value to be tried")
+        return value
 
 
 def of_configuration(text: str, only: tuple[str, ...] = ()) -> list[Parameter]:
