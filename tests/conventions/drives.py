@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Drives and buses with a protocol of their own: CANopen's CiA 402, moteus, VESC, ODrive, J1939, NMEA 2000, OBD-II."""
 
+import contextlib
 import importlib.util
 import io
 import logging
@@ -16,15 +17,17 @@ import canopen
 import j1939
 import moteus.moteus
 import moteus.multiplex
+import numpy as np
 import obd.commands
 from canopen.objectdictionary import ObjectDictionary, ODVariable, datatypes
 from canopen.profiles.p402 import State402
 from nmea2000.decoder import NMEA2000Decoder
 from odrive_can.utils import get_dbc
+from PyRoboteq import RoboteqHandler
 
 from experiment import said
 
-CANOPEN, MOTEUS, VESC, ODRIVE = "canopen 2.4.1", "moteus 1.1.1", "pyvesc-fix 1.0.3", "odrive-can 2.1.0"
+CANOPEN, MOTEUS, VESC, ODRIVE, ROBOTEQ = "canopen 2.4.1", "moteus 1.1.1", "pyvesc-fix 1.0.3", "odrive-can 2.1.0", "PyRoboteq 0.1.2"
 J1939, NMEA, OBD = "can-j1939 2.0.12", "nmea2000 2026.10.3", "obd 0.7.3"
 BY_DBC = "a DBC states factor, unit and sign ([can.md](can.md))"
 COUNTED = "lost frames are counted, and a silent bus is a finding"
@@ -36,6 +39,7 @@ def rows():
     yield from _moteus()
     yield from _vesc()
     yield from _odrive()
+    yield from _roboteq()
     yield from _j1939()
     yield from _nmea2000()
     yield from _obd()
@@ -86,14 +90,17 @@ def _canopen():
 def _moteus():
     def read(data):
         return moteus.moteus.parse_registers(bytes(data))[1]
+    def written(value, resolution=moteus.multiplex.INT16, form="<h"):
+        out = io.BytesIO()
+        moteus.moteus.Writer(out).write_position(value, resolution)
+        return struct.unpack(form, out.getvalue())[0]
     yield "moteus: positions of 80 as int8 and 8000 as int16", f"{read([0x21, 1, 0x80])[1]}, {read([0x25, 1, 0, 0x80])[1]}", MOTEUS, "a NaN is refused, and counted"
     yield "moteus: int8 positions of 1 and 127", f"{read([0x21, 1, 1])[1]}, {read([0x21, 1, 127])[1]} turns", MOTEUS, BY_DBC
     yield "moteus: an int16 velocity of -400", f"{read([0x25, 2] + list(struct.pack('<h', -400)))[2]} turns/s", MOTEUS, BY_DBC
 
-    def written(value):
-        out = io.BytesIO()
-        moteus.moteus.Writer(out).write_position(value, moteus.multiplex.INT16)
-        return struct.unpack("<h", out.getvalue())[0]
+    answer = moteus.moteus.parse_registers(bytes([0x29, 1]) + struct.pack("<i", 12345) + bytes([0x30, 2, 7]))
+    yield "moteus: an int32 position of 12345 beside a velocity that is refused", f"{answer.response[1]:.5f} turns; {answer.errors[0]} among the errors", MOTEUS, "no value without a frame"
+    yield "moteus: the largest int32 position, and 1000000 turns", f"{read([0x29, 1, *struct.pack('<i', 2**31 - 1)])[1]:.2f} turns, written as {written(1e6, moteus.multiplex.INT32, '<i')}: its end", MOTEUS, BY_DBC
     yield "moteus: 5 and -5 turns, and no number, as int16", f"{written(5)}, {written(-5)}, {written(math.nan)}: the ends of its range", MOTEUS, "sends nothing on CAN"
 
 
@@ -103,20 +110,50 @@ def _vesc():
     package.__path__ = [str(Path(importlib.util.find_spec("can").origin).parents[1] / "pyvesc_fix")]
     sys.modules["pyvesc"] = package
     from pyvesc.protocol.base import VESCMessage
+    from pyvesc.protocol.interface import decode, encode
     from pyvesc.VESC.messages import GetValues, SetDutyCycle, SetRPM
 
     yield "pyvesc: a duty cycle of 0.5", str(struct.unpack(">i", VESCMessage.pack(SetDutyCycle(0.5))[1:])[0]), VESC, "sends nothing on CAN"
     yield "pyvesc: 1000.7 turns a minute", said(lambda: VESCMessage.pack(SetRPM(1000.7))), VESC, "sends nothing on CAN"
     factors = {name: factor for name, _, factor in GetValues.fields}
     yield "pyvesc: factors of rpm and tachometer", f"{factors['rpm']} and {factors['tachometer']}: electrical, of the motor's pole pairs", VESC, BY_DBC
+    kinds = {name: kind for name, kind, _ in GetValues.fields}
+    yield "pyvesc: kinds of rpm and tachometer", f"{kinds['rpm']} and {kinds['tachometer']}: signed, 32 bits", VESC, BY_DBC
+    broken = bytearray(encode(SetRPM(1000)))
+    broken[4] ^= 1
+    with contextlib.redirect_stdout(io.StringIO()):
+        got = decode(bytes(broken) + encode(SetRPM(2000)))[0]
+    yield "pyvesc: a packet with a wrong sum, then one of 2000", f"{got.rpm}, without a word", VESC, COUNTED
 
 
 def _odrive():
     message = get_dbc().get_message_by_name("Axis0_Get_Encoder_Estimates")
     signals = [f"{signal.name} {signal.unit}" for signal in message.signals]
     yield "ODrive's DBC: units of the encoder's estimates", ", ".join(signals), ODRIVE, BY_DBC
+
+    def counts(name):
+        found = [signal for each in get_dbc(name).messages for signal in each.signals if signal.name == "Shadow_Count"][:1]
+        return "".join(f"{signal.length} bits, {'signed' if signal.is_signed else 'unsigned'}" for signal in found) or "none"
+    step = np.spacing(np.float32(1e5))
+    yield ("ODrive's DBC: counts of the encoder, 0.5.6 and 0.6.10", f"{counts('odrive-cansimple-0.5.6')}; {counts('odrive-cansimple-0.6.10')}: "
+           f"turns as 32-bit floating point, {step:.4f} apart at 100000 turns", ODRIVE, BY_DBC)
+    heartbeat = get_dbc().get_message_by_name("Axis0_Heartbeat")
+    yield "ODrive's DBC: periods of the encoder's estimates and of the heartbeat", f"{message.cycle_time} ms, {heartbeat.cycle_time} ms", ODRIVE, "rates are measured; a silent bus is a finding"
     decoded = message.decode(struct.pack("<ff", math.nan, 1.5))
     yield "ODrive's DBC by cantools: an estimate of NaN", str(decoded["Pos_Estimate"]), ODRIVE, "a NaN is refused, and counted"
+
+
+def _roboteq():
+    class Port:
+        def __init__(self, answer):
+            self.write, self.read_all = lambda data: None, lambda: answer
+
+    def read(answer):
+        drive = RoboteqHandler()
+        drive.ser = Port(answer)
+        return repr(drive.read_value("?CB", 1))
+    yield "PyRoboteq: a counter of 12345", f"{read(b'?CB 1' + bytes([13]) + b'CB=12345' + bytes([13]))}: text", ROBOTEQ, "counts of CAN signals"
+    yield "PyRoboteq: of that answer the first half", f"{read(b'?CB 1' + bytes([13]) + b'CB=12')}: as if it were whole", ROBOTEQ, "short frames are malformed, and counted"
 
 
 def _j1939():
