@@ -123,7 +123,7 @@ def _vesc():
     broken[4] ^= 1
     with contextlib.redirect_stdout(io.StringIO()):
         got = decode(bytes(broken) + encode(SetRPM(2000)))[0]
-    yield "pyvesc: a packet with a wrong sum, then one of 2000", f"{got.rpm}, without a word", VESC, COUNTED
+    yield "pyvesc: a packet with a wrong sum, then one of 2000", f"{got.rpm}: the broken one is skipped", VESC, COUNTED
 
 
 def _odrive():

@@ -92,6 +92,14 @@ def newest(uses, build):
     return bad, tried
 
 
+def other_rows(lines):
+    """Of rows that left (-) and came (+), those that differ in more than the version, their third cell."""
+    def content(line):
+        cells = line[1:].split(" | ")
+        return cells[:2], cells[3:]
+    return [line for line in lines if not any(line[0] != other[0] and content(line) == content(other) for other in lines)]
+
+
 def before(rows):
     """The grounds' tables by an older release, which lies before the other packages in Python's path."""
     base = ROOT / ".cache/conventions"
@@ -105,7 +113,7 @@ def before(rows):
             continue
         sites = [next((place / "lib").glob("python3*/site-packages")) for place in (folder, base)]
         done = words(folder / "bin/python", "tests/conventions/tables.py", *grounds.split(), env={**os.environ, "PYTHONPATH": ":".join(map(str, sites)), "PROJ_NETWORK": "OFF", "TZ": "UTC"})
-        changed = [line for line in done.stdout.splitlines() if re.match(r"[-+]\|", line)]
+        changed = other_rows([line for line in done.stdout.splitlines() if re.match(r"[-+]\|", line)])
         had = ", ".join(f"{key} {value}" for key, value in versions(folder).items() if key not in ("pip", "setuptools"))
         print(f"== {had}: {len(changed) // 2} rows of {grounds} differ (- newer, + this)" if done.stdout else f"== {had}: does not run with the others' versions: {done.stderr.strip().splitlines()[-1]}")
         print(*changed, sep="\n", end="\n" if changed else "", flush=True)

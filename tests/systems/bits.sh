@@ -12,7 +12,7 @@ cd "$(dirname "$(readlink -f "$0")")/../.."
 mkdir -p .cache/systems
 systems=$(readlink -f .cache/systems)
 here=$PWD
-# Archives: this machine's own of Debian; Ubuntu's and that of its ports as the environment names them. "-": none is known.
+# Archives: this machine's own of Debian; Ubuntu's, and that of its ports before 26.04, as the environment names them. "-": none is known.
 debian=${WM_DEBIAN_ARCHIVE:-$(awk '/^URIs/{print $2; exit}' /etc/apt/sources.list.d/debian.sources 2>/dev/null)}
 debian=${debian:--} ubuntu=${WM_UBUNTU_ARCHIVE:--} ports=${WM_UBUNTU_PORTS:--}
 # Name, suite, archive, components, libstdc++ that its compiler links.
@@ -20,10 +20,12 @@ table="debian-12-amd64 bookworm $debian main 12
 debian-13-amd64 trixie $debian main 14
 ubuntu-22.04-amd64 jammy $ubuntu main,universe 11
 ubuntu-24.04-amd64 noble $ubuntu main,universe 13
+ubuntu-26.04-amd64 resolute $ubuntu main,universe 15
 debian-12-arm64 bookworm $debian main 12
 debian-13-arm64 trixie $debian main 14
 ubuntu-22.04-arm64 jammy $ports main,universe 11
-ubuntu-24.04-arm64 noble $ports main,universe 13"
+ubuntu-24.04-arm64 noble $ports main,universe 13
+ubuntu-26.04-arm64 resolute $ubuntu main,universe 15"
 libraries=libc6-dev,libeigen3-dev,libyaml-dev,liblcm-dev,nlohmann-json3-dev,libcli11-dev,libturbojpeg0-dev,libpng-dev,zlib1g-dev,libapriltag-dev,libavformat-dev,libavcodec-dev,libavutil-dev,libswscale-dev
 compilers=ninja-build,gcc,g++,g++-aarch64-linux-gnu,python3,python3-yaml,pkg-config,liblcm-bin,dash,bash,coreutils,sed,grep,findutils
 
@@ -41,8 +43,12 @@ unpack() { # NAME SUITE ARCHIVE COMPONENTS LIBSTDCXX
   [ "$1" = debian-13-amd64 ] && packages+=,ubuntu-keyring
   rm -rf "$root" "$root.new"
   say "unpacking $1"
-  mmdebstrap --variant=extract --architectures="$arch" "${keyring[@]}" --include="$packages" "$2" "$root.new" \
-    "deb $3 $2 ${4//,/ }" "deb $3 $2-updates ${4//,/ }" >"$root.log" 2>&1 || { rm -rf "$root.new"; return 1; }
+  for folder in "$2-updates" ""; do # a mirror may be amid taking its updates
+    mmdebstrap --variant=extract --architectures="$arch" "${keyring[@]}" --include="$packages" "$2" "$root.new" \
+      "deb $3 $2 ${4//,/ }" ${folder:+"deb $3 $folder ${4//,/ }"} >"$root.log" 2>&1 && break
+    rm -rf "$root.new"
+    [ -n "$folder" ] || return 1
+  done
   # One /usr, also where a maintainer script would have made it.
   for folder in bin sbin lib lib64; do
     if [ -d "$root.new/$folder" ] && [ ! -L "$root.new/$folder" ]; then
@@ -137,18 +143,26 @@ done
 say "videos"
 libav=(-lavformat -lavcodec -lavutil -lswscale)
 gcc -O1 -o build/systems/videos tests/systems/videos.c "${libav[@]}"
-for codec in libx264 mpeg4; do build/systems/videos make "build/systems/clip.$codec" "$codec" 2>/dev/null; done
+for codec in libx264 mpeg4 mpeg2video; do build/systems/videos make "build/systems/clip.$codec" "$codec" 2>/dev/null; done
+# Compiled for each system, as each libav has its own interface. Some of its libraries lie in folders of their own.
 for name in "${there[@]}"; do
-  [[ $name == *-amd64 ]] || { echo "$name: videos are left out"; continue; } # compiled there, as each libav has its own interface
-  root=$systems/$name
-  mkdir -p "$root/tmp"
-  cp tests/systems/videos.c "$root/tmp/"
-  chroot "$root" gcc -O1 -w -o /tmp/videos /tmp/videos.c "${libav[@]}" -Wl,--allow-shlib-undefined
-  for codec in libx264 mpeg4; do
+  root=$systems/$name triplet=x86_64-linux-gnu
+  [[ $name == *-amd64 ]] || triplet=aarch64-linux-gnu
+  folder=/usr/lib/$triplet:/usr/lib/$triplet/pulseaudio:/usr/lib/$triplet/blas:/usr/lib/$triplet/lapack
+  if [ $triplet = aarch64-linux-gnu ]; then
+    libav_there=("${libav[@]/#-l/$root/usr/lib/$triplet/lib}")
+    aarch64-linux-gnu-gcc -O1 -w -idirafter "$root/usr/include" -idirafter "$root/usr/include/$triplet" -o build/systems/videos-arm64 tests/systems/videos.c \
+      "${libav_there[@]/%/.so}" -Wl,--allow-shlib-undefined
+    program=(qemu-aarch64 -L "$root" -E "LD_LIBRARY_PATH=$folder" build/systems/videos-arm64)
+  else
+    mkdir -p "$root/tmp"
+    cp tests/systems/videos.c "$root/tmp/"
+    chroot "$root" gcc -O1 -w -o /tmp/videos /tmp/videos.c "${libav[@]}" -Wl,--allow-shlib-undefined
+    program=("$root/usr/lib/$triplet/ld-linux-x86-64.so.2" --library-path "$root${folder//:/:$root}" "$root/tmp/videos")
+  fi
+  for codec in libx264 mpeg4 mpeg2video; do
     here_line=$(build/systems/videos "build/systems/clip.$codec")
-    there_line=$(LD_LIBRARY_PATH='' "$root/usr/lib/x86_64-linux-gnu/ld-linux-x86-64.so.2" \
-      --library-path "$root/usr/lib/x86_64-linux-gnu:$root/usr/lib/x86_64-linux-gnu/pulseaudio:$root/usr/lib/x86_64-linux-gnu/blas:$root/usr/lib/x86_64-linux-gnu/lapack" \
-      "$root/tmp/videos" "build/systems/clip.$codec") || there_line="no result"
+    there_line=$(LD_LIBRARY_PATH='' "${program[@]}" "build/systems/clip.$codec") || there_line="no result"
     if [ "$here_line" = "$there_line" ]; then echo "$name: the same, $there_line"; else
       echo "$name: here $here_line, there $there_line"
       code=1

@@ -78,6 +78,8 @@ static void decode(const char *path) {
     stop("not a video");
   const AVCodecParameters *about = format->streams[0]->codecpar;
   AVCodecContext *from = avcodec_alloc_context3(avcodec_find_decoder(about->codec_id));
+  from->flags |= AV_CODEC_FLAG_BITEXACT;  // as tools/import/decoder.cpp
+  from->idct_algo = FF_IDCT_SIMPLE;
   if (avcodec_parameters_to_context(from, about) < 0 || avcodec_open2(from, from->codec, NULL) != 0) stop("no decoder");
   AVPacket *packet = av_packet_alloc();
   AVFrame *frame = av_frame_alloc();

@@ -106,6 +106,10 @@ Decoder::Decoder(const std::filesystem::path &file) : av_(std::make_unique<Libav
   const AVStream *stream = av.format->streams[av.stream];
   if (!av.codec || !av.packet || !av.frame) throw Failure(file.string() + ": no memory");
   if (const int code = avcodec_parameters_to_context(av.codec, stream->codecpar); code < 0) throw Failure(why(code));
+  // MPEG-4 and MPEG-2 leave the last bit of their DCT to the decoder, and libav rounds motion by the processor's own
+  // way: one way for all.
+  av.codec->flags |= AV_CODEC_FLAG_BITEXACT;
+  av.codec->idct_algo = FF_IDCT_SIMPLE;
   if (const int code = avcodec_open2(av.codec, codec, nullptr); code < 0) throw Failure(why(code));
   av.grey.width = av.codec->width;
   av.grey.height = av.codec->height;

@@ -10,10 +10,12 @@
 extern "C" {
 #include <libavcodec/avcodec.h>
 #include <libavformat/avformat.h>
+#include <libavutil/cpu.h>
 }
 
 #include "common/failure.h"
 #include "common/suite.h"
+#include "import/decoder.h"
 #include "import/import.h"
 #include "waymark/video.h"
 
@@ -26,11 +28,19 @@ fs::path folder;
 // A bright bar that goes to the right by 4 px a picture.
 bool is_bright(int x, int picture) { return x / 4 >= picture && x / 4 < picture + kBar / 4; }
 
+uint8_t bar(int x, int, int picture) { return is_bright(x, picture) ? 235 : 16; }
+// Fine curves that move, with noise.
+uint8_t curves(int x, int y, int picture) {
+  auto noise = static_cast<uint32_t>((picture * kHeight + y) * kWidth + x) * 2654435761u;
+  noise = (noise ^ noise >> 15) * 2246822519u;
+  return static_cast<uint8_t>((x + 3 * picture) * (y + picture) / 64 + static_cast<int>(noise >> 29));
+}
+
 // Pictures that refer to later ones are among them, where the encoder can: their order in the file is another.
-void encode(const fs::path &file) {
+void encode(const fs::path &file, AVCodecID kind, uint8_t (*grey)(int x, int y, int picture)) {
   AVFormatContext *format = nullptr;
   TEST_ASSERT_TRUE(avformat_alloc_output_context2(&format, nullptr, "mp4", file.c_str()) >= 0);
-  const AVCodec *codec = avcodec_find_encoder(AV_CODEC_ID_H264);
+  const AVCodec *codec = avcodec_find_encoder(kind);
   if (!codec) codec = avcodec_find_encoder(AV_CODEC_ID_MPEG4);
   AVCodecContext *to = avcodec_alloc_context3(codec);
   to->width = kWidth;
@@ -38,7 +48,7 @@ void encode(const fs::path &file) {
   to->pix_fmt = AV_PIX_FMT_YUV420P;
   to->time_base = {1, 10};
   to->max_b_frames = 2;
-  to->bit_rate = 400000;
+  to->bit_rate = 10000;  // coarse: much of a picture is that of the one before, moved by half pixels
   to->thread_count = 1;
   if ((format->oformat->flags & AVFMT_GLOBALHEADER) != 0) to->flags |= AV_CODEC_FLAG_GLOBAL_HEADER;
   TEST_ASSERT_EQUAL(0, avcodec_open2(to, codec, nullptr));
@@ -57,7 +67,7 @@ void encode(const fs::path &file) {
     if (picture < kPictures) {
       TEST_ASSERT_EQUAL(0, av_frame_make_writable(frame));
       for (int y = 0; y < kHeight; y++)
-        for (int x = 0; x < kWidth; x++) frame->data[0][y * frame->linesize[0] + x] = is_bright(x, picture) ? 235 : 16;
+        for (int x = 0; x < kWidth; x++) frame->data[0][y * frame->linesize[0] + x] = grey(x, y, picture);
       for (int c = 1; c < 3; c++)
         for (int y = 0; y < kHeight / 2; y++)
           std::memset(frame->data[c] + static_cast<ptrdiff_t>(y) * frame->linesize[c], 128, kWidth / 2);
@@ -146,6 +156,26 @@ TEST(a_csv_of_stamps_is_kept_as_it_is) {
   judge(folder / "stamped", 5'000'000'000, 6'000'000'070, 4'000'000);
 }
 
+std::vector<uint8_t> pixels(const fs::path &file) {
+  std::vector<uint8_t> out;
+  wm::tools::Decoder decoder(file);
+  while (const auto shown = decoder.next()) out.insert(out.end(), shown->grey->bytes.begin(), shown->grey->bytes.end());
+  return out;
+}
+
+// With the processor's own instructions and without: another one has others.
+TEST(pixels_do_not_depend_on_the_processor) {
+  for (const AVCodecID kind : {AV_CODEC_ID_H264, AV_CODEC_ID_MPEG4, AV_CODEC_ID_MPEG2VIDEO}) {
+    encode(folder / "curves.mp4", kind, curves);
+    const std::vector<uint8_t> own = pixels(folder / "curves.mp4");
+    av_force_cpu_flags(0);
+    const std::vector<uint8_t> plain = pixels(folder / "curves.mp4");
+    av_force_cpu_flags(-1);
+    TEST_ASSERT_EQUAL(kPictures * kWidth * kHeight, own.size());
+    TEST_ASSERT_TRUE_MESSAGE(own == plain, avcodec_get_name(kind));
+  }
+}
+
 TEST(what_does_not_agree_is_said_and_leaves_nothing) {
   wm::tools::ImportWish wish = wish_to("refused");
   wish.stamps = folder / "short.csv";
@@ -189,7 +219,7 @@ int suite_begin(int, char **) {
   folder = fs::temp_directory_path() / ("import_video_" + std::to_string(getpid()));
   fs::create_directories(folder);
   av_log_set_level(AV_LOG_FATAL);
-  encode(folder / "drive.mp4");
+  encode(folder / "drive.mp4", AV_CODEC_ID_H264, bar);
   return SUITE_RUNS;
 }
 
