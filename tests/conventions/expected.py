@@ -33,6 +33,7 @@ MISSED = {
     110: ("dpkt: packets of one moment",),
     130: ("pyvesc: 1000.7 turns a minute",),
     133: ("j1939: group of 18EF1234",),
+    190: ("PyAV: grey of the black",),
     178: ("ODrive's DBC: counts of the encoder",),
     179: ("ODrive's DBC: periods of",),
     151: ("Cyclone DDS: what is read after an instance was disposed",),

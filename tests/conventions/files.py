@@ -128,6 +128,23 @@ def of_videos():
             frame = next(file.decode(video=0))
             first = round(1000 * float(frame.pts * frame.time_base))
         yield f"first stamp of a .{ending} whose first picture is of 1400 ms", f"OpenCV {position(folder / f'late.{ending}')} ms, PyAV {first} ms", f"{CV}, {AV}", "stamps count from the first picture"
+    yield from _of_pictures(folder)
+
+
+def _of_pictures(folder):
+    """Of a video whose container has its viewers turn it by 90 degrees clockwise, and of one that is black."""
+    turned = folder / "turned.mp4"
+    video(turned, (0, 100))
+    data = bytearray(turned.read_bytes())
+    head = data.find(b"tkhd") + 4
+    matrix = head + (40 if data[head] == 0 else 52)  # ISO/IEC 14496-12, 8.3.2: behind the version's times
+    data[matrix:matrix + 36] = struct.pack(">9i", 0, 1 << 16, 0, -(1 << 16), 0, 0, 48 << 16, 0, 1 << 30)
+    turned.write_bytes(data)
+    rows, columns = cv2.VideoCapture(str(turned)).read()[1].shape[:2]
+    stored = next(av.open(str(turned)).decode(video=0))
+    yield "size of a video of 64 x 48 that its container turns by 90 degrees", f"OpenCV {columns} x {rows}, PyAV {stored.width} x {stored.height}", f"{CV}, {AV}", "pictures as stored; `waymark import` says that viewers turn them"
+    black = av.VideoFrame.from_ndarray(np.repeat(np.uint8([16, 128]), [48 * 64, 24 * 64]).reshape(72, 64), format="yuv420p")
+    yield "PyAV: grey of the black of a video of limited range, which is 16", str(black.to_ndarray(format="gray").max()), AV, "black is 0 and white is 255, whatever the range"
 
 
 def of_packets():

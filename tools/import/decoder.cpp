@@ -4,10 +4,13 @@
 extern "C" {
 #include <libavcodec/avcodec.h>
 #include <libavformat/avformat.h>
+#include <libavutil/display.h>
 #include <libavutil/imgutils.h>
 #include <libswscale/swscale.h>
 }
 
+#include <array>
+#include <cmath>
 #include <cstring>
 
 #include "common/failure.h"
@@ -28,6 +31,8 @@ struct Decoder::Libav {
   bool drained = false;
   uint64_t damaged = 0;
   images::Picture8 grey;
+  uint64_t interlaced = 0;
+  int turned_deg = 0;
 
   ~Libav() {
     sws_freeContext(scale);
@@ -49,7 +54,23 @@ struct Decoder::Libav {
     return avcodec_send_packet(codec, nullptr) == 0;
   }
   void to_grey();
+  void look();
 };
+
+// What the container and the codec say of a picture.
+void Decoder::Libav::look() {
+#ifdef AV_FRAME_FLAG_INTERLACED
+  interlaced += (frame->flags & AV_FRAME_FLAG_INTERLACED) != 0;
+#else
+  interlaced += frame->interlaced_frame != 0;
+#endif
+  const AVFrameSideData *side = av_frame_get_side_data(frame, AV_FRAME_DATA_DISPLAYMATRIX);
+  if (!side || side->size < sizeof(std::array<int32_t, 9>)) return;
+  std::array<int32_t, 9> matrix{};
+  std::memcpy(matrix.data(), side->data, sizeof matrix);
+  const double turn_deg = -av_display_rotation_get(matrix.data());
+  if (std::isfinite(turn_deg)) turned_deg = static_cast<int>(std::lround(turn_deg + 360)) % 360;
+}
 
 // The brightness alone, 0 to 255 whatever range the video has it in, the same bytes on every machine.
 void Decoder::Libav::to_grey() {
@@ -97,6 +118,9 @@ Decoder::Decoder(const std::filesystem::path &file) : av_(std::make_unique<Libav
   if (opened < 0) throw Failure(why(opened), kUsage);
   refuse_text(*av.format, file);
   if (const int code = avformat_find_stream_info(av.format, nullptr); code < 0) throw Failure(why(code));
+#if LIBAVCODEC_VERSION_MAJOR < 60
+  av_format_inject_global_side_data(av.format);  // newer ones give a picture the container's matrix without
+#endif
   const AVCodec *codec = nullptr;
   av.stream = av_find_best_stream(av.format, AVMEDIA_TYPE_VIDEO, -1, -1, &codec, 0);
   if (av.stream < 0 || !codec) throw Failure(file.string() + ": has no video in it that libav can decode");
@@ -123,6 +147,8 @@ int Decoder::width() const { return av_->grey.width; }
 int Decoder::height() const { return av_->grey.height; }
 const char *Decoder::codec() const { return avcodec_get_name(av_->codec->codec_id); }
 uint64_t Decoder::damaged() const { return av_->damaged; }
+uint64_t Decoder::interlaced() const { return av_->interlaced; }
+int Decoder::turned_deg() const { return av_->turned_deg; }
 
 double Decoder::rate_hz() const {
   const AVRational rate = av_->format->streams[av_->stream]->avg_frame_rate;
@@ -136,6 +162,7 @@ std::optional<Decoder::Shown> Decoder::next() {
     if (code == AVERROR_EOF || !av.feed()) return std::nullopt;
   }
   if (av.frame->decode_error_flags != 0 || (av.frame->flags & AV_FRAME_FLAG_CORRUPT) != 0) av.damaged++;
+  av.look();
   av.to_grey();
   Shown out{&av.grey, std::nullopt};
   if (const int64_t pts = av.frame->best_effort_timestamp; pts != AV_NOPTS_VALUE) {

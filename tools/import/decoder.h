@@ -31,7 +31,9 @@ class Decoder {
   };
   // None at the end. Throws Failure where the size of the pictures changes.
   std::optional<Shown> next();
-  [[nodiscard]] uint64_t damaged() const;  // packets that could not be decoded, pictures decoded with errors
+  [[nodiscard]] uint64_t damaged() const;     // packets that could not be decoded, pictures decoded with errors
+  [[nodiscard]] uint64_t interlaced() const;  // pictures whose lines are of two moments
+  [[nodiscard]] int turned_deg() const;       // clockwise, by which viewers turn the pictures; they come as stored
 
  private:
   struct Libav;

@@ -88,6 +88,8 @@ Imported import_video(const ImportWish &wish) {
     made.pictures++;
   }
   made.damaged = decoder.damaged();
+  made.interlaced = decoder.interlaced();
+  made.turned_deg = decoder.turned_deg();
   made.seconds = made.own_stamps ? 0 : std::fmax(last_s, 0);
   if (!out.close(problem)) throw Failure(problem);
   if (made.pictures == 0) throw Failure(wish.video.string() + ": no picture in it could be decoded");

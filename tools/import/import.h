@@ -16,7 +16,8 @@ struct ImportWish {
 };
 
 struct Imported {
-  uint64_t pictures = 0, damaged = 0;
+  uint64_t pictures = 0, damaged = 0, interlaced = 0;
+  int turned_deg = 0;  // clockwise, by which viewers turn the pictures, which are as stored
   std::string codec;
   int width = 0, height = 0;
   double seconds = 0;       // from the first to the last stamp

@@ -30,6 +30,16 @@ int run(const wm::tools::ImportWish &wish) {
   if (made.damaged > 0)
     std::printf("%llu packets were damaged: pictures may be missing or smeared\n",
                 static_cast<unsigned long long>(made.damaged));
+  if (made.turned_deg != 0)
+    std::printf(
+        "its viewers turn the pictures by %d degrees clockwise: they are here as stored, as those for the lens's "
+        "calibration have to be\n",
+        made.turned_deg);
+  if (made.interlaced > 0)
+    std::printf(
+        "%llu pictures are interlaced: every other line is of half a period later, and moving edges are combs; record "
+        "without interlacing, or make two pictures of each before (ffmpeg -vf yadif=1)\n",
+        static_cast<unsigned long long>(made.interlaced));
   return wm::tools::kDone;
 }
 

@@ -11,6 +11,7 @@ extern "C" {
 #include <libavcodec/avcodec.h>
 #include <libavformat/avformat.h>
 #include <libavutil/cpu.h>
+#include <libavutil/display.h>
 }
 
 #include "common/failure.h"
@@ -36,8 +37,24 @@ uint8_t curves(int x, int y, int picture) {
   return static_cast<uint8_t>((x + 3 * picture) * (y + picture) / 64 + static_cast<int>(noise >> 29));
 }
 
+// As a phone that was held upright writes it.
+void turn(AVStream *stream, int clockwise_deg) {
+  constexpr size_t kBytes = 9 * sizeof(int32_t);
+#if LIBAVCODEC_VERSION_MAJOR < 61
+  uint8_t *data = av_stream_new_side_data(stream, AV_PKT_DATA_DISPLAYMATRIX, kBytes);
+#else
+  AVCodecParameters *about = stream->codecpar;
+  uint8_t *data =
+      av_packet_side_data_new(&about->coded_side_data, &about->nb_coded_side_data, AV_PKT_DATA_DISPLAYMATRIX, kBytes, 0)
+          ->data;
+#endif
+  TEST_ASSERT_NOT_NULL(data);
+  av_display_rotation_set(reinterpret_cast<int32_t *>(data), clockwise_deg);
+}
+
 // Pictures that refer to later ones are among them, where the encoder can: their order in the file is another.
-void encode(const fs::path &file, AVCodecID kind, uint8_t (*grey)(int x, int y, int picture)) {
+void encode(const fs::path &file, AVCodecID kind, uint8_t (*grey)(int x, int y, int picture), int turn_deg = 0,
+            bool is_interlaced = false) {
   AVFormatContext *format = nullptr;
   TEST_ASSERT_TRUE(avformat_alloc_output_context2(&format, nullptr, "mp4", file.c_str()) >= 0);
   const AVCodec *codec = avcodec_find_encoder(kind);
@@ -51,10 +68,12 @@ void encode(const fs::path &file, AVCodecID kind, uint8_t (*grey)(int x, int y, 
   to->bit_rate = 10000;  // coarse: much of a picture is that of the one before, moved by half pixels
   to->thread_count = 1;
   if ((format->oformat->flags & AVFMT_GLOBALHEADER) != 0) to->flags |= AV_CODEC_FLAG_GLOBAL_HEADER;
+  if (is_interlaced) to->flags |= AV_CODEC_FLAG_INTERLACED_DCT;
   TEST_ASSERT_EQUAL(0, avcodec_open2(to, codec, nullptr));
   AVStream *stream = avformat_new_stream(format, nullptr);
   avcodec_parameters_from_context(stream->codecpar, to);
   stream->time_base = to->time_base;
+  if (turn_deg != 0) turn(stream, turn_deg);
   TEST_ASSERT_TRUE(avio_open(&format->pb, file.c_str(), AVIO_FLAG_WRITE) >= 0);
   TEST_ASSERT_TRUE(avformat_write_header(format, nullptr) >= 0);
   AVFrame *frame = av_frame_alloc();
@@ -174,6 +193,22 @@ TEST(pixels_do_not_depend_on_the_processor) {
     TEST_ASSERT_EQUAL(kPictures * kWidth * kHeight, own.size());
     TEST_ASSERT_TRUE_MESSAGE(own == plain, avcodec_get_name(kind));
   }
+}
+
+TEST(what_viewers_turn_and_what_is_interlaced_is_counted) {
+  wm::tools::ImportWish wish = wish_to("turned");
+  wish.video = folder / "turned.mp4";
+  encode(wish.video, AV_CODEC_ID_H264, bar, 90);
+  wm::tools::Imported made = wm::tools::import_video(wish);
+  TEST_ASSERT_EQUAL(90, made.turned_deg);
+  TEST_ASSERT_EQUAL(kWidth, made.width);
+  TEST_ASSERT_EQUAL(0, made.interlaced);
+  wish = wish_to("interlaced");
+  wish.video = folder / "interlaced.mp4";
+  encode(wish.video, AV_CODEC_ID_MPEG2VIDEO, bar, 0, true);
+  made = wm::tools::import_video(wish);
+  TEST_ASSERT_EQUAL(0, made.turned_deg);
+  TEST_ASSERT_EQUAL(kPictures, made.interlaced);
 }
 
 TEST(what_does_not_agree_is_said_and_leaves_nothing) {
