@@ -39,7 +39,7 @@ MISSED = {
     151: ("Cyclone DDS: what is read after an instance was disposed",),
     170: ("pymavlink: unit of RAW_IMU.",),
 }
-NO_ROW = {45, 57, 155}  # in the text below a table, or of this computer's settings
+NO_ROW = {45, 57, 155, 192, 197}  # in the text below a table, of this computer's settings, or of our own programs
 
 
 def marked(asked):

@@ -142,7 +142,7 @@ def _of_pictures(folder):
     turned.write_bytes(data)
     rows, columns = cv2.VideoCapture(str(turned)).read()[1].shape[:2]
     stored = next(av.open(str(turned)).decode(video=0))
-    yield "size of a video of 64 x 48 that its container turns by 90 degrees", f"OpenCV {columns} x {rows}, PyAV {stored.width} x {stored.height}", f"{CV}, {AV}", "pictures as stored; `waymark import` says that viewers turn them"
+    yield "size of a video of 64 x 48 that its container turns by 90 degrees", f"OpenCV {columns} x {rows}, PyAV {stored.width} x {stored.height}", f"{CV}, {AV}", "pictures as stored; `waymark import` states that viewers turn them"
     black = av.VideoFrame.from_ndarray(np.repeat(np.uint8([16, 128]), [48 * 64, 24 * 64]).reshape(72, 64), format="yuv420p")
     yield "PyAV: grey of the black of a video of limited range, which is 16", str(black.to_ndarray(format="gray").max()), AV, "black is 0 and white is 255, whatever the range"
 

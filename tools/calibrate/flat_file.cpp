@@ -2,7 +2,6 @@
 #include "calibrate/flat_file.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <cstring>
 #include <fstream>
@@ -10,6 +9,7 @@
 #include <sstream>
 
 #include "common/failure.h"
+#include "common/number.h"
 #include "waymark/yaml.h"
 
 namespace wm::calibrate {
@@ -182,12 +182,9 @@ std::vector<double> FlatFile::numbers(const std::string &key) const {
   std::vector<double> out;
   if (entry == nullptr) return out;
   for (const std::string &word : entry->words) {
-    const char *from = word.c_str() + (word.starts_with('+') ? 1 : 0);
-    const char *to = word.c_str() + word.size();
-    double value = 0;
-    const auto [end, problem] = std::from_chars(from, to, value);
-    if (problem != std::errc{} || end != to || !std::isfinite(value)) fail(key, "'" + word + "' is not a number");
-    out.push_back(value);
+    const std::optional<double> value = tools::number_of<double>(word);
+    if (!value || !std::isfinite(*value)) fail(key, "'" + word + "' is not a number");
+    out.push_back(*value);
   }
   return out;
 }

@@ -2,12 +2,12 @@
 // OCamCalib's calib_results.txt (D. Scaramuzza et al., "A toolbox for easily calibrating omnidirectional cameras", IROS
 // 2006): polynomial of the ray, its inverse, centre (row, column), affine c d e, size (height, width), each after a
 // line that begins with '#'.
-#include <charconv>
 #include <cmath>
 #include <sstream>
 
 #include "calibrate/foreign.h"
 #include "common/failure.h"
+#include "common/number.h"
 
 namespace wm::calibrate {
 namespace {
@@ -27,12 +27,9 @@ std::vector<Line> read_lines(const std::string &text, const std::string &path) {
     Line row{{}, number};
     std::istringstream words(line);
     for (std::string word; words >> word;) {
-      double value = 0;
-      const char *from = word.c_str() + (word.starts_with('+') ? 1 : 0);
-      const auto [end, problem] = std::from_chars(from, word.c_str() + word.size(), value);
-      if (problem != std::errc{} || *end != '\0')
-        throw tools::Failure(path + ":" + std::to_string(number) + ": '" + word + "' is not a number");
-      row.values.push_back(value);
+      const std::optional<double> value = tools::number_of<double>(word);
+      if (!value) throw tools::Failure(path + ":" + std::to_string(number) + ": '" + word + "' is not a number");
+      row.values.push_back(*value);
     }
     out.push_back(row);
   }

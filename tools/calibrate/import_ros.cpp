@@ -2,12 +2,12 @@
 // ROS camera_info: the file of camera_calibration and of camera_info_manager, what `ros2 topic echo` prints, and the
 // INI that camera_calibration writes beside its YAML (ost.ini, ost.txt).
 #include <algorithm>
-#include <charconv>
 #include <map>
 #include <sstream>
 
 #include "calibrate/foreign.h"
 #include "common/failure.h"
+#include "common/number.h"
 
 namespace wm::calibrate {
 
@@ -64,10 +64,9 @@ bool numbers_of(const std::string &line, std::vector<double> &out) {
   std::istringstream words(line);
   std::vector<double> all;
   for (std::string word; words >> word;) {
-    double value = 0;
-    const auto [end, problem] = std::from_chars(word.data(), word.data() + word.size(), value);
-    if (problem != std::errc{} || end != word.data() + word.size()) return false;
-    all.push_back(value);
+    const std::optional<double> value = tools::number_of<double>(word);
+    if (!value) return false;
+    all.push_back(*value);
   }
   out.insert(out.end(), all.begin(), all.end());
   return !all.empty();

@@ -2,11 +2,11 @@
 #include "common/csv.h"
 
 #include <algorithm>
-#include <charconv>
 #include <fstream>
 #include <limits>
 
 #include "common/failure.h"
+#include "common/number.h"
 
 namespace wm::tools {
 namespace {
@@ -75,11 +75,9 @@ size_t Csv::need(std::string_view column) const {
 double Csv::number(size_t row, size_t column) const {
   const std::string_view field = text(row, column);
   if (field.empty()) return std::numeric_limits<double>::quiet_NaN();
-  double value = 0;
-  const auto [end, problem] = std::from_chars(field.data(), field.data() + field.size(), value);
-  if (problem != std::errc() || end != field.data() + field.size())
-    throw Failure(where(row, column) + ": '" + std::string(field) + "' is not a number");
-  return value;
+  const std::optional<double> value = number_of<double>(field);
+  if (!value) throw Failure(where(row, column) + ": '" + std::string(field) + "' is not a number");
+  return *value;
 }
 
 double Csv::number(size_t row, std::optional<size_t> column) const {
@@ -88,13 +86,11 @@ double Csv::number(size_t row, std::optional<size_t> column) const {
 
 int64_t Csv::integer(size_t row, size_t column) const {
   const std::string_view field = text(row, column);
-  int64_t value = 0;
-  const auto [end, problem] = std::from_chars(field.data(), field.data() + field.size(), value);
-  if (field.empty() || problem != std::errc() || end != field.data() + field.size())
-    throw Failure(where(row, column) + ": '" + std::string(field) + "' is not a whole number of 64 bits");
-  if (value < -kIntegerLimit || value > kIntegerLimit)
+  const std::optional<int64_t> value = number_of<int64_t>(field);
+  if (!value) throw Failure(where(row, column) + ": '" + std::string(field) + "' is not a whole number of 64 bits");
+  if (*value < -kIntegerLimit || *value > kIntegerLimit)
     throw Failure(where(row, column) + ": '" + std::string(field) + "' is out of range: at most 4e18 is possible");
-  return value;
+  return *value;
 }
 
 std::string Csv::where(size_t row, size_t column) const {

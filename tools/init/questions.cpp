@@ -3,11 +3,11 @@
 
 #include <algorithm>
 #include <cctype>
-#include <charconv>
 #include <cstdio>
 #include <iostream>
 
 #include "common/failure.h"
+#include "common/number.h"
 #include "init/text_file.h"
 
 namespace wm::init {
@@ -162,10 +162,8 @@ void ask_numbers(Robot &robot) {
       std::string question = number.about;
       question[0] = static_cast<char>(std::toupper(question[0]));
       const std::string answer = ask(question, "", number.option);
-      double value = 0;
-      const auto [end, problem] = std::from_chars(answer.data(), answer.data() + answer.size(), value);
-      const bool is_number = problem == std::errc{} && end == answer.data() + answer.size();
-      if (is_number && value >= number.least && value <= number.most)
+      const std::optional<double> value = tools::number_of<double>(answer);
+      if (value && *value >= number.least && *value <= number.most)
         out = value;
       else
         std::printf("'%s' is not a number from %g to %g.\n", answer.c_str(), number.least, number.most);

@@ -2,6 +2,7 @@
 #include "init/urdf.h"
 
 #include "common/failure.h"
+#include "common/number.h"
 #include "images/camera.h"
 #include "init/proposals.h"
 #include "init/text_file.h"
@@ -10,7 +11,6 @@
 #include <tinyxml2.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <set>
 #endif
@@ -96,13 +96,11 @@ class UrdfReader {
   }
 
   double number(const XMLElement *e, const std::string &word, const char *attribute) const {
-    double value = 0;
-    const auto [end, problem] = std::from_chars(word.data(), word.data() + word.size(), value);
-    if (problem != std::errc{} || end != word.data() + word.size() || !std::isfinite(value) ||
-        std::abs(value) > kFarthestPart_m)
+    const std::optional<double> value = tools::number_of<double>(word);
+    if (!value || !std::isfinite(*value) || std::abs(*value) > kFarthestPart_m)
       fail(e, std::string("<") + e->Name() + "> " + attribute + ": '" + word +
                   "' is not a number from -1000 to 1000 (metres, radians)");
-    return value;
+    return *value;
   }
 
   images::Vec3 three(const XMLElement *e, const char *attribute) const {

@@ -7,11 +7,14 @@
 #include <filesystem>
 #include <fstream>
 
+#include "common/csv.h"
 #include "common/failure.h"
+#include "common/number.h"
 #include "common/suite.h"
 #include "init/files.h"
 #include "init/nmea2000.h"
 #include "init/robot.h"
+#include "init/urdf.h"
 #include "made.h"
 #include "waymark/recording.h"
 
@@ -95,6 +98,19 @@ TEST(test_a_wheel_in_millimetres) {
       "<link name=\"wheel\"><collision><geometry><cylinder radius=\"100\" length=\"30\"/></geometry></collision>"
       "</link>\n");
   TEST_ASSERT_TRUE(names(noted(urdf), "<link name=\"wheel\">: its radius is taken in metres; is it in millimetres?"));
+}
+
+// As printf's "%+g" writes them, and the robot's readers read them.
+TEST(test_numbers_with_a_plus_sign) {
+  const made::Folder folder;
+  folder.write("a.csv", "id,x_m\n+7,+0.25\n");
+  const auto table = wm::tools::Csv::load(folder.path() / "a.csv");
+  TEST_ASSERT_EQUAL_DOUBLE(0.25, table.number(0, 1));
+  TEST_ASSERT_EQUAL_INT64(7, table.integer(0, 0));
+  TEST_ASSERT_FALSE(wm::tools::number_of<double>("+-1") || wm::tools::number_of<double>("+"));
+  if (!can_read_urdf()) TEST_IGNORE_MESSAGE("this build reads no URDF");
+  const Urdf urdf = parse_urdf(urdf_of("fixed", "<origin xyz=\"+0.25 1e-1\t.5\"/>"), "robot.urdf");
+  TEST_ASSERT_EQUAL_DOUBLE(0.25, urdf.links.at("front").translation().x());
 }
 
 // ── logs ────────────────────────────────────────────────────────────────────────────────────────────────────────────
