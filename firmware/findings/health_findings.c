@@ -66,15 +66,17 @@ static void about_losses(const wm_source_health *s, const char *reason, wm_findi
                {WM_FOUND_ROWS_DISORDERED, s->duplicates, "were sent twice and fused once",
                 "look for two programs that send or record the same data"},
                {WM_FOUND_CLOCKS_APART, s->future, "had stamps from the future", NULL},
-               {WM_FOUND_VALUES_FROZEN, s->frozen, "came with a counter that does not change", NULL},
+               {WM_FOUND_VALUES_FROZEN, s->frozen, "equal the one before, or have a counter that does not change", NULL},
                {WM_FOUND_DATA_MISSING, s->overflows,
                 "were dropped by the kernel or the device because they were not read in time", NULL},
                {WM_FOUND_DEVICE_TROUBLE, s->bus_errors, "error frames on the bus",
                 "look at wiring, termination (60 ohms) and bit rate: `ip -d -s link show`"}};
   for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++) {
     if (kinds[i].count == 0) continue;
-    const int is_refused = kinds[i].id == WM_FOUND_ROWS_SKIPPED;  // these are not among those received
-    const uint64_t all = s->received + (is_refused ? s->malformed + s->not_finite : 0);
+    const int is_refused = kinds[i].id == WM_FOUND_ROWS_SKIPPED;
+    const int is_apart = kinds[i].id == WM_FOUND_DATA_MISSING || kinds[i].id == WM_FOUND_VALUES_FROZEN;
+    // What was refused, is missing or repeats the one before is not among those received.
+    const uint64_t all = s->received + (is_refused ? s->malformed + s->not_finite : is_apart ? kinds[i].count : 0);
     wm_find(out, kinds[i].id, WM_SEVERITY_NOTE, s->name, kinds[i].fix, "%" PRIu64 " of %" PRIu64 " %s%s%s",
             kinds[i].count, all, kinds[i].what, is_refused && reason[0] ? "; the first: " : "",
             is_refused ? reason : "")

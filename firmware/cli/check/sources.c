@@ -55,10 +55,10 @@ static const char *mend_rows(const wm_source *source) {
 
 static void counted(const wm_assembled_source *s, const source_facts *facts, wm_findings *out) {
   const wm_source_counts *c = &s->source->counts;
-  const uint64_t skipped = c->malformed + c->not_finite, all = facts->events + skipped;
-  if (c->first_problem[0] && skipped == 0)  // of the whole file, not of a row
+  const uint64_t skipped = c->malformed + c->not_finite, all = facts->events + skipped + c->frozen;
+  if (c->first_problem[0] && skipped + c->frozen == 0)  // of the whole file, not of a row
     wm_find(out, WM_FOUND_NO_DATA, WM_SEVERITY_NOTE, s->name, mend_rows(s->source), "%s", c->first_problem);
-  else if (c->first_problem[0])
+  else if (c->first_problem[0] && skipped > 0)
     wm_find(out, WM_FOUND_ROWS_SKIPPED, of_hundred(skipped, all) >= 2 ? WM_SEVERITY_BAD : WM_SEVERITY_NOTE, s->name,
             mend_rows(s->source), "%s (%" PRIu64 " like it, %" PRIu64 " of 100)", c->first_problem, skipped,
             of_hundred(skipped, all));
