@@ -60,15 +60,16 @@ class Bag:
     def __init__(self, folder):
         self.m, self.folder, self._topics = Messages(), folder, {}
         self._rows = []
+        self.is_sorted, self.plugin = True, StoragePlugin.MCAP  # by the log; else in the order in which they were put
 
     def put(self, topic, kind, log_ns, message):
-        """Adds a message; they are written in the order of their log."""
+        """Adds a message."""
         self._rows.append((log_ns, len(self._rows), topic, self.m.type(kind), message))
 
     def write(self):
         """Writes the bag."""
-        with Writer(self.folder, version=9, storage_plugin=StoragePlugin.MCAP) as bag:
-            for log_ns, _, topic, name, message in sorted(self._rows, key=lambda row: row[:2]):
+        with Writer(self.folder, version=9, storage_plugin=self.plugin) as bag:
+            for log_ns, _, topic, name, message in sorted(self._rows, key=lambda row: row[:2]) if self.is_sorted else self._rows:
                 if topic not in self._topics:
                     self._topics[topic] = bag.add_connection(topic, name, typestore=self.m.store)
                 bag.write(self._topics[topic], log_ns, self.m.store.serialize_cdr(message, name))

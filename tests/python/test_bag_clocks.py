@@ -8,6 +8,7 @@ import unittest
 
 import numpy as np
 from bag_drives import END, SPEED, STILL, BagTest, ns, place, times, turn_rate
+from rosbags.rosbag2 import StoragePlugin
 
 S = 1_000_000_000
 
@@ -82,6 +83,42 @@ class Steps(BagTest):
         recording, said = self.take(moved)
         self.assertIn("a pause of the recorder", said)
         self.assertGreater(recording.meta["duration_s"], 600)
+
+
+class OfTheRecorder(BagTest):
+    """The clock of stamps and log is set while it records."""
+
+    def drive(self, by_s, plugin=StoragePlugin.MCAP):
+        bag = self.bag()
+        bag.is_sorted, bag.plugin = False, plugin
+        for t, sensor in sorted([(t, 0) for t in times()] + [(t, 1) for t in times(50)]):
+            now = ns(t) + (int(by_s * S) if t > 6 else 0)
+            if sensor:
+                bag.imu(now, now + 1_000_000, (0, 0, turn_rate(t)))
+            else:
+                bag.odometry(now, now + 2_000_000, place(t), (SPEED, 0, 0), (0, 0, turn_rate(t)))
+        return bag
+
+    def test_what_comes_later_continues_what_came_before(self):
+        for by_s in (-2, -30, -3600, 3, 30, 40_000_000):
+            for plugin in (StoragePlugin.MCAP, StoragePlugin.SQLITE3):
+                with self.subTest(by_s=by_s, plugin=plugin.name):
+                    recording, said = self.take(self.drive(by_s, plugin))
+                    self.assertRegex(said, "set back by|the clock was set; the later times are moved back")
+                    self.assertNotIn("spread evenly", said)
+                    self.assert_end(recording, said, 0.03)
+                    self.assertEqual(len(recording.table("imu.csv")["t_ns"]), 751)
+
+    def test_parts_in_another_order_are_no_clock_that_was_set(self):
+        bag = self.bag()
+        bag.is_sorted = False
+        for begin, end in ((0, 4), (8, 12), (4, 8), (12, 15.1)):
+            for t in times():
+                if begin <= t < end:
+                    bag.odometry(ns(t), ns(t) + 2_000_000, place(t), (SPEED, 0, 0), (0, 0, turn_rate(t)))
+        recording, said = self.take(bag)
+        self.assertNotIn("clock", said)
+        self.assert_end(recording, said)
 
 
 class OwnClocks(BagTest):
@@ -166,6 +203,7 @@ class Coarse(BagTest):
                 recording, said = self.take(bag)
                 self.assertIn(f"steps of {step // 1_000_000} ms", said)
                 self.assertIn("times of the log are used", said)
+                self.assertNotIn("jump", said)
                 self.assert_end(recording, said, 0.03)
 
     def test_without_a_finer_log_they_are_spread(self):
@@ -176,6 +214,27 @@ class Coarse(BagTest):
         recording, said = self.take(bag)
         self.assertIn("spread evenly", said)
         self.assert_end(recording, said, 0.1)
+
+    def test_messages_that_were_read_at_once_came_before(self):
+        for late_ns, words in ((1_000_000, "spread evenly"), (None, "times of the log are used")):
+            bag = self.bag()
+            bag.drive()
+            for i, t in enumerate(times(100)):
+                read = ns(i // 5 * 5 / 100 + 0.04)
+                bag.imu(read, ns(t) + 50_000_000 if late_ns is None else read + late_ns, (0, 0, turn_rate(t)))
+            recording, said = self.take(bag)
+            self.assertIn(words, said)
+            imu = recording.table("imu.csv")
+            np.testing.assert_allclose(imu["t_ns"][10:], [ns(t) for t in times(100)][10:], atol=11_000_000 if late_ns is None else 1)
+
+    def test_milliseconds_in_place_of_nanoseconds(self):
+        bag = self.bag()
+        for t in times():
+            bag.odometry(ns(t) // S * S + ns(t) % S // 1_000_000, ns(t) + 2_000_000, place(t), (SPEED, 0, 0), (0, 0, turn_rate(t)))
+        recording, said = self.take(bag)
+        self.assertIn("come in bursts", said)
+        self.assertNotIn("jump", said)
+        self.assert_end(recording, said)
 
     def test_steps_of_16_ms_are_named(self):
         bag = self.bag()

@@ -139,6 +139,38 @@ class Comparison(ImuTest):
             _, said = self.assert_imu(bag, ("zeros between others",))
             self.assertNotIn("finding: /imu/data: its gyro is", said)
 
+    def test_short_runs_of_zeros(self):
+        chance = np.random.default_rng(3)
+        noisy = lambda t, w, a: (np.zeros(3) if round(t * 50) % 3 else w + 0.002 * chance.normal(size=3), a)  # noqa: E731
+        recording, _ = self.assert_imu(self.with_imu(noisy), ("67 % of its messages have a gyro of zeros",), 0.1)
+        self.assertEqual(np.count_nonzero(recording.table("imu.csv")["wz_radps"]), 251)
+
+    def test_a_quiet_gyro_of_coarse_steps_keeps_its_zeros(self):
+        step, chance = 0.001, np.random.default_rng(3)
+        coarse = lambda t, w, a: (np.round((w + 0.0006 * chance.normal(size=3)) / step) * step, a)  # noqa: E731
+        recording, said = self.assert_imu(self.with_imu(coarse), ())
+        self.assertNotIn("zeros", said)
+        self.assertEqual(len(recording.table("imu.csv")["t_ns"]), 751)
+
+    def test_accelerations_of_zeros_are_left_empty(self):
+        recording, said = self.assert_imu(self.with_imu(lambda t, w, a: (w, a if round(t * 50) % 2 else np.zeros(3))), ("accelerations of zeros",))
+        self.assertAlmostEqual(np.nanmin(recording.table("imu.csv")["az_mps2"][1:-1]), 9.81)
+
+    def test_a_bias_is_subtracted(self):
+        bias = np.array([0.05, -0.02, 0.1])
+        stood = lambda t, w, a: (w + bias, a)  # noqa: E731
+        recording, _ = self.assert_imu(self.with_imu(stood), ("finding: /imu/data: its gyro shows (0.050, -0.020, 0.100)", "--as-is"))
+        np.testing.assert_allclose(recording.table("imu.csv")["wz_radps"][:400], 0, atol=1e-3)
+        for small in (bias / 10, bias * 0):
+            _, said = self.take(self.with_imu(lambda t, w, a, b=small: (w + b, a)))
+            self.assertNotIn("bias", said)
+
+    def test_counts_of_the_sensor_are_scaled(self):
+        chance = np.random.default_rng(3)
+        counts = lambda t, w, a: (np.round(np.degrees(w) * 16.4 + chance.normal(size=3)), np.round(a / 9.81 * 16384))  # noqa: E731
+        recording, _ = self.assert_imu(self.with_imu(counts), ("its accelerometer shows 1.638e+04 at rest", "is 940 times the turn rate"))
+        np.testing.assert_allclose(recording.table("imu.csv")["az_mps2"], 9.80665, atol=1e-3)
+
     def test_nothing_in_common(self):
         chance = np.random.default_rng(7)
         recording, said = self.take(self.with_imu(lambda t, w, a: (chance.normal(size=3), a)))
@@ -290,6 +322,14 @@ class Transforms(ImuTest):
             bag.tf("base_link", "imu_link", turned, log=ns(14.5))
 
         self.mounted(tf)
+
+    def test_the_last_of_two_static_transforms_counts(self):
+        turn = from_rpy(np.pi / 2, 0, 0)
+        bag = self.with_imu(mounted=turn)
+        bag.tf("base_link", "imu_link", matrix((0, 0, 0)), log=ns(0) - 1)
+        recording, said = self.assert_imu(bag, ("tf_static has 'imu_link' in 'base_link' with other values later",))
+        self.assertNotIn("moves", said)
+        np.testing.assert_allclose(recording.calibration["imu"]["mounting"]["rpy_deg"], (90, 0, 0), atol=1e-6)
 
     def test_a_moving_joint_on_the_way_is_named(self):
         bag = self.with_imu()

@@ -152,6 +152,23 @@ class SensorsWithALever(BagTest):
             self.assertIn(f"{abs(ahead):.2f} m {'ahead of' if ahead > 0 else 'behind'} the axle", said)
             self.assertIn("motion6.csv", recording.streams())
 
+    def test_frames_whose_names_say_that_z_is_down(self):
+        for child in ("base_link_frd", "base_link_ned", "base_footprint_frd"):
+            bag = self.bag()
+            for t in times():
+                x, y, heading = place(t)
+                bag.odometry(ns(t), ns(t), (x, -y, -heading), (SPEED, 0, 0), (0, 0, -turn_rate(t)), frame="odom_ned", child=child)
+            recording, said = self.take(bag)
+            self.assertIn(f"motion of '{child}'", said)
+            self.assert_end(recording, said)
+
+    def test_a_child_that_is_the_world_is_the_robot(self):
+        bag = self.bag()
+        bag.drive(child="odom")
+        recording, said = self.take(bag)
+        self.assertIn("'odom', a frame of the world", said)
+        self.assert_end(recording, said)
+
     def test_other_names_of_the_robot_s_frame(self):
         for child in ("base_footprint", "/base_link", "robot1/base_link", "chassis", ""):
             with self.subTest(child):
@@ -190,6 +207,21 @@ class Contradictions(BagTest):
         recording, said = self.take(bag)
         self.assertIn("mm in place of m", said)
         self.assert_end(recording, said)
+
+    def test_poses_that_are_reset_go_on(self):
+        for name, twist in (("twists", SPEED), ("poses alone", 0.0)):
+            with self.subTest(name):
+                bag, reset = self.bag(), matrix((*place(12)[:2], 0), (0, 0, place(12)[2]))
+                for t in times():
+                    x, y, heading = place(t)
+                    pose = matrix((x, y, 0), (0, 0, heading))
+                    bag.odometry(ns(t), ns(t), np.linalg.inv(reset) @ pose if t >= 12 else pose, (twist, 0, 0), (0, 0, twist * turn_rate(t)))
+                recording, said = self.take(bag)
+                self.assertIn("its poses leap by 11.85 m at 11.95 s", said)
+                self.assertNotIn("finding", said)
+                self.assert_end(recording, said)
+                if not twist:
+                    self.assertLess(np.abs(recording.table("increments.csv")["dx_m"]).max(), 0.06)
 
     def test_noise_is_no_contradiction(self):
         chance = np.random.default_rng(3)

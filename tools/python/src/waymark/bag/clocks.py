@@ -17,11 +17,13 @@ STEP_NS = 100_000_000  # a clock that is set moves by more: time servers slew wh
 OTHER_CLOCK_NS = 10_000_000_000  # a message is never later than this: a larger offset is another clock
 AHEAD_NS = 50_000_000  # a message that is logged before its stamp by more has another clock: computers on one network agree better
 OTHER_LOG_NS = 60_000_000_000  # a log farther off than this from all stamps is of another clock (simulated time)
-PAUSE_NS = 60_000_000_000  # a silence of all topics that is longer is named
+PAUSE_NS = 10_000_000_000  # a silence of all topics that is longer is named
+GAP_NS = 1_000_000_000  # one that is longer, over which poses go on, is a clock that was set
 SET_NS = 86_400_000_000_000  # a silence of all topics of more than a day: the clock was set on the way
 _WINDOW = 10  # messages on each side of a step whose smallest delays are compared
 _DRIFT_MIN_NS = 10_000_000  # drift over the drive that is taken out of a sensor's own clock; less is below its delays
 _COARSE_NS = 2_000_000  # a step of a clock that is finer matters to no sensor of a robot
+_BURST = 0.1  # messages nearer to each other than this share of their usual distance have one stamp
 _LAG_NS = 500_000_000  # a delay that grows by more is named
 
 Say = Callable[[str, str], None]
@@ -47,14 +49,18 @@ class Clock:
     spread: bool = False  # messages of one stamp are spread evenly up to the next stamp
     cuts: list[tuple[int, int]] = field(default_factory=list)  # times from which on all is earlier, and by how much
 
+    def mended(self, stamp_ns: Array, log_ns: Array) -> Array:
+        """Stamps without the steps of their clock."""
+        piece = np.searchsorted(np.array(self.ends_ns, dtype=np.int64), log_ns, side="right") if self.ends_ns else 0
+        return np.asarray(stamp_ns + np.array(self.offset_ns, dtype=np.int64)[piece])
+
     def __call__(self, stamp_ns: Array, log_ns: Array) -> tuple[Array, Array]:
         """Times and arrivals of messages by their stamps (0: none) and times of the log."""
         stamp_ns, log_ns = np.asarray(stamp_ns, dtype=np.int64), np.asarray(log_ns, dtype=np.int64)
-        piece = np.searchsorted(np.array(self.ends_ns, dtype=np.int64), log_ns, side="right") if self.ends_ns else 0
-        t = stamp_ns + np.array(self.offset_ns, dtype=np.int64)[piece] + np.rint(self.drift * (log_ns - self.start_ns)).astype(np.int64)
+        t = self.mended(stamp_ns, log_ns) + np.rint(self.drift * (log_ns - self.start_ns)).astype(np.int64)
         t = np.where((stamp_ns == 0) | self.by_log, log_ns - self.delay_ns, t)
         if self.spread:
-            t = _spread(t)
+            t = _spread(t, log_ns)
         arrival = np.maximum(log_ns, t) if self.has_arrival else t
         shift_t, shift_a = np.zeros_like(t), np.zeros_like(t)
         for at_ns, by_ns in self.cuts:
@@ -66,13 +72,18 @@ class Clock:
 _LOST_NS = 3600 * 10**9  # farther apart than the bag is long and an hour, stamps and log have nothing in common
 
 
-def _spread(t: Array) -> Array:
-    """Messages of one stamp evenly from it to the next stamp; those of the last one at the usual distance."""
+def _spread(t: Array, log: Array) -> Array:
+    """Messages of one stamp evenly from it to the next stamp, or, where they were logged between both, from the stamp before to theirs: they
+    waited and were read at once. Those of the last or first stamp have the usual distance."""
     _, first, counts = np.unique(t, return_index=True, return_counts=True)
     begins = t[first]
     usual = int(np.median(np.diff(begins) // counts[:-1])) if len(begins) > 1 else 0
-    width = np.append(np.diff(begins) // counts[:-1], usual)
     rank = np.arange(len(t)) - np.repeat(np.sort(first), counts)
+    logged = log[first + counts - 1]
+    if len(begins) > 1 and float(((begins[:-1] < logged[:-1]) & (logged[:-1] < begins[1:])).mean()) > 0.5:
+        width = np.append(usual, np.diff(begins) // counts[1:])
+        return np.asarray(np.repeat(begins, counts) - (np.repeat(counts, counts) - 1 - rank) * np.repeat(width, counts))
+    width = np.append(np.diff(begins) // counts[:-1], usual)
     return np.asarray(np.repeat(begins, counts) + rank * np.repeat(width, counts))
 
 
@@ -118,9 +129,15 @@ def _look(name: str, times: Array) -> _Topic:
     s, lg = stamp[known], log[known]
     if not len(s):
         return _Topic(name, stamp, log, [], [0], known)
-    steps = _steps(s, lg)
-    pieces = np.split(lg - s, steps)
-    return _Topic(name, stamp, log, [int(lg[i]) for i in steps], [int(piece.min()) for piece in pieces], known)
+    ends, delays = list[int](), list[int]()
+    for i, piece in zip([0, *(steps := _steps(s, lg))], np.split(lg - s, steps)):
+        delay = int(piece.min())
+        if delays and abs(delay - delays[-1]) <= STEP_NS:  # over its pieces the clock is the same: stamps that are coarse, or come in bursts
+            delays[-1] = min(delay, delays[-1])
+        else:
+            ends += [int(lg[i])] if delays else []
+            delays.append(delay)
+    return _Topic(name, stamp, log, ends, delays, known)
 
 
 def _drift(topic: _Topic) -> tuple[float, int, int]:
@@ -154,20 +171,21 @@ def _reference(topics: list[_Topic]) -> tuple[list[_Topic], int]:
 
 
 def _name_coarse(topic: _Topic, clock: Clock, say: Say) -> None:
-    """Stamps of a coarse clock. Where messages share one, the times of the log are better."""
-    stamp, log = topic.stamp[topic.known], topic.log[topic.known]
+    """Stamps of a coarse clock, or of messages that were read in bursts. Where several have about one, the times of the log are better."""
+    log = topic.log[topic.known]
+    stamp = clock.mended(topic.stamp[topic.known], log)
     steps = np.diff(np.unique(stamp))
     if len(stamp) < 10 or not len(steps):
         return
     grid = int(np.gcd.reduce(steps))
-    shared = 1 - (len(steps) + 1) / len(stamp)
-    usual = (int(stamp.max()) - int(stamp.min())) / max(len(stamp) - 1, 1)
-    text = f"its stamps come in steps of {grid / 1e6:.6g} ms"
-    if grid >= _COARSE_NS and shared > 0.2:
-        if len(np.unique(log)) > 0.9 * len(log):
+    usual = float(np.minimum(steps, PAUSE_NS).sum()) / (len(stamp) - 1)  # without pauses
+    near = float((np.diff(np.sort(stamp)) < _BURST * usual).mean())
+    text = f"its stamps come in steps of {grid / 1e6:.6g} ms" if grid >= _COARSE_NS else "its stamps come in bursts"
+    if near > 0.2 and usual >= _COARSE_NS / 2:
+        if float((np.diff(np.sort(log)) < _BURST * usual).mean()) < 0.1:
             clock.by_log, clock.delay_ns = True, topic.delay
-            say(topic.name, f"{text}, and {100 * shared:.0f} % of the messages share one with another: the times of the log are used")
-        else:
+            say(topic.name, f"{text}, and {100 * near:.0f} % of the messages have that of another one: the times of the log are used")
+        elif grid >= _COARSE_NS:
             clock.spread = True
             say(topic.name, f"{text}, and the times of the log are no finer: messages of one stamp are spread evenly")
     elif grid >= _COARSE_NS and grid > 0.3 * usual and (steps % int(np.median(steps)) != 0).mean() > 0.03:
@@ -257,12 +275,12 @@ def settle(stamps: dict[str, Array], note: Say) -> dict[str, Clock]:
 
 
 def silences(clocks: dict[str, Clock], stamps: dict[str, Array]) -> list[tuple[int, int]]:
-    """Spans (begin, end; ns) in which no topic has a message, longer than PAUSE_NS."""
+    """Spans (begin, end; ns) in which no topic has a message, longer than GAP_NS."""
     all_t = [clocks[name](times[:, 0], times[:, 1])[0] for name, times in stamps.items() if len(times)]
     if not all_t:
         return []
     t = np.unique(np.concatenate(all_t))
-    gaps = np.flatnonzero(np.diff(t) > PAUSE_NS)
+    gaps = np.flatnonzero(np.diff(t) > GAP_NS)
     return [(int(t[i]), int(t[i + 1])) for i in gaps]
 
 

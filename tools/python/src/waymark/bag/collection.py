@@ -12,7 +12,7 @@ from ..recording import RecordingWriter
 from ..tables import Array
 from . import names
 from .can import CanLog
-from .clocks import SET_NS, Clock, excess, goes_on, once, seconds, settle, silences
+from .clocks import GAP_NS, PAUSE_NS, SET_NS, Clock, excess, goes_on, once, seconds, settle, silences
 from .frames import Frames
 from .samples import Samples
 from .views import Sight
@@ -84,17 +84,18 @@ class Collection:
                 if not keep.all():
                     self.note(topic, f"{int((~keep).sum())} of its {len(keep)} messages come twice, with the same stamp: taken once")
         self.clocks = settle(stamps, self.note)
-        cuts = [cut for begin, end in silences(self.clocks, stamps) if (cut := self._silence(begin, end))]
+        poses = [self.timed(topic, samples) for kind in ("odometry", "poses") for topic, samples in self.samples.get(kind, {}).items()]
+        cuts = [cut for begin, end in silences(self.clocks, stamps) if (cut := self._silence(begin, end, poses))]
         for clock in self.clocks.values():
             clock.cuts = cuts
 
-    def _silence(self, begin_ns: int, end_ns: int) -> tuple[int, int] | None:
+    def _silence(self, begin_ns: int, end_ns: int, poses: list[tuple[Array, Array, Array]]) -> tuple[int, int] | None:
         """A span without any message: a pause (None), or, where poses go on as if nothing was, a clock that was set: when, by how much."""
         text = f"no topic has a message for {seconds(end_ns - begin_ns)} from {(begin_ns - self._first_ns()) / 1e9:.2f} s on"
-        poses = [self.timed(topic, samples) for kind in ("odometry", "poses") for topic, samples in self.samples.get(kind, {}).items()]
-        moved = [excess(t_ns, end_ns) for t_ns, _, values in poses if goes_on(t_ns, values[:, :3], end_ns)]
+        moved = [by for t_ns, _, values in poses if goes_on(t_ns, values[:, :3], end_ns) and (by := excess(t_ns, end_ns)) > GAP_NS]
         if not moved and end_ns - begin_ns <= SET_NS:
-            self.note("clock", f"{text}: a pause of the recorder, or a clock that was set; the times are kept")
+            if end_ns - begin_ns > PAUSE_NS:
+                self.note("clock", f"{text}: a pause of the recorder, or a clock that was set; the times are kept")
             return None
         why = "and the poses go on as if there was none" if moved else "longer than a day"
         self.note("clock", f"{text}, {why}: the clock was set; the later times are moved back")

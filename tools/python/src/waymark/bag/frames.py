@@ -12,6 +12,8 @@ from ..tables import Array
 
 BASES = ("base_link", "base_footprint", "base", "chassis", "chassis_link", "base_frame", "robot_base", "vehicle", "body")
 """Names of the robot's own frame, in the order of preference (REP 105, REP 120; the others are in common use)."""
+_DOWNWARDS = re.compile(r"_(ned|frd)$", re.I)  # REP 103: `_ned` has z down; `_frd` is the same of a body (MAVROS)
+_HALF_ROLL = np.diag([1.0, -1.0, -1.0, 1.0])
 _STILL_M, _STILL_RAD = 1e-3, 1e-3  # a transform that changes by more is a joint that moves: sums of floats change by less
 _DECODED_MAX = 2000  # messages of /tf that are read in whole; of further ones every tenth: joints move all the time
 
@@ -32,12 +34,13 @@ class Frames:
     def __init__(self) -> None:
         self._edges: dict[tuple[str, str], Array] = {}
         self.moving: set[tuple[str, str]] = set()
+        self.replaced: set[tuple[str, str]] = set()  # static transforms that were sent anew with other values: the last ones count
         self.topics: set[str] = set()
         self._seen: set[bytes] = set()
         self._decoded = 0
 
-    def add(self, message: Any) -> None:
-        """Takes the transforms of a TFMessage; one that changes on the way is a moving joint."""
+    def add(self, message: Any, is_static: bool = False) -> None:
+        """Takes the transforms of a TFMessage; one that changes on the way is a moving joint, or, on tf_static, a correction."""
         for item in message.transforms:
             where, turn = item.transform.translation, item.transform.rotation
             values = np.array([where.x, where.y, where.z, turn.x, turn.y, turn.z, turn.w])
@@ -48,7 +51,8 @@ class Frames:
             if old is None:
                 self._edges[key] = matrix
             elif self._differs(old, matrix):
-                self.moving.add(key)
+                (self.replaced if is_static else self.moving).add(key)
+                self._edges[key] = matrix if is_static else old
 
     def is_known(self, topic: str, raw: bytes | memoryview) -> bool:
         """Whether a serialized message of /tf brings nothing new: the same bytes but for the stamp, or one of very many."""
@@ -102,9 +106,12 @@ class Frames:
 
     def transform(self, frame: str, base: str) -> Array | None:
         """The pose of `frame` in `base`; None where no way of transforms that stand still leads there."""
-        way = self._way(frame.lstrip("/"), base.lstrip("/"), also_moving=False)
+        frame, base = frame.lstrip("/"), base.lstrip("/")
+        way = self._way(frame, base, also_moving=False)
         if way is None:
-            return None
+            upright = _DOWNWARDS.sub("", frame)
+            place = None if upright == frame else np.eye(4) if self.is_base(upright, base) else self.transform(upright, base)
+            return None if place is None else place @ _HALF_ROLL
         matrix = np.eye(4)
         for parent, child, up in way:
             step = self._edges[parent, child]

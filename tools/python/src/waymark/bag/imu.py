@@ -26,6 +26,9 @@ _SAME, _NEAR = np.cos(np.radians(20)), np.cos(np.radians(30))  # directions that
 _FITS, _LIKE = 0.8, 0.5  # correlation from which on gyro and motion say the same; below the second they have nothing in common
 _EXACT_SHARE, _EXACT_R = 0.03, 0.98  # half or double is a unit's fault only where it is exact: the turns of skid steer are off by as much
 _ZEROS = 0.2  # share of messages of exact zeros between others from which on they are no data
+_ZEROS_RUN, _ZEROS_SMALL = 10, 0.02  # messages of a run at most; a value, of any unit, that no step of a gyro reaches
+_BIAS_STILL, _BIAS_DRIVING = 0.01, 0.05  # rad/s of a gyro where the robot stands, or in the mean: below it the estimators' own prior holds it
+_ANY_SCALE = 5.0  # a factor beyond this is no error of a scale, but a unit, or the sensor's own counts
 _SILENT = 0.15
 _UP = np.array([0.0, 0.0, 1.0])
 
@@ -53,12 +56,30 @@ def _is_there(values: Array) -> bool:
     return bool(np.isfinite(values).all(axis=1).mean() > 0.5 and np.nan_to_num(values).any())
 
 
+def _runs_of_zeros(values: Array) -> Array:
+    """Which rows are exact zeros on all axes, in short runs between others that are not small: nothing was measured there."""
+    zero = ~values.any(axis=1)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], zero, [False]]).astype(np.int8)))
+    out = np.zeros(len(zero), dtype=bool)
+    sizes = np.abs(values).max(axis=1)
+    for begin, end in edges.reshape(-1, 2):
+        if end - begin <= _ZEROS_RUN and begin > 0 and end < len(zero):
+            out[begin:end] = True
+    quantum = float(sizes[sizes > 0].min(initial=np.inf))
+    beside = np.convolve(out, np.ones(3), "full")[1:-1].astype(bool) & ~zero if len(out) else out
+    # A quiet sensor of a coarse step has zeros, too: its other values are a few steps then.
+    return out if beside.any() and float(np.quantile(sizes[beside], 0.9)) > min(10 * quantum, _ZEROS_SMALL) else np.zeros_like(out)
+
+
 def _without_zeros(imu: Imu) -> None:
-    """Leaves messages out that have exact zeros on all axes of the gyro between others that have not."""
-    zero: Array = np.asarray(~imu.gyro.any(axis=1))
-    between = zero.copy()
-    between[1:-1] &= ~zero[:-2] | ~zero[2:]
-    if zero.any() and _ZEROS < between.mean() and zero.mean() < 0.95:
+    """Leaves messages out that have exact zeros on all axes of the gyro between others that have not; so do accelerations of zeros."""
+    bare = _runs_of_zeros(np.nan_to_num(imu.accelerometer))
+    if bare.mean() > _ZEROS / 10:
+        imu.accelerometer[bare] = np.nan
+        imu.say(f"{100 * bare.mean():.0f} % of its messages have accelerations of zeros between others that have not: these are left empty")
+    zero = _runs_of_zeros(imu.gyro)
+    turning = int((imu.gyro.any(axis=1)).sum())
+    if zero.sum() > _ZEROS * (zero.sum() + turning):
         imu.say(f"{100 * zero.mean():.0f} % of its messages have a gyro of zeros between others that have not: left out")
         for name in ("t_ns", "arrival_ns", "gyro", "accelerometer", "sigmas"):
             setattr(imu, name, getattr(imu, name)[~zero])
@@ -115,6 +136,12 @@ def _gravity(imu: Imu) -> Array | None:
         return None
     mean = imu.accelerometer[ok].mean(axis=0)
     size, steady = float(np.median(np.linalg.norm(imu.accelerometer[ok], axis=1))), float(np.linalg.norm(mean))
+    if size > _ANY_SCALE * _G and min(abs(size / value - 1) for value in _UNITS) > _UNIT_SHARE and steady > _STEADY * size:
+        imu.say(f"its accelerometer shows {size:.4g} at rest, in no unit of accelerations (the sensor's own counts?): divided by {size / _G:.4g}, so that it "
+                "shows gravity; --as-is takes it as it is")
+        imu.accelerometer *= _G / size
+        imu.sigmas[:, 3:] *= _G / size
+        return np.asarray(mean / steady)
     for value, (name, scale) in sorted(_UNITS.items(), key=lambda unit: abs(np.log(size / unit[0]))):
         if abs(size / value - 1) < _UNIT_SHARE:
             if name:
@@ -161,6 +188,25 @@ def _fit(imu: Imu, motion: Motion) -> _Fit | str:
     still = next((fit for fit in fits if fit.lag == 0), fits[0])
     best = max(fits, key=lambda fit: fit.r)
     return best if best.r > still.r + 0.02 else still
+
+
+def _without_bias(imu: Imu, motion: Motion) -> None:
+    """Subtracts what the gyro shows where the robot stands, else what it shows beside the motion's turns; where it is small the estimators' states hold it."""
+    borders = compare.grid(imu.t_ns, motion.t_ns)
+    gyro, twist = compare.held(imu.t_ns, imu.gyro, borders) / compare.WINDOW_S, compare.held(motion.t_ns, motion.twist, borders)
+    ok = np.isfinite(gyro).all(axis=1) & np.isfinite(twist).all(axis=1)
+    still = ok & ~twist.any(axis=1)
+    if still.sum() >= compare.WINDOWS_MIN:
+        bias, limit, where = np.median(gyro[still], axis=0), _BIAS_STILL, "where the motion stands"
+    elif ok.sum() >= compare.WINDOWS_MIN and np.ptp(twist[ok, 5]) > 0:
+        design = np.column_stack([np.ones(int(ok.sum())), twist[ok, 5] / compare.WINDOW_S])
+        (bias, _), limit, where = np.linalg.lstsq(design, gyro[ok], rcond=None)[0], _BIAS_DRIVING, "where the motion doesn't turn"
+    else:
+        return
+    spread = float(np.linalg.norm(np.ptp(gyro[ok], axis=0)))  # of degrees a second the limit is none
+    if np.linalg.norm(bias) > limit and np.linalg.norm(bias) > 0.02 * spread and spread < 100:
+        imu.gyro = imu.gyro - bias
+        imu.say(f"its gyro shows ({', '.join(f'{v:.3f}' for v in bias)}) {where}: this bias is subtracted; --as-is takes it as it is")
 
 
 def _set_up(imu: Imu, up: Array, motion: Motion | None) -> str:
@@ -215,6 +261,11 @@ def _scale(imu: Imu, size: float, r: float, words: str) -> None:
     if known is None and 1 / compare.SAME <= size <= compare.SAME:
         return
     text = f"its gyro is {size:.3g} times {words}"
+    if known is None and not 1 / _ANY_SCALE < size < _ANY_SCALE and r > _EXACT_R:
+        imu.gyro /= size
+        imu.sigmas[:, :3] /= size
+        imu.say(f"{text}, in no unit of turn rates (the sensor's own counts?): divided by {size:.4g}, so that it turns as the motion; --as-is takes it as it is")
+        return
     if known is None:
         imu.say(f"{text}: one of both has another scale; it is kept as it is")
         return
@@ -279,6 +330,8 @@ def _by_gravity(imu: Imu, gravity: Array | None, motion: Motion | None) -> None:
 def _judge(imu: Imu, motion: Motion | None) -> None:
     """What gravity and the motion say of the IMU."""
     gravity = _gravity(imu)
+    if motion is not None and not motion.is_command:
+        _without_bias(imu, motion)
     fit = "not observable" if motion is None else _fit(imu, motion)
     if motion is None or isinstance(fit, str):
         _by_gravity(imu, gravity, motion)

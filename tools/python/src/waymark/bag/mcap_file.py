@@ -13,7 +13,7 @@ import zstandard
 
 from . import decoding
 from .decoding import Topic
-from .order import Batch, in_order
+from .order import Batch, Seams, in_order
 
 MAGIC = b"\x89MCAP0\r\n"
 _HEADER, _FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _CHUNK_INDEX, _ATTACHMENT, _STATISTICS, _DATA_END = 1, 2, 3, 4, 5, 6, 8, 9, 11, 15
@@ -121,8 +121,10 @@ class McapFile:
 
     def messages(self, wanted: Callable[[Topic], bool]) -> Iterator[tuple[Topic, int, Any]]:
         """Messages of the wanted topics in the order of their log: topic, log time in ns, bytes."""
-        yield from in_order(self._batches(wanted))
+        seams = Seams()
+        yield from in_order(self._batches(wanted), seams)
         self.done = 1.0
+        self.notes += seams.notes()
         if self._wrong_sums:
             self.notes.append(f"{self._wrong_sums} of its chunks differ from their checksums: bytes were damaged, and values may be wrong")
 

@@ -29,6 +29,7 @@ _SILENT = 0.15  # a part of the twist with less than this share of the poses' is
 _AGREES = 1.05  # largest factor between poses and twists that say the same: the numbers of one message come from the same wheels
 _LAG_GAIN = 0.02  # a lag is one where the correlation grows by more
 _LATE_AGREES = 1.25  # largest factor where the twist is smoothed: a mean over a turn is smaller than the turn
+_LEAP, _LEAP_MPS = 10.0, 3.0  # a step of poses is a leap where it is so many times as fast as 99 % of them, and faster than that
 _REPEATS = 0.5  # share of messages that repeat the one before, from which on it is said
 _LATE_MAX_NS = 100_000_000  # differences are known at their end: as twists only where that is soon enough to be fused
 _POSE_UNITS = {1000.0: "mm", 100.0: "cm", 39.37: "inches"}
@@ -78,7 +79,7 @@ class _Odometry:
     def __init__(self, topic: str, t_ns: Array, values: Array):
         self.topic, self.t, self.said = topic, t_ns, list[tuple[bool, str]]()
         self.twist = values[:, 7:].copy()
-        self.places, quaternions = values[:, :3], values[:, 3:7]
+        self.places, quaternions = values[:, :3].copy(), values[:, 3:7]
         self.turns = rotations(quaternions)
         self.has_orientation = bool(np.isfinite(self.turns).all(axis=(1, 2)).mean() > 0.9)
         self.by_poses = False
@@ -91,7 +92,7 @@ class _Odometry:
     def body(self) -> Array:
         """The twist (n, 6) in the child's frame, as the comparison says; parts that only the poses have are theirs."""
         poses_ok = self.has_orientation and len(self.t) > 2
-        rates = pose_rates(self.t, self.places, self.turns) if poses_ok else np.zeros((len(self.t), 6))
+        rates = self._rates() if poses_ok else np.zeros((len(self.t), 6))
         borders = compare.grid(self.t)
         by_pose, by_twist = compare.held(self.t, rates, borders), compare.held(self.t, self.twist, borders)
         moves, turns = compare.moves(by_pose[:, :3]), compare.turns(by_pose[:, 5])
@@ -105,7 +106,8 @@ class _Odometry:
             return self.twist
         if not moves and not turns:
             if compare.moves(by_twist[:, :3]) or compare.turns(by_twist[:, 5]):
-                self.say("its poses stand still while its twist moves: the twist is used")
+                self.say("its poses stand still while its twist moves: the twist is used" if poses_ok else
+                         "its poses have no orientation (a quaternion of zeros): nothing compares its twist, which is used")
             return self.twist
         larger = compare.likeness(np.linalg.norm(by_pose[:, :3], axis=1), np.linalg.norm(by_twist[:, :3], axis=1)).factor
         unit = next((name for size, name in _POSE_UNITS.items() if abs(larger / size - 1) < compare.KNOWN_SHARE), None)
@@ -121,6 +123,21 @@ class _Odometry:
         if turns and not self.by_poses:
             out = self._angular(out, rates, by_pose, by_twist)
         return rates if self.by_poses else out
+
+    def _rates(self) -> Array:
+        """The twists by the poses. Where these leap (odometry that was reset, or corrected by a map), the later ones go on from the one before."""
+        rates = pose_rates(self.t, self.places, self.turns)
+        speed = np.linalg.norm(np.nan_to_num(rates[:, :3]), axis=1)
+        leaps = np.flatnonzero(speed[:-1] > max(_LEAP * float(np.quantile(speed, 0.99)), _LEAP_MPS))
+        for i in leaps:
+            step = self.places[i + 1] - self.places[i]
+            self.say(f"its poses leap by {np.linalg.norm(step):.2f} m at {(int(self.t[i]) - int(self.t[0])) / 1e9:.2f} s, as of a reset: they are put together there")
+            before = max(i - 1, 0)
+            turn = self.turns[i] @ self.turns[before].T @ self.turns[i] @ self.turns[i + 1].T
+            place = self.places[i] + self.turns[i] @ self.turns[before].T @ (self.places[i] - self.places[before])
+            self.places[i + 1 :] = place + (self.places[i + 1 :] - self.places[i + 1]) @ turn.T
+            self.turns[i + 1 :] = turn @ self.turns[i + 1 :]
+        return pose_rates(self.t, self.places, self.turns) if len(leaps) else rates
 
     def _is_late(self, by_pose: Array, borders: Array) -> bool:
         """Whether the turns of the twist come late, as of a running mean: the poses show when they were."""
@@ -195,13 +212,15 @@ def _place(into: Collection, topic: str, frame: str, base: str) -> tuple[Array, 
     """The pose of a topic's frame in the robot's, and what is to be said of it."""
     if into.frames.is_base(frame, base):
         return np.eye(4), ""
+    if is_world(frame):
+        return np.eye(4), f"its child_frame_id is '{frame}', a frame of the world: its motion is taken as that of '{base}'"
     matrix = into.frames.transform(frame, base)
     if matrix is None:
         return np.eye(4), f"{into.frames.why_not(frame, base)}: its motion is taken as that of '{base}'"
     if np.allclose(matrix[:2, 3], 0, atol=1e-6) and np.allclose(matrix[:3, :3], np.eye(3), atol=1e-6):
         return matrix, ""
     x, y, z = matrix[:3, 3]
-    return matrix, f"it is the motion of '{frame}', which tf has at ({x:.3g}, {y:.3g}, {z:.3g}) m in '{base}': it is moved to '{base}' with this lever"
+    return matrix, f"it is the motion of '{frame}', which lies at ({x:.3g}, {y:.3g}, {z:.3g}) m in '{base}': it is moved to '{base}' with this lever"
 
 
 def _repeats(values: Array) -> float:

@@ -80,7 +80,7 @@ def fix(into: Collection, topic: str, message: Any, log_ns: int) -> None:
 def transforms(into: Collection, topic: str, message: Any, _log_ns: int) -> None:
     """Transforms of /tf_static and /tf."""
     into.frames.topics.add(topic)
-    into.frames.add(message)
+    into.frames.add(message, is_static=topic.endswith("tf_static"))
 
 
 TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")

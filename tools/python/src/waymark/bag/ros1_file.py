@@ -12,7 +12,7 @@ import lz4.frame  # type: ignore[import-untyped]
 
 from . import decoding
 from .decoding import Topic
-from .order import Batch, in_order
+from .order import Batch, Seams, in_order
 
 MAGIC = b"#ROSBAG V2.0\n"
 _MESSAGE, _CHUNK, _CONNECTION, _CHUNK_INFO = 2, 5, 7, 6
@@ -115,8 +115,10 @@ class Ros1File:
 
     def messages(self, wanted: Callable[[Topic], bool]) -> Iterator[tuple[Topic, int, Any]]:
         """Messages of the wanted topics in the order of their log: topic, log time in ns, bytes."""
-        yield from in_order(self._batches(wanted))
+        seams = Seams()
+        yield from in_order(self._batches(wanted), seams)
         self.done = 1.0
+        self.notes += seams.notes()
 
     def _batches(self, wanted: Callable[[Topic], bool]) -> Iterator[Batch]:
         choice: dict[int, Topic | None] = {}

@@ -10,6 +10,7 @@ from typing import Any
 
 from . import decoding
 from .decoding import Topic
+from .order import Batch, Seams, in_order
 
 MAGIC = b"SQLite format 3\0"
 _STYLES = {"ros2msg": "msg", "ros2idl": "idl"}
@@ -67,20 +68,24 @@ class SqliteFile:
 
     def messages(self, wanted: Callable[[Topic], bool]) -> Iterator[tuple[Topic, int, Any]]:
         """Messages of the wanted topics in the order of their log: topic, log time in ns, bytes."""
-        chosen = {key: topic for key, topic in self._topics.items() if wanted(topic)}
+        seams = Seams()
+        yield from in_order(self._batches({key: topic for key, topic in self._topics.items() if wanted(topic)}), seams)
+        self.notes += seams.notes()
+        self.done = 1.0
+
+    def _batches(self, chosen: dict[int, Topic]) -> Iterator[Batch]:
+        """In the order in which they were written."""
         total = sum(topic.count or 0 for topic in chosen.values())
-        marks = ",".join("?" * len(chosen))
-        query = f"SELECT topic_id, timestamp, data FROM messages WHERE topic_id IN ({marks}) ORDER BY timestamp, id"
+        query = f"SELECT topic_id, timestamp, data FROM messages WHERE topic_id IN ({','.join('?' * len(chosen))}) ORDER BY id"
         count = 0
         try:
             for key, log_ns, data in self._database.execute(query, list(chosen)):
                 count += 1
                 self.done = count / max(total, 1)
                 if isinstance(log_ns, int) and isinstance(data, bytes):
-                    yield chosen[key], log_ns, data
+                    yield Batch(log_ns, [(log_ns, chosen[key], data)])
         except sqlite3.Error:
             self.notes.append(f"its database is damaged or cut: {count} of its messages are read; `sqlite3 {self.path.name} .recover` may give more")
-        self.done = 1.0
 
     def attachments(self, _wanted: Callable[[str], bool]) -> dict[str, bytes]:
         """A database has none."""
