@@ -31,10 +31,10 @@ size_t jpeg_encode_grey(const uint8_t *grey, uint32_t width_px, uint32_t height_
   return failed ? 0 : length;
 }
 
-jpeg_verdict jpeg_size(jpeg_decoder *self, const uint8_t *data, size_t length, uint32_t *width_px,
-                       uint32_t *height_px) {
-  int width, height, sampling, space;
-  if (tjDecompressHeader3(self->handle, data, length, &width, &height, &sampling, &space) != 0 || width < 1 ||
+static jpeg_verdict header(jpeg_decoder *self, const uint8_t *data, size_t length, uint32_t *width_px,
+                           uint32_t *height_px, int *space) {
+  int width, height, sampling;
+  if (tjDecompressHeader3(self->handle, data, length, &width, &height, &sampling, space) != 0 || width < 1 ||
       height < 1)
     return JPEG_DAMAGED;
   *width_px = (uint32_t)width;
@@ -42,12 +42,19 @@ jpeg_verdict jpeg_size(jpeg_decoder *self, const uint8_t *data, size_t length, u
   return JPEG_GOOD;
 }
 
+jpeg_verdict jpeg_size(jpeg_decoder *self, const uint8_t *data, size_t length, uint32_t *width_px,
+                       uint32_t *height_px) {
+  int space;
+  return header(self, data, length, width_px, height_px, &space);
+}
+
 jpeg_verdict jpeg_decode(jpeg_decoder *self, const uint8_t *data, size_t length, uint32_t width_px, uint32_t height_px,
                          uint8_t *grey, uint32_t stride_bytes, char *why, size_t why_bytes) {
   uint32_t width, height;
+  int space = TJCS_GRAY;
   if (!self->handle) self->handle = tjInitDecompress();
-  if (!self->handle || jpeg_size(self, data, length, &width, &height) != JPEG_GOOD) {
-    (void)snprintf(why, why_bytes, "no JPEG: %s", tjGetErrorStr2(self->handle));
+  if (!self->handle || header(self, data, length, &width, &height, &space) != JPEG_GOOD) {
+    (void)snprintf(why, why_bytes, "its %zu bytes have no head of a JPEG that can be read", length);
     jpeg_close(self);  // libjpeg-turbo 2.1 otherwise reads the next header as this one's continuation
     return JPEG_DAMAGED;
   }
@@ -61,6 +68,9 @@ jpeg_verdict jpeg_decode(jpeg_decoder *self, const uint8_t *data, size_t length,
   // Stray bytes between the parts of a picture are harmless, and some cameras always write them.
   const char *said = tjGetErrorStr2(self->handle);
   if (tjGetErrorCode(self->handle) == TJERR_WARNING && strstr(said, "extraneous bytes")) return JPEG_GOOD;
-  (void)snprintf(why, why_bytes, "%s", said);
+  if (space == TJCS_CMYK || space == TJCS_YCCK)
+    (void)snprintf(why, why_bytes, "is a JPEG of four inks (CMYK), which is not read; save it in grey or in RGB");
+  else
+    (void)snprintf(why, why_bytes, "is cut or damaged: not all of its %zu bytes are a JPEG's", length);
   return JPEG_DAMAGED;
 }

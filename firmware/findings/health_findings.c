@@ -57,20 +57,21 @@ static void about_losses(const wm_source_health *s, const char *reason, wm_findi
     wm_finding_id id;
     uint64_t count;
     const char *what, *fix;
-  } kinds[] = {{WM_FOUND_DATA_MISSING, s->dropped, "dropped because a queue was full",
-                "raise merge.queue_events and realtime.ring_events, or give the run more of the computer"},
-               {WM_FOUND_DATA_MISSING, s->lost, "missing by the sender's own count (pictures: by their stamps)", NULL},
-               {WM_FOUND_ROWS_SKIPPED, s->malformed, "could not be read", NULL},
-               {WM_FOUND_ROWS_SKIPPED, s->not_finite, "were no finite numbers, or outside of what can be", NULL},
-               {WM_FOUND_ROWS_DISORDERED, s->out_of_order, "were older than the one before", NULL},
-               {WM_FOUND_ROWS_DISORDERED, s->duplicates, "were sent twice and fused once",
-                "look for two programs that send or record the same data"},
-               {WM_FOUND_CLOCKS_APART, s->future, "had stamps from the future", NULL},
-               {WM_FOUND_VALUES_FROZEN, s->frozen, "equal the one before, or have a counter that does not change", NULL},
-               {WM_FOUND_DATA_MISSING, s->overflows,
-                "were dropped by the kernel or the device because they were not read in time", NULL},
-               {WM_FOUND_DEVICE_TROUBLE, s->bus_errors, "error frames on the bus",
-                "look at wiring, termination (60 ohms) and bit rate: `ip -d -s link show`"}};
+  } kinds[] = {
+      {WM_FOUND_DATA_MISSING, s->dropped, "dropped because a queue was full",
+       "raise merge.queue_events and realtime.ring_events, or give the run more of the computer"},
+      {WM_FOUND_DATA_MISSING, s->lost, "missing by the sender's own count (pictures: by their stamps)", NULL},
+      {WM_FOUND_ROWS_SKIPPED, s->malformed, "could not be read", NULL},
+      {WM_FOUND_ROWS_SKIPPED, s->not_finite, "were no finite numbers, or outside of what can be", NULL},
+      {WM_FOUND_ROWS_DISORDERED, s->out_of_order, "were older than the one before", NULL},
+      {WM_FOUND_ROWS_DISORDERED, s->duplicates, "were sent twice and fused once",
+       "look for two programs that send or record the same data"},
+      {WM_FOUND_CLOCKS_APART, s->future, "had stamps from the future", NULL},
+      {WM_FOUND_VALUES_FROZEN, s->frozen, "equal the one before, or have a counter that does not change", NULL},
+      {WM_FOUND_DATA_MISSING, s->overflows,
+       "were dropped by the kernel or the device because they were not read in time", NULL},
+      {WM_FOUND_DEVICE_TROUBLE, s->bus_errors, "error frames on the bus",
+       "look at wiring, termination (60 ohms) and bit rate: `ip -d -s link show`"}};
   for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++) {
     if (kinds[i].count == 0) continue;
     const int is_refused = kinds[i].id == WM_FOUND_ROWS_SKIPPED;

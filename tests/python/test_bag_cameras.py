@@ -308,6 +308,9 @@ ENCODINGS = {
     "mono16 of 12 bits": ("mono16", ramp16(12), {}, RAMP),
     "mono16 of 10 bits": ("mono16", ramp16(10), {}, RAMP),
     "mono16 of 8 bits": ("mono16", ramp16(8), {}, RAMP),
+    "mono12": ("mono12", ramp16(12), {}, RAMP),
+    "bayer_rggb10": ("bayer_rggb10", bayer(200, 100, 50, "rggb").astype(np.uint16) << 2, {}, (200 + 2 * 100 + 50) / 4),
+    "bgra16": ("bgra16", np.dstack([RED[:, :, ::-1], RAMP]).astype(np.uint16) * 257, {"width": 64}, LUMA_OF_RED),
     "mono16, big endian": ("mono16", ramp16(12).astype(">u2"), {"big": 1}, RAMP),
     "yuv422 (UYVY)": ("yuv422", np.dstack([np.full_like(RAMP, 90), RAMP]), {"width": 64}, RAMP),
     "uyvy": ("uyvy", np.dstack([np.full_like(RAMP, 90), RAMP]), {"width": 64}, RAMP),
@@ -362,8 +365,13 @@ class Pictures(BagTest):
         good = jpeg(RAMP, quality=95)
         filled = good[:2] + b"\xff\xff" + good[2:]  # a fill byte before a marker
         rgb = jpeg(RED, "PNG")
+        out = io.BytesIO()
+        Image.fromarray(GREY3).convert("CMYK").save(out, "JPEG", quality=95)
+        inks = out.getvalue()
         cases = {
             "jpeg": ([good] * 3, "jpeg", 3, RAMP), "fill bytes": ([filled] * 3, "jpeg", 3, RAMP), "padding behind": ([good + bytes(64)] * 3, "jpeg", 3, RAMP),
+            "a buffer's padding behind": ([good + bytes(20000)] * 3, "jpeg", 3, RAMP),
+            "four inks": ([inks] * 3, "jpeg", 3, RAMP),
             "png": ([jpeg(RAMP, "PNG")] * 3, "png", 3, RAMP), "png of colour": ([rgb] * 3, "bgr8; png compressed bgr8", 3, LUMA_OF_RED),
             "png of 16 bits": ([jpeg(ramp16(12), "PNG")] * 3, "mono16; png compressed mono16", 3, RAMP),
             "webp": ([jpeg(GREY3, "WEBP", lossless=True)] * 3, "webp", 3, RAMP),
@@ -380,8 +388,9 @@ class Pictures(BagTest):
                 text, folder = self.take(events.mcap(self.folder / "a.mcap"), out=f"out {name}")
                 frames = list(waymark.Recording(folder).frames("cam"))
                 self.assertEqual(len(frames), count, text)
-                grey = np.asarray(Image.open(io.BytesIO(frames[-1].jpeg)).convert("L")).astype(float)
-                self.assertLess(np.abs(grey - wanted).max(), 4)
+                picture = Image.open(io.BytesIO(frames[-1].jpeg))
+                self.assertNotEqual(picture.mode, "CMYK")
+                self.assertLess(np.abs(np.asarray(picture.convert("L")).astype(float) - wanted).max(), 4)
                 if count < 3:
                     at = START_NS / 1e9 + (0 if name.startswith("the first") else 0.1)
                     self.assertIn(f"note: /cam/image_raw/compressed: 1 of 3 messages is left out; the first at {at:.3f} s: ", text)
