@@ -47,6 +47,22 @@ class Fixes(BagTest):
                     np.testing.assert_allclose(recording.calibration["gnss"]["origin"], ORIGIN, atol=1e-6)
                     self.assert_end(recording, said, 0.1, config=CONFIG)
 
+    def test_places_from_which_no_drive_leads_to_the_next_are_none(self):
+        kinds = {"the last known place": lambda w: place_of(ORIGIN, -300, 40)[:2], "a receiver's default": lambda w: (31.2, 121.4),
+                 "nearly zero": lambda w: (1e-9, -1e-9)}
+        for name, stale in kinds.items():
+            with self.subTest(name):
+                recording, said = self.take(self.drive(lambda i, w, a, s=stale: (s(w) if i < 3 else w, a, 0)))
+                self.assertIn("finding: /fix: its first 3 fixes are of a place", said)
+                np.testing.assert_allclose(recording.calibration["gnss"]["origin"], ORIGIN, atol=1e-6)
+                self.assert_end(recording, said, 0.1, config=CONFIG)
+
+    def test_an_outlier_on_the_way_stays(self):
+        for at in (2, 7):
+            recording, said = self.take(self.drive(lambda i, w, a, k=at: (place_of(ORIGIN, 5000, 40)[:2] if i == k else w, a, 0)))
+            self.assertEqual(len(recording.table("gnss.csv")["t_ns"]), 16, said)
+            self.assert_end(recording, said, 0.1, config=CONFIG)
+
     def test_an_altitude_that_is_absent(self):
         nan = float("nan")
         for name, change, empty in (("of the first three", lambda i, w, a: (w, nan if i < 3 else a, 0), 3), ("of some", lambda i, w, a: (
@@ -74,9 +90,11 @@ class Fixes(BagTest):
                 right = (pose if parent == "base_link" else np.linalg.inv(pose))[:3, 3]
                 bag = self.drive(antenna=right[:2])
                 bag.tf(parent, child, pose)
-                recording, said = self.take(bag, "--origin", *ORIGIN)
-                np.testing.assert_allclose(recording.calibration["gnss"]["mounting"]["xyz_m"], right, atol=1e-6)
-                self.assert_end(recording, said, 0.1, config=CONFIG)
+                for origin in (("--origin", *ORIGIN), ()):  # else the robot's place at its start, not the antenna's
+                    recording, said = self.take(bag, *origin)
+                    np.testing.assert_allclose(recording.calibration["gnss"]["mounting"]["xyz_m"], right, atol=1e-6)
+                    np.testing.assert_allclose(recording.calibration["gnss"]["origin"], ORIGIN, atol=1e-6)
+                    self.assert_end(recording, said, 0.1, config=CONFIG)
 
     def test_an_antenna_without_a_place_is_named(self):
         recording, said = self.take(self.drive())

@@ -20,6 +20,8 @@ _STATUS_SIGMA_M = {-1: 5.0, 0: 5.0, 1: 2.0, 2: 0.5}
 _VARIANCE_MAX_M2 = 1e6  # a larger one means "not known"
 _UP_SIGMAS = 2.0  # the altitude's sigma in horizontal ones, by the satellites' geometry
 _SPREAD_SIGMAS = 3.0  # the way under the fixes in sigmas of a fix, from which on they show its direction
+_SPEED_MAX_MPS = 100.0  # of a robot whose motion is not known
+_LEAP_SIGMAS = 10.0
 _FUSED = re.compile(r"filtered|fused|ekf|ukf", re.I)
 
 
@@ -33,7 +35,9 @@ def _real(topic: str, into: Collection, values: Array) -> Array:
     for mask, text in ((none, "say that there is no fix"), (zero, "are of latitude 0 and longitude 0, which is no fix"),
                        (~none & ~zero & ~inside, "have no latitude and longitude")):
         if mask.any():
-            into.note(topic, f"{int(mask.sum())} of its {len(values)} messages {text}: left out")
+            first = values[int(np.argmax(mask))]
+            what = f" ({first[0]:.6g}, {first[1]:.6g})" if "no latitude" in text else ""
+            into.note(topic, f"{int(mask.sum())} of its {len(values)} messages {text}{what}: left out")
     return np.asarray(~none & ~zero & inside)
 
 
@@ -79,8 +83,32 @@ def _altitude(into: Collection, topic: str, altitude: Array) -> Array:
     return out
 
 
-def _start(motion: Motion | None, t_ns: Array, places: Array, sigma_m: Array) -> Array | None:
-    """Where the drive starts (east, north; m) if its first fix comes on the way: the dead-reckoned way is laid over the fixes
+def _stale(into: Collection, topic: str, motion: Motion | None, t_ns: Array, values: Array) -> int:
+    """How many fixes at the beginning are none: of a place that the robot can't have left in the time to the next one (the last known place,
+    a default of the receiver's)."""
+    if len(t_ns) < 4:
+        return 0
+    places = tangent_plane([values[-1, 0], values[-1, 1], 0.0], values[:, 0], values[:, 1], np.zeros(len(values)))
+    speed = _SPEED_MAX_MPS if motion is None else 2 * float(np.nanmax(np.linalg.norm(motion.twist[:, :3], axis=1))) + 5
+    sigma = _sigmas(values, np.isfinite(values[:, 2]))[0]
+
+    def is_leap(a: int, b: int) -> bool:
+        way = float(np.linalg.norm(places[b] - places[a]))
+        return way > speed * float(t_ns[b] - t_ns[a]) / 1e9 + _LEAP_SIGMAS * float(sigma[a] + sigma[b])
+
+    leaps = [i for i in range(len(t_ns) // 2) if is_leap(i, i + 1)]
+    while len(leaps) > 1 and not is_leap(leaps[-2], leaps[-1] + 1):  # outliers on the way, and back
+        del leaps[-2:]
+    if not leaps:
+        return 0
+    count = leaps[-1] + 1
+    far = np.linalg.norm(places[count] - places[count - 1])
+    into.find(topic, f"its first {count} fixes are of a place {far:.0f} m from the next one, {(t_ns[count] - t_ns[count - 1]) / 1e9:.2f} s later: no fixes, left out")
+    return count
+
+
+def _start(motion: Motion | None, t_ns: Array, places: Array, sigma_m: Array, antenna: Array) -> Array | None:
+    """Where the drive starts (east, north; m) if that is not the first fix: the dead-reckoned way of the antenna is laid over the fixes
     (Umeyama 1991, without a scale). None: it starts at the first fix, or the fixes don't show it.
     """
     if motion is None or motion.is_command or len(t_ns) < 5:
@@ -92,6 +120,8 @@ def _start(motion: Motion | None, t_ns: Array, places: Array, sigma_m: Array) ->
                             np.sin(middle) * twist[:, 0] + np.cos(middle) * twist[:, 1]]) * dt[:, None]
     way = np.vstack([np.zeros(2), np.cumsum(step, axis=0)[:-1]])
     at = np.column_stack([np.interp(t_ns, motion.t_ns, column) for column in way.T])
+    turned = np.interp(t_ns, motion.t_ns, heading)
+    at += np.column_stack([np.cos(turned) * antenna[0] - np.sin(turned) * antenna[1], np.sin(turned) * antenna[0] + np.cos(turned) * antenna[1]])
     before = np.linalg.norm(at[0])
     a, b = at - at.mean(axis=0), places - places.mean(axis=0)
     if before < float(np.median(sigma_m)) or np.linalg.norm(a, axis=1).max() < max(_SPREAD_SIGMAS * float(np.median(sigma_m)), 1.0):
@@ -105,17 +135,17 @@ def _start(motion: Motion | None, t_ns: Array, places: Array, sigma_m: Array) ->
     return np.asarray(places.mean(axis=0) - rotation @ at.mean(axis=0))
 
 
-def _origin(into: Collection, topic: str, motion: Motion | None, t_ns: Array, values: Array, known: Array) -> list[float]:
-    """The map's origin: the first fix, or the start of a drive whose first fix comes later."""
+def _origin(into: Collection, topic: str, motion: Motion | None, t_ns: Array, values: Array, known: Array, antenna: Array) -> list[float]:
+    """The map's origin: the first fix, or, where the drive shows it, the robot's place at its start."""
     first = [float(values[0, 0]), float(values[0, 1]), float(known[0]) if len(known) else 0.0]
     if not len(known):
         into.note(topic, "no fix has an altitude: that of the origin is written as 0")
     places = tangent_plane(first, values[:, 0], values[:, 1], np.full(len(values), first[2]))[:, :2]
-    start = _start(motion, t_ns, places, _sigmas(values, np.isfinite(values[:, 2]))[0])
+    start = _start(motion, t_ns, places, _sigmas(values, np.isfinite(values[:, 2]))[0], antenna)
     if start is None or motion is None:
         return first
-    into.note(topic, f"its first fix comes {(int(t_ns[0]) - int(motion.t_ns[0])) / 1e9:.1f} s after the drive's start: the map's origin is the start, "
-                     f"{np.linalg.norm(start):.2f} m from that fix by {motion.topic}")
+    into.note(topic, f"its first fix comes {max(int(t_ns[0]) - int(motion.t_ns[0]), 0) / 1e9:.1f} s after the drive's start: the map's origin is the robot's start, "
+                     f"{np.linalg.norm(start):.2f} m from that fix by {motion.topic}" + (" and the antenna's place" if antenna.any() else ""))
     return [*place_of(first, start[0], start[1])[:2], first[2]]
 
 
@@ -134,9 +164,13 @@ def write(into: Collection, given: argparse.Namespace, base: str, motion: Motion
         into.refuse(topic, "it never has a fix")
         return
     t, arrival, values = t[ok], arrival[ok], values[ok]
+    stale = _stale(into, topic, motion, t, values)
+    t, arrival, values = t[stale:], arrival[stale:], values[stale:]
     altitude = _altitude(into, topic, values[:, 2])
     known = altitude[np.isfinite(altitude)]
-    origin = list(given.origin or _origin(into, topic, motion, t, values, known))
+    place = _antenna(into, topic, samples.frame, base)
+    antenna = np.array(place["mounting"]["xyz_m"][:2] if place else [0.0, 0.0])
+    origin = list(given.origin or _origin(into, topic, motion, t, values, known, antenna))
     # Without an altitude the place on the ground follows from one like it: 10 m change it by 1.6 parts in a million.
     height = np.where(np.isfinite(altitude), altitude, np.median(known) if len(known) else origin[2])
     east, north, up = tangent_plane(origin, values[:, 0], values[:, 1], height).T
@@ -144,10 +178,10 @@ def write(into: Collection, given: argparse.Namespace, base: str, motion: Motion
     into.writer.table("gnss.csv", without_arrival({
         "t_ns": t, "x_m": east, "y_m": north, "z_m": np.where(np.isfinite(altitude), up, np.nan), "sigma_xy_m": xy,
         "sigma_z_m": z, "arrival_ns": arrival}))
-    into.writer.calibration["gnss"] = {"origin": [float(value) for value in origin], **_antenna(into, topic, samples.frame, base)}
+    into.writer.calibration["gnss"] = {"origin": [float(value) for value in origin], **place}
 
 
-def _antenna(into: Collection, topic: str, frame: str, base: str) -> dict[str, object]:
+def _antenna(into: Collection, topic: str, frame: str, base: str) -> dict[str, dict[str, list[float]]]:
     matrix = into.frames.transform(frame, base)
     if matrix is not None:
         return {"mounting": {"xyz_m": mounting(matrix)["xyz_m"]}}
