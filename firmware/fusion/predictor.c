@@ -10,11 +10,35 @@ void wm_predictor_init(wm_predictor *self, const wm_predictor_params *params, wm
   memset(self, 0, sizeof *self);
   self->params = *params;
   self->odometry = odometry;
-  self->last_t_ns = WM_TIME_NONE;
+  self->last_t_ns = self->fed_ns = WM_TIME_NONE;
+  for (size_t i = 0; i < WM_SOURCES_MAX; i++) self->source_ns[i] = WM_TIME_NONE;
+}
+
+// Whether an event holds rates alone, which mean the same a moment later; counts and increments belong to their stamps.
+static int has_rates_alone(const wm_event *event) {
+  if (event->kind != WM_EVENT_QUANTITIES) return event->kind == WM_EVENT_TWIST2 || event->kind == WM_EVENT_TWIST6;
+  for (uint8_t i = 0; i < event->as.quantities.count; i++)
+    if (event->as.quantities.id[i] == WM_Q_WHEEL_TICKS_LEFT || event->as.quantities.id[i] == WM_Q_WHEEL_TICKS_RIGHT)
+      return 0;
+  return 1;
 }
 
 void wm_predictor_motion(wm_predictor *self, const wm_event *event) {
-  if (wm_odometry_feed(self->odometry, event) != WM_OK) self->odometry_refused++;
+  wm_time_ns *newest_ns = event->source < WM_SOURCES_MAX ? &self->source_ns[event->source] : NULL;
+  const int is_its_newest = newest_ns && (*newest_ns == WM_TIME_NONE || event->t_ns > *newest_ns);
+  wm_status status = wm_odometry_feed(self->odometry, event);
+  if (status == WM_TIME_RAN_BACK && is_its_newest && has_rates_alone(event)) {
+    // Another sensor's data were quicker (a bus beside a gyro): the value holds from now on.
+    wm_event now = *event;
+    now.t_ns = self->fed_ns;
+    status = wm_odometry_feed(self->odometry, &now);
+  }
+  if (status != WM_OK) {
+    self->odometry_refused++;
+    return;
+  }
+  if (is_its_newest) *newest_ns = event->t_ns;
+  if (self->fed_ns == WM_TIME_NONE || event->t_ns > self->fed_ns) self->fed_ns = event->t_ns;
 }
 
 void wm_predictor_fused(wm_predictor *self, const wm_estimate *fused, const wm_motion_calibration *calibration) {

@@ -8,6 +8,7 @@
 #include "waymark/estimator.h"
 #include "waymark/motion.h"
 #include "waymark/pose.h"
+#include "waymark/source.h"
 
 typedef struct wm_predictor_params {
   double jump_m, jump_rad;  // map against odom: larger moves between two messages count as jumps
@@ -25,6 +26,8 @@ typedef struct wm_predictor {
   uint32_t resets, jumps;
   double last_jump_m, last_jump_rad;
   uint64_t odometry_refused;  // motion events that the odometry refused
+  wm_time_ns fed_ns;          // newest motion, of all sources and of each; WM_TIME_NONE: none
+  wm_time_ns source_ns[WM_SOURCES_MAX];
 } wm_predictor;
 
 // `odometry` is initialised and outlives the predictor.

@@ -59,6 +59,24 @@ TEST(it_carries_the_fused_pose_to_now) {
   TEST_ASSERT_EQUAL_UINT32(0, p.status_flags);
 }
 
+// A speed that comes 100 ms later than a gyro's rates, as over a slow bus, holds from when it comes; a row of its own
+// past is refused.
+TEST(data_that_are_later_than_another_sensor_s_count) {
+  wm_published p;
+  for (int ms = 0; ms <= 1000; ms += 10) {
+    wm_event gyro = {.t_ns = ms * MS, .arrival_ns = ms * MS, .kind = WM_EVENT_QUANTITIES, .source = 1};
+    gyro.as.quantities = (wm_quantities){.count = 1, .id = {WM_Q_YAW_RATE}, .value = {0.5}};
+    wm_predictor_motion(&predictor, &gyro);
+    if (ms >= 100) move(ms - 100, 1, 0.2);
+  }
+  TEST_ASSERT_EQUAL_UINT64(0, predictor.odometry_refused);
+  fuse(900, 0, 0, 0, 0);
+  TEST_ASSERT_EQUAL(1, wm_predictor_publish(&predictor, 1000 * MS, &p));
+  TEST_ASSERT_DOUBLE_WITHIN(0.002, 0.1, p.now.pose_map_base.p_m[0]);
+  move(400, 5, 0);
+  TEST_ASSERT_EQUAL_UINT64(1, predictor.odometry_refused);
+}
+
 TEST(stamps_rise_strictly) {
   wm_published p;
   move(0, 1, 0);
