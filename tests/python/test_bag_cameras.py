@@ -6,12 +6,14 @@
 
 import io
 import unittest
+from types import SimpleNamespace
 
 import numpy as np
 from bag_files import M, START_NS, BagTest, Events, camera_info, grey_ramp, image
 from PIL import Image
 
 import waymark
+from waymark.bag.cameras import Cameras
 
 STEP_NS = 100_000_000
 SIZE = (64, 48)
@@ -238,6 +240,25 @@ class Lenses(BagTest):
         self.assertEqual(waymark.Recording(folder).calibration["cameras"]["cam"]["intrinsics"], list(map(float, K)))
         self.assertIn("its camera_info changes at 1700000002.003 s", text)
         self.assertIn("the first 2 messages of /cam/camera_info are of a camera that is not calibrated", text)
+
+    def test_a_definition_without_a_field_costs_its_messages(self):
+        with self.assertRaises(AttributeError):
+            Cameras().camera_info("/cam/camera_info", SimpleNamespace(header=M.header(0, "c"), k=np.ones(9), p=np.ones(12), d=np.zeros(5)), 0)
+
+    def test_a_lens_without_pictures_is_that_of_its_tags(self):
+        events = Events().drive()
+        for i in range(3):
+            t_ns = START_NS + i * STEP_NS
+            events.put("/front/camera_info", "CameraInfo", t_ns, camera_info(t_ns, "front_optical"))
+            events.put("/front/image_raw", "sensor_msgs/Image", t_ns, image(t_ns, "front_optical", RAMP.astype(np.uint16), "16UC1"))
+            events.put("/rear/image_raw", "sensor_msgs/Image", t_ns, image(t_ns, "rear_optical", RAMP, "mono8"))
+            tag = M.make("AprilTagDetection", family="tag36h11", id=7, homography=np.zeros(9),
+                         corners=[M.make("apriltag_msgs/Point", x=float(x), y=float(y)) for x, y in ((10, 30), (30, 31), (31, 10), (11, 9))])
+            events.put("/front/detections", "AprilTagDetectionArray", t_ns, M.make("AprilTagDetectionArray", header=M.header(t_ns, "front_optical"), detections=[tag]))
+        _, folder = self.take(events.mcap(self.folder / "a.mcap"))
+        recording = waymark.Recording(folder)
+        self.assertEqual(set(recording.table("marker-corners.csv")["sensor"]), {"front"})
+        self.assertEqual(list(recording.calibration["cameras"]), ["front"])
 
     def test_ros_1_spells_it_in_capitals(self):
         for compression in (None,):

@@ -47,6 +47,7 @@ class Found:
     info: Any = None
     is_rectified: bool = False
     has_pictures: bool = True
+    is_spare: bool = False  # its pictures are not taken: it counts where tags were seen by it
 
 
 @dataclass
@@ -107,6 +108,7 @@ class Cameras:
         """Keeps the first camera_info that has a lens."""
         info = self.infos.get(topic)
         if info is None:
+            lenses.of(message, False, None)  # a definition that lacks a field shows here, where it costs a message
             info = self.infos[topic] = Info(names.camera_info(topic))
         info.frame = info.frame or message.header.frame_id.lstrip("/")
         if info.message is None:
@@ -134,11 +136,12 @@ class Cameras:
                                   camera.topic.is_rectified or info.topic.is_rectified, camera.size))
         folders = {name.folder for name in self._others}
         for topic, info in sorted(self.infos.items()):
-            if topic in used or info.topic.folder in folders or any(info.topic.folder == camera.topic.folder for camera in cameras):
+            if topic in used or any(info.topic.folder == camera.topic.folder for camera in cameras):
                 continue
             name = info.topic.camera
             if name not in {found.name for found in out}:
-                out.append(self._with(Found(name, Lens(None), info.frame, info.topic.folder, has_pictures=False), info, info.topic.is_rectified, None))
+                out.append(self._with(Found(name, Lens(None), info.frame, info.topic.folder, has_pictures=False, is_spare=info.topic.folder in folders),
+                                      info, info.topic.is_rectified, None))
         return out
 
     @staticmethod
@@ -185,5 +188,7 @@ def of_detections(cameras: list[Found], topic: str, frame: str) -> Found | None:
     """The camera that saw what a topic reports: that of its frame, else that of its namespace, else the only one."""
     folder = tuple(part for part in topic.split("/") if part)[:-1]
     same = [camera for camera in cameras if frame and camera.frame == frame]
-    choice = same or [camera for camera in cameras if names.common(camera.folder, folder)] or (cameras if len(cameras) == 1 else [])
+    near = [camera for camera in cameras if names.common(camera.folder, folder)]
+    alone = [camera for camera in cameras if not camera.is_spare]
+    choice = same or near or (alone if len(alone) == 1 and not (frame and alone[0].frame) else [])
     return max(choice, key=lambda camera: (camera.has_pictures, names.common(camera.folder, folder), camera.name)) if choice else None

@@ -94,6 +94,8 @@ def write(into: Collection, base: str, rectified_tags: bool | None) -> None:
     for name, topic in into.sight.topics.items():
         into.writer.restamp(name, into.clocks[topic])
     found = into.sight.cameras.found()
+    seeing = {id(cameras.of_detections(found, topic, rows.frame)) for topic, rows in into.sight.tags.items()}
+    found = [camera for camera in found if not camera.is_spare or id(camera) in seeing]
     entries: dict[str, dict[str, Any]] = {}
     for camera in found:
         label = f"camera {camera.name}"
