@@ -52,8 +52,9 @@ typedef struct wm_assembly {
   size_t unused_count;
   const char *calibration_text;
   size_t calibration_length;
-  wm_vision *vision;  // sources of pictures; NULL where there are none
-  const void *kept;   // map of an earlier run for the estimator (waymark/keeper.h); NULL: none
+  const wm_mounting *imu;  // of calibration.yaml
+  wm_vision *vision;       // sources of pictures; NULL where there are none
+  const void *kept;        // map of an earlier run for the estimator (waymark/keeper.h); NULL: none
   size_t kept_bytes;
   const char *map_path;               // NULL where the estimator takes no map
   char recording[WM_NAME_MAX + 96];   // the recording's name

@@ -19,17 +19,20 @@
 #define NEAR 0.1            // of a factor that is named: 57.3 within 10 %
 #define NOTHING_SHARE 0.15  // of the other's root mean square, over NOTHING_WINDOWS together: shows no turn
 #define NOTHING_WINDOWS 8
-#define LONE_ZEROS_MIN 0.2  // share of the values; a wheel that turns slowly has a few
-#define OBEYED 0.98         // a command that fits better is no command
+#define LONE_ZEROS_MIN 0.2   // share of the values; a wheel that turns slowly has a few
+#define OBEYED 0.98          // a command that fits better is no command
+#define BIAS_MAX_RADPS 0.05  // of a gyro beside another sensor's turn; below, the estimators' states hold it
 #define DEGREES (180 / M_PI)
 #define KMH 3.6
+#define G_MPS2 9.80665
 
 typedef struct fit {
   double aa, bb, ab;  // sums over the windows
-  double total[2];    // of the sizes: rad or m
-  double coarse[2];   // root mean square over several windows together, of a rate
-  double r;           // correlation about zero
-  double lag_s;       // by which b is later
+  double a, b;
+  double total[2];   // of the sizes: rad or m
+  double coarse[2];  // root mean square over several windows together, of a rate
+  double r;          // correlation about zero
+  double lag_s;      // by which b is later
   size_t count;
 } fit;
 
@@ -48,6 +51,8 @@ static fit fit_at(const channel *a, const channel *b, int lag) {
     out.aa += x * x;
     out.bb += y * y;
     out.ab += x * y;
+    out.a += x;
+    out.b += y;
     out.total[0] += fabs(x);
     out.total[1] += fabs(y);
     out.count++;
@@ -175,6 +180,18 @@ static const char *name_of(const channel *c, const wm_assembly *assembly, char *
   return out;
 }
 
+// Of a and b without their means: what a shows where b is 0 (rad/s), where the two are alike otherwise; else 0.
+static double bias_of(const fit *f) {
+  const double n = (double)f->count;
+  if (n < PAIRS_MIN) return 0;
+  const double aa = f->aa - f->a * f->a / n, bb = f->bb - f->b * f->b / n, ab = f->ab - f->a * f->b / n;
+  const int b_is_steady = bb < 1e-3 * f->aa, a_is_steady = aa < 0.1 * f->a * f->a / n;
+  if (b_is_steady) return a_is_steady && fabs(f->b) < 0.2 * fabs(f->a) ? f->a / n / WINDOW_S : 0;
+  const double factor = ab / bb;
+  if (ab < FIT_MIN * sqrt(aa * bb) || factor > FACTOR_MIN || factor < 1 / FACTOR_MIN) return 0;
+  return (f->a - factor * f->b) / n / WINDOW_S;
+}
+
 typedef struct scene {
   const channels *all;
   const wm_assembly *assembly;
@@ -188,19 +205,50 @@ static int is_upside_down(const channels *all, uint16_t source) {
   return n > 0 && a[2] / n < -0.7 * sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]) / n && a[2] / n < -2;
 }
 
+static void matrix_of(const double rpy[3], double out[3][3]) {
+  const double sr = sin(rpy[0]), cr = cos(rpy[0]), sp = sin(rpy[1]), cp = cos(rpy[1]), sy = sin(rpy[2]),
+               cy = cos(rpy[2]);
+  const double m[3][3] = {{cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr},
+                          {sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr},
+                          {-sp, cp * sr, cp * cr}};
+  memcpy(out, m, sizeof m);
+}
+
+// The line that mounts an IMU which, on the axes of base_link as they are stated, has to be turned by rpy_deg more.
+static const char *mounting_line(const scene *s, double roll_deg, double pitch_deg, char *out, size_t capacity) {
+  static const double kNone[3] = {0, 0, 0};
+  const double more[3] = {roll_deg / DEGREES, pitch_deg / DEGREES, 0};
+  double by[3][3], old[3][3], m[3][3];
+  matrix_of(more, by);
+  matrix_of(s->assembly->imu ? s->assembly->imu->rpy_rad : kNone, old);
+  for (int i = 0; i < 3; i++)
+    for (int k = 0; k < 3; k++) m[i][k] = by[i][0] * old[0][k] + by[i][1] * old[1][k] + by[i][2] * old[2][k];
+  const int is_upright = fabs(m[2][0]) < 1 - 1e-9;  // else roll and yaw are one
+  const double rpy[3] = {is_upright ? atan2(m[2][1], m[2][2]) : 0, asin(fmax(-1, fmin(1, -m[2][0]))),
+                         is_upright ? atan2(m[1][0], m[0][0]) : atan2(-m[0][1], m[1][1])};
+  double deg[3];
+  for (int i = 0; i < 3; i++) {
+    deg[i] = round(rpy[i] * DEGREES * 10) / 10 + 0.0;
+    if (deg[i] == -180) deg[i] = 180;
+  }
+  (void)snprintf(out, capacity, "`imu: {mounting: {rpy_deg: [%g, %g, %g]}}`", deg[0], deg[1], deg[2]);
+  return out;
+}
+
 static void sign_line(const scene *s, const channel *c, char *fix, size_t capacity) {
   const char *source = source_of(c, s->assembly);
+  char line[96];
   if (is_can(c, s->assembly))
     (void)snprintf(fix, capacity,
                    "`scale: -1` at the one that is not positive to the left; or left and right are swapped");
   else if (c->kind == CHANNEL_YAW_RATE && is_upside_down(s->all, c->source))
-    (void)snprintf(fix, capacity, "it hangs upside down. calibration.yaml: `imu: {mounting: {rpy_deg: [180, 0, 0]}}`");
+    (void)snprintf(fix, capacity, "it hangs upside down. calibration.yaml: %s",
+                   mounting_line(s, 180, 0, line, sizeof line));
   else if (c->kind == CHANNEL_YAW_RATE)
     (void)snprintf(
         fix, capacity,
-        "calibration.yaml: `imu: {mounting: {rpy_deg: [180, 0, 0]}}` where it hangs upside down; else %s.csv: "
-        "wz_radps times -1: positive is to the left",
-        source);
+        "calibration.yaml: %s where it hangs upside down; else %s.csv: wz_radps times -1: positive is to the left",
+        mounting_line(s, 180, 0, line, sizeof line), source);
   else
     (void)snprintf(fix, capacity, "%s.csv: %s times -1: positive is to the left", source, word_of(c, s->assembly));
 }
@@ -265,10 +313,11 @@ static const channel *other_axis(const channels *all, const channel *gyro, const
   return NULL;
 }
 
-// rpy_deg by which the axis that turns, by its sign, becomes z.
-static const char *turned_mounting(const channel *axis, double r) {
-  if (axis->kind == CHANNEL_ROLL_RATE) return r > 0 ? "[0, -90, 0]" : "[0, 90, 0]";
-  return r > 0 ? "[90, 0, 0]" : "[-90, 0, 0]";
+// The mounting by which the axis that turns, by its sign, becomes z.
+static const char *turned_mounting(const scene *s, const channel *axis, double r, char *out, size_t capacity) {
+  const double by_deg = r > 0 ? 90 : -90;
+  return axis->kind == CHANNEL_ROLL_RATE ? mounting_line(s, 0, -by_deg, out, capacity)
+                                         : mounting_line(s, by_deg, 0, out, capacity);
 }
 
 static void shows_nothing(const scene *s, const channel *quiet, const channel *other, const fit *f) {
@@ -286,7 +335,8 @@ static void shows_nothing(const scene *s, const channel *quiet, const channel *o
   const wm_severity severity = are_commands(s->all, other) && !is_constant ? WM_SEVERITY_NOTE : WM_SEVERITY_BAD;
   const channel *axis = quiet->kind == CHANNEL_YAW_RATE ? other_axis(s->all, quiet, other, &r) : NULL;
   if (axis) {
-    (void)snprintf(fix, sizeof fix, "calibration.yaml: `imu: {mounting: {rpy_deg: %s}}`", turned_mounting(axis, r));
+    char line[96];
+    (void)snprintf(fix, sizeof fix, "calibration.yaml: %s", turned_mounting(s, axis, r, line, sizeof line));
     wm_find(s->out, WM_FOUND_SENSORS_DISAGREE, WM_SEVERITY_BAD, about, fix,
             "%s shows no turn where %s turns (%.1f rad), but its %s does (r %.2f): its %s axis is up", name, of, turned,
             word_of(axis, s->assembly), r, axis->kind == CHANNEL_ROLL_RATE ? "x" : "y");
@@ -336,6 +386,26 @@ static void disagrees(const scene *s, const channel *c, const channel *other, co
       ->size = factor;
 }
 
+// Whether a gyro shows a turn where another sensor shows none, in the mean of the drive: it is said then.
+static int has_bias(const scene *s, const channel *c, const channel *other) {
+  if (c->kind != CHANNEL_YAW_RATE || !other->has_scale || are_commands(s->all, other)) return 0;
+  const fit f = best_fit(c, other);
+  const double bias = bias_of(&f);
+  if (!(fabs(bias) > BIAS_MAX_RADPS)) return 0;
+  char name[96], of[96], fix[WM_FINDING_FIX_MAX];
+  if (is_can(c, s->assembly))
+    (void)snprintf(fix, sizeof fix,
+                   "can-signals.yaml: `offset: %.3g` at yaw_rate; and let the gyro find its zero at rest", -bias);
+  else
+    (void)snprintf(fix, sizeof fix, "%s.csv: wz_radps less %.3g; and let the gyro find its zero at rest",
+                   source_of(c, s->assembly), bias);
+  wm_find(s->out, WM_FOUND_SENSORS_DISAGREE, WM_SEVERITY_BAD, source_of(c, s->assembly), fix,
+          "%s shows %.3f rad/s where %s shows no turn: its zero is off", name_of(c, s->assembly, name, sizeof name),
+          bias, name_of(other, s->assembly, of, sizeof of))
+      ->size = bias;
+  return 1;
+}
+
 // Channels of one quantity. The one that agrees with most of the others is the measure of them.
 static void judge_quantity(const scene *s, int of_way) {
   const channel *of[CHANNELS_MAX];
@@ -357,6 +427,7 @@ static void judge_quantity(const scene *s, int of_way) {
   for (size_t i = 0; i < count; i++) {
     if (i == best) continue;
     const contradiction how = compare(of[i], of[best], &f);
+    if (how != OTHER_SIGN && (has_bias(s, of[i], of[best]) || has_bias(s, of[best], of[i]))) continue;
     if (how == FIRST_SHOWS_NOTHING)
       shows_nothing(s, of[i], of[best], &f);
     else if (how == SECOND_SHOWS_NOTHING)
@@ -368,8 +439,10 @@ static void judge_quantity(const scene *s, int of_way) {
 
 // An accelerometer at rest, or on the average of a drive, measures 9.8 m/s2 upwards.
 static void judge_gravity(const scene *s, uint16_t source) {
-  static const char *const kMountings[3][2] = {
-      {"[0, -90, 0]", "[0, 90, 0]"}, {"[90, 0, 0]", "[-90, 0, 0]"}, {"", "[180, 0, 0]"}};
+  static const struct {
+    double size;
+    const char *unit;
+  } kUnits[] = {{1, "g"}, {1000, "thousandths of g"}, {100 * G_MPS2, "cm/s2"}};
   const double n = (double)s->all->accelerations[source];
   double a[3], size = 0;
   if (n < 100) return;
@@ -382,20 +455,28 @@ static void judge_gravity(const scene *s, uint16_t source) {
   size = sqrt(size);
   const char *about = wm_assembly_source_name(s->assembly, source);
   char fix[WM_FINDING_FIX_MAX];
-  if (size > 0.9 && size < 1.1) {
-    wm_find(s->out, WM_FOUND_VALUE_IMPLAUSIBLE, WM_SEVERITY_BAD, about,
-            "its accelerations are in g: times 9.80665 (ax_mps2, ay_mps2, az_mps2)",
+  const char *unit = NULL;
+  double off = NEAR;
+  for (size_t i = 0; i < sizeof kUnits / sizeof kUnits[0]; i++) {
+    if (!(fabs(size / kUnits[i].size - 1) < off)) continue;
+    off = fabs(size / kUnits[i].size - 1);
+    unit = kUnits[i].unit;
+  }
+  if (unit || size > 3 * G_MPS2) {
+    (void)snprintf(fix, sizeof fix, "its accelerations are in %s: times %.6g (ax_mps2, ay_mps2, az_mps2)",
+                   unit ? unit : "another unit", G_MPS2 / size);
+    wm_find(s->out, WM_FOUND_VALUE_IMPLAUSIBLE, WM_SEVERITY_BAD, about, fix,
             "the mean of its acceleration is %.2f m/s2, gravity is 9.8", size);
     return;
   }
   // Within 45 degrees of up, or no gravity in it: a tilt is the mounting's own business.
   if (wm_findings_has(s->out, WM_FOUND_SENSORS_DISAGREE, about)) return;
   if (size < 8 || size > 11.5 || (axis == 2 && a[2] > 0) || fabs(a[axis]) < 0.9 * size) return;
-  (void)snprintf(
-      fix, sizeof fix,
-      "calibration.yaml: `imu: {mounting: {rpy_deg: %s}}`, with the last number by its direction; of one that is "
-      "given already, correct it%s",
-      kMountings[axis][a[axis] < 0], axis == 2 ? "; or all accelerations have the other sign" : "");
+  const double by_deg = axis == 2 ? 180 : a[axis] > 0 ? 90 : -90;
+  char line[96];
+  (void)snprintf(fix, sizeof fix, "calibration.yaml: %s, with the last number by its direction%s",
+                 mounting_line(s, axis == 0 ? 0 : by_deg, axis == 0 ? -by_deg : 0, line, sizeof line),
+                 axis == 2 ? "; or all accelerations have the other sign" : "");
   wm_find(s->out, WM_FOUND_SENSORS_DISAGREE, WM_SEVERITY_BAD, about, fix,
           "its accelerometer shows gravity on %s%c: that axis is up, not z", a[axis] < 0 ? "-" : "", "xyz"[axis])
       ->size = a[axis];

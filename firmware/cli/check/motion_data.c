@@ -202,13 +202,15 @@ void motion_data_judge(const motion_data *self, const wm_assembly *assembly, uin
   uint64_t count[WM_Q_COUNT] = {0};
   uint32_t elsewhere = 0;  // quantities of CAN that another source gives
   const char *counter = ABOUT;
+  int has_can = 0;  // another source without any datum says so itself
   for (size_t s = 0; s < assembly->source_count && s < WM_SOURCES_MAX; s++) {
     elsewhere |= assembly->sources[s].drops;
+    has_can |= strncmp(assembly->sources[s].name, ABOUT, strlen(ABOUT)) == 0;
     for (unsigned q = 0; q < WM_Q_COUNT; q++) count[q] += self->at[s][q].count;
     if (self->at[s][WM_Q_WHEEL_TICKS_LEFT].count > 0) counter = assembly->sources[s].name;
   }
   for (unsigned q = 0; q < WM_Q_COUNT; q++)
-    if (((bound >> q) & 1u) && count[q] == 0 && !((elsewhere >> q) & 1u))
+    if (has_can && ((bound >> q) & 1u) && count[q] == 0 && !((elsewhere >> q) & 1u))
       wm_find(out, WM_FOUND_NO_DATA, WM_SEVERITY_BAD, ABOUT,
               "look at message and bus in can-signals.yaml, and at what candump receives",
               "%s is bound, but no frame with a value of it came", wm_quantity_name(q));

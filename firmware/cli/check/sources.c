@@ -90,7 +90,7 @@ static void counted(const wm_assembled_source *s, const source_facts *facts, wm_
 static void rate(const wm_assembled_source *s, const source_facts *facts, wm_findings *out) {
   const double seconds = wm_seconds_between(facts->first_ns, facts->last_ns);
   if (facts->events < EVENTS_MIN || facts->stamps < 2 || seconds <= 0) {
-    if (facts->events >= EVENTS_MIN && s->source->is_motion)
+    if (facts->events >= EVENTS_MIN && facts->stamps < 2 && s->source->is_motion)
       wm_find(out, WM_FOUND_RATE_IMPLAUSIBLE, WM_SEVERITY_BAD, s->name, NULL,
               "all of its %" PRIu64 " data have the same stamp", facts->events);
     return;
