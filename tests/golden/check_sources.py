@@ -206,6 +206,7 @@ FAULTS = [
     ("floats without their type, unsigned", can(valtype=False, signed="+"), ("bad", "value-implausible", "can"), "as a float", "SIG_VALTYPE_"),
     ("floats without their type, backwards", can(valtype=False, v=-1), ("bad", "value-implausible", "can"), "as a float", "SIG_VALTYPE_"),
     ("floats without their type, slow", can(valtype=False, v=0.01, w=0.1), ("bad", "value-implausible", "can"), "as a float", "SIG_VALTYPE_"),
+    ("what candump shows on the screen", {**can(), "can.log": "".join(f" ({START_NS / 1e9 + t:.6f})  can0  100   [2]  11 22\n" for t in times(10))}, ("bad", "refused-input", "setup"), "on the screen", ""),
     ("commands beside a gyro", {"motion.csv": commands(), "imu.csv": imu()}, ("note", "data-unused", "imu"), "the gyro is not used", "twist: measured"),
     ("nobody takes the edge points", {**both(), "points.csv": "t_ns,x_m,y_m\n" + "".join(f"{ns(k / 10)},2.0,0.1\n" for k in range(600)), "config.yaml": "format: waymark-config/1\nestimator: slam\n"}, ("bad", "data-unused", "points"), "these do: edge_mcl", "use: false"),
     ("positions of ten times their sigma", {"motion.csv": motion(), "gnss.csv": gnss(sigma=0.01, stated=2.0), "config.yaml": "format: waymark-config/1\nestimator: landmark_ekf\n"}, ("bad", "noise-too-large", "gnss"), "of what is stated", "real sigma"),
