@@ -28,6 +28,9 @@ std::string read_unpacked(const std::filesystem::path &path) {
   }
   const bool is_cut = gzclose(file.release()) == Z_BUF_ERROR;
   if (n < 0 || is_cut) throw Failure(path.string() + ": is packed by gzip, and damaged or cut off");
+  if (out.rfind("\xef\xbb\xbf", 0) == 0) out.erase(0, 3);  // a byte order mark, which editors of Windows write
+  if (out.rfind("\xff\xfe", 0) == 0 || out.rfind("\xfe\xff", 0) == 0)
+    throw Failure(path.string() + ": is written in UTF-16; save it as UTF-8");
   return out;
 }
 

@@ -126,7 +126,7 @@ class Mountings {
           robot.urdf->base + "; poses are of this point");
   }
 
-  std::optional<images::Pose> of(const std::string &name, std::string &by) const {
+  std::optional<images::Pose> of(const std::string &name, std::string &by, bool is_camera = false) const {
     if (const std::string text = value_for(robot_.wish.mountings, name, "--mounting"); !text.empty()) {
       by = "given";
       return parse_mounting(name, text);
@@ -140,7 +140,7 @@ class Mountings {
           robot_.wish.urdf + ": there is no link '" + link + "' (--frame " + name + "=" + link + "); it has " + known,
           tools::kUsage);
     }
-    if (link.empty()) link = robot_.urdf->link_of(name);
+    if (link.empty()) link = robot_.urdf->link_of(name, is_camera, robot_.wish.cameras.size() == 1);
     if (link.empty()) return std::nullopt;
     const auto moving = robot_.urdf->moving.find(link);
     if (moving != robot_.urdf->moving.end())
@@ -223,7 +223,7 @@ void mount(Robot &robot, const Mountings &mountings, std::vector<Imported> &of_c
     RobotCamera &camera = robot.cameras[i];
     const std::optional<ChainCamera> &chain = of_camera[i].chain;
     const std::string file = std::filesystem::path(of_camera[i].file).filename().string();
-    std::optional<images::Pose> own = mountings.of(camera.entry.name, camera.mounted_by), by_chain;
+    std::optional<images::Pose> own = mountings.of(camera.entry.name, camera.mounted_by, true), by_chain;
     const bool given = own && camera.mounted_by == "given";
     if (chain && chain->in_imu && imu) {
       by_chain = *imu * *chain->in_imu;

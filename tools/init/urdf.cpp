@@ -12,15 +12,46 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 #endif
+#include <set>
+#include <sstream>
 
 namespace wm::init {
 
-std::string Urdf::link_of(const std::string &name) const {
+namespace {
+
+// What a link's name says beside the words that many have: "front_camera_optical_frame" says "front" of a camera.
+std::set<std::string> own_words(const std::string &name, bool is_camera) {
+  static const std::set<std::string> kOfAll{"link", "frame", "optical", "sensor", "base"}, kOfCameras{"camera", "cam"};
+  std::set<std::string> out;
+  std::istringstream words(name);
+  for (std::string word; std::getline(words, word, '_');)
+    if (!word.empty() && !kOfAll.contains(word) && !(is_camera && kOfCameras.contains(word))) out.insert(word);
+  return out;
+}
+
+bool is_of_a_camera(const std::string &link) {
+  const std::set<std::string> words = own_words(link, false);
+  return words.contains("camera") || words.contains("cam");
+}
+
+}  // namespace
+
+std::string Urdf::link_of(const std::string &name, bool is_camera, bool is_only) const {
   for (const char *end : {"", "_optical_frame", "_optical", "_link", "_frame"})
     if (links.contains(name + end)) return name + end;
-  return "";
+  std::string best, camera;
+  std::set<std::set<std::string>> cameras;
+  const auto take = [](std::string &to, const std::string &link) {  // one with z along the view, else the shortest name
+    const auto rank = [](const std::string &l) { return std::pair(l.find("optical") == std::string::npos, l.size()); };
+    if (to.empty() || rank(link) < rank(to)) to = link;
+  };
+  for (const auto &[link, pose] : links) {
+    if (is_camera && !is_of_a_camera(link)) continue;
+    if (is_camera) cameras.insert(own_words(link, true)), take(camera, link);
+    if (own_words(link, is_camera) == own_words(name, is_camera)) take(best, link);
+  }
+  return best.empty() && is_only && cameras.size() == 1 ? camera : best;
 }
 
 images::Pose Urdf::body(const std::string &link) const {
@@ -51,8 +82,8 @@ class UrdfReader {
   Urdf read(const std::string &text) {
     tinyxml2::XMLDocument doc;
     if (doc.Parse(text.data(), text.size()) != tinyxml2::XML_SUCCESS)
-      throw tools::Failure(path_ + ":" + std::to_string(doc.ErrorLineNum()) + ": not valid XML (" + doc.ErrorName() +
-                           ")");
+      throw tools::Failure(path_ + ":" + std::to_string(doc.ErrorLineNum()) +
+                           ": is no XML from here on: cut off, a tag that is not closed, or no URDF at all");
     const XMLElement *robot = doc.RootElement();
     if (robot == nullptr || std::string(robot->Name()) != "robot")
       fail(robot, "a URDF begins with <robot>; of a xacro file `xacro FILE > robot.urdf` makes one");

@@ -60,6 +60,36 @@ struct Noted {
   const char *type, *place, *text;  // "": no such note
 };
 
+// Links of URDFs that people have, the sensor's name, whether it is a camera and the only one, and the link that is
+// its.
+TEST(test_links_by_what_their_names_say) {
+  const struct {
+    std::vector<std::string> links;
+    std::string name;
+    bool is_camera, is_only;
+    std::string right;
+  } rows[] = {
+      {{"base_link", "front_camera_link", "front_camera_optical_frame", "rear_camera_link"},
+       "front",
+       true,
+       false,
+       "front_camera_optical_frame"},
+      {{"base_link", "camera_front", "camera_rear"}, "rear", true, false, "camera_rear"},
+      {{"base_link", "camera_link", "camera_optical_frame"}, "front", true, true, "camera_optical_frame"},
+      {{"base_link", "camera_link"}, "front", true, false, ""},
+      {{"base_link", "camera_color_frame", "camera_depth_frame"}, "front", true, true, ""},
+      {{"base_link", "base_imu_link"}, "imu", false, false, "base_imu_link"},
+      {{"base_link", "imu_sensor_frame", "imu"}, "imu", false, false, "imu"},
+      {{"base_link", "front_camera_link"}, "front", false, false, ""},
+      {{"base_link", "front_left_camera", "front_right_camera"}, "left", true, false, ""},
+  };
+  for (const auto &row : rows) {
+    Urdf urdf;
+    for (const std::string &link : row.links) urdf.links[link] = images::Pose::Identity();
+    TEST_ASSERT_EQUAL_STRING(row.right.c_str(), urdf.link_of(row.name, row.is_camera, row.is_only).c_str());
+  }
+}
+
 TEST(test_urdfs_that_are_not_meant_so) {
   if (!can_read_urdf()) TEST_IGNORE_MESSAGE("this build reads no URDF");
   const char *const kPlain = "<origin xyz=\"0.3 0 0.5\" rpy=\"0 0.35 0\"/>";
