@@ -63,6 +63,7 @@ class Columns(Folder):
                               (np.array([1e18, np.nan]), "row 1 has nan"),
                               (np.array([1e18, 1e30]), "row 1 has 1e.30"),
                               (np.zeros((2, 2)), "has the shape .2, 2."),
+                              (["2023-11-14T00:00:00", "2023-11-14T00:00:01"], "t_ns holds text .'2023-11-14T00:00:00'.; whole nanoseconds"),
                               (np.array([1j, 2j]), "holds complex128")):
             with self.assertRaisesRegex(ValueError, words):
                 self.written(stamps)
@@ -72,9 +73,18 @@ class Columns(Folder):
                               ({"temperature": np.zeros(2)}, "temperature is not one of this table; it has t_ns, arrival_ns, v_mps"),
                               ({"vy_mps": np.zeros(3)}, "different lengths: vy_mps 3 where others have 2"),
                               ({"vy_mps": np.array(STAMPS, dtype="datetime64[ns]")}, "only stamps .columns that end in _ns. are times"),
-                              ({"vy_mps": np.array([None, 1.0])}, "vy_mps holds NoneType; numbers or names")):
+                              ({"vy_mps": ["1", "x"]}, "vy_mps holds text .'1'.; numbers are needed"),
+                              ({"vy_mps": np.array([None, 1.0])}, "vy_mps holds NoneType; numbers are needed")):
             with self.assertRaisesRegex(ValueError, words):
                 self.written(STAMPS, **others)
+        with self.assertRaisesRegex(ValueError, "did you mean motion.csv"), waymark.RecordingWriter(self.folder / "c") as writer:
+            writer.table("motoin.csv", {"t_ns": np.array(STAMPS)})
+        with self.assertRaisesRegex(TypeError, "a table is columns by name, and not list"), waymark.RecordingWriter(self.folder / "d") as writer:
+            writer.table("motion.csv", [STAMPS])
+        with waymark.RecordingWriter(self.folder / "e") as writer:
+            writer.table("motion.csv", {"t_ns": np.array(STAMPS), "v_mps": np.ones(2), "w_radps": np.ones(2)})
+        with self.assertRaisesRegex(FileNotFoundError, "it has no table imu.csv; it has motion.csv"):
+            waymark.Recording(self.folder / "e").table("imu.csv")
         with self.assertRaisesRegex(ValueError, "w_radps is missing"), waymark.RecordingWriter(self.folder / "b") as writer:
             writer.table("motion.csv", {"t_ns": np.array(STAMPS), "v_mps": np.ones(2)})
         with self.assertRaisesRegex(ValueError, "names have no comma"):

@@ -81,7 +81,8 @@ bool is_bag(const std::filesystem::path &path) {
 
 // Whether an argument is the value of an option before it.
 bool is_value(const char *before) {
-  return std::string_view(before).substr(0, 2) == "--" && std::strchr(before, '=') == nullptr;
+  const std::string_view option(before);
+  return option.substr(0, 2) == "--" && option != "--as-is" && option.find('=') == std::string_view::npos;
 }
 
 int run_bag_import(char **argv) {

@@ -85,7 +85,7 @@ TEST(test_links_by_what_their_names_say) {
   };
   for (const auto &row : rows) {
     Urdf urdf;
-    for (const std::string &link : row.links) urdf.links[link] = images::Pose::Identity();
+    for (const std::string &link : row.links) urdf.links[link] = wm::images::Pose::Identity();
     TEST_ASSERT_EQUAL_STRING(row.right.c_str(), urdf.link_of(row.name, row.is_camera, row.is_only).c_str());
   }
 }

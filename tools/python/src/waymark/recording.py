@@ -6,7 +6,7 @@ import difflib
 import io
 import itertools
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TextIO
@@ -81,7 +81,11 @@ class CanFrame:
 
 def _known_columns(name: str, table: Table, where: str) -> None:
     """ValueError for a column that the runtime wouldn't read, or that it needs."""
+    if not isinstance(table, Mapping):
+        raise TypeError(f"{where}: a table is columns by name, and not {type(table).__name__}")
     if name not in COLUMNS:
+        if near := difflib.get_close_matches(name, COLUMNS, n=1, cutoff=0.8):
+            raise ValueError(f"{where}: no program reads a table of this name; did you mean {near[0]}?")
         return
     needed, others = COLUMNS[name]
     known = ("t_ns", "arrival_ns", *needed, *others)
@@ -128,6 +132,9 @@ class Recording:
 
     def table(self, name: str) -> Table:
         """A table by its file's name: "sightings.csv", "truth.csv", "landmarks.csv" ..."""
+        if not (self.path / name).is_file():
+            there = ", ".join(sorted(path.name for path in self.path.glob("*.csv")))
+            raise FileNotFoundError(f"{self.path}: it has no table {name}; it has {there or 'none'}")
         return read_table(self.path / name)
 
     def cameras(self) -> list[str]:

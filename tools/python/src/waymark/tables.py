@@ -2,6 +2,7 @@
 """CSV files of recordings and runs as columns: read and written without a loss."""
 
 import csv
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -16,6 +17,7 @@ Table: TypeAlias = dict[str, Array]
 
 _WORDS = {"sensor", "source", "state", "verdict", "residual", "picture", "cause"}
 _COUNTS = {"id", "landmark", "frame", "polyline", "resets"}
+_MEASURES = re.compile(r"_(m|mps|mps2|rad|radps|px|deg|hz|s)$")  # units of numbers
 _BLOCK_ROWS = 4096  # written at once
 ABSENT = -1
 """An empty field of a column of integers."""
@@ -105,6 +107,10 @@ def _whole(name: str, column: Array, where: str) -> Array:
     return column.astype(np.int64)
 
 
+def _needed(name: str) -> str:
+    return "whole nanoseconds (int64) or datetime64" if name.endswith("_ns") else "numbers" if _MEASURES.search(name) else "numbers or names"
+
+
 def as_column(name: str, values: Any, where: str) -> Array:
     """Values as a column of a table of that name: int64, float64 or str. ValueError in words where they can't be one."""
     column = np.asarray(values)
@@ -116,13 +122,14 @@ def as_column(name: str, values: Any, where: str) -> Array:
         column = np.char.decode(column, "utf-8")
     if column.dtype.kind == "U":
         bad = next((text for text in sorted(set(column.tolist())) if any(mark in text for mark in ',"\r\n')), None)
+        if column.size and (is_integer(name) or _MEASURES.search(name)):
+            raise ValueError(f"{where}: {name} holds text ({str(column[0])!r}); {_needed(name)} are needed")
         if bad is not None:
             raise ValueError(f"{where}: {name} is {bad!r}; names have no comma, quote or line end")
         return column
     if column.dtype.kind not in "biuf":
         kind = type(column.flat[0]).__name__ if column.dtype.kind == "O" and column.size else str(column.dtype)
-        needed = "whole nanoseconds (int64) or datetime64" if name.endswith("_ns") else "numbers or names"
-        raise ValueError(f"{where}: {name} holds {kind}; {needed} are needed")
+        raise ValueError(f"{where}: {name} holds {kind}; {_needed(name)} are needed")
     return _whole(name, column, where) if is_integer(name) and column.dtype.kind == "f" else column
 
 
