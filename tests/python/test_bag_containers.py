@@ -159,14 +159,18 @@ class Cut(BagTest):
     def rows(self, path, out):
         text, folder = self.take(path, out=out)
         t = waymark.Recording(folder).table("motion.csv")["t_ns"]
-        self.assertEqual(t.tolist(), [START_NS + i * 50_000_000 for i in range(len(t))])
+        if ".db3" in out:  # pages of a database are not in the order of its rows
+            self.assertLessEqual(set(t.tolist()), {START_NS + i * 50_000_000 for i in range(400)})
+        else:
+            self.assertEqual(t.tolist(), [START_NS + i * 50_000_000 for i in range(len(t))])
         return text, len(t)
 
     def test_a_file_that_is_cut_is_read_up_to_the_cut(self):
         whole = {"one chunk.mcap": self.events.mcap(self.folder / "g", CompressionType.NONE, 1 << 24), "zstd.mcap": self.events.mcap(self.folder / "a", CompressionType.ZSTD, 1 << 15), "lz4.mcap": self.events.mcap(
             self.folder / "b", CompressionType.LZ4, 1 << 15), "plain.mcap": self.events.mcap(self.folder / "c", CompressionType.NONE),
             "loose.mcap": self.events.mcap(self.folder / "d", chunking=False), "ros1.bag": self.events.ros1(self.folder / "e"),
-            "bz2.bag": self.events.ros1(self.folder / "f", Ros1Writer.CompressionFormat.BZ2)}
+            "bz2.bag": self.events.ros1(self.folder / "f", Ros1Writer.CompressionFormat.BZ2),
+            "x.db3": next(self.events.folder(self.folder / "h", StoragePlugin.SQLITE3).glob("*.db3"))}
         for name, path in whole.items():
             data = path.read_bytes()
             least = {"bz2.bag": 0}.get(name, 1)  # one chunk of bz2 is one block: nothing of it can be had
@@ -181,7 +185,7 @@ class Cut(BagTest):
                     text, count = self.rows(cut, f"out-{share}-{name}")
                     self.assertGreater(count, 0.8 * 400 * (share - 0.25), text)
                     if count < 400:  # else the index alone is missing
-                        self.assertRegex(text, "read up to there|without its end|is cut")
+                        self.assertRegex(text, "read up to there|without its end|is cut|damaged or cut")
 
     def test_a_packed_file_that_is_cut(self):
         packed = self.folder / "a.mcap.zstd"
@@ -238,6 +242,10 @@ class Refused(BagTest):
         (f / "ros1.bag").write_bytes(b"#ROSBAG V2.0\n")
         (f / "old.bag").write_bytes(b"#ROSBAG V1.2\n" + bytes(100))
         (f / "junk.zst").write_bytes(zstd(b"not a bag, but packed"))
+        (f / "cut.zst").write_bytes(zstd(b"packed and cut" * 1000)[:15])
+        (f / "pointer.bag").write_bytes(b"version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 1\n")
+        (f / "page.mcap").write_bytes(b"<!DOCTYPE html><html></html>")
+        (f / "bag.zip").write_bytes(b"PK\3\4" + bytes(60))
         (f / "nothing").mkdir()
         two = f / "two"
         for name in "ab":
@@ -248,7 +256,8 @@ class Refused(BagTest):
         database.commit()
         database.close()
         for name, word in (("empty.mcap", "is empty"), ("text.bag", "is no bag"), ("zeros.db3", "is no bag"), ("magic.mcap", "without its end"),
-                           ("short.db3", "rosbag2"), ("ros1.bag", "nothing"), ("old.bag", "format 2.0"), ("junk.zst", "is no bag"),
+                           ("short.db3", "rosbag2"), ("ros1.bag", "nothing"), ("old.bag", "format 2.0"), ("junk.zst", "is no bag"), ("cut.zst", "nothing of what it holds"),
+                           ("pointer.bag", "git lfs pull"), ("page.mcap", "a web page"), ("bag.zip", "a zip archive"),
                            ("nothing", "no file in this folder"), ("two", "2 bags"), ("missing.mcap", "no such file"), ("other.db3", "rosbag2")):
             with self.subTest(name):
                 text, out = self.take(f / name, code=1, out=f"out-{name}")

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """rosbag2's SQLite files (.db3), with what a recorder that was killed left in the write-ahead file beside them."""
 
+import os
 import shutil
 import sqlite3
 import tempfile
@@ -34,6 +35,16 @@ class SqliteFile:
     def _address(self) -> str:
         """Where the database is opened: it itself, never changed; with a write-ahead file a copy, into which SQLite merges that."""
         path, ahead = self.path, self.path.with_name(self.path.name + "-wal")
+        with path.open("rb") as file:
+            head = file.read(32)
+        page = int.from_bytes(head[16:18], "big")
+        whole = int.from_bytes(head[28:32], "big") * (65536 if page == 1 else page)  # sqlite.org/fileformat.html
+        if path.stat().st_size < whole and not ahead.is_file():  # SQLite refuses a file that is cut; one with empty pages it reads up to them
+            self._folder = tempfile.TemporaryDirectory(prefix="waymark-bag-")
+            out = Path(self._folder.name) / "bag.db3"
+            shutil.copyfile(path, out)
+            os.truncate(out, whole)
+            return out.as_uri() + "?mode=ro&immutable=1"
         if ahead.is_file() and ahead.stat().st_size:
             self._folder = tempfile.TemporaryDirectory(prefix="waymark-bag-")
             path = Path(self._folder.name) / "bag.db3"
