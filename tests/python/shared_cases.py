@@ -180,13 +180,7 @@ def gpsd(trial):
     setup.write_text((trial.at / "robot.yaml").read_text().replace("29870", str(port)))
     shutil.copy(trial.at / "calibration.yaml", trial.folder)
     with subprocess.Popen([sys.executable, trial.at / "fake_gpsd.py", str(port)], stderr=subprocess.DEVNULL):
-        robot = subprocess.Popen([(BIN / "waymark").resolve(), "run", "--config", setup, "--out", trial.folder / "runs", "--record", trial.folder / "kept"],
-                                 stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
-        try:
-            robot.wait(8)
-        except subprocess.TimeoutExpired:
-            robot.terminate()
-        trial.said += robot.communicate()[0]
+        trial.program("waymark", "record", "--config", setup, "--out", trial.folder / "kept", "--duration", "7")
     (kept,) = trial.folder.rglob("gnss.csv")
     near(waymark.Recording(kept.parent).table("gnss.csv")["sigma_xy_m"].max(), 0.010, 1e-6)
 

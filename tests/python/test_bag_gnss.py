@@ -63,6 +63,13 @@ class Fixes(BagTest):
             self.assertEqual(len(recording.table("gnss.csv")["t_ns"]), 16, said)
             self.assert_end(recording, said, 0.1, config=CONFIG)
 
+    def test_a_few_places_far_from_each_other_stay(self):
+        bag = self.bag()
+        for i in range(4):
+            self.fix(bag, i, place_of(ORIGIN, 2000 * i, 1000 * i)[:2])
+        recording, said = self.take(bag)
+        self.assertEqual(len(recording.table("gnss.csv")["t_ns"]), 4, said)
+
     def test_an_altitude_that_is_absent(self):
         nan = float("nan")
         for name, change, empty in (("of the first three", lambda i, w, a: (w, nan if i < 3 else a, 0), 3), ("of some", lambda i, w, a: (

@@ -21,7 +21,7 @@ _VARIANCE_MAX_M2 = 1e6  # a larger one means "not known"
 _UP_SIGMAS = 2.0  # the altitude's sigma in horizontal ones, by the satellites' geometry
 _SPREAD_SIGMAS = 3.0  # the way under the fixes in sigmas of a fix, from which on they show its direction
 _SPEED_MAX_MPS = 100.0  # of a robot whose motion is not known
-_LEAP_SIGMAS = 10.0
+_LEAP_SIGMAS, _LEAPS_MAX = 10.0, 0.1  # of a leap; share of leaps among the steps of a drive
 _FUSED = re.compile(r"filtered|fused|ekf|ukf", re.I)
 
 
@@ -99,9 +99,9 @@ def _stale(into: Collection, topic: str, motion: Motion | None, t_ns: Array, val
     leaps = [i for i in range(len(t_ns) // 2) if is_leap(i, i + 1)]
     while len(leaps) > 1 and not is_leap(leaps[-2], leaps[-1] + 1):  # outliers on the way, and back
         del leaps[-2:]
-    if not leaps:
+    count = leaps[-1] + 1 if leaps else 0
+    if not count or np.mean([is_leap(i, i + 1) for i in range(count, len(t_ns) - 1)]) > _LEAPS_MAX:
         return 0
-    count = leaps[-1] + 1
     far = np.linalg.norm(places[count] - places[count - 1])
     into.find(topic, f"its first {count} fixes are of a place {far:.0f} m from the next one, {(t_ns[count] - t_ns[count - 1]) / 1e9:.2f} s later: no fixes, left out")
     return count
