@@ -84,7 +84,8 @@ def _known_columns(name: str, table: Table, where: str) -> None:
     if not isinstance(table, Mapping):
         raise TypeError(f"{where}: a table is columns by name, and not {type(table).__name__}")
     if name not in COLUMNS:
-        if near := difflib.get_close_matches(name, COLUMNS, n=1, cutoff=0.8):
+        alike = [known for known in COLUMNS if len(known) == len(name)]  # a longer name is one of the user's own
+        if near := difflib.get_close_matches(name, alike, n=1, cutoff=0.8):
             raise ValueError(f"{where}: no program reads a table of this name; did you mean {near[0]}?")
         return
     needed, others = COLUMNS[name]
