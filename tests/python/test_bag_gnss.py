@@ -74,7 +74,8 @@ class Fixes(BagTest):
         nan = float("nan")
         for name, change, empty in (("of the first three", lambda i, w, a: (w, nan if i < 3 else a, 0), 3), ("of some", lambda i, w, a: (
                 w, nan if i % 4 == 2 else a, 0), 4), ("of all", lambda i, w, a: (w, nan, 0), 16), ("0 of the first", lambda i, w, a: (
-                    w, 0.0 if i < 2 else a, 0), 2), ("infinite", lambda i, w, a: (w, np.inf if i == 5 else a, 0), 1)):
+                    w, 0.0 if i < 2 else a, 0), 2), ("infinite", lambda i, w, a: (w, np.inf if i == 5 else a, 0), 1), ("far off", lambda i, w, a: (
+                        w, 1e9 if i < 9 else a, 0), 9)):
             with self.subTest(name):
                 recording, said = self.take(self.drive(change))
                 gnss = recording.table("gnss.csv")

@@ -87,7 +87,7 @@ def changed(value, chance):
     if isinstance(value, bool):
         return not value
     if isinstance(value, float):
-        return chance.choice([float("nan"), float("inf"), -float("inf"), 0.0, -value, 1e300, 1e9, -1.0, value * 57.29578])
+        return chance.choice([float("nan"), float("inf"), -float("inf"), 0.0, -value, 1e30, 1e9, -1.0, value * 57.29578])
     if isinstance(value, int):
         return chance.choice([0, 1, 2, 100, 127])  # fits the integers of all fields that are changed
     if isinstance(value, str):

@@ -21,6 +21,7 @@ _VARIANCE_MAX_M2 = 1e6  # a larger one means "not known"
 _UP_SIGMAS = 2.0  # the altitude's sigma in horizontal ones, by the satellites' geometry
 _SPREAD_SIGMAS = 3.0  # the way under the fixes in sigmas of a fix, from which on they show its direction
 _SPEED_MAX_MPS = 100.0  # of a robot whose motion is not known
+_ALTITUDE_MAX_M = 10_000.0  # of a robot's place; of more, and of no number, nothing is known
 _LEAP_SIGMAS, _LEAPS_MAX = 10.0, 0.1  # of a leap; share of leaps among the steps of a drive
 _FUSED = re.compile(r"filtered|fused|ekf|ukf", re.I)
 
@@ -73,7 +74,7 @@ def _choose(into: Collection, given: argparse.Namespace) -> str | None:
 
 def _altitude(into: Collection, topic: str, altitude: Array) -> Array:
     """The altitudes; NaN where a fix has none (2-D: not a number, or exactly 0 between others that are far from it)."""
-    out = np.where(np.isfinite(altitude), altitude, np.nan)
+    out = np.where(np.abs(altitude) <= _ALTITUDE_MAX_M, altitude, np.nan)
     known = out[np.isfinite(out) & (out != 0)]
     if len(known) and abs(np.median(known)) > 5:
         out[out == 0] = np.nan
