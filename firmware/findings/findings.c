@@ -73,14 +73,6 @@ void wm_findings_print(const wm_findings *self, FILE *to) {
     (void)fputs("      Each [name] is a section of " WM_FINDINGS_PAGE ".\n", to);
 }
 
-void wm_findings_each(const wm_findings *self, wm_line_fn say, void *context) {
-  char line[sizeof(wm_finding)];
-  for (size_t i = 0; i < self->count; i++) {
-    (void)wm_finding_line(&self->at[i], line, sizeof line);
-    say(context, line);
-  }
-}
-
 // ── JSON ────────────────────────────────────────────────────────────────────────────────────────────────────────────
 
 void wm_json_string(FILE *to, const char *key, const char *text) {

@@ -141,8 +141,6 @@ void wm_json_string(FILE *to, const char *key, const char *text);
 
 // Receives a line of text without its end: notes for a person or a log.
 typedef void (*wm_line_fn)(void *context, const char *line);
-// Each finding as a line.
-void wm_findings_each(const wm_findings *self, wm_line_fn say, void *context);
 
 // Findings of a run by its health, less those that `out` has already: late, lost and unreadable data, silent sources,
 // devices, refused observations, maps.

@@ -28,6 +28,7 @@
 #define OUTLIERS_NOTE 0.001
 #define OUTLIERS_BAD 0.02
 #define BIASED_LOST_MAX 0.3  // share of the time lost beyond which a bias may come from wrong poses
+#define MAP_SCALE 0.03       // beyond this neither a tyre nor a sensor is off, where the two agree
 #define FACTOR_BAD 3.0       // of a sensor's stated sigma
 // Mean of the innovations over their sigma. Errors that last are correlated, so a tenth of a sigma is usual.
 #define BIAS_NOTE 0.5
@@ -398,8 +399,13 @@ static int is_skid_track(const wm_assembly *assembly, const wm_calibration_value
   return 0;
 }
 
-// A factor of noise against the stated sigma: of a position's only a share counts as new (positions.noise.factor).
+// A factor of noise against the stated sigma: of a position's only a share counts as new (positions.noise.factor). Of an
+// antenna the way from where calibration.yaml has it; 0 where it has none.
 static double judged_value(const wm_assembly *assembly, const wm_calibration_value *c) {
+  if (strstr(c->name, ".antenna_")) {
+    const double stated_m = assembly->setup.rig->antenna_m[strcmp(c->name, "gnss.antenna_y_m") == 0];
+    return isfinite(stated_m) ? c->value - stated_m : 0;
+  }
   if (strcmp(c->name, "noise.place_factor") != 0) return c->value;
   return c->value * fmin(number_of(&wm_position_params_table, assembly->config->positions, "noise.factor"), 1.0);
 }
@@ -415,33 +421,63 @@ static void calibration(const wm_assembly *assembly, const wm_health *health, wm
       // A scale of ranges has no tyre and no temperature: beyond 3 % a unit, a map or a marker's size is off.
       {"range_scale", 1, 0.97, 1.03, 1 / 1.8, 1.8,
        "ranges are too long (above 1) or too short: divide range_m by this"},
+      {".angle_scale", 0, -0.03, 0.03, -0.3, 0.3, "the lens is of another resolution or zoom: calibrate it again"},
       // Tyres, ranges and gyros are off by some per cent; beyond a factor of 1.8 it is another radius, track or unit.
       {"_scale", 1, 1 / 1.2, 1.2, 1 / 1.8, 1.8,
        "multiply the value that it scales by this factor; where the robot makes its own map, markers or ranges of a "
        "wrong size look the same"},
+      // Nobody states the noise of the turn: a default that is too small for a robot is no mistake in its files.
+      {"noise.turn", 1, 0, FACTOR_BAD, 0, INFINITY, "set motion.noise for this robot: `waymark suggest` finds it"},
       {"noise.", 1, 0, FACTOR_BAD, 0, FACTOR_BAD, "the stated sigma is too small, or what is observed does not fit"},
       // A tenth of a second is more than cameras and lasers need; 0.17 rad of yaw are seen with the naked eye.
       {".time_offset_s", 0, -0.1, 0.1, -0.25, 0.25, "correct the stamps of this sensor by this time"},
+      {".antenna_", 0, -0.05, 0.05, -0.1, 0.1,
+       "measure gnss.mounting of calibration.yaml again: this is where the drive shows the antenna"},
       {".yaw_rad", 0, -0.17, 0.17, -0.8, 0.8, "turn the sensor's mounting (rpy_deg, the last number) by this angle"},
   };
   for (uint32_t i = 0; i < wm_health_calibration_count(health); i++) {
     const wm_calibration_value *c = wm_health_calibration(health, i);
     const int skids = is_skid_track(assembly, c);
+    const int is_antenna = strstr(c->name, ".antenna_") != NULL;
     const double value = judged_value(assembly, c);
     for (size_t k = 0; k < sizeof kLimits / sizeof kLimits[0]; k++) {
-      if (!strstr(c->name, kLimits[k].ending) || (value >= kLimits[k].least && value <= kLimits[k].most)) continue;
-      if (fabs(c->value - kLimits[k].expected) < 3 * c->sigma) continue;
+      if (!strstr(c->name, kLimits[k].ending)) continue;
+      if (value >= kLimits[k].least && value <= kLimits[k].most) break;
+      if (fabs(value - kLimits[k].expected) < 3 * c->sigma) break;
       // Within two sigmas of skid steer's prior it is its base's; beyond, `track_m` is wrong.
-      if (skids && fabs(c->value - WM_SKID_TRACK) <= 2 * WM_SKID_TRACK_SIGMA) continue;
+      if (skids && fabs(c->value - WM_SKID_TRACK) <= 2 * WM_SKID_TRACK_SIGMA) break;
       const int is_bad = !skids && (value < kLimits[k].bad_least || value > kLimits[k].bad_most ||
                                     wm_health_has_alarm(health, WM_ALARM_SCALE, i));
       wm_find(out, WM_FOUND_CALIBRATION_OFF, is_bad ? WM_SEVERITY_BAD : WM_SEVERITY_NOTE, "calibration", kLimits[k].fix,
               "%s is %.4g +- %.2g at the end; %g was expected", c->name, c->value, c->sigma,
-              skids ? WM_SKID_TRACK : kLimits[k].expected)
+              skids        ? WM_SKID_TRACK
+              : is_antenna ? c->value - value
+                           : kLimits[k].expected)
           ->size = c->value;
       break;
     }
   }
+}
+
+// Wheels and ranges agree that the map has other lengths than theirs.
+static void map_scale(const wm_assembly *assembly, const wm_health *health, wm_findings *out) {
+  double way = 0;
+  const wm_calibration_value *ranges = NULL;
+  for (uint32_t i = 0; i < wm_health_calibration_count(health); i++) {
+    const wm_calibration_value *c = wm_health_calibration(health, i);
+    if (strcmp(c->name, "motion.speed_scale") == 0) way = log(c->value);
+    if (strstr(c->name, ".range_scale") && c->sigma < MAP_SCALE / 3) ranges = c;
+  }
+  if (!ranges || assembly->setup.landmark_count == 0) return;
+  const double range = log(ranges->value);
+  if (fabs(way) < MAP_SCALE || fabs(range) < MAP_SCALE || fabs(way + range) > MAP_SCALE / 2) return;
+  char fix[WM_FINDING_FIX_MAX];
+  const double factor = exp(0.5 * (range - way));
+  (void)snprintf(fix, sizeof fix, "landmarks.csv: x_m, y_m and z_m times %.4g, if wheels and ranges are right", factor);
+  wm_find(out, WM_FOUND_MAP_IMPLAUSIBLE, WM_SEVERITY_BAD, "map", fix,
+          "by the wheels and by the ranges of %.*s it is %.1f %% too %s", (int)strcspn(ranges->name, "."), ranges->name,
+          100 * fabs(1 / factor - 1), factor < 1 ? "large" : "small")
+      ->size = factor;
 }
 
 void evidence_judge(const drive_evidence *self, const wm_assembly *assembly, const wm_health *health, uint64_t total,
@@ -456,5 +492,6 @@ void evidence_judge(const drive_evidence *self, const wm_assembly *assembly, con
   landmarks(self, out);
   unknown(self, out);
   calibration(assembly, health, out);
+  map_scale(assembly, health, out);
   map_unused(assembly, out);
 }

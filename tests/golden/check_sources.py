@@ -110,6 +110,23 @@ def gnss(sigma=0.05, stated=0.05, rate_hz=5, scale=1.0, steady=False):
     return table("t_ns,x_m,y_m,z_m,sigma_xy_m,sigma_z_m", rows)
 
 
+def sighted(map_factor=1.0, most_m=""):
+    """Ranges and bearings to posts beside the way, on a map whose lengths are times a factor; a sensor that states `most_m`."""
+    n, x, y, rows = noise(6), 0.0, 0.0, []
+    posts = [(3.0 * i, side) for i in range(-1, 8) for side in (-4.0, 3.0, 9.0)]
+    for k in range(round(SECONDS * 100)):
+        h = heading_at[k]
+        for i, (px, py) in enumerate(posts) if k % 20 == 0 else ():
+            away, bearing = math.hypot(px - x, py - y), math.remainder(math.atan2(py - y, px - x) - h, 2 * math.pi)
+            if away < 7:
+                rows.append([ns(k / 100), "eye", i, f"{bearing + n(0.01):.5f}", f"{away + n(0.02):.4f}"])
+        x, y = x + 0.01 * speed(k / 100) * math.cos(h), y + 0.01 * speed(k / 100) * math.sin(h)
+    return {"motion.csv": motion(), "sightings.csv": table("t_ns,sensor,id,bearing_rad,range_m", rows),
+            "landmarks.csv": table("id,x_m,y_m,z_m,sigma_m", [[i, map_factor * px, map_factor * py, 0, 0.01] for i, (px, py) in enumerate(posts)]),
+            "calibration.yaml": f"sensors: {{eye: {{mounting: {{xyz_m: [0, 0, 0]}}, bearing_sigma_rad: 0.01, range_sigma_m: 0.02{most_m}}}}}\n",
+            "config.yaml": "format: waymark-config/1\nestimator: landmark_ekf\n"}
+
+
 heading_at = [0.0]
 for _k in range(round(SECONDS * 100)):
     heading_at.append(heading_at[-1] + 0.01 * turn(_k / 100))
@@ -209,6 +226,9 @@ FAULTS = [
     ("what candump shows on the screen", {**can(), "can.log": "".join(f" ({START_NS / 1e9 + t:.6f})  can0  100   [2]  11 22\n" for t in times(10))}, ("bad", "refused-input", "setup"), "on the screen", ""),
     ("commands beside a gyro", {"motion.csv": commands(), "imu.csv": imu()}, ("note", "data-unused", "imu"), "the gyro is not used", "twist: measured"),
     ("nobody takes the edge points", {**both(), "points.csv": "t_ns,x_m,y_m\n" + "".join(f"{ns(k / 10)},2.0,0.1\n" for k in range(600)), "config.yaml": "format: waymark-config/1\nestimator: slam\n"}, ("bad", "data-unused", "points"), "these do: edge_mcl", "use: false"),
+    ("a map that is 6 % too large", sighted(1.06), ("bad", "map-implausible", "map"), "% too large", "x_m, y_m and z_m times 0.9"),
+    ("an antenna that is elsewhere", {"motion.csv": motion(), "gnss.csv": gnss(sigma=0.01, stated=0.02), "heading.csv": headings(), "calibration.yaml": "gnss: {mounting: {xyz_m: [0, 0.6, 1]}}\n", "config.yaml": "format: waymark-config/1\nestimator: landmark_ekf\n"}, ("bad", "calibration-off", "calibration"), "0.6 was expected", "gnss.mounting"),
+    ("no sighting is fused", sighted(1, ", max_range_m: 0.5"), ("bad", "value-implausible", "sightings:eye"), "not used", "max_range_m"),
     ("positions of ten times their sigma", {"motion.csv": motion(), "gnss.csv": gnss(sigma=0.01, stated=2.0), "config.yaml": "format: waymark-config/1\nestimator: landmark_ekf\n"}, ("bad", "noise-too-large", "gnss"), "of what is stated", "real sigma"),
 ]
 RIGHT = [
@@ -217,6 +237,7 @@ RIGHT = [
     ("a slow gyro with much noise", both(imu_csv=imu(20, sigma=0.05))),
     ("a base that turns a fifth less than its wheels", both(motion_csv=motion(w=1.2))),
     ("values in threes beside a gyro", {"motion.csv": motion(100, repeat=3), "imu.csv": imu()}),
+    ("sightings of posts on the map", sighted()),
     ("positions at one speed, the antenna's place unknown", {"motion.csv": motion(steady=True), "gnss.csv": gnss(sigma=0.03, steady=True), "heading.csv": headings(), "recording.yaml": RECORDING.format("motion.csv, gnss.csv, heading.csv").split("vehicle:")[0], "config.yaml": "format: waymark-config/1\nestimator: landmark_ekf\n"}),
     ("a gyro that lags by 0.3 s", both(imu_csv=imu(lag_s=0.3))),
     ("a gyro on CAN", can()),
