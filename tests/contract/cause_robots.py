@@ -127,7 +127,7 @@ def tags_robot(folder, seed):
                 continue
             rows.append({"t_ns": _stamp(t), "sensor": "front", "id": number,
                          **{f"{name}{k}_px": value + rng.gauss(0, 0.2) for k, pixel in enumerate(pixels) for name, value in zip("uv", pixel)}})
-    landmarks = [{"id": i, "x_m": x, "y_m": y, "z_m": z, "yaw_rad": face, "sigma_m": 0.01} for i, ((x, y, z), face) in enumerate(_tags())]
+    landmarks = [{"id": i, "x_m": x, "y_m": y, "z_m": z, "yaw_rad": face + math.pi / 2, "sigma_m": 0.01} for i, ((x, y, z), face) in enumerate(_tags())]
     _write(folder, "tags", path, {"motion.csv": _twists(path, rng), "marker-corners.csv": rows, "landmarks.csv": landmarks},
            f"markers: {{family: tag36h11, size_m: {TAG_M}}}\ncameras:\n  front:\n    model: pinhole-radtan\n    size: [{WIDTH_PX}, {HEIGHT_PX}]\n"
            f"    intrinsics: [{FOCAL_PX}, {FOCAL_PX}, {(WIDTH_PX - 1) / 2}, {(HEIGHT_PX - 1) / 2}]\n    distortion: [0, 0, 0, 0]\n"

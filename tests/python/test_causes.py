@@ -4,6 +4,7 @@
 
     test_causes.py BIN_DIR       Skipped (77) where the build has no libwaymark.so (sanitizers)."""
 
+import dataclasses
 import math
 import os
 import sys
@@ -119,6 +120,23 @@ class Judgement(unittest.TestCase):
             rows = {"t_ns": np.concatenate([moved, stamps]), "source": np.repeat([1, 2], 10)}
             original = Undo.of([change], ("can", "sightings:front", "gnss")).original(rows)
             np.testing.assert_allclose((original - begin) * 1e-9, np.tile(stamps - begin, 2) * 1e-9, atol=1e-6)
+
+    def test_stamps_that_two_mistakes_move_are_moved_back_in_turn(self):
+        begin = 1_700_000_000_000_000_000
+        stamps = begin + np.arange(0, 100, 10, np.int64) * 10**9
+        shift, drift = (Fault("f", ((0.0,),), lambda _: [], lambda _: "", clock=Clock("gnss", begin, is_rate)) for is_rate in (False, True))
+        moved = stamps + 3 * 10**9
+        moved = moved - (moved - begin) // 50
+        rows = {"t_ns": moved, "source": np.repeat(0, 10)}
+        original = Undo.of([(shift, (3.0,)), (drift, (0.02,))], ("gnss",)).original(rows)
+        np.testing.assert_allclose((original - begin) * 1e-9, (stamps - begin) * 1e-9, atol=1e-6)
+
+    def test_two_landmarks_that_few_observations_see_are_named_by_these(self):
+        few = np.where(np.arange(40) % 20 == 5, 30.0, 0.0)
+        better = dataclasses.replace(drive(1.0), gain=drive(1.0).gain + few)
+        self.assertFalse(self.search._helps(better, drive(1.0)))
+        self.assertTrue(self.search._helps(dataclasses.replace(better, is_local=True), drive(1.0)))
+        self.assertFalse(self.search._helps(dataclasses.replace(drive(1.0), is_local=True), drive(1.0)))
 
     def test_student_s_distribution(self):
         self.assertAlmostEqual(search._student(2.086, 20), 0.975, places=3)

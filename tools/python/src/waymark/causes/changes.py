@@ -6,7 +6,7 @@ import io
 import math
 import re
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import yaml
@@ -34,14 +34,27 @@ class Edit:
         """What is done to a table or a picture; "" where the changed line shows it."""
         return ""
 
-    def line(self, before: bytes, after: bytes) -> str:
-        """FILE:LINE: what to write."""
+    def place(self, before: bytes, after: bytes) -> "Place":
+        """The first line that changes."""
         old, new = before.decode("utf-8", "replace").splitlines(), after.decode("utf-8", "replace").splitlines()
         number = next((i for i, text in enumerate(new) if i >= len(old) or text != old[i]), 0)
-        words = self.words()
         shown = new[number].strip() if new else ""
-        shown = shown if len(shown) <= 90 else shown[:87] + "..."
-        return f"{self.file}:{number + 1}: {words + ': ' if words else ''}`{shown}`{' and so each row' if words else ''}"
+        return Place(self.file, number + 1, shown if len(shown) <= 90 else shown[:87] + "...", self.words())
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where to write what: `text` in a line (0: none of a picture), or `words` for each row, of which `text` is the first."""
+
+    file: str
+    line: int
+    text: str
+    words: str = ""
+
+    def said(self) -> str:
+        """FILE:LINE: what to write."""
+        text = f"`{self.text}`" if self.text else ""
+        return ": ".join(part for part in (f"{self.file}:{self.line}" if self.line else self.file, self.words, text) if part) + (" and so each row" if self.words and text else "")
 
 
 # ── tables ───────────────────────────────────────────────────────────────────────────────────────────────────────────
@@ -153,9 +166,8 @@ class Value(Edit):
             return (text[:node.start_mark.index] + self.text + text[_end(text, node):]).encode()
         return _inserted(text, node, self.path[walked:], self.text, self.file).encode()
 
-    def line(self, before: bytes, after: bytes) -> str:
-        whole = super().line(before, after)
-        return f"{':'.join(whole.split(':')[:2])}: `{self.path[-1]}: {self.text}`"
+    def place(self, before: bytes, after: bytes) -> Place:
+        return replace(super().place(before, after), text=f"{self.path[-1]}: {self.text}")
 
     def dotted(self) -> str:
         """The path as a key of the configuration."""
@@ -246,8 +258,8 @@ class Mirrored(Edit):
             picture.transpose(way).save(out, "PNG")
         return out.getvalue()
 
-    def line(self, before: bytes, after: bytes) -> str:
-        return f"{self.file}: {self.words()}"
+    def place(self, before: bytes, after: bytes) -> Place:
+        return Place(self.file, 0, "", self.words())
 
 
 # ── a copy ───────────────────────────────────────────────────────────────────────────────────────────────────────────
@@ -284,16 +296,16 @@ class Files:
             (out / file).write_bytes(self.edited(edits, file))
         return {file: out / file for file in changed if file in self.named}
 
-    def lines(self, edits: Sequence[Edit]) -> str:
+    def places(self, edits: Sequence[Edit]) -> list[Place]:
         """What to write, and where."""
         out = []
         for edit in edits:
             before = self.read(edit.file)
             after = edit.apply(before)
             if after != before and not (isinstance(edit, Rows) and edit.optional):
-                line = edit.line(before, after)
-                out.append(f"{self.config}{line}" if edit.file == CONFIG else line)
-        return "; ".join(out)
+                place = edit.place(before, after)
+                out.append(replace(place, file=str(self.config)) if edit.file == CONFIG else place)
+        return out
 
     def apply(self, edits: Sequence[Edit], out: Path) -> Path | None:
         """Writes the corrected copy that a person asked for: with a comment at what was changed. Returns the configuration in it
@@ -301,7 +313,7 @@ class Files:
         if out.exists():
             raise FileExistsError(f"{out}: is there already; name a new folder")
         moved = self.copy(edits, out)
-        notes = [f"# waymark check --apply: {edit.file}: {edit.words() or edit.line(self.read(edit.file), edit.apply(self.read(edit.file)))}"
+        notes = [f"# waymark check --apply: {edit.file}: {edit.words() or edit.place(self.read(edit.file), edit.apply(self.read(edit.file))).said()}"
                  for edit in edits if edit.file != CONFIG]
         meta = out / "recording.yaml"
         text = meta.read_text()

@@ -2,6 +2,7 @@
 """waymark causes: the mistake in the files that explains a drive."""
 
 import argparse
+import dataclasses
 import json
 import math
 import sys
@@ -42,8 +43,9 @@ def _share(drive: Drive) -> dict[str, float]:
 
 def _cause(robot: Robot, change: Change) -> dict[str, Any]:
     fault, size = change
-    places = [robot.files.lines(fault.edits(size)), *(robot.files.lines(edits) for edits in fault.other_places(size))]
-    return {"name": fault.name, "what": fault.say(size), "size": [round(value, 6) for value in size], "fix": ", or ".join(places)}
+    ways = [robot.files.places(edits) for edits in (fault.edits(size), *fault.other_places(size))]
+    return {"name": fault.name, "what": fault.say(size), "size": [round(value, 6) for value in size],
+            "fix": ", or ".join("; ".join(place.said() for place in way) for way in ways), "places": [dataclasses.asdict(place) for place in ways[0]]}
 
 
 def report(robot: Robot, verdict: Verdict) -> dict[str, Any]:

@@ -59,6 +59,8 @@ class Fault:
     prior: float = 0.0
     clock: Clock | None = None
     """What it does to stamps."""
+    is_local: bool = False
+    """It touches few observations: those of two landmarks."""
     scales: str = ""
     """The residual whose observations are multiplied by the size."""
     settled: Callable[[Size, dict[str, float]], Size] = lambda size, states: size
@@ -87,9 +89,9 @@ class Fault:
 
 
 def discrete(name: str, edits: Callable[..., Sequence[Edit]], say: Callable[..., str], *, group: str = "", size: float = 1.0,
-             prior: float = 0.0, scales: str = "") -> Fault:
+             prior: float = 0.0, scales: str = "", is_local: bool = False) -> Fault:
     """A mistake that is there or not."""
-    return Fault(name, ((size,),), edits, say, group=group, prior=prior, scales=scales)
+    return Fault(name, ((size,),), edits, say, group=group, prior=prior, scales=scales, is_local=is_local)
 
 
 def factor_words(factor: float) -> str:

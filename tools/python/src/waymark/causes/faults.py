@@ -43,14 +43,15 @@ def all_faults(robot: Robot) -> list[Fault]:
 
 
 def _settings(robot: Robot) -> Iterator[Fault]:
-    """Numbers of the configuration that are far from their defaults."""
+    """Noises and start sigmas of the configuration that are far from their defaults; other numbers are choices."""
     try:
         known = parameters(robot.files.read(CONFIG).decode("utf-8", "replace"))
     except (WaymarkError, ValueError):
         return
     for key, number in known.items():
         value, usual = number["value"], number["initial"]
-        if usual > 0 and value > 0 and abs(math.log(value / usual)) >= math.log(SETTING_FAR):
+        is_noise = "noise" in key.split(".") or "sigma" in key
+        if is_noise and usual > 0 and value > 0 and abs(math.log(value / usual)) >= math.log(SETTING_FAR):
             yield discrete(f"setting {key}", lambda _, k=key, u=usual: [Value(CONFIG, tuple(k.split(".")), f"{u:.6g}")],
                            lambda _, k=key, v=value, u=usual: f"{k} is {v / u:.3g} times its default")
 
@@ -84,15 +85,16 @@ def _clocks(robot: Robot, source: Source) -> Iterator[Fault]:
                            lambda _, u=unit: f"the stamps of {name} are in {u}", group=f"clock of {name}")
         yield Fault(f"clock of {name}", ((gap,), (float(round(gap)),)), shift, late)
         return
-    begin, only = int(stamps.min()), source.sensor if source.kind != "pictures" else ""
+    begin, only, offset = int(stamps.min()), source.sensor if source.kind != "pictures" else "", f"{source.sensor or source.kind}.time_offset_s"
     yield Fault(f"clock of {name}", tuple((s,) for s in CLOCKS_S), shift, late, step=(0.25,), smallest=(0.01,),
                 is_possible=lambda size: abs(size[0]) <= CLOCK_MOST_S, clock=Clock(name, begin), group=f"along the way of {name}",
-                settled=lambda size, states: (size[0] - states.get(f"{source.sensor or source.kind}.time_offset_s", 0.0),))
+                settled=lambda size, states: (size[0] - states.get(offset, 0.0),))
     yield Fault(f"drift of {name}", tuple((rate,) for rate in DRIFTS),
                 lambda size: [stretched(source.file, n, size[0], begin, only, n == "arrival_ns") for n in ("t_ns", "arrival_ns")],
                 lambda size: f"the stamps of {name} run away: {abs(size[0]) * 1e3:.3g} ms {'more' if size[0] > 0 else 'less'} each second "
                              "(a queue that nobody empties, or a clock of its own)",
-                step=(0.01,), smallest=(1e-4,), is_possible=lambda size: abs(size[0]) < 0.3, clock=Clock(name, begin, is_rate=True), group=f"along the way of {name}")
+                step=(0.01,), smallest=(1e-4,), is_possible=lambda size: abs(size[0]) < 0.3, clock=Clock(name, begin, is_rate=True), group=f"along the way of {name}",
+                settled=lambda size, states: (size[0] - 2e9 * states.get(offset, 0.0) / max(1, int(stamps.max()) - begin),))  # the state is that of half the time
 
 
 # ── values ───────────────────────────────────────────────────────────────────────────────────────────────────────────
@@ -156,7 +158,7 @@ def exchanged(robot: Robot, source: Source, table: dict[int, int]) -> Fault:
     if len(pairs) == 2 and pairs[0] == pairs[1][::-1]:
         a, b = pairs[0]
         return discrete(f"landmarks {a} and {b}", lambda _: [identities("landmarks.csv", table)],
-                        lambda _: f"landmarks {a} and {b} are exchanged on the map (or their numbers where they stand)", group=f"identities {pairs}")
+                        lambda _: f"landmarks {a} and {b} are exchanged on the map (or their numbers where they stand)", group=f"identities {pairs}", is_local=True)
     return discrete(f"identities of {source.name} by a table", lambda _: [identities(source.file, table, source.sensor)],
                     lambda _: f"the ids of {source.name} are permuted against those of the map", group=f"identities {pairs}", prior=-4.0)
 
@@ -261,10 +263,10 @@ def _maps(robot: Robot) -> Iterator[Fault]:
 # ── markers, lenses, satellites ──────────────────────────────────────────────────────────────────────────────────────
 
 def _calibrated(name: str, path: tuple[str, ...], value: float, grid: Sequence[float], words: str, file: str = "calibration.yaml",
-                settled: Callable[[Size, dict[str, float]], Size] = lambda size, states: size) -> Fault:
+                settled: Callable[[Size, dict[str, float]], Size] = lambda size, states: size, scales: str = "") -> Fault:
     return Fault(name, tuple((f,) for f in grid), lambda s: [Value(file, path, f"{value * s[0]:.6g}")],
                  lambda s: f"{words} is {factor_words(s[0])}", step=(0.04,), smallest=(0.004,), is_log=True, named=LENGTHS,
-                 is_possible=lambda s: abs(math.log(s[0])) > 0.01, settled=settled)
+                 is_possible=lambda s: abs(math.log(s[0])) > 0.01, settled=settled, scales=scales)
 
 
 def _markers(robot: Robot) -> Iterator[Fault]:
@@ -275,7 +277,7 @@ def _markers(robot: Robot) -> Iterator[Fault]:
     if sees_tags and size and any(source.kind == "corners" or source.detector for source in robot.sources):
         yield _calibrated("size of the markers", ("vision", "apriltag", "size_m") if mine else ("markers", "size_m"), size,
                           (0.8, 1.25, *NEAR, 0.5, 2, *LENGTHS), "the markers' size", CONFIG if mine else "calibration.yaml",
-                          lambda s, states: (s[0] / next((v for name, v in states.items() if name.endswith(".range_scale")), 1.0),))
+                          lambda s, states: (s[0] / next((v for name, v in states.items() if name.endswith(".range_scale")), 1.0),), "range")
     family = (robot.calibration.get("markers") or {}).get("family")
     if any(source.detector == "apriltag" for source in robot.sources):
         for other in FAMILIES:

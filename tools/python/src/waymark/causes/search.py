@@ -29,7 +29,10 @@ GAIN_MIN = 0.1  # nats an update, over no mistake
 APART_MIN = 0.02  # nats an update, over another cause: below, the drive does not tell them apart
 # A drive is right with: 14 % of the updates refused, a mean square of 1.34, lost for 0.5 %: the most of 29 good drives.
 EXPLAINED_MIN, SQUARES_MOST, LOST_MOST, DEGRADED_MOST = 0.85, 1.7, 0.02, 0.2
-STATES_MIN, STATES_APART = 6.0, 6.0  # nats of calibration states: odds of 400 to 1
+STATES_APART = math.log(NAMED_FROM / (1 - NAMED_FROM))  # nats of calibration states
+# nats in all by which few observations tell: with the right densities the odds of a gain by chance are its exponential, and the
+# pairs that are tried, and errors that last, take a part of it.
+LOCAL_MIN = 15.0
 EXPLAINED_ALL = 0.97  # then nothing is left for a second mistake
 LONGEST = 6.0  # of a drive's time without changes; one that searches for its pose all the time is no right one
 CAUSES_MOST = 3
@@ -161,22 +164,26 @@ class Search:
         part_s = self.part_s(len(starts), SCREEN_SHARE, SCREEN_MAX_S)
         base = self._plain(fixed, part_s) or now
         kept = self._within_reach(self._best_sizes(self._tried(starts, fixed, part_s), part_s), base, part_s)[:ROWS_KEPT]
+        near = self._fitted(kept[:ROWS_FITTED], fixed, part_s)  # a size that is far off loses the rest of the drive
         # Where a row explains the part, no table of identities is looked for.
         proposed = [] if any(self._is_right(c.drive) for c in kept) else self._proposals(fixed, now)
         fit_s = self.part_s(ROWS_KEPT + len(proposed) + 9 * ROWS_FITTED, 0.5, FIT_MAX_S)
         over_s = self._whole(fit_s) if proposed else fit_s
         base = self._plain(fixed, over_s) or now
-        more = self._tried([*((c.fault, c.size) for c in kept), *proposed], fixed, over_s)
+        more = self._tried([*near, *((c.fault, c.size) for c in kept[ROWS_FITTED:]), *proposed], fixed, over_s)
         ordered = self._within_reach(self._best_sizes(more, over_s), base, over_s)
-        fitted = self._fitted(ordered[:ROWS_FITTED], fixed, fit_s)
+        fitted = self._fitted(ordered[:ROWS_FITTED], fixed, fit_s, 1 / 3)
         others = [(c.fault, c.size) for c in ordered[ROWS_FITTED:ROWS_JUDGED]]
         self.trials.settings = {}
-        final = self._tried([*fitted, *others, *self._by_states(rows, now)], fixed, 0.0, has_states=True)
+        told = self._by_states(rows, now)
+        growing = [Candidate(*change, now) for change in told if change[0].clock and change[0].clock.is_rate]  # which the whole drive shows
+        told = [c for c in told if c[0] not in [g.fault for g in growing]] + self._fitted(growing, fixed, 0.0)
+        final = self._tried([*fitted, *others, *told], fixed, 0.0, has_states=True)
         return self._ordered(final)
 
     def _by_states(self, rows: list[Fault], now: Drive) -> list[Change]:
         """Rows that a calibration state took up: their sizes are what the state says."""
-        if now.unusual < STATES_MIN:
+        if now.unusual < STATES_APART:
             return []
         sizes = [(row, row.by_states(now.states)) for row in rows if row.step and row.smallest]
         nothing = {row.name: row.by_states({}) for row, _ in sizes}
@@ -216,9 +223,9 @@ class Search:
                 best[candidate.fault.name] = score, candidate
         return [candidate for _, candidate in sorted(best.values(), key=lambda pair: -pair[0])]
 
-    def _fitted(self, candidates: Sequence[Candidate], fixed: list[Change], until_s: float) -> list[Change]:
-        """Sizes of the largest likelihood, by a parabola through three sizes on each axis, with ever smaller steps."""
-        state = [_Fit(c.fault, c.size, list(c.fault.step)) for c in candidates]
+    def _fitted(self, candidates: Sequence[Candidate], fixed: list[Change], until_s: float, begin: float = 1.0) -> list[Change]:
+        """Sizes of the largest likelihood, by a parabola through three sizes on each axis, with ever smaller steps; `begin`: of the rows' steps."""
+        state = [_Fit(c.fault, c.size, [begin * step for step in c.fault.step]) for c in candidates]
         known: dict[tuple[str, Size], float] = {}
         axes = max((len(c.fault.step) for c in candidates), default=0)
         for axis in [k for _ in range(FIT_ROUNDS) for k in range(axes)]:
@@ -300,7 +307,7 @@ class Search:
             if not best.fault.is_possible(size) or all(abs(a - b) < least for a, b, least in zip(size, best.size, best.fault.smallest)):
                 break
             again = self.trials.run([[*fixed, (best.fault, size)]], has_states=True)[0]
-            if not again or self._judging(again, best.drive)[0] < -APART_MIN or not self._is_right(again):
+            if not again or _worth(again) < _worth(best.drive) or not self._is_right(again):
                 break
             best = Candidate(best.fault, size, again)
         return best
@@ -327,6 +334,8 @@ class Search:
         gain, probability = self._judging(a, b)
         if gain >= least and probability >= NAMED_FROM:
             return True, probability
+        if a.is_local and (nats := float((a.gain - b.gain)[~_fit(len(a.gain))].sum()) / max(1.0, b.squares)) >= LOCAL_MIN:
+            return True, 1 - math.exp(-nats)
         nearer = min(50.0, b.unusual - a.unusual)
         if gain > -APART_MIN and nearer >= STATES_APART:
             return True, 1 / (1 + math.exp(-nearer))
@@ -334,7 +343,7 @@ class Search:
 
     def _ordered(self, found: list[Candidate]) -> list[Candidate]:
         """The best first: that which no other one beats; of several, one with which the drive is right."""
-        left = sorted(found, key=lambda c: -(float(c.drive.gain.sum()) - c.drive.unusual + c.fault.prior))
+        left = sorted(found, key=lambda c: -_worth(c.drive) - c.fault.prior)
         unbeaten = [c for c in left if not any(self._beats(o.drive, c.drive, APART_MIN)[0] for o in left if o is not c)] or left
         best = next((c for c in unbeaten if self._is_right(c.drive)), unbeaten[0] if unbeaten else None)
         return [c for c in left if c is best] + [c for c in left if c is not best]
@@ -377,6 +386,11 @@ class Search:
             verdict.probability = probability
             return [*fixed, (best.fault, best.size)], best.drive
         return None
+
+
+def _worth(drive: Drive) -> float:
+    """Nats of the whole drive, of its calibration states, too."""
+    return float(drive.gain.sum()) - drive.unusual
 
 
 def _contradicted(rows: dict[str, Array]) -> list[tuple[int, int]]:

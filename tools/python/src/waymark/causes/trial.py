@@ -34,6 +34,8 @@ FAR_OUTLIERS = 1e-6  # where sizes are fitted: an update of any size still tells
 
 BEGIN_S = 0.02  # of a drive that states where the calibration begins: before its first observations are fused
 UNUSUAL_MOST = 12.0  # nats of one state: of 5 sigma and more
+# What wheels and ranges are off by where nothing is wrong: a filter's start sigma is wider, so that it finds more.
+PLAUSIBLE = {"range_scale": 0.02, "speed_scale": 0.015}
 
 Change = tuple[Fault, Size]
 
@@ -55,7 +57,8 @@ class Drive:
     estimate: Estimate | None = None
     sources: tuple[str, ...] = ()  # by their numbers
     states: dict[str, float] = field(default_factory=dict)  # calibration states at the end, by their names
-    unusual: float = 0.0  # nats that their distance from where they began costs by their start sigmas
+    unusual: float = 0.0  # nats that their distance from where they began costs by their sigmas
+    is_local: bool = False  # what was changed touches few observations
 
 
 @dataclass(frozen=True)
@@ -109,22 +112,22 @@ def likelihoods(rows: dict[str, Array], densities: dict[str, float], scaled: dic
 @dataclass(frozen=True)
 class Undo:
     """What a trial changed of the observations, so that those of two trials are compared with each other: log factors of residuals'
-    values, and of a source's stamps begin, factor and offset, ns."""
+    values, and of sources' stamps begin, factor and offset, ns, the last change first."""
 
     scaled: dict[str, float] = field(default_factory=dict)
-    moved: dict[int, tuple[int, float, float]] = field(default_factory=dict)
+    moved: tuple[tuple[int, int, float, float], ...] = ()
 
     @classmethod
     def of(cls, changes: Sequence[Change], sources: Sequence[str]) -> "Undo":
         """Of these changes."""
-        clocks = [(number, fault.clock, size) for fault, size in changes for number, name in enumerate(sources) if fault.clock and fault.clock.is_of(name)]
+        clocks = [(number, fault.clock, size) for fault, size in reversed(changes) for number, name in enumerate(sources) if fault.clock and fault.clock.is_of(name)]
         return cls({fault.scales: math.log(abs(size[0])) for fault, size in changes if fault.scales},
-                   {number: (clock.begin_ns, *clock.original(size)) for number, clock, size in clocks})
+                   tuple((number, clock.begin_ns, *clock.original(size)) for number, clock, size in clocks))
 
     def original(self, rows: dict[str, Array]) -> Array:
         """Stamps as they are in the recording."""
         out: Array = rows["t_ns"].copy()
-        for source, (begin, factor, offset) in self.moved.items():
+        for source, begin, factor, offset in self.moved:
             mine = rows["source"] == source
             out[mine] = begin + ((out[mine] - begin) * factor + offset).astype(np.int64)
         return out
@@ -175,8 +178,12 @@ def _driven(job: Job) -> Drive | None:
     began = arguments["out"].with_name(arguments["out"].name + "-begin")
     replay(**arguments | {"until_s": BEGIN_S, "out": began})
     stated, _ = ended_states(began)
-    sigmas = {name: (value - stated[name][0]) / stated[name][1] for name, (value, _) in ended.items()
-              if name in stated and stated[name][1] > 0 and not name.startswith("noise.")}
+    sigmas = {}
+    for name, (value, _) in ended.items():
+        at, sigma = stated.get(name, (0.0, 0.0))
+        usual = PLAUSIBLE.get(name.rsplit(".")[-1])
+        if sigma > 0 and not name.startswith("noise."):
+            sigmas[name] = (value - 1) / usual if usual else (value - at) / sigma
     remove(began)
     return dataclasses.replace(drive, sources=sources, states={name: value for name, (value, _) in ended.items()},
                                unusual=sum(min(UNUSUAL_MOST, 0.5 * sigma**2) for sigma in sigmas.values()))
@@ -235,7 +242,8 @@ class Trials:
             return arguments, blocks, Undo.of(jobs[number], self.sources), keeps
 
         def ended(number: int, drive: Drive | None, is_there: bool) -> None:
-            out[number] = drive
+            is_local = bool(jobs[number]) and jobs[number][-1][0].is_local
+            out[number] = dataclasses.replace(drive, is_local=True) if drive and is_local else drive
             self.spent_s += drive.cpu_s if drive else 0.0 if is_there else most_s
             self.drives += 1
             remove(self.folder / str(number))
