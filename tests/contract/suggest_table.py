@@ -4,7 +4,7 @@
 first part is searched and the promise measured on the rest; of a world the promise is measured on another seed. Truth
 judges here, after the suggestion. A table, not a gate: rows that miss a bar name it.
 
-    suggest_table.py BIN_DIR SOURCE_DIR DATA_DIR [--only WORD[,WORD]] [--json]"""
+    suggest_table.py BIN_DIR SOURCE_DIR DATA_DIR [--only WORD[,WORD]] [--minutes N] [--json]"""
 import json
 import math
 import sys
@@ -44,7 +44,7 @@ def judge(options, case, scratch):
         recording = other = options.data_dir / name
         end_s = PART * judged(options, recording, plain, scratch / "before", align)["duration_s"]
         searched, checked = ("--to", end_s), ("--from", end_s)
-    promise = json.loads(command(suggest, plain, recording, "--json", "--out", new, *searched))
+    promise = json.loads(command(suggest, plain, recording, "--json", "--out", new, "--minutes", options.minutes, *searched))
     row = {"case": f"{name} {estimator}", "changes": {c["parameter"]: c["suggested"] for c in promise["changes"]},
            "withdrawn": promise["withdrawn"], "share": promise["share"], "halves": promise["halves"], "is_cut": promise["is_cut"]}
     before = judged(options, other, plain, scratch / "before", align)
@@ -69,11 +69,13 @@ def judge(options, case, scratch):
 def line(row):
     figures = (("promised", 3), ("measured", 3), ("promised_gap", 3), ("measured_gap", 3), ("before_m", 3), ("after_m", 3), ("before_nees", 2), ("after_nees", 2))
     return (f"{row['case']:28} {len(row['changes']):3} " + " ".join(f"{printed(row.get(key), digits):>8}" for key, digits in figures)
-            + f"  {', '.join(row['misses']) or row['withdrawn'] or 'none'}")
+            + f"  {', '.join(row['misses']) or row['withdrawn'] or 'none'}" + " (the search was cut)" * row["is_cut"])
 
 
 def main():
-    options = replays.parser(__doc__, "cases whose title contains one of these words").parse_args()
+    parser = replays.parser(__doc__, "cases whose title contains one of these words")
+    parser.add_argument("--minutes", type=float, default=10.0, help="of each search")
+    options = parser.parse_args()
     if not options.data_dir.is_dir():
         print(f"{options.data_dir}: no recordings here")
         return 77
