@@ -399,8 +399,8 @@ static int is_skid_track(const wm_assembly *assembly, const wm_calibration_value
   return 0;
 }
 
-// A factor of noise against the stated sigma: of a position's only a share counts as new (positions.noise.factor). Of an
-// antenna the way from where calibration.yaml has it; 0 where it has none.
+// A factor of noise against the stated sigma: of a position's only a share counts as new (positions.noise.factor). Of
+// an antenna the way from where calibration.yaml has it; 0 where it has none.
 static double judged_value(const wm_assembly *assembly, const wm_calibration_value *c) {
   if (strstr(c->name, ".antenna_")) {
     const double stated_m = assembly->setup.rig->antenna_m[strcmp(c->name, "gnss.antenna_y_m") == 0];

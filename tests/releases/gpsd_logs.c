@@ -13,8 +13,9 @@ int main(void) {
     if (why)
       printf("! %s\n", why);
     else
-      printf("%d %lld %.17g %.17g %.17g %.17g %.17g %.17g %.17g %.17g %.17g %.17g %.17g %.17g %.17g %.17g %.17g\n", (int)r.kind, (long long)r.time_ns,
-             r.mode, r.status, r.latitude_deg, r.longitude_deg, r.ellipsoid_m, r.alt_m, r.east_m, r.north_m, r.across_m, r.up_m, r.speed_mps, r.track_deg,
-             r.speed_error_mps, r.track_error_deg, r.heading_deg);
+      printf("%d %lld %.17g %.17g %.17g %.17g %.17g %.17g %.17g %.17g %.17g %.17g %.17g %.17g %.17g %.17g %.17g\n",
+             (int)r.kind, (long long)r.time_ns, r.mode, r.status, r.latitude_deg, r.longitude_deg, r.ellipsoid_m,
+             r.alt_m, r.east_m, r.north_m, r.across_m, r.up_m, r.speed_mps, r.track_deg, r.speed_error_mps,
+             r.track_error_deg, r.heading_deg);
   }
 }

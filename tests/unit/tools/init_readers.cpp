@@ -160,7 +160,8 @@ struct BadInput {
   const char *message;
 };
 const BadInput kTable[] = {
-    {"cut off", kUrdf, ROBOT "<link name=\"a\"", "robot.urdf:2: is no XML from here on: cut off, a tag that is not closed, or no URDF at all"},
+    {"cut off", kUrdf, ROBOT "<link name=\"a\"",
+     "robot.urdf:2: is no XML from here on: cut off, a tag that is not closed, or no URDF at all"},
     {"another kind of file", kUrdf, "<sdf version=\"1.7\"/>",
      "robot.urdf:1: a URDF begins with <robot>; of a xacro file `xacro FILE > robot.urdf` makes one"},
     {"xacro", kUrdf, ROBOT "<xacro:include filename=\"a\"/></robot>",
