@@ -9,9 +9,6 @@ namespace {
 
 // A delay is linear in the path while its sigma is less: a robot begins to drive in a tenth of a second.
 constexpr double kLinearDelay_s = 0.1;
-// Speeds that differ by less are one: the noise of a measured speed would seem to tell the delay from the antenna's
-// place.
-constexpr double kHeldShare = 0.01, kHeld_mps = 0.05;
 
 }  // namespace
 
@@ -54,72 +51,39 @@ double position_aid::lasting_error(const planar_motion &filter) const {
 }
 
 // Where the delay is uncertain, its derivatives are those of the chord over two sigmas: a robot that may have stood
-// then, or driven, has neither's derivative [Julier1997]. The antenna's place goes along with the delay as the two are
-// correlated: at constant speed the bend of the path does not tell them apart. Nor does the speed's scale, whose error
-// is in the innovation, too: the derivative is that of the speed as measured, as from first estimates [Huang2010].
-// Before the first motion datum the robot is taken to have moved as it does by that one: taken to have stood, its first
-// positions would be exact, and determine a delay that cannot be separated from the place of the antenna.
-void position_aid::widen_delay(const planar_motion &filter, view *at) {
+// then, or driven, has neither's derivative [Julier1997]. Before the first motion datum the robot is taken to have
+// moved as it does by that one: taken to have stood, its first positions would be exact, and determine a delay that
+// cannot be separated from the place of the antenna.
+void position_aid::widen_delay(const planar_motion &filter, view *at) const {
   past_pose &past = at->past;
+  at->bend_m[0] = at->bend_m[1] = 0.0;
   if (time_ < 0) return;
-  const double *scale = filter.calibration().value;
-  const double by_speed = 1.0 / (scale[kSpeedScale] * 0.5 * (scale[kLeftScale] + scale[kRightScale]));
   const double sigma_s = std::sqrt(filter.variance(time_)), age_s = filter.value(time_);
   const wm_time_ns now = filter.now_ns();
-  if (sigma_s >= kLinearDelay_s) {
-    if (!filter.is_path_known(now - wm_ns_from_seconds(age_s + sigma_s))) {
-      motion_twist ahead{};
-      (void)filter.path(now, now + 1, &ahead);
-      put_age(filter.steady(ahead), at->h, past.age_by);
-    } else {
-      put_chord(filter, sigma_s, at);
-    }
+  if (sigma_s < kLinearDelay_s) return;
+  if (!filter.is_path_known(now - wm_ns_from_seconds(age_s + sigma_s))) {
+    motion_twist ahead{};
+    (void)filter.path(now, now + 1, &ahead);
+    put_age(filter.steady(ahead), sincos(past.pose.heading_rad), past.age_by);
+    return;
   }
-  for (int k = 0; k < 2; k++) past.age_by[k] *= by_speed;
-  hold_speed(at->h, past.age_by);
-}
-
-void position_aid::hold_speed(const sin_cos &h, double age_by[2]) {
-  const double speed = -age_by[0] * h.cos - age_by[1] * h.sin, off = speed - held_mps_;
-  if (!(std::fabs(off) < kHeldShare * std::fabs(held_mps_) + kHeld_mps)) held_mps_ = speed;
-  const double back = speed - held_mps_;
-  age_by[0] += back * h.cos;
-  age_by[1] += back * h.sin;
-}
-
-void position_aid::put_chord(const planar_motion &filter, double sigma_s, view *at) const {
-  past_pose &past = at->past;
-  const double age_s = filter.value(time_);
-  double arm_by[2] = {0.0, 0.0}, turned[2] = {0.0, 0.0};
-  for (int k = 0; k < 2 && antenna_ >= 0; k++) arm_by[k] = filter.covariance(antenna_ + k, time_) / square(sigma_s);
-  for (double &by : past.age_by) by = 0.0;
-  for (int side = -1; side <= 1; side += 2) {
-    const double later_s = side * sigma_s;
-    const wm_pose2 there = pose_before(filter, age_s + later_s).pose;
-    const sin_cos h = sincos(there.heading_rad);
-    const double arm_m[2] = {at->arm_m[0] + later_s * arm_by[0], at->arm_m[1] + later_s * arm_by[1]};
-    const double way_m[2] = {there.x_m - past.pose.x_m, there.y_m - past.pose.y_m};
-    const double turn_m[2] = {h.cos * arm_m[0] - h.sin * arm_m[1] - at->off_m[0],
-                              h.sin * arm_m[0] + h.cos * arm_m[1] - at->off_m[1]};
-    for (int k = 0; k < 2; k++) {
-      past.age_by[k] += way_m[k] / (2.0 * later_s);
-      turned[k] += turn_m[k] / (2.0 * later_s);
-      at->bend_m[k] += 0.5 * (way_m[k] + turn_m[k]);
-    }
-  }
-  at->turn_by[0] = turned[0] - at->h.cos * arm_by[0] + at->h.sin * arm_by[1];
-  at->turn_by[1] = turned[1] - at->h.sin * arm_by[0] - at->h.cos * arm_by[1];
+  const wm_pose2 earlier = pose_before(filter, age_s + sigma_s).pose, later = pose_before(filter, age_s - sigma_s).pose;
+  past.age_by[0] = (earlier.x_m - later.x_m) / (2.0 * sigma_s);
+  past.age_by[1] = (earlier.y_m - later.y_m) / (2.0 * sigma_s);
+  past.age_by[2] = wrap(earlier.heading_rad - later.heading_rad) / (2.0 * sigma_s);
+  at->bend_m[0] = 0.5 * (earlier.x_m + later.x_m) - past.pose.x_m;
+  at->bend_m[1] = 0.5 * (earlier.y_m + later.y_m) - past.pose.y_m;
 }
 
 position_aid::view position_aid::look(const wm_position &p, planar_motion *filter) {
   has_position_ = 1;
   carry_error(filter->now_ns(), p.sigma_xy_m, filter);
-  view out{pose_before(*filter, time_ < 0 ? 0.0 : filter->value(time_)), {}, {}, {}, {}, {}};
+  view out{pose_before(*filter, time_ < 0 ? 0.0 : filter->value(time_)), {}, {}, {}, {}};
+  widen_delay(*filter, &out);
   const sin_cos h = out.h = sincos(out.past.pose.heading_rad);
   for (int i = 0; i < 2; i++) out.arm_m[i] = antenna_m_[i] + (antenna_ < 0 ? 0.0 : filter->value(antenna_ + i));
   out.off_m[0] = h.cos * out.arm_m[0] - h.sin * out.arm_m[1];
   out.off_m[1] = h.sin * out.arm_m[0] + h.cos * out.arm_m[1];
-  widen_delay(*filter, &out);
   return out;
 }
 
@@ -128,7 +92,6 @@ double position_aid::put_row(int axis, const view &at, const planar_motion &filt
   const bool is_x = axis == 0;
   const double by[3] = {is_x ? 1.0 : 0.0, is_x ? 0.0 : 1.0, is_x ? -at.off_m[1] : at.off_m[0]};
   add_past_pose(row, by, at.past, time_);
-  row->add(time_, at.turn_by[axis]);
   double expected = (is_x ? at.past.pose.x_m : at.past.pose.y_m) + at.off_m[axis];
   if (antenna_ >= 0) {
     row->add(antenna_, is_x ? at.h.cos : at.h.sin);
@@ -141,22 +104,9 @@ double position_aid::put_row(int axis, const view &at, const planar_motion &filt
   return expected;
 }
 
-void position_aid::put_arm(const planar_motion &filter, double speed_mps, double variance_m2[2]) const {
-  planar_row along{};
-  along.add(time_, -speed_mps);
-  along.add(antenna_, 1.0);
-  variance_m2[0] = filter.variance_of(along);
-  variance_m2[1] = antenna_ < 0 ? 0.0 : filter.variance(antenna_ + 1);
-}
-
 void position_aid::put_rows(const wm_position &p, const view &at, const planar_motion &filter,
                             const wm_innovation &record, residual rows[2]) const {
   const double white_m2 = square(white_sigma_m(p.sigma_xy_m, params_)) * filter.noise().scale(noise_adaption::kPlace);
-  // Second order: the product of the errors of the heading and of where the antenna was. A delay at 1.5 m/s that is
-  // uncertain by 0.5 s is a place that is uncertain by 0.75 m.
-  double arm_m2[2];
-  put_arm(filter, held_mps_, arm_m2);
-  const double turn_rad2 = filter.variance(kHeading);
   for (int k = 0; k < 2; k++) {
     residual &r = rows[k];
     r.row = {};
@@ -167,9 +117,7 @@ void position_aid::put_rows(const wm_position &p, const view &at, const planar_m
     r.record.expected = expected;
     r.innovation = p.p_m[k] - expected;
     r.source = {noise_adaption::kPlace, white_m2};
-    r.noise = white_m2 + 2.0 * square(at.bend_m[k]) +
-              turn_rad2 *
-                  (square(k == 0 ? at.h.sin : at.h.cos) * arm_m2[0] + square(k == 0 ? at.h.cos : at.h.sin) * arm_m2[1]);
+    r.noise = white_m2 + 2.0 * square(at.bend_m[k]);
   }
 }
 

@@ -36,7 +36,6 @@ class position_aid {
     for (int i = 0; i < 2; i++) antenna_m_[i] = mounted.place_m[i];
     heading_bias_ = params.heading_bias_sigma_rad > 0.0 ? add(0.0, params.heading_bias_sigma_rad) : -1;
     has_heading_ = has_position_ = is_awake_ = unused_ = 0;
-    held_mps_ = 0.0;
     receiver_.begin();
   }
   const wm_position_params &params() const { return params_; }
@@ -50,11 +49,10 @@ class position_aid {
   // The robot when it was measured.
   struct view {
     past_pose past;
-    sin_cos h;          // of its heading
-    double arm_m[2];    // the antenna's place in base_link
-    double off_m[2];    // the same on the map's axes
-    double bend_m[2];   // by how much the middle of the delay's chord is off the path
-    double turn_by[2];  // of the antenna's turn around base_link, by the delay's chord
+    sin_cos h;         // of its heading
+    double arm_m[2];   // the antenna's place in base_link
+    double off_m[2];   // the same on the map's axes
+    double bend_m[2];  // by how much the middle of the delay's chord is off the path
   };
   // The receiver's error goes on to this position; then the robot as it was.
   view look(const wm_position &p, planar_motion *filter);
@@ -72,12 +70,7 @@ class position_aid {
 
  private:
   void carry_error(wm_time_ns t_ns, double position_sigma_m, planar_motion *filter);
-  void widen_delay(const planar_motion &filter, view *at);
-  // The derivative's speed is the last one that differed by more than noise.
-  void hold_speed(const sin_cos &h, double age_by[2]);
-  void put_chord(const planar_motion &filter, double sigma_s, view *at) const;
-  // Variances of where the antenna was, ahead of and beside where it is taken to have been.
-  void put_arm(const planar_motion &filter, double speed_mps, double variance_m2[2]) const;
+  void widen_delay(const planar_motion &filter, view *at) const;
   double put_row(int axis, const view &at, const planar_motion &filter, planar_row *row) const;
   double bias(const planar_motion &filter) const { return heading_bias_ < 0 ? 0.0 : filter.value(heading_bias_); }
 
@@ -85,7 +78,6 @@ class position_aid {
   int time_, error_, antenna_, heading_bias_;           // states; -1: none
   int has_heading_, has_position_, is_awake_, unused_;  // has_: one has come; no padding
   double antenna_m_[2], antenna_sigma_m_;               // in base_link, without the states of its error
-  double held_mps_;
   receiver_error receiver_;
 };
 

@@ -28,7 +28,7 @@ CASES = Path(os.environ.get("WM_CASES_DIR", ROOT / "../shared/cases"))
 OWN_WORDS = re.compile(r"Traceback|Error\b|please report|object at 0x|<_io")
 
 
-AT_ONE_SPEED = "from a found start, a receiver's unknown delay makes the turn's noise adapt to 15 times its variance: degraded, while the pose is right"
+AT_ONE_SPEED = "at one speed a receiver's delay and the antenna's place along the way are told apart by noise: the delay is called wrong, while the pose is right"
 
 
 @dataclass

@@ -147,7 +147,7 @@ double delay_of(uint64_t seed) {
   return found("gnss.time_offset_s").value;
 }
 
-// 0.028 s (root mean square) and 0.079 s at most; with the derivative of one moment 0.045 and 0.133 s.
+// 0.034 s (root mean square) and 0.088 s at most; with the derivative of one moment 0.045 and 0.133 s.
 TEST(test_a_receivers_delay_is_found_when_a_robot_drives_off) {
   double squares = 0.0, worst = 0.0;
   for (uint64_t seed = 1; seed <= 40; seed++) {
@@ -180,34 +180,6 @@ TEST(test_a_receivers_delay_is_not_observed_at_one_speed) {
     TEST_ASSERT_GREATER_THAN_DOUBLE(0.2, delay.sigma);  // 0.3 m of antenna at 1.5 m/s
     TEST_ASSERT_LESS_THAN_DOUBLE(3.0, std::fabs(delay.value) / delay.sigma);
   }
-}
-
-// The same in curves, where the noise of a measured speed and the errors of heading and scale seem to excite it.
-TEST(test_a_receivers_delay_is_not_observed_in_curves_at_one_speed) {
-  double squares = 0.0;
-  for (uint64_t seed = 1; seed <= 10; seed++) {
-    begin();
-    wm_pose2 p{};
-    for (int k = 0; k < 2500; k++) {
-      const double t = 0.02 * k, w = 0.4 * std::sin(0.3 * t);
-      const auto at = static_cast<uint64_t>(5 * k);
-      const auto noise = [&](uint64_t channel, double sigma) {
-        return sigma * wm_random_normal(7, seed, at + channel);
-      };
-      feed(make::twist(t, 1.5 + noise(0, 0.02), w + noise(1, 0.005)));
-      if (k % 10 == 0) {
-        feed(make::position(t, p.x_m + noise(2, 0.03), p.y_m + noise(3, 0.03), 0.05));
-        feed(make::heading(t, std::remainder(p.heading_rad + noise(4, 0.02), 2 * M_PI), 0.02));
-      }
-      const double middle_rad = p.heading_rad + 0.01 * w;
-      p = {p.x_m + 0.03 * std::cos(middle_rad), p.y_m + 0.03 * std::sin(middle_rad), p.heading_rad + 0.02 * w};
-    }
-    const wm_calibration_value delay = found("gnss.time_offset_s");
-    TEST_ASSERT_GREATER_THAN_DOUBLE(0.13, delay.sigma);
-    squares += delay.value * delay.value / (delay.sigma * delay.sigma) / 10;
-  }
-  std::printf("delay: %.2f sigma\n", std::sqrt(squares));
-  TEST_ASSERT_LESS_THAN_DOUBLE(1.0, std::sqrt(squares));
 }
 
 }  // namespace
