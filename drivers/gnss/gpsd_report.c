@@ -82,8 +82,8 @@ static gpsd_class class_of(const wm_yaml_node *report) {
   return class_named(name, strlen(name));
 }
 
-// Whether a line names at its begin, as gpsd's do, a class that nobody reads. Such lines are not parsed: the log
-// batches of gpsd 3.22 to 3.25 have a name twice, and SKY is the longest and most frequent of all.
+// Whether a line begins with a class that has no reader here. Such lines are not parsed: log batches of gpsd 3.22 to
+// 3.25 have a name twice, and SKY reports are the longest and most frequent ones.
 static int is_of_no_use(const char *line, size_t length) {
   static const char kBegin[] = "{\"class\":\"";
   const size_t begin = sizeof kBegin - 1;

@@ -89,7 +89,7 @@ static void judge_whole(can_stream *self) {
   char *first = self->base.counts.first_problem;
   const int is_missing = wm_can_decoder_missing(self->decoder, self->survey, text, sizeof text) > 0;
   if (!is_missing && wm_can_decoder_floats(self->decoder, text, sizeof text) == 0) return;
-  const int has_frames = self->survey->count > 0;  // else the lines are no log, which the first one says
+  const int has_frames = self->survey->count > 0;  // 0: the first problem is that the lines are no log
   if (first[0] && (self->base.counts.received > 0 || !has_frames)) return;
   const char *slash = strrchr(self->lines.path, '/');
   (void)snprintf(first, sizeof self->base.counts.first_problem, "%.40s: %.210s", slash ? slash + 1 : self->lines.path,

@@ -20,7 +20,7 @@ namespace wm::init {
 
 namespace {
 
-// What a link's name says beside the words that many have: "front_camera_optical_frame" says "front" of a camera.
+// Words of a link's name but for those that many have: of "front_camera_optical_frame" of a camera, "front".
 std::set<std::string> own_words(const std::string &name, bool is_camera) {
   static const std::set<std::string> kOfAll{"link", "frame", "optical", "sensor", "base"}, kOfCameras{"camera", "cam"};
   std::set<std::string> out;

@@ -24,8 +24,8 @@ struct Urdf {
   std::map<std::string, std::string> moving;  // link -> the joint between it and `base` that moves
   std::vector<std::string> notes;             // what is unusual in the file, with its line
 
-  // Link of a sensor: `name` itself, else NAME_optical_frame, NAME_optical, NAME_link, NAME_frame, else the one that
-  // says the same beside words like link and camera, else, of an only camera, the only camera's; "": none.
+  // Link of a sensor; "": none. The first that is there of: `name` itself, NAME_optical_frame, NAME_optical, NAME_link,
+  // NAME_frame, the one with the same words but for link, camera and the like. An only camera has the only camera's.
   [[nodiscard]] std::string link_of(const std::string &name, bool is_camera, bool is_only) const;
   // A sensor's body frame (x along the view) in `base`; a link named ..._optical... looks along its z axis.
   [[nodiscard]] images::Pose body(const std::string &link) const;

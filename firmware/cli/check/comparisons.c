@@ -386,7 +386,7 @@ static void disagrees(const scene *s, const channel *c, const channel *other, co
       ->size = factor;
 }
 
-// Whether a gyro shows a turn where another sensor shows none, in the mean of the drive: it is said then.
+// Whether a gyro shows a turn where another sensor shows none, in the mean of the drive. Makes the finding.
 static int has_bias(const scene *s, const channel *c, const channel *other) {
   if (c->kind != CHANNEL_YAW_RATE || !other->has_scale || are_commands(s->all, other)) return 0;
   const fit f = best_fit(c, other);

@@ -202,7 +202,7 @@ void motion_data_judge(const motion_data *self, const wm_assembly *assembly, uin
   uint64_t count[WM_Q_COUNT] = {0};
   uint32_t elsewhere = 0;  // quantities of CAN that another source gives
   const char *counter = ABOUT;
-  int has_can = 0;  // another source without any datum says so itself
+  int has_can = 0;  // another source without any datum has a finding of its own
   for (size_t s = 0; s < assembly->source_count && s < WM_SOURCES_MAX; s++) {
     elsewhere |= assembly->sources[s].drops;
     has_can |= strncmp(assembly->sources[s].name, ABOUT, strlen(ABOUT)) == 0;

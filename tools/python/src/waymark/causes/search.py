@@ -30,8 +30,8 @@ APART_MIN = 0.02  # nats an update, over another cause: below, the drive does no
 # A drive is right with: 14 % of the updates refused, a mean square of 1.34, lost for 0.5 %: the most of 29 good drives.
 EXPLAINED_MIN, SQUARES_MOST, LOST_MOST, DEGRADED_MOST = 0.85, 1.7, 0.02, 0.2
 STATES_APART = math.log(NAMED_FROM / (1 - NAMED_FROM))  # nats of calibration states
-# nats in all by which few observations tell: with the right densities the odds of a gain by chance are its exponential, and the
-# pairs that are tried, and errors that last, take a part of it.
+# Gain, in nats, from which a mistake that few observations show is named. By chance a gain of g nats has odds of exp(-g). The number of
+# pairs that are tried, and errors that last, use up a part of it.
 LOCAL_MIN = 15.0
 EXPLAINED_ALL = 0.97  # then nothing is left for a second mistake
 LONGEST = 6.0  # of a drive's time without changes; one that searches for its pose all the time is no right one
