@@ -240,6 +240,16 @@ void error_state::add_chance(double probability, const double *off) {
   add_spread(probability, [off](int j) { return off[j]; });
 }
 
+// An update with the variance's negative: P + g g' / left, g = P h, left = variance - h' P h.
+void error_state::take_back(const sparse_row &row, double off, double variance) {
+  double *gain = vector(0);
+  project(row, filled(), gain);
+  const double left = variance - dot(row, gain);
+  if (!(left > 0.0)) return;
+  vectors::add_scaled(mean(), gain, off / left, even(n_));
+  add_spread(1.0 / left, [gain](int j) { return gain[j]; });
+}
+
 // P + e r' + r e', e and r as add_spread() left them.
 void error_state::apply_spread() {
   touch();

@@ -103,6 +103,9 @@ class error_state {
   // P += share d d', d = of(state).
   template <class Of>
   void add_spread(double share, Of of);
+  // Takes back an observation of the row's value that was fused with this variance; `off`: the value now less what was
+  // observed. Nothing changes where the state is less certain than the observation.
+  void take_back(const sparse_row &row, double off, double variance);
   // Covariance of a mixture: with this probability, the states differ by `off`, `states()` doubles.
   void add_chance(double probability, const double *off);
 

@@ -447,7 +447,7 @@ static void calibration(const wm_assembly *assembly, const wm_health *health, wm
       // Within two sigmas of skid steer's prior it is its base's; beyond, `track_m` is wrong.
       if (skids && fabs(c->value - WM_SKID_TRACK) <= 2 * WM_SKID_TRACK_SIGMA) break;
       const int is_bad = !skids && (value < kLimits[k].bad_least || value > kLimits[k].bad_most ||
-                                    wm_health_has_alarm(health, WM_ALARM_SCALE, i));
+                                    wm_health_has_alarm(health, WM_ALARM_STATED, i));
       wm_find(out, WM_FOUND_CALIBRATION_OFF, is_bad ? WM_SEVERITY_BAD : WM_SEVERITY_NOTE, "calibration", kLimits[k].fix,
               "%s is %.4g +- %.2g at the end; %g was expected", c->name, c->value, c->sigma,
               skids        ? WM_SKID_TRACK

@@ -292,10 +292,8 @@ std::vector<wm_alarm> alarms_about(const wm_setup &setup, const scale_value &sca
   std::vector<wm_alarm> out(WM_ALARMS_MAX);
   wm::calibration_list list(out.data(), out.size());
   list.add("scale", scale.value, scale.sigma);
-  list.judge_scale(scale.term == kRange
-                       ? wm::judge_range_scale(*setup.sightings, scale.value, scale.sigma)
-                       : wm::judge_motion_scale(setup.motion->states, scale.term, scale.value, scale.sigma),
-                   scale.value);
+  list.add_length(scale.term == kRange ? wm::length_square(*setup.sightings, scale.value, scale.sigma)
+                                       : wm::length_square(setup.motion->states, scale.term, scale.value, scale.sigma));
   out.resize(list.finish_alarms());
   return out;
 }
@@ -361,42 +359,23 @@ TEST(lengths_that_contradict_each_other_are_degraded) {
   TEST_ASSERT_EQUAL(WM_STATE_TRACKING, state_with(setup, scale_value{WM_SPEED_SCALE, 1.19, 0.005}));
 }
 
-// On a known map a scale is off from a fifth on; one of 0.88 is five sigmas, and no other unit or size.
-TEST(a_scale_that_is_off_by_less_than_a_fifth_is_no_contradiction) {
-  const parameters::values motion(wm_motion_params_table, {{"states.left_scale_sigma", 0.02}});
-  const wm_landmark post{};
-  wm_setup setup{};
-  setup.motion = static_cast<const wm_motion_params *>(static_cast<const void *>(motion.data()));
-  setup.landmarks = &post;
-  setup.landmark_count = 1;
-  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, state_with(setup, scale_value{WM_LEFT_SCALE, 0.88, 0.003}));
-  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, state_with(setup, scale_value{WM_LEFT_SCALE, 1.12, 0.003}));
-  TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, scale_value{WM_LEFT_SCALE, 0.82, 0.003}));
-  TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, scale_value{WM_LEFT_SCALE, 1.22, 0.003}));
-}
-
 // Of any sensor, against the prior of all of them.
 TEST(a_scale_of_ranges_is_held_against_the_sensors_prior) {
   parameters::values sightings(wm_sighting_params_table, {{"states.range_scale_sigma", 0.02}});
-  const wm_landmark post{};
   wm_setup setup{};
   setup.sightings = reinterpret_cast<const wm_sighting_params *>(sightings.data());
-  setup.landmarks = &post;
-  setup.landmark_count = 1;
-  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, state_with(setup, scale_value{kRange, 1.12, 0.003}));
-  TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, scale_value{kRange, 1.25, 0.003}));
-  TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, scale_value{kRange, 0.79, 0.003}));
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, state_with(setup, scale_value{kRange, 1.06, 0.003}));
+  TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, scale_value{kRange, 1.08, 0.003}));
+  TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, scale_value{kRange, 0.92, 0.003}));
 }
 
-// Its effective track is 1.5 +- 0.25 of the distance of its wheels. The third value of `drive` is skid_steer.
-TEST(the_wide_track_of_skid_steer_is_its_prior) {
-  const parameters::values plain(wm_motion_params_table, {}), skids(wm_motion_params_table, {{"drive", 2}});
+// A track and a gyro's scale are no lengths.
+TEST(scales_of_turns_are_no_standards_of_length) {
+  const parameters::values motion(wm_motion_params_table, {});
   wm_setup setup{};
-  setup.motion = static_cast<const wm_motion_params *>(static_cast<const void *>(plain.data()));
-  TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, scale_value{WM_TRACK_SCALE, 1.7, 0.01}));
-  setup.motion = static_cast<const wm_motion_params *>(static_cast<const void *>(skids.data()));
-  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, state_with(setup, scale_value{WM_TRACK_SCALE, 1.7, 0.01}));
-  TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, scale_value{WM_TRACK_SCALE, 2.9, 0.01}));
+  setup.motion = static_cast<const wm_motion_params *>(static_cast<const void *>(motion.data()));
+  for (const int term : {WM_TRACK_SCALE, WM_YAW_RATE_SCALE})
+    TEST_ASSERT_EQUAL(WM_STATE_TRACKING, state_with(setup, scale_value{term, 1.7, 0.01}));
 }
 
 // Contradicted for 10 s: any heading, whose variance is pi^2 / 3.

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "filters/core/scale_test.hpp"
+#include "filters/core/length_test.hpp"
 #include "waymark/pose.h"
 
 namespace wm {
@@ -28,10 +28,7 @@ class calibration_list {
   }
   // About the value added last.
   void alarm(wm_alarm_kind kind, double value) { put_alarm(kind, static_cast<int32_t>(count_) - 1, value); }
-  void judge_scale(const scale_judgement &of, double value) {
-    length_squares_ += of.length_square;
-    if (of.contradicts) alarm(WM_ALARM_SCALE, value);
-  }
+  void add_length(double square) { length_squares_ += square; }
 
   size_t count() const { return count_; }
   // Behind the last value.

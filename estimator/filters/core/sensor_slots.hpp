@@ -87,7 +87,8 @@ class sensor_slots {
         if (slot < 0) continue;
         const double value = filter.value(slot), sigma = std::sqrt(filter.variance(slot));
         out->add(setup.sensors[i].name, kSensorStateSpecs[k].name, value, sigma);
-        if (k == kRangeScale) out->judge_scale(judge_range_scale(*setup.sightings, value, sigma), value);
+        if (k == kRangeScale) out->add_length(length_square(*setup.sightings, value, sigma));
+        if (filter.is_stated_wrongly(slot)) out->alarm(WM_ALARM_STATED, value);
       }
   }
 

@@ -29,6 +29,7 @@ void planar_motion::init_motion(const wm_setup &setup) {
   for (int &state : own_state_) state = -1;
   kind_ = kKindUnknown;
   start_ns_ = setup.start.t_ns;
+  stated_.clear();
   odom_ = {};
   travelled_m_ = turned_rad_ = 0.0;
   twist_ = {};
@@ -41,11 +42,15 @@ void planar_motion::init_motion(const wm_setup &setup) {
 
 void planar_motion::set_sensor_state(int state, double walk, double low, double high) {
   sensor_state_[sensor_states_++] = {state, 0, square(walk), low, high};
+  stated_.add(state, value(state), variance(state), square(walk));
 }
 
 void planar_motion::set_motion_state(const wm_motion_states &states, int i, int state) {
   walk_[i] = square(states.walk[i]);
   start_variance_[i] = square(start_sigma(states, i));
+  // Scales are read off a sheet. Biases and a command's delays are the motion's own, and their priors wide.
+  const bool is_scale = kNeutralCalibration.value[i] == 1.0;
+  if (state >= 0 && is_scale) stated_.add(state, calibration_.value[i], start_variance_[i], walk_[i]);
   own_state_[i] = state;
   by_kind_[i] = states.sigma[i] < 0.0;
   motion_state_[i] = by_kind_[i] ? -1 : state;
@@ -56,6 +61,7 @@ void planar_motion::take_kind() {
   const motion_kind kind = front_.kind();
   kind_ = kind;
   for (int i = 0; i < kCalibrationCount; i++) {
+    if (kind == kKindCommands) stated_.leave_untested(own_state_[i]);  // it stands for how the robot obeys
     if (!by_kind_[i]) continue;
     motion_state_[i] = is_state(-1.0, i, kind) ? own_state_[i] : -1;
     if (motion_state_[i] < 0) calibration_.value[i] = kNeutralCalibration.value[i];
@@ -243,8 +249,15 @@ void planar_motion::list_states(calibration_list *out) const {
     if (const int state = motion_state_[i]; state >= 0) {
       const double sigma = std::sqrt(variance(state));
       out->add(motion_state_name(i), value(state), sigma);
-      out->judge_scale(judge_motion_scale(front_.params().states, i, value(state), sigma), value(state));
+      out->add_length(length_square(front_.params().states, i, value(state), sigma));
+      if (is_stated_wrongly(state)) out->alarm(WM_ALARM_STATED, value(state));
     }
+}
+
+void planar_motion::check_stated() {
+  if (!stated_.check(&state_, now_ns())) return;
+  state_.set_value(kHeading, wrap(value(kHeading)));
+  take_calibration(state_.mean());
 }
 
 void planar_motion::take_calibration(double *states) {

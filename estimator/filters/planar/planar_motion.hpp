@@ -6,6 +6,7 @@
 
 #include <cmath>
 
+#include "belief/stated_values.hpp"
 #include "filters/core/calibration_list.hpp"
 #include "filters/core/noise_adaption.hpp"
 #include "filters/core/turn_check.hpp"
@@ -96,6 +97,8 @@ class planar_motion {
   void forget(int state, double value, double variance);
   // Adds variances of x and y, and of the heading, as noise of the motion does.
   void inflate_pose(double xy_m2, double heading_rad2);
+  // A value of the calibration that the configuration states is wrong, and not known as well yet as it was stated.
+  bool is_stated_wrongly(int state) const { return stated_.is_wrong(state, variance(state)); }
   // Fills time, mean, covariance and twist.
   void estimate(wm_estimate *out) const;
 
@@ -116,14 +119,17 @@ class planar_motion {
   // The velocity in the robot's axes at a heading.
   planar_twist velocity_at(double heading_rad) const;
   double velocity_sigma(int k) const { return std::sqrt(start_variance_[kCalibrationCount + k]); }
-  // A state of a sensor's error: its random walk per sqrt(s), and the limits beyond which an update is cut.
+  // A state of a sensor's error, as it is now: its random walk per sqrt(s), and the limits beyond which an update is
+  // cut.
   void set_sensor_state(int state, double walk, double low, double high);
 
   // By default a gyro's scale is no less certain than kGyroScaleSigma, also after a roll-back to its start.
   void limit_gyro_scale() {
     const int state = by_kind_[kYawRateScale] ? motion_state_[kYawRateScale] : -1;
     if (kind_ != kKindGyro || state < 0 || walk_[kYawRateScale] > 0.0) return;
-    if (variance(state) > square(kGyroScaleSigma)) forget(state, value(state), square(kGyroScaleSigma));
+    if (variance(state) <= square(kGyroScaleSigma)) return;
+    forget(state, value(state), square(kGyroScaleSigma));
+    stated_.set_variance(state, square(kGyroScaleSigma));
   }
   // At standstill the gyro measures its bias: innovation of that state and its variance. False: no measurement.
   bool standstill_bias(double *innovation, double *variance) const {
@@ -167,6 +173,7 @@ class planar_motion {
   void predict_to(wm_time_ns t_ns, Walked walked) {
     front_.set_position_variance(variance(kX) + variance(kY));
     if (now_ns() == WM_TIME_NONE) front_.set_now(t_ns);
+    check_stated();
     if (now_ns() < start_ns_) {  // the start pose is later: until then only the inputs that hold are kept
       front_.advance(t_ns < start_ns_ ? t_ns : start_ns_, calibration_,
                      [](const motion_segment &, const motion_twist &, const motion_noise &) {});
@@ -218,6 +225,7 @@ class planar_motion {
                  const pose_step &step, double heading_end_rad);
   // The calibration takes the states' values, which are cut to their limits.
   void take_calibration(double *states);
+  void check_stated();
 
   void list_states(calibration_list *out) const;
 
@@ -233,6 +241,7 @@ class planar_motion {
   };
   sensor_state_limits sensor_state_[kMaxSensorStates];
   int sensor_states_;
+  stated_values<kCalibrationCount + kMaxSensorStates> stated_;
   int32_t kind_;                        // motion_kind
   int32_t by_kind_[kCalibrationCount];  // a state only with kinds of motion that have the term
   wm_time_ns start_ns_;

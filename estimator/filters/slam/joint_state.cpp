@@ -66,6 +66,7 @@ void joint_state::set_motion_states(const wm_motion_states &states, int model, c
     forget(mean, 1.0, variance);
     state_.set_covariance(mean, wheel, variance);
     state_.set_covariance(wheel, wheel, variance + square(slip.sigma));
+    stated_.leave_untested(wheel);
   }
 }
 

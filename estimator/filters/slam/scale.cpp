@@ -42,6 +42,7 @@ void joint_state::leave_scale() {
 
 void joint_state::follow_scale(int state, double share, bool anchors) {
   if (state < 0) return;
+  stated_.leave_untested(state);  // no standard of length beside it that could contradict it
   scale_share_[state] = share;
   scale_start_[state] = value(state);
   scale_variance_[state] = anchors ? variance(state) : 0.0;

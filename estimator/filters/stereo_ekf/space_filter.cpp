@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "filters/stereo_ekf/space_filter.hpp"
 
+#include <cmath>
 #include <cstring>
 #include <utility>
+
+#include "belief/stated_prior.hpp"
 
 namespace wm {
 namespace {
@@ -37,6 +40,9 @@ void space_filter::init(double *memory, const head_model models[kHeadStates], in
   r_ = camera_axes_ = kIdentity3;
   turn_rate_ = {0, 0, 0};
   pending_ = false;
+  unchecked_s_ = 0.0;
+  std::memset(stated_variance_, 0, sizeof stated_variance_);
+  std::memset(is_wrong_, 0, sizeof is_wrong_);
   std::memset(head_, 0, sizeof head_);
   restart_head();
 }
@@ -49,8 +55,50 @@ void space_filter::begin_increment() {
 void space_filter::restart(int which) {
   if (at_[which] < 0) return;
   if (which == kMovedPlace || which == kMovedTurn) return begin_increment();
+  // What is wrong of a process stays wrong.
+  if (models_[which].tau_s == 0.0) is_wrong_[which] = 0;
+  if (!is_wrong_[which]) stated_variance_[which] = square(models_[which].sigma);
   decorrelate(at_[which], kHeadSpecs[which].width, square(models_[which].sigma));
   for (int i = 0; i < kHeadSpecs[which].width; i++) head_[at_[which] + i] = kHeadSpecs[which].neutral;
+}
+
+bool space_filter::is_stated_wrongly(int which) const {
+  double most = 0.0;
+  for (int i = 0; i < kHeadSpecs[which].width; i++) most = larger(most, variance(at_[which] + i));
+  return is_wrong_[which] != 0 && is_vaguer(most, stated_variance_[which]);
+}
+
+stated_prior space_filter::prior_of(int which) const {
+  stated_prior out{kHeadSpecs[which].width, {}, {}, {}, 0.0};
+  const double sigma = std::sqrt(stated_variance_[which]);
+  out.wider = kHeadSpecs[which].blunder / sigma;
+  for (int i = 0; i < out.count; i++) {
+    out.state[i] = at_[which] + i;
+    out.mean[i] = kHeadSpecs[which].neutral - head_[at_[which] + i];
+    out.root[i][i] = sigma;
+  }
+  return out;
+}
+
+void space_filter::check_priors(double dt_s) {
+  unchecked_s_ += dt_s;
+  if (unchecked_s_ < kCheckEvery_s) return;
+  for (int k = 0; k < kHeadStates; k++)
+    if (models_[k].tau_s == 0.0) stated_variance_[k] += square(models_[k].walk) * unchecked_s_;
+  unchecked_s_ = 0.0;
+  for (int found = 1; found > 0;) {
+    blunder_search search;
+    for (int k = 0; k < kHeadStates; k++)
+      if (at_[k] >= 0 && !is_wrong_[k] && kHeadSpecs[k].blunder > 0.0) search.weigh(state_, prior_of(k), k);
+    found = search.take(&state_);
+    for (int i = 0; i < found; i++) {
+      const int k = search.key(i);
+      is_wrong_[k] = 1;
+      if (models_[k].tau_s > 0.0) models_[k].sigma = kHeadSpecs[k].blunder;
+    }
+    pending_ = pending_ || found > 0;
+    settle();
+  }
 }
 
 void space_filter::restart_head() {

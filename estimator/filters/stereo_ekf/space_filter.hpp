@@ -14,6 +14,7 @@
 
 #include <cstddef>
 
+#include "belief/stated_prior.hpp"
 #include "filters/stereo_ekf/states.hpp"
 #include "motion/spatial.hpp"
 #include "state/error_state.hpp"
@@ -153,6 +154,8 @@ class space_filter {
   void restart_transient();
   // States of one number, for the roll-back of calibration.
   double value(int state) const { return head_[state]; }
+  // A state of the sensors is stated wrongly, and not known as well yet as it was stated.
+  bool is_stated_wrongly(int which) const;
   void forget(int state, double value, double variance);
   void restart_receiver();
   int calibration_begin() const { return movers() + (at_[kRates] >= 0 ? 6 : 0); }
@@ -197,6 +200,9 @@ class space_filter {
   void add_noise(int row, int column, const mat3 &block, const mat3 &then, double noise[kMovers][kMovers]) const;
   void add_with_rate(int which, int into, double with_rate, const step &s);
   void walk(double dt_s);
+  // Whether what is stated of the sensors is a blunder (belief/stated_prior.hpp); nothing may be pending.
+  void check_priors(double dt_s);
+  stated_prior prior_of(int which) const;
   double pose_variance(int state) const;  // sum of three
   void bound_pose(int state, double limit, double before);
 
@@ -208,6 +214,9 @@ class space_filter {
   int first_point_, points_max_;
   int at_[kHeadStates];
   head_model models_[kHeadStates];
+  double stated_variance_[kHeadStates];  // of each number of a state, as it would be now without data
+  int32_t is_wrong_[kHeadStates];        // that is
+  double unchecked_s_;
   bool pending_;
   pose3 pose_, moved_;
   mat3 r_, camera_axes_;

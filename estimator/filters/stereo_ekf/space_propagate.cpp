@@ -178,6 +178,7 @@ void space_filter::add_noise(int row, int column, const mat3 &block, const mat3 
 
 void space_filter::propagate(const body_stretch &twist) {
   settle();
+  check_priors(twist.dt_s);
   if (!(twist.dt_s > 0.0)) return;
   const double place_before = pose_variance(kPlace), turn_before = pose_variance(kTurn);
   const step s = step_of(twist);

@@ -277,6 +277,7 @@ void stereo_ekf::list_calibration(calibration_list *list) const {
       const double about = k == kAntenna ? antenna_m_[i] : 0.0;
       list->add(kHeadSpecs[k].name[i], about + filter_.head(first + i) + filter_.pending1(first + i),
                 std::sqrt(filter_.variance(first + i)));
+      if (filter_.is_stated_wrongly(k)) list->alarm(WM_ALARM_STATED, filter_.head(first + i));
     }
   }
   const vec3 error = filter_.head3(kReceiverError);

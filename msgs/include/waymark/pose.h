@@ -137,10 +137,11 @@ typedef struct wm_calibration_value {
 // What contradicts itself by the estimator's own values. The numbers and names are stable.
 typedef enum wm_alarm_kind {
   WM_ALARM_NOISE = 0,      // a factor on a variance is at its limit: sources disagree; value: the factor
-  WM_ALARM_SCALE,          // a scale is far from its prior; value: the scale
+  WM_ALARM_SCALE,          // of older versions: a scale is far from its prior
   WM_ALARM_LENGTHS,        // wheels and ranges together are far from their priors; value: sigmas
   WM_ALARM_LASTING_ERROR,  // a receiver's lasting error is far larger than stated; value: over its sigma
   WM_ALARM_TURN,           // the measured turn has another sign or unit; value: the factor that explains the rest
+  WM_ALARM_STATED,         // a stated value is wrong, and not known as well yet as it was stated; value: the value
   WM_ALARM_KIND_COUNT
 } wm_alarm_kind;
 
@@ -150,7 +151,7 @@ typedef struct wm_alarm {
   double value;
 } wm_alarm;
 
-// Room for all that an estimator of 16 sensors may have (estimator/filters/core/scale_test.cpp counts it).
+// Room for all that an estimator of 16 sensors may have (estimator/filters/core/length_test.cpp counts it).
 #define WM_ALARMS_MAX 32
 
 // "noise", "scale" ...; "?" beyond.

@@ -32,13 +32,13 @@ void make_setup(const wm_wheels &wheels) {
 
 // A filter with everything on that twists can teach, driven for a while so that all is correlated.
 // No lag: it is held at 0 and above, which is not linear.
-void make_busy_filter() {
+void make_busy_filter(int more = 0) {
   wm_wheels wheels = make::no_wheels();
   wheels.track_m = 0.5;
   make_setup(wheels);
   const double sigma[9] = {0.1, 0.1, 0.02, 0.05, 0.05, 0.05, 0, 0, 0.05};
   std::memcpy(states.sigma, sigma, sizeof sigma);
-  filter->init(setup, states, wm::kPoseStates + wm::planar_filter::count_motion_states(states));
+  filter->init(setup, states, wm::kPoseStates + wm::planar_filter::count_motion_states(states) + more);
   for (int i = 0; i <= 20; i++) filter->move(make::twist(0.1 * i, 1.0 + 0.3 * sin(i), 0.5 * cos(0.7 * i)));
 }
 
@@ -291,6 +291,29 @@ TEST(test_a_copied_and_a_carried_state) {
   filter->carry_state(4, row, 0.25, 0.02);
   expect_row_of_f(4, carried, 0.02, p);
   TEST_ASSERT_EQUAL_DOUBLE(before + 0.25, filter->value(4));
+}
+
+// A sensor's yaw, stated with a sigma of 0.05 rad, is 1: given up within the next test, in doubt while it is known less
+// well than it was stated, and then as if it had never been stated so. One of 0.1 is kept.
+TEST(test_a_yaw_that_is_stated_wrongly_is_found) {
+  for (const double yaw : {1.0, 0.1}) {
+    make_busy_filter(1);
+    const int state = filter->add_sensor_state(0.0, 0.05, 0.0, -3.2, 3.2);
+    wm::planar_row row;
+    row.add(state, 1.0);
+    const auto see = [&](double variance) {
+      TEST_ASSERT_TRUE(filter->update(row, yaw - filter->value(state), variance));
+    };
+    see(0.15 * 0.15);
+    filter->move(make::twist(2.6, 1.0, 0.1));
+    TEST_ASSERT_EQUAL(yaw == 1.0, filter->is_stated_wrongly(state));
+    const double prior = yaw == 1.0 ? wm::square(wm::kWider * 0.05) : wm::square(0.05);
+    const double expected = yaw * prior / (prior + wm::square(0.15));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, expected, filter->value(state));
+    see(1e-6);
+    filter->move(make::twist(3.2, 1.0, 0.1));
+    TEST_ASSERT_FALSE(filter->is_stated_wrongly(state));
+  }
 }
 
 TEST(test_the_estimate_of_a_drive_has_its_twist) {

@@ -163,6 +163,32 @@ TEST(test_sensor_states_swing_the_way_as_they_should) {
                                 a.filter->covariance(i, j));
 }
 
+// A camera that is turned by 0.4 rad about one axis where 0.01 is stated, a constant and a process: given up within the
+// next test, and in doubt until it is known better.
+TEST(test_a_turn_of_the_camera_that_is_stated_wrongly_is_found) {
+  for (const double tau_s : {0.0, 20.0}) {
+    head_model models[kHeadStates] = {};
+    models[kCameraRotation] = {0.01, 0, tau_s};
+    const machine m(models, 0);
+    const int state = m.filter->at(kCameraRotation);
+    const auto see = [&](double variance) {
+      row_block block;
+      const int column = block.add_columns(state, 3),
+                row = block.add_row(WM_RESIDUAL_BEARING, 0.4, 0.4 - m.filter->head(state + 2), variance);
+      block.by[row][column + 2] = 1.0;
+      TEST_ASSERT_TRUE(m.filter->fuse(block, {1e6, 1e6}).fused);
+      m.filter->propagate({0.6, {}, {}, {}, {}});
+    };
+    see(0.03 * 0.03);
+    m.filter->propagate({0.1, {}, {}, {}, {}});
+    TEST_ASSERT_TRUE(m.filter->is_stated_wrongly(kCameraRotation));
+    TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.4, m.filter->head(state + 2));
+    if (tau_s > 0) continue;  // it wanders as widely from now on
+    see(1e-6);
+    TEST_ASSERT_DOUBLE_WITHIN(0.001, 0.4, m.filter->head(state + 2));
+  }
+}
+
 // The error of the motion since a picture is the pose's own, in that picture's axes, where the pose was exact then.
 // Considered states keep their covariance while what they correlate with is learnt.
 TEST(test_motion_since_a_picture_and_considered_states) {

@@ -306,7 +306,7 @@ TEST(a_scale_with_an_alarm_is_bad) {
     *(i < 2 ? &health.calibration[0] : &health.more_calibration[0]) =
         (wm_calibration_value){.name = "motion.left_scale", .value = 1.25, .sigma = 0.003};
     health.alarm_count = 1;
-    health.alarms[0] = (wm_alarm){i % 2 ? WM_ALARM_SCALE : WM_ALARM_NOISE, (int32_t)at, 1.25};
+    health.alarms[0] = (wm_alarm){i % 2 ? WM_ALARM_STATED : WM_ALARM_NOISE, (int32_t)at, 1.25};
     evidence_judge(&evidence, &assembly, &health, 0, &found);
     TEST_ASSERT_EQUAL(1, found.count);
     TEST_ASSERT_EQUAL(WM_FOUND_CALIBRATION_OFF, found.at[0].id);

@@ -29,12 +29,13 @@ ESTIMATOR_NEVER = re.compile(
 # Inside estimator/: folder -> folders whose headers it may include (its own always). A detector includes no other detector
 # and no filter, a filter no other filter.
 SENSING = ["", "math", "memory", "sensors", "image", "vision"]
-FILTER = ["", "aid", "math", "memory", "state", "motion", "maps", "sensors", "filters", "filters/core", "filters/planar", "filters/relocalize"]
+FILTER = ["", "aid", "math", "memory", "state", "belief", "motion", "maps", "sensors", "filters", "filters/core", "filters/planar", "filters/relocalize"]
 FOLDER_MAY_USE = {
     "": [],
     "math": [],
     "memory": [],
     "state": ["math", "memory"],
+    "belief": ["math", "memory", "state"],
     "motion": ["", "math", "memory"],
     "maps": ["math", "memory"],
     "sensors": ["", "math", "memory"],
@@ -49,7 +50,7 @@ FOLDER_MAY_USE = {
     "vision/stereo": SENSING,
     "filters": [],
     "filters/core": ["", "math", "memory", "motion", "sensors"],
-    "filters/planar": ["math", "memory", "state", "motion", "sensors", "filters/core"],
+    "filters/planar": ["math", "memory", "state", "belief", "motion", "sensors", "filters/core"],
     "filters/relocalize": ["math", "memory", "maps", "sensors", "filters/core"],
     "aid": ["", "math", "memory", "state", "motion", "maps", "sensors", "filters/core", "filters/planar", "filters/relocalize"],
     "filters/edge_mcl": FILTER,
