@@ -31,7 +31,7 @@ wm_status waymark_open(const waymark_options *options, waymark_session **out, wm
   *out = NULL;
   status = library_take_options(__func__, options, options ? options->bytes : 0, &taken, sizeof taken, err);
   if (status != WM_OK) return status;
-  if (!taken.config)
+  if (!taken.config || !taken.config[0])
     return wm_fail(err, WM_BAD_USAGE, "waymark_open: options.config: the configuration's path is missing");
   status = session_open(&taken, &self, err);
   if (status != WM_OK) return status;

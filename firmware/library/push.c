@@ -45,19 +45,21 @@ static wm_status check_ahead(session *self, const char *name, wm_time_ns t_ns, w
 // What the merge said to a datum.
 static wm_status judge(const session *self, const wm_event *event, wm_merge_verdict verdict, wm_error *err) {
   const char *name = self->assembly.sources[event->source].name;
-  const double late_s = wm_seconds_between(event->t_ns, event->arrival_ns);
+  const double behind_s = wm_seconds_between(event->t_ns, self->now_ns);
   switch (verdict) {
     case WM_MERGE_TAKEN: break;
     case WM_MERGE_LATE:
       return wm_fail(err, WM_TIME_RAN_BACK,
-                     "%s: newer data were fused already: push in the order of the stamps, or raise lateness_max_ms; it "
-                     "came %.3f s after its stamp",
-                     name, late_s);
+                     "%s: newer data were fused already, and it is %.3f s behind the newest time of this session: %s",
+                     name, behind_s,
+                     behind_s > wm_seconds_between(0, AHEAD_MAX_NS)
+                         ? "is one of another clock? A session keeps that of its first datum: open another one"
+                         : "push in the order of the stamps, or raise lateness_max_ms");
     case WM_MERGE_FUTURE:
       return wm_fail(
           err, WM_OUT_OF_RANGE,
           "%s: its stamp is %.3f s later than its arrival, more than merge.horizon_ms: are both on one clock?", name,
-          -late_s);
+          wm_seconds_between(event->arrival_ns, event->t_ns));
     case WM_MERGE_DUPLICATE: return wm_fail(err, WM_BAD_DATA, "%s: the same datum was pushed before", name);
     case WM_MERGE_DROPPED: return wm_fail(err, WM_FULL, "%s: the queue is full: raise merge.queue_events", name);
   }
@@ -232,7 +234,7 @@ wm_status session_advance(session *self, const char *function, wm_time_ns now_ns
   wm_status status = session_check_started(self, function, err);
   if (status == WM_OK) status = check_time("now_ns", now_ns, err);
   if (status == WM_OK) status = check_ahead(self, "now_ns", now_ns, err);
-  if (status == WM_OK) advance(self, now_ns);
+  if (status == WM_OK && self->has_data) advance(self, now_ns);  // else a wrong one would make all data late
   return status;
 }
 

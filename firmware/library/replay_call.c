@@ -11,6 +11,8 @@
 #include "replay/replay.h"
 #include "waymark/map.h"
 
+#define PART_MAX_S 1e9  // as of `from_s` in a configuration: no recording is longer
+
 static void put(void *context, wm_output_kind kind, const void *record, size_t bytes) {
   const waymark_replay_options *options = context;
   const waymark_record known = library_record(kind);
@@ -131,11 +133,13 @@ static wm_status replay_input(waymark_replay_options *options, wm_run_report *re
 }
 
 wm_status session_replay(waymark_replay_options *taken, waymark_report *out, wm_error *err) {
-  if (!taken->input)
+  if (!taken->input || !taken->input[0])
     return wm_fail(err, WM_BAD_USAGE, "waymark_replay: options.input: a recording or an event log is missing");
   if (!(isfinite(taken->from_s) && isfinite(taken->until_s)))
     return wm_fail(err, WM_NOT_FINITE, "waymark_replay: from_s and until_s are seconds");
-  if (taken->from_s < 0 || taken->until_s < 0 || (taken->until_s > 0 && taken->until_s <= taken->from_s))
+  const double last_s = fmax(taken->from_s, taken->until_s);
+  if (taken->from_s < 0 || taken->until_s < 0 || last_s > PART_MAX_S ||
+      (taken->until_s > 0 && taken->until_s <= taken->from_s))
     return wm_fail(err, WM_OUT_OF_RANGE, "waymark_replay: from_s %.10g and until_s %.10g are no part of a recording",
                    taken->from_s, taken->until_s);
   wm_run_report *report = calloc(1, sizeof *report);

@@ -7,7 +7,8 @@
 #include <stdint.h>
 #include <string.h>
 
-static inline int room(size_t length) { return length > INT32_MAX ? INT32_MAX : (int)length; }
+// 0 beyond: a length that was negative.
+static inline int room(size_t length) { return length > INT32_MAX ? 0 : (int)length; }
 static inline size_t written(int bytes) { return bytes > 0 ? (size_t)bytes : 0; }
 
 // Whether a message is of the type of another one, by its first eight bytes: then it is too short where it can't be

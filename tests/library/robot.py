@@ -20,8 +20,9 @@ import small_robot  # noqa: E402
 BUILD = pathlib.Path(sys.argv[1]).resolve()
 CC = shlex.split(sys.argv[2]) if len(sys.argv) > 2 else ["cc"]
 CXX = shlex.split(sys.argv[3]) if len(sys.argv) > 3 else ["c++"]
-EXAMPLES = {"C": (ROOT / "tests/package/downstream/robot.c", [*CC, "-std=c17"]),
-            "C++": (ROOT / "tests/package/downstream/robot.cpp", [*CXX, "-std=c++17"])}
+EXAMPLES = {standard: (ROOT / "tests/package/downstream" / name, [*compiler, f"-std={standard}"])
+            for name, compiler, standards in (("robot.c", CC, ("c11", "c17")), ("robot.cpp", CXX, ("c++17", "c++20", "c++23")))
+            for standard in standards}
 CLANG, CLANGXX = (next((path for name in (tool, f"{tool}-14") if (path := shutil.which(name))), tool) for tool in ("clang", "clang++"))
 
 
@@ -69,7 +70,7 @@ def headers_compile():
 def poses_of(name, library, work):
     """What the example prints, given the recording's rows."""
     source, compiler = EXAMPLES[name]
-    program = work / source.name.replace(".", "-")
+    program = work / f"robot-{name}"
     includes = [f"-I{ROOT / room}" for room in ("msgs/include", "firmware/library/include")]
     subprocess.run([*compiler, "-Wall", "-Wextra", "-Werror", *includes, source, library, f"-Wl,-rpath,{library.parent}", "-o", program],
                    check=True)

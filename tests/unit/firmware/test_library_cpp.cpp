@@ -66,6 +66,30 @@ TEST(test_a_session_moves_and_its_sources_stay) {
   TEST_ASSERT_EQUAL(WM_BAD_USAGE, late.error().status);
 }
 
+TEST(test_a_source_outlives_its_session) {
+  std::optional<waymark::source> motion;
+  {
+    auto session = waymark::session::open(options()).value();
+    motion = session.add_source("motion").value();
+    session.start().value();
+    drive(*motion);
+  }
+  TEST_ASSERT_EQUAL(WM_BAD_USAGE, motion->push(1s, {0.5, kAbsent, 0.0}).error().status);
+}
+
+TEST(test_times_beyond_64_bits_are_refused) {
+  using seconds = std::chrono::duration<double>;
+  auto session = waymark::session::open(options()).value();
+  auto motion = session.add_source("motion").value();
+  session.start().value();
+  for (const waymark::time t : {waymark::time(seconds(kAbsent)), waymark::time(seconds(1e300)),
+                                waymark::time(seconds(-HUGE_VAL)), waymark::time(std::chrono::hours::max())}) {
+    TEST_ASSERT_EQUAL(WM_OUT_OF_RANGE, motion.push(t, {0.5, kAbsent, 0.0}).error().status);
+    TEST_ASSERT_EQUAL(WM_OUT_OF_RANGE, session.pose(t).error().status);
+  }
+  TEST_ASSERT_EQUAL_INT64(1500000000, waymark::time(seconds(1.5)).ns());
+}
+
 TEST(test_errors_have_a_status_and_a_text) {
   waymark::options with = options();
   with.config = "/nowhere/robot.yaml";

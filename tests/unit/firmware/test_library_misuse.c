@@ -45,6 +45,12 @@ static wm_status open_with(const char *config_path, const char *site, const char
   return status;
 }
 
+static wm_status open_sized(size_t bytes) {
+  waymark_session *session = NULL;
+  const waymark_options options = {.bytes = bytes, .config = config, .site = dir};
+  return waymark_open(&options, &session, &err);
+}
+
 static wm_status open_into(waymark_session **out) {
   const waymark_options options = {.bytes = sizeof options, .config = config, .site = dir};
   return waymark_open(&options, out, &err);
@@ -157,6 +163,8 @@ static wm_status replay(const char *input, const char *with_config, double from_
   return waymark_replay(&options, &report, sizeof report, &err);
 }
 
+static void take_parameter(void *context, const waymark_parameter *parameter) { (void)context, (void)parameter; }
+
 static wm_status said_in_callback;
 static waymark_session *caller;
 static void call_again(void *context, waymark_record kind, const void *record, size_t bytes) {
@@ -249,6 +257,9 @@ static void misuse_pointers(void) {
   MISUSE(open_into(NULL), WM_BAD_USAGE, "`out` is NULL");
   MISUSE(waymark_open(NULL, &out, &err), WM_BAD_USAGE, "0 bytes");
   MISUSE(open_with(NULL, NULL, NULL), WM_BAD_USAGE, "options.config");
+  MISUSE(open_with("", NULL, NULL), WM_BAD_USAGE, "options.config");
+  MISUSE(open_sized(0), WM_BAD_USAGE, "its options have 0 bytes");
+  MISUSE(open_sized(SIZE_MAX), WM_BAD_USAGE, "set `bytes` to their sizeof");
   MISUSE(open_with("/nowhere/robot.yaml", NULL, NULL), WM_NOT_FOUND, "/nowhere/robot.yaml");
   MISUSE(open_with(config, "/nowhere", NULL), WM_NOT_FOUND, "options.site: there is no such folder");
   MISUSE(open_with(config, config, NULL), WM_NOT_FOUND, "options.site: there is no such folder");
@@ -287,10 +298,17 @@ static void misuse_pointers(void) {
   MISUSE(waymark_read_innovation("x", SIZE_MAX, &innovation, sizeof innovation, &err), WM_BAD_DATA, "innovation_t");
   MISUSE(waymark_replay(NULL, NULL, 0, &err), WM_BAD_USAGE, "`options` is NULL");
   MISUSE(replay(NULL, config, 0, 0), WM_BAD_USAGE, "options.input");
+  MISUSE(replay("", config, 0, 0), WM_BAD_USAGE, "options.input");
   MISUSE(replay(dir, NULL, 0, 0), WM_BAD_USAGE, "needs a configuration");
   MISUSE(replay(dir, config, NANV, 0), WM_NOT_FINITE, "from_s and until_s");
   MISUSE(replay(dir, config, -1, 0), WM_OUT_OF_RANGE, "no part of a recording");
   MISUSE(replay(dir, config, 5, 2), WM_OUT_OF_RANGE, "no part of a recording");
+  MISUSE(replay(dir, config, 1e300, 0), WM_OUT_OF_RANGE, "from_s 1e+300");
+  MISUSE(replay(dir, config, 0, DBL_MAX), WM_OUT_OF_RANGE, "no part of a recording");
+  MISUSE(waymark_parameters(NULL, take_parameter, NULL, &err), WM_BAD_USAGE, "a text and a function");
+  MISUSE(waymark_parameters("estimator: slam", NULL, NULL, &err), WM_BAD_USAGE, "a text and a function");
+  MISUSE(waymark_parameters("", take_parameter, NULL, &err), WM_BAD_CONFIG, "format: waymark-config/1");
+  MISUSE(waymark_parameters("format: waymark-config/1\n", take_parameter, NULL, &err), WM_BAD_CONFIG, "estimator");
 }
 
 static void misuse_order_and_sizes(void) {
@@ -372,7 +390,7 @@ static void misuse_times(void) {
   MISUSE(arrives(1, 61), WM_OUT_OF_RANGE, "motion: arrival_ns: 60.000 s ahead");
   MISUSE(arrives(1.7e9, 1), WM_OUT_OF_RANGE, "later than its arrival");
   MISUSE(arrives(3, 1), WM_OUT_OF_RANGE, "its stamp is 2.000 s later than its arrival");
-  MISUSE(arrives(-3600, 1), WM_TIME_RAN_BACK, "newer data were fused already");
+  MISUSE(arrives(-3600, 1), WM_TIME_RAN_BACK, "3601.000 s behind the newest time of this session: is one of another");
   MISUSE(row(started, motion, 0.1, 0.5, NANV, 0), WM_TIME_RAN_BACK, "push in the order of the stamps");
   MISUSE(row(started, motion, 1, 0.5, NANV, 0), WM_BAD_DATA, "the same datum was pushed before");
 }
@@ -520,6 +538,19 @@ TEST(test_one_stamp_far_ahead_makes_nothing_late) {
   TEST_ASSERT_EQUAL_UINT64(0, health.sources[0].late);
   TEST_ASSERT_EQUAL_UINT64(19, health.sources[0].malformed);  // none is left out without a count
   TEST_ASSERT_NOT_NULL_MESSAGE(strstr(health.refused_because[0], "60.0"), health.refused_because[0]);
+}
+
+// Nothing that could tell which clock is right has come yet.
+TEST(test_a_time_before_the_first_datum_makes_nothing_late) {
+  waymark_session *session = open_session();
+  ok(waymark_add_source(session, "motion", &motion, &err));
+  ok(waymark_start(session, &err));
+  ok(waymark_advance(session, NS(3600), &err));
+  TEST_ASSERT_EQUAL(WM_AGAIN, waymark_pose(session, NS(1.7e9), &pose, sizeof pose, &err));
+  for (int i = 0; i < 50; i++) ok(row(session, motion, i * 0.02, 0.5, NANV, 0));
+  ok(waymark_pose(session, NS(1), &pose, sizeof pose, &err));
+  TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.5, pose.now.pose_map_base.p_m[0]);
+  ok(waymark_close(session, &err));
 }
 
 TEST(test_after_a_pause_data_are_taken_again) {

@@ -104,11 +104,12 @@ wm_status waymark_start(waymark_session *session, wm_error *err);
 //   WM_BAD_DATA       it contradicts itself, or was pushed before
 //   WM_NOT_FINITE     NaN or infinity where a number is needed
 //   WM_OUT_OF_RANGE   a number or a time that can't be
-//   WM_TIME_RAN_BACK  newer data were fused already
+//   WM_TIME_RAN_BACK  newer data were fused already, or the datum is of another clock than the session's first one
 //   WM_FULL           the queue is full
-// A time may be 10 s ahead of the newest one that the session was given, and a stamp merge.horizon_ms ahead of its
-// arrival. After a pause of the whole program all times are farther ahead: they are taken again once they went on for
-// 1 s without one that is nearer.
+// A time may be 10 s ahead of the newest one that the session was given: programs seldom stand still for longer, and
+// UTC, TAI and GPS differ by 18 s and more. A stamp may be merge.horizon_ms ahead of its arrival. After a pause of the
+// whole program all times are farther ahead: they are taken again once they went on for 1 s without one that is nearer.
+// The first datum sets the session's clock; waymark_advance and waymark_pose before it do not.
 //
 // A row of "motion", "motion6", "ticks", "speeds", "steering", "imu", "heading", "depth" or "gnss": the numbers of the
 // table's columns behind the stamps (docs/recording-format.md), NaN where absent; missing ones at the end are absent.

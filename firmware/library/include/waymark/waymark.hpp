@@ -19,6 +19,7 @@
 #include <initializer_list>
 #include <memory>
 #include <optional>
+#include <ratio>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -105,16 +106,21 @@ class [[nodiscard]] result<void> {
 // is CLOCK_MONOTONIC on Linux.
 class time {
  public:
+  // Beyond 64 bits of nanoseconds, or NaN: refused by what takes it (WM_OUT_OF_RANGE).
   template <class Rep, class Period>
-  constexpr time(std::chrono::duration<Rep, Period> since_epoch)
-      : ns_(std::chrono::duration_cast<std::chrono::nanoseconds>(since_epoch).count()) {}
+  constexpr time(std::chrono::duration<Rep, Period> since_epoch) : ns_(ns_of(since_epoch)) {}
   template <class Clock, class Duration>
-  constexpr time(std::chrono::time_point<Clock, Duration> at)
-      : ns_(std::chrono::duration_cast<std::chrono::nanoseconds>(at.time_since_epoch()).count()) {}
+  constexpr time(std::chrono::time_point<Clock, Duration> at) : ns_(ns_of(at.time_since_epoch())) {}
   static constexpr time of_ns(wm_time_ns ns) { return time(std::chrono::nanoseconds(ns)); }
   constexpr wm_time_ns ns() const noexcept { return ns_; }
 
  private:
+  template <class Duration>
+  static constexpr wm_time_ns ns_of(Duration of) {
+    const double ns = std::chrono::duration<double, std::nano>(of).count();
+    if (!(ns > -9.2e18 && ns < 9.2e18)) return INT64_MAX;
+    return std::chrono::duration_cast<std::chrono::nanoseconds>(of).count();
+  }
   wm_time_ns ns_;
 };
 
@@ -226,7 +232,7 @@ class source {
   // A row of a table: numbers of the columns behind the stamps, NaN where absent. Without `arrival` it comes at its
   // stamp.
   result<void> push(time t, span<double> numbers, std::optional<time> arrival = std::nullopt) {
-    return detail::call(out_, waymark_push_row, handle_, number_, t.ns(), arrival ? arrival->ns() : WM_TIME_NONE,
+    return detail::call(out_.get(), waymark_push_row, handle_, number_, t.ns(), arrival ? arrival->ns() : WM_TIME_NONE,
                         numbers.data(), numbers.size());
   }
   result<void> push(time t, std::initializer_list<double> numbers, std::optional<time> arrival = std::nullopt) {
@@ -234,16 +240,16 @@ class source {
   }
   // An event with its times; event.arrival_ns may be WM_TIME_NONE.
   result<void> push(const wm_event &event) {
-    return detail::call(out_, waymark_push_event, handle_, number_, &event, sizeof event);
+    return detail::call(out_.get(), waymark_push_event, handle_, number_, &event, sizeof event);
   }
   std::uint32_t number() const noexcept { return number_; }
 
  private:
   friend class session;
-  source(waymark_session *handle, detail::outlet *out, std::uint32_t number)
-      : handle_(handle), out_(out), number_(number) {}
+  source(waymark_session *handle, std::shared_ptr<detail::outlet> out, std::uint32_t number)
+      : handle_(handle), out_(std::move(out)), number_(number) {}
   waymark_session *handle_;
-  detail::outlet *out_;
+  std::shared_ptr<detail::outlet> out_;
   std::uint32_t number_;
 };
 
@@ -252,7 +258,7 @@ class session {
   static result<session> open(options with) {
     const std::string config = with.config.string(), site = with.site.string(), out = with.out.string();
     session made;
-    made.out_ = std::make_unique<detail::outlet>();
+    made.out_ = std::make_shared<detail::outlet>();
     made.out_->on = std::move(with.on);
     waymark_options c = {};
     c.bytes = sizeof c, c.config = config.c_str(), c.changes = detail::or_null(with.changes);
@@ -275,7 +281,7 @@ class session {
     std::uint32_t number = 0;
     if (auto added = detail::call(out_.get(), waymark_add_source, handle_, name.c_str(), &number); !added)
       return added.error();
-    return source(handle_, out_.get(), number);
+    return source(handle_, out_, number);
   }
   result<void> start() { return detail::call(out_.get(), waymark_start, handle_); }
 
@@ -308,7 +314,7 @@ class session {
 
  private:
   session() = default;
-  std::unique_ptr<detail::outlet> out_;
+  std::shared_ptr<detail::outlet> out_;  // of its sources, too
   waymark_session *handle_ = nullptr;
 };
 
