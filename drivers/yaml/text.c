@@ -10,6 +10,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "waymark/utf8.h"
+
 #define NUMBER_MAX 63  // letters; a double needs 24
 #define WORD_MAX 63    // letters that are compared
 
@@ -123,36 +125,18 @@ const char *wm_word_nearest(const char *word, const char *const *known) {
   return nearest;
 }
 
-// Bytes of the valid UTF-8 sequence at `s`, 0 where there is none.
-static size_t utf8_length(const unsigned char *s, size_t left) {
-  size_t n = s[0] < 0x80                   ? 1
-             : s[0] >= 0xC2 && s[0] < 0xE0 ? 2
-             : (s[0] & 0xF0) == 0xE0       ? 3
-             : s[0] >= 0xF0 && s[0] < 0xF5 ? 4
-                                           : 0;
-  if (n == 0 || n > left) return 0;
-  for (size_t i = 1; i < n; i++)
-    if ((s[i] & 0xC0) != 0x80) return 0;
-  if ((s[0] == 0xE0 && s[1] < 0xA0) || (s[0] == 0xED && s[1] > 0x9F) || (s[0] == 0xF0 && s[1] < 0x90) ||
-      (s[0] == 0xF4 && s[1] > 0x8F))
-    return 0;
-  return n;
-}
-
 const char *wm_show_text(const char *text, size_t length, char *out, size_t capacity) {
   size_t used = 0, i = 0;
   size_t room = capacity > 4 ? capacity - 4 : 0;  // for "..." and the terminator
   while (i < length) {
     const unsigned char *s = (const unsigned char *)text + i;
-    size_t n = utf8_length(s, length - i);
-    int bad = n == 0 || (n == 1 && (*s < 0x20 || *s == 0x7F));
-    size_t bytes = bad ? 1 : n;
+    const size_t n = wm_utf8_shown(s, length - i), bytes = n > 0 ? n : 1;
     if (used + bytes > room) {
       memcpy(out + used, "...", capacity > 4 ? 3 : 0);
       used += capacity > 4 ? 3 : 0;
       break;
     }
-    if (bad)
+    if (n == 0)
       out[used] = '?';
     else
       memcpy(out + used, s, bytes);

@@ -11,8 +11,8 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include "live/lcm_stamp.h"
 #include "live/lcm_subscriber.h"
-#include "rt/clock.h"
 #include "waymark/devices.h"
 #include "waymark/lcm_messages.h"
 
@@ -37,12 +37,12 @@ static wm_status next_command(wm_source *base, wm_event *out, wm_error *err) {
   if (bytes < 0) return WM_AGAIN;
   const char *why = wm_lcm_read_set_pose(datagram, (size_t)bytes, out);
   if (why && !wm_lcm_read_reset(datagram, (size_t)bytes, out)) why = NULL;
+  char text[160];
+  if (!why) why = lcm_stamp_command(out, text, sizeof text);
   if (why) {
     wm_source_refuse(&base->counts, self->at.sun_path, why);
     return WM_AGAIN;
   }
-  out->arrival_ns = wm_monotonic_ns();
-  if (out->t_ns == 0) out->t_ns = out->arrival_ns;
   out->seq = self->seq++;
   out->source = base->index;
   base->counts.received++;

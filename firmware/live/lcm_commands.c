@@ -6,8 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "live/lcm_stamp.h"
 #include "live/lcm_subscriber.h"
-#include "rt/clock.h"
 #include "waymark/lcm_messages.h"
 
 #define WAITING_MAX 16  // commands between two calls; further ones are dropped
@@ -22,6 +22,8 @@ typedef struct lcm_commands {
 } lcm_commands;
 
 static void take(lcm_commands *self, const char *channel, const char *why, wm_event *event) {
+  char text[160];
+  if (!why) why = lcm_stamp_command(event, text, sizeof text);
   if (why) {
     wm_source_refuse(&self->base.counts, channel, why);
     return;
@@ -30,8 +32,6 @@ static void take(lcm_commands *self, const char *channel, const char *why, wm_ev
     self->base.counts.overflows++;
     return;
   }
-  event->arrival_ns = wm_monotonic_ns();
-  if (event->t_ns == 0) event->t_ns = event->arrival_ns;
   memcpy(&self->waiting[self->waiting_count++], event, WM_EVENT_SMALL_BYTES);
 }
 

@@ -4,6 +4,8 @@
 #include <math.h>
 #include <stdio.h>
 
+#include "rt/clock.h"
+
 // A stamp on this computer's clock is never later than its arrival; a sender that stamps the end of an interval rounds.
 #define AHEAD_MAX_NS (10 * WM_NS_PER_MS)
 // An older stamp is of another clock: no queue of a sender holds so much.
@@ -16,4 +18,10 @@ const char *lcm_stamp_fault(wm_time_ns t_ns, wm_time_ns arrival_ns, char *text, 
   (void)snprintf(text, capacity, "t_ns is %.3g s %s this computer's CLOCK_MONOTONIC", fabs(ahead_s),
                  ahead_s > 0 ? "ahead of" : "behind");
   return text;
+}
+
+const char *lcm_stamp_command(wm_event *event, char *text, size_t capacity) {
+  event->arrival_ns = wm_monotonic_ns();
+  if (event->t_ns == 0) event->t_ns = event->arrival_ns;
+  return lcm_stamp_fault(event->t_ns, event->arrival_ns, text, capacity);
 }

@@ -5,9 +5,12 @@
 
 #include <stddef.h>
 
-#include "waymark/time.h"
+#include "waymark/event.h"
 
 // NULL, or why a stamp can't be of a message that arrives now; in `text` where it has figures.
 const char *lcm_stamp_fault(wm_time_ns t_ns, wm_time_ns arrival_ns, char *text, size_t capacity);
+
+// A command that arrives now; without a stamp it is of now. NULL, or why it can't be.
+const char *lcm_stamp_command(wm_event *event, char *text, size_t capacity);
 
 #endif

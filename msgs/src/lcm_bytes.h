@@ -7,6 +7,8 @@
 #include <stdint.h>
 #include <string.h>
 
+#include "waymark/utf8.h"
+
 // 0 beyond: a length that was negative.
 static inline int room(size_t length) { return length > INT32_MAX ? 0 : (int)length; }
 static inline size_t written(int bytes) { return bytes > 0 ? (size_t)bytes : 0; }
@@ -22,6 +24,20 @@ static inline void put_name(uint8_t *out, size_t capacity, const char *name) {
   const size_t length = strnlen(name, capacity - 1);
   memset(out, 0, capacity);
   memcpy(out, name, length);
+}
+
+// A name of any sender, up to its first zero: what can't be shown becomes '?'.
+static inline void take_name(char *out, size_t capacity, const uint8_t *name, size_t length) {
+  const size_t end = strnlen((const char *)name, length < capacity ? length : capacity - 1);
+  memset(out, 0, capacity);
+  for (size_t i = 0; i < end;) {
+    const size_t n = wm_utf8_shown(name + i, end - i);
+    if (n > 0)
+      memcpy(out + i, name + i, n);
+    else
+      out[i] = '?';
+    i += n > 0 ? n : 1;
+  }
 }
 
 #endif

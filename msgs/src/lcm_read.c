@@ -9,17 +9,6 @@
 #include "waymark_pose_t.h"
 #include "waymark_refused_t.h"
 
-// Names come from any sender and go to a terminal: control characters (C0, DEL, and C1 in UTF-8) become '?'.
-static void take_name(char *out, size_t capacity, const uint8_t *name, size_t length) {
-  size_t n = length < capacity ? length : capacity;
-  for (size_t i = 0; i < n; i++) {
-    const int is_c1 = i > 0 && name[i - 1] == 0xc2 && name[i] >= 0x80 && name[i] < 0xa0;
-    const int is_control = name[i] != '\0' && (name[i] < 0x20 || name[i] == 0x7f || is_c1);
-    out[i] = is_control ? '?' : (char)name[i];
-  }
-  out[n - 1] = '\0';
-}
-
 const char *wm_lcm_read_pose(const void *message, size_t length, wm_published *out) {
   waymark_pose_t m;
   if (waymark_pose_t_decode(message, 0, room(length), &m) < 0) return "is not a pose_t of this version";

@@ -63,8 +63,7 @@ const char *wm_lcm_read_sightings(const void *message, size_t length, char *sens
   if (m.t_ns <= 0) return "t_ns is not above 0: when was it seen, on the robot's monotonic clock?";
   if (m.count < 0 || m.count > WM_LCM_OBSERVATIONS_MAX) return "count is not in 0 to 64";
   _Static_assert(sizeof m.sensor >= WM_NAME_MAX, "a name fits");
-  memcpy(sensor, m.sensor, WM_NAME_MAX);
-  sensor[WM_NAME_MAX - 1] = '\0';
+  take_name(sensor, WM_NAME_MAX, m.sensor, sizeof m.sensor);
   *t_ns = m.t_ns;
   for (int i = 0; i < m.count; i++) {
     const char *why = read_sighting(&m, i, &out[i]);

@@ -225,12 +225,12 @@ TEST(poses_and_resets_that_are_told_become_events) {
   TEST_ASSERT_EQUAL_DOUBLE(-2, event.as.set_pose.pose_map_base.p_m[1]);
   TEST_ASSERT_EQUAL_DOUBLE(0.5, event.as.set_pose.sigma_xy_m);
 
-  waymark_reset_t reset = {.t_ns = 77};
+  waymark_reset_t reset = {.t_ns = before_ns};
   int reset_bytes = waymark_reset_t_encode(bytes, 0, sizeof bytes, &reset);
   lcm_publish(lcm, "T_RESET", bytes, (unsigned)reset_bytes);
   TEST_ASSERT_EQUAL(WM_OK, source->ops->next(source, &event, &err));
   TEST_ASSERT_EQUAL(WM_EVENT_RESET, event.kind);
-  TEST_ASSERT_EQUAL_INT64(77, event.t_ns);
+  TEST_ASSERT_EQUAL_INT64(before_ns, event.t_ns);
   TEST_ASSERT_EQUAL_UINT32(1, event.seq);
   source->ops->close(source);
   lcm_destroy(lcm);
@@ -260,6 +260,30 @@ TEST(nonsense_that_is_told_is_refused) {
   TEST_ASSERT_NOT_NULL(strstr(source->counts.first_problem, "T_SET_POSE: position_m is not finite"));
   source->ops->close(source);
   lcm_destroy(lcm);
+}
+
+TEST(commands_of_another_clock_are_refused) {
+  const struct {
+    wm_time_ns off_ns;
+    const char *why;
+  } wrong[] = {{1700000000 * WM_NS_PER_S, "T_SET_POSE: t_ns is 1.7e+09 s ahead of this computer's CLOCK_MONOTONIC"},
+               {50 * WM_NS_PER_MS, "0.05 s ahead of"},
+               {-11 * WM_NS_PER_S, "11 s behind"}};
+  const wm_set_pose there = {.pose_map_base = {.q_xyzw = {0, 0, 0, 1}}, .sigma_xy_m = 1, .sigma_heading_rad = 1};
+  for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+    wm_source *source;
+    wm_event event;
+    wm_error err;
+    uint8_t bytes[512];
+    lcm_t *lcm = lcm_create("memq://");
+    TEST_ASSERT_EQUAL(WM_OK, lcm_commands_open("memq://", "T_", lcm, &source, &err));
+    const size_t length = wm_lcm_set_pose(&there, wm_monotonic_ns() + wrong[i].off_ns, bytes, sizeof bytes);
+    lcm_publish(lcm, "T_SET_POSE", bytes, (unsigned)length);
+    TEST_ASSERT_EQUAL(WM_AGAIN, source->ops->next(source, &event, &err));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(source->counts.first_problem, wrong[i].why), source->counts.first_problem);
+    source->ops->close(source);
+    lcm_destroy(lcm);
+  }
 }
 
 static const wm_sensor kEyes[] = {{.name = "left"}, {.name = "right"}};
@@ -307,6 +331,7 @@ TEST(sightings_that_cannot_be_are_refused) {
     wm_event event;
   } wrong[] = {
       {"nose", "'nose' is not a sensor", {.t_ns = now_ns, .as.sighting = {.bearing_rad = 1, .range_m = 1}}},
+      {"no\033[2J\xff", "'no?[2J?' is not a sensor", {.t_ns = now_ns, .as.sighting = {.range_m = 1}}},
       {"left",
        "3.6e+03 s ahead of this computer's CLOCK_MONOTONIC",
        {.t_ns = now_ns + 3600 * WM_NS_PER_S, .as.sighting = {.range_m = 1}}},

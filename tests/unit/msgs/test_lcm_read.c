@@ -284,12 +284,12 @@ TEST(identities_of_sightings) {
 TEST(control_characters_of_names) {
   static wm_health h, read;
   h = (wm_health){.source_count = 1};
-  const char name[] = "a\x01\x1f \x7f\xc2\x80\xc2\x9f\xc2\xa0\xc3\x80~";
+  const char name[] = "a\x01\x1f \x7f\xc2\x80\xc2\x9f\xc2\xa0\xc3\x80~\xff\xe2\x82";
   strcpy(h.sources[0].name, name);
   memset(h.host, 'h', sizeof h.host);
   const size_t length = wm_lcm_health(&h, bytes, sizeof bytes);
   TEST_ASSERT_NULL(wm_lcm_read_health(bytes, length, &read));
-  TEST_ASSERT_EQUAL_STRING("a?? ?\xc2?\xc2?\xc2\xa0\xc3\x80~", read.sources[0].name);
+  TEST_ASSERT_EQUAL_STRING("a?? ?????\xc2\xa0\xc3\x80~???", read.sources[0].name);
   TEST_ASSERT_EQUAL(sizeof read.host - 1, strlen(read.host));
 }
 
