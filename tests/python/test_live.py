@@ -10,6 +10,7 @@ import json
 import os
 import pathlib
 import shutil
+import signal
 import struct
 import subprocess
 import sys
@@ -260,6 +261,63 @@ class Foreign(unittest.TestCase):
         sender.publish("OTHER_HEALTH", b"")
         self.assertIsNone(live.next(0.5))
         self.assertEqual({"OTHER_POSE": 1, "OTHER_HEALTH": 1}, dict(live.malformed))
+
+
+class Fields(unittest.TestCase):
+    def test_lists_of_any_length_become_messages_and_come_back(self):
+        ids = list(range(150))
+        messages = waymark.build("observations_t", t_ns=5, sensor="fr\u00f6nt", landmark_id=ids, bearing_rad=np.full(150, 0.1))
+        self.assertEqual([64, 64, 22], [message.count for message in messages])
+        back = [waymark.plain(waymark.observations_t.decode(message.encode())) for message in messages]
+        self.assertEqual(ids, [number for part in back for number in part["landmark_id"]])
+        self.assertEqual({("fr\u00f6nt", 5)}, {(part["sensor"], part["t_ns"]) for part in back})
+        self.assertTrue(np.isnan(back[2]["range_m"]).all() and len(back[2]["range_m"]) == 22)  # not given: absent
+        (told,) = waymark.build("set_pose_t", position_m=(1, 2, 0), orientation_xyzw=[0, 0, 0, 1], sigma_xy_m=0.1)
+        self.assertEqual([1, 2, 0], waymark.plain(waymark.set_pose_t.decode(told.encode()))["position_m"])
+
+    def test_parts_are_cut_to_their_counts(self):
+        health = waymark.health_t()
+        health.source_count, health.sources[1].name, health.sources[1].late = 2, b"eye".ljust(48, b"\0"), 7
+        read = waymark.plain(health)
+        self.assertEqual((2, "eye", 7, []), (len(read["sources"]), read["sources"][1]["name"], read["sources"][1]["late"], read["calibration"]))
+
+    def test_what_does_not_fit_is_named(self):
+        for kind, fields, words in (("observations_t", {"sensor": "x" * 32}, "sensor has 31 bytes at most"), ("nose_t", {}, "'nose_t' is not"),
+                                    ("observations_t", {"sensr": "x"}, "has no field 'sensr'"),
+                                    ("observations_t", {"landmark_id": [1], "range_m": [1.0, 2.0]}, "landmark_id 1, range_m 2"),
+                                    ("set_pose_t", {"position_m": [1]}, "position_m has 3 values, 1 are given")):
+            with self.assertRaisesRegex(ValueError, words):
+                waymark.build(kind, **fields)
+
+    def test_a_run_takes_what_is_built(self):
+        import lcm
+
+        folder = pathlib.Path(tempfile.mkdtemp(prefix="waymark-built-"))
+        self.addCleanup(shutil.rmtree, folder)
+        lcm_tools.write_recording(folder / "site", 1)
+        (folder / "robot.yaml").write_text("format: waymark-config/1\nestimator: landmark_ekf\ncalibration: site/calibration.yaml\n"
+                                           "landmarks: site/landmarks.csv\ninitial_pose: {x_m: 0, y_m: 0, heading_rad: 0}\n"
+                                           "realtime: {lock_memory: false}\ndevices: {lcm: [{stream: motion}], sightings: lcm}\n"
+                                           f"publish: {{lcm_url: '{lcm_tools.URL}'}}\n")
+        run = subprocess.Popen([BIN / "waymark", "run", "--config", folder / "robot.yaml", "--out", folder / "out"], stdout=subprocess.PIPE,
+                               stderr=subprocess.PIPE, text=True)
+        self.addCleanup(lcm_tools.end_all, [run])
+        lcm_tools.wait_for_listener()
+        node = lcm.LCM(lcm_tools.URL)
+        time.sleep(0.7)
+        for _ in range(20):
+            now_ns = time.monotonic_ns()
+            for channel, kind, fields in (("MOTION", "motion_t", {"v_mps": 0.0}),
+                                          ("SIGHTINGS", "observations_t", {"sensor": "eye", "landmark_id": [0, *range(100, 199)], "range_m": [5.0] * 100})):
+                for message in waymark.build(kind, t_ns=now_ns, **fields):
+                    node.publish("WAYMARK_" + channel, message.encode())
+            time.sleep(0.05)
+        time.sleep(0.5)
+        run.send_signal(signal.SIGINT)
+        lcm_tools.finish(run)
+        seen = waymark.Run(folder / "out").health["sources"]["sightings"]
+        self.assertEqual((2000, 0), (seen["received"], seen["malformed"]), seen)
+        self.assertGreater(seen["fused"], 10)
 
 
 if __name__ == "__main__":

@@ -20,12 +20,13 @@ from .run import Run, covariance
 from .tables import Array, Table, read_table, write_table
 
 if TYPE_CHECKING:
+    from .lcm_fields import build, plain
     from .live import Live
     from .native import WaymarkError
     from .replaying import Estimate, EventLog, parameters, replay
 
 __all__ = ["Array", "CanFrame", "Estimate", "EventLog", "FloorPlan", "Frame", "Live", "Recording", "RecordingWriter", "Run", "Table",
-           "WaymarkError", "covariance", "eval", "parameters", "read_floor_plan", "read_landmarks", "read_table", "replay",
+           "WaymarkError", "build", "covariance", "eval", "parameters", "plain", "read_floor_plan", "read_landmarks", "read_table", "replay",
            "write_floor_plan", "write_landmarks", "write_table"]
 
 
@@ -40,6 +41,10 @@ def __getattr__(name: str) -> Any:
         from .live import Live
 
         return Live
+    if name in ("build", "plain"):
+        from . import lcm_fields
+
+        return getattr(lcm_fields, name)
     if name in ("Estimate", "EventLog", "parameters", "replay"):
         from . import replaying
 

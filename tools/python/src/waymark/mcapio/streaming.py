@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..lcm_fields import text
 from ..ros import Messages
 from ..run import SPACE
 from ..tables import Array, Table
@@ -29,10 +30,6 @@ SIGHTINGS = ["t_ns", "sensor", "id", "bearing_rad", "range_m"]
 _AXES = ("x", "y", "z", "rx", "ry", "rz")
 
 
-def _name(characters: bytes) -> str:
-    return bytes(characters).split(b"\0")[0].decode("utf-8", "replace")
-
-
 def _words(kind: type, prefix: str) -> dict[int, str]:
     """The constants of a type whose names begin with a prefix: number and word."""
     return {value: name.removeprefix(prefix).lower() for name, value in vars(kind).items()
@@ -46,9 +43,9 @@ def health_of(message: Any, states: dict[int, str], counters: dict[int, str], ve
     sources = {}
     for source in message.sources[: message.source_count]:
         counts = {name: getattr(source, name) for name in source.__slots__ if isinstance(getattr(source, name), (int, float))}
-        sources[_name(source.name)] = {**counts, "stale": bool(source.stale), "rejected": dict(zip(verdicts, source.rejected))}
+        sources[text(source.name)] = {**counts, "stale": bool(source.stale), "rejected": dict(zip(verdicts, source.rejected))}
     return {**plain, "state": states.get(message.state, "unknown"), "sources": sources,
-            "calibration": {_name(c.name): {"value": c.value, "sigma": c.sigma}
+            "calibration": {text(c.name): {"value": c.value, "sigma": c.sigma}
                             for c in message.calibration[: message.calibration_count]},
             "counters": {counters.get(c.kind, str(c.kind)): {"count": c.count} for c in message.counters[: message.counter_count]}}
 
@@ -139,7 +136,7 @@ class LiveItems:
         yield from estimates.path(self._messages, "/waymark/path", self.newest_ns, t_ns, (stamps, where, turns))
 
     def _health(self, message: Any) -> Iterator[Item]:
-        self._sources = [_name(source.name) for source in message.sources[: message.source_count]]
+        self._sources = [text(source.name) for source in message.sources[: message.source_count]]
         health = health_of(message, self._states, self._counters, [self._verdicts[i] for i in sorted(self._verdicts)])
         yield estimates.diagnostics(self._messages, health, self.newest_ns)
 
@@ -155,13 +152,13 @@ class LiveItems:
 
     def _observations(self, message: Any) -> Iterator[Item]:
         n, t_ns = message.count, self._utc(message.t_ns)
-        table: Table = {"t_ns": np.full(n, t_ns), "sensor": np.array([_name(message.sensor)] * n),
+        table: Table = {"t_ns": np.full(n, t_ns), "sensor": np.array([text(message.sensor)] * n),
                         "id": np.array(message.landmark_id[:n]), "bearing_rad": np.array(message.bearing_rad[:n]),
                         "range_m": np.array(message.range_m[:n])}
         kind = streams.register(self._messages, "sightings.csv", SIGHTINGS)
         for i in range(n):
             yield Item(self.newest_ns, "/recording/sightings", kind,
-                       streams.row(self._messages, kind, table, i, estimates.topic_name(_name(message.sensor))))
+                       streams.row(self._messages, kind, table, i, estimates.topic_name(text(message.sensor))))
 
     def _balls(self, topic: str, parts: list[Any], colour: Any, covariances: bool) -> Iterator[Item]:
         where = np.concatenate([np.asarray(part.position_m[: part.count], dtype=float).reshape(-1, 3) for part in parts])
