@@ -43,6 +43,9 @@ static void of_pose(const watch *self, wm_time_ns now_ns, FILE *to) {
   const double xx = c[wm_cov_index(0, 0)], yy = c[wm_cov_index(1, 1)], tt = c[wm_cov_index(5, 5)];
   gauge(to, "pose_age_seconds", "Since the newest pose came.", (double)(now_ns - self->pose_at_ns) * 1e-9);
   gauge(to, "pose_rate_hertz", "Poses a second, smoothed.", self->rate_hz);
+  gauge(to, "pose_x_meters", "Position in the map.", e->pose_map_base.p_m[0]);
+  gauge(to, "pose_y_meters", "Position in the map.", e->pose_map_base.p_m[1]);
+  gauge(to, "pose_heading_radians", "Heading in the map, positive to the left of its x axis.", watch_heading(e));
   gauge(to, "pose_sigma_meters", "Standard deviation of the position, of both axes together.", sqrt(fmax(xx + yy, 0)));
   gauge(to, "pose_heading_sigma_radians", "Standard deviation of the heading.", sqrt(fmax(tt, 0)));
   gauge(to, "pose_fused_age_seconds", "From the newest fused datum to the pose.",
@@ -69,7 +72,7 @@ static void of_state(const watch *self, FILE *to) {
 #define AT(member) offsetof(wm_health, member)
 #define OF(member) offsetof(wm_source_health, member)
 
-// Counters of 64 bits, since the start of the run.
+// Whole numbers of 64 bits; counters since the start of the run.
 typedef struct counted {
   const char *name, *about;
   size_t at;
@@ -94,6 +97,11 @@ static const counted kOfSource[] = {{"received", "Data that came.", OF(received)
                                     {"frozen", "Data of a sender that stands still.", OF(frozen)},
                                     {"overflows", "Data that the kernel dropped.", OF(overflows)},
                                     {"bus_errors", "Error frames of the bus.", OF(bus_errors)}};
+// Times, ns.
+static const counted kTimesOfSource[] = {
+    {"silent", "Since its newest datum came.", OF(silent_ns)},
+    {"lateness_p99", "From a stamp to its arrival, 99 of 100.", OF(lateness_p99_ns)},
+    {"lateness_max", "What its data are waited for.", OF(lateness_max_ns)}};
 
 static uint64_t count_at(const void *of, size_t at) {
   uint64_t count;
@@ -143,11 +151,14 @@ static void of_sources(const wm_health *h, FILE *to) {
       label(to, "verdict", wm_verdict_name(i));
       (void)fprintf(to, "} %" PRIu64 "\n", s->rejected[i]);
     }
-  head(to, "source_silent_seconds", "gauge", "Since its newest datum came.");
-  for (const wm_source_health *s = h->sources; s < end; s++) {
-    source_head(to, "silent_seconds", s);
-    (void)fputc('}', to);
-    value(to, (double)s->silent_ns * 1e-9);
+  for (const counted *c = kTimesOfSource; c < kTimesOfSource + sizeof kTimesOfSource / sizeof kTimesOfSource[0]; c++) {
+    (void)snprintf(name, sizeof name, "source_%s_seconds", c->name);
+    head(to, name, "gauge", c->about);
+    for (const wm_source_health *s = h->sources; s < end; s++) {
+      source_head(to, name + strlen("source_"), s);
+      (void)fputc('}', to);
+      value(to, (double)(wm_time_ns)count_at(s, c->at) * 1e-9);
+    }
   }
   head(to, "source_device", "gauge", "1 for the state of its device.");
   for (const wm_source_health *s = h->sources; s < end; s++) {

@@ -127,12 +127,16 @@ const char *watch_state(const watch *self, wm_time_ns now_ns, char *why, size_t 
   }
 }
 
+double watch_heading(const wm_estimate *pose) {
+  const double *q = pose->pose_map_base.q_xyzw;
+  return atan2(2 * (q[3] * q[2] + q[0] * q[1]), 1 - 2 * (q[1] * q[1] + q[2] * q[2]));
+}
+
 static void print_pose(const wm_published *p, double rate_hz, FILE *to) {
   const wm_estimate *e = &p->now;
-  const double *q = e->pose_map_base.q_xyzw, *c = e->covariance;
-  double heading = atan2(2 * (q[3] * q[2] + q[0] * q[1]), 1 - 2 * (q[1] * q[1] + q[2] * q[2]));
+  const double *c = e->covariance;
   (void)fprintf(to, "pose       x %8.2f m  y %8.2f m  heading %7.1f deg   (sigma %.2f, %.2f m, %.1f deg)\n",
-                e->pose_map_base.p_m[0], e->pose_map_base.p_m[1], heading * 180 / M_PI,
+                e->pose_map_base.p_m[0], e->pose_map_base.p_m[1], watch_heading(e) * 180 / M_PI,
                 sqrt(fmax(c[wm_cov_index(0, 0)], 0)), sqrt(fmax(c[wm_cov_index(1, 1)], 0)),
                 sqrt(fmax(c[wm_cov_index(5, 5)], 0)) * 180 / M_PI);
   (void)fprintf(to, "           %.2f m/s  %.1f deg/s   fused until %.0f ms ago   %.0f a second   %" PRIu32 " jumps\n",

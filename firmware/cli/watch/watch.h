@@ -31,6 +31,8 @@ void watch_pose(watch *self, const void *message, size_t length, wm_time_ns now_
 void watch_health(watch *self, const void *message, size_t length, wm_time_ns now_ns);
 void watch_refused(watch *self, const void *message, size_t length);
 void watch_innovation(watch *self, const void *message, size_t length);
+// Heading of base_link in the map, rad.
+double watch_heading(const wm_estimate *pose);
 // Whether the observations agree with the estimator's covariance, in words.
 const char *watch_consistency(const watch *self);
 // State in a word ("tracking", "degraded", "lost" ...), with the reason where health has it.

@@ -17,8 +17,8 @@ static inline size_t wm_utf8_shown(const unsigned char *s, size_t left) {
   for (size_t i = 1; i < n; i++)
     if ((s[i] & 0xC0) != 0x80) return 0;
   const int is_c1 = s[0] == 0xC2 && s[1] < 0xA0;
-  const int is_none = (s[0] == 0xE0 && s[1] < 0xA0) || (s[0] == 0xED && s[1] > 0x9F) ||
-                      (s[0] == 0xF0 && s[1] < 0x90) || (s[0] == 0xF4 && s[1] > 0x8F);
+  const int is_none = (s[0] == 0xE0 && s[1] < 0xA0) || (s[0] == 0xED && s[1] > 0x9F) || (s[0] == 0xF0 && s[1] < 0x90) ||
+                      (s[0] == 0xF4 && s[1] > 0x8F);
   return is_c1 || is_none ? 0 : n;
 }
 

@@ -205,8 +205,10 @@ TEST(a_run_is_metrics) {
   TEST_ASSERT_EQUAL_STRING("# HELP waymark_up 1 where a run is heard.\n# TYPE waymark_up gauge\nwaymark_up 0\n",
                            metrics_at(0));
   pose.now.covariance[wm_cov_index(0, 0)] = 0.0009, pose.now.covariance[wm_cov_index(1, 1)] = 0.0016;
+  pose.now.pose_map_base = (wm_pose3){{1.5, -2, 0}, {0, 0, 0.6, 0.8}};
   watch_pose(&seen, bytes, wm_lcm_pose(&pose, 0, bytes, sizeof bytes), 10 * WM_NS_PER_S);
   (void)snprintf(health.sources[1].name, WM_HEALTH_NAME_MAX, "a\"b\\c");
+  health.sources[0].silent_ns = -1, health.sources[0].lateness_p99_ns = 25 * WM_NS_PER_MS;
   health.deadlines_missed = 12;
   health.sources[0].received = UINT64_C(9007199254740993);  // whole, beyond what a double holds
   health.lost_probability = (double)NAN;
@@ -218,6 +220,11 @@ TEST(a_run_is_metrics) {
                                "\nwaymark_state{state=\"lost\"} 0\n",
                                "\nwaymark_pose_sigma_meters 0.05\n",
                                "\nwaymark_pose_age_seconds 1\n",
+                               "\nwaymark_pose_x_meters 1.5\n",
+                               "\nwaymark_pose_y_meters -2\n",
+                               "\nwaymark_pose_heading_radians 1.28700221",
+                               "\nwaymark_source_silent_seconds{source=\"can\"} -1e-09\n",
+                               "\nwaymark_source_lateness_p99_seconds{source=\"can\"} 0.025\n",
                                "\n# TYPE waymark_deadlines_missed_total counter\nwaymark_deadlines_missed_total 12\n",
                                "\nwaymark_lost_probability NaN\n",
                                "\nwaymark_reckoning_left_meters 41.6\n",
