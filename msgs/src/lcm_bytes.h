@@ -11,12 +11,13 @@
 
 // 0 beyond: a length that was negative.
 static inline int room(size_t length) { return length > INT32_MAX ? 0 : (int)length; }
+static inline int given(const void *message, size_t length) { return message ? room(length) : 0; }
 static inline size_t written(int bytes) { return bytes > 0 ? (size_t)bytes : 0; }
 
 // Whether a message is of the type of another one, by its first eight bytes: then it is too short where it can't be
 // read.
 static inline int is_beginning(const void *message, size_t length, const uint8_t *right) {
-  return length >= sizeof(int64_t) && memcmp(message, right, sizeof(int64_t)) == 0;
+  return given(message, length) >= (int)sizeof(int64_t) && memcmp(message, right, sizeof(int64_t)) == 0;
 }
 
 // A name, cut where it has to be, padded with zeros.

@@ -16,7 +16,8 @@ static void begin(wm_event *out, unsigned kind, wm_time_ns t_ns) {
 
 const char *wm_lcm_read_set_pose(const void *message, size_t length, wm_event *out) {
   waymark_set_pose_t m;
-  if (waymark_set_pose_t_decode(message, 0, room(length), &m) < 0) return "is not a set_pose_t of this version";
+  if (waymark_set_pose_t_decode(message, 0, given(message, length), &m) < 0)
+    return "is not a set_pose_t of this version";
   double norm = 0, farthest_m = 0;
   for (int i = 0; i < 4; i++) norm += m.orientation_xyzw[i] * m.orientation_xyzw[i];
   for (int i = 0; i < 3; i++)
@@ -42,7 +43,7 @@ const char *wm_lcm_read_set_pose(const void *message, size_t length, wm_event *o
 
 const char *wm_lcm_read_reset(const void *message, size_t length, wm_event *out) {
   waymark_reset_t m;
-  if (waymark_reset_t_decode(message, 0, room(length), &m) < 0) return "is not a reset_t of this version";
+  if (waymark_reset_t_decode(message, 0, given(message, length), &m) < 0) return "is not a reset_t of this version";
   begin(out, WM_EVENT_RESET, m.t_ns);
   return NULL;
 }

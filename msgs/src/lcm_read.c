@@ -11,7 +11,7 @@
 
 const char *wm_lcm_read_pose(const void *message, size_t length, wm_published *out) {
   waymark_pose_t m;
-  if (waymark_pose_t_decode(message, 0, room(length), &m) < 0) return "is not a pose_t of this version";
+  if (waymark_pose_t_decode(message, 0, given(message, length), &m) < 0) return "is not a pose_t of this version";
   *out = (wm_published){.made_ns = m.made_ns,
                         .fused_until_ns = m.fused_until_ns,
                         .pose_odom_base = {m.odom_position_m[0], m.odom_position_m[1], m.odom_heading_rad},
@@ -70,7 +70,7 @@ static void take_source(wm_source_health *out, const waymark_source_health_t *s)
 
 const char *wm_lcm_read_health(const void *message, size_t length, wm_health *out) {
   static _Thread_local waymark_health_t m;  // large
-  if (waymark_health_t_decode(message, 0, room(length), &m) < 0) return "is not a health_t of this version";
+  if (waymark_health_t_decode(message, 0, given(message, length), &m) < 0) return "is not a health_t of this version";
   memset(out, 0, sizeof *out);
   out->t_ns = m.t_ns;
   out->fused_until_ns = m.fused_until_ns;
@@ -110,7 +110,8 @@ const char *wm_lcm_read_health(const void *message, size_t length, wm_health *ou
 
 const char *wm_lcm_read_innovation(const void *message, size_t length, wm_innovation *out) {
   waymark_innovation_t m;
-  if (waymark_innovation_t_decode(message, 0, room(length), &m) < 0) return "is not an innovation_t of this version";
+  if (waymark_innovation_t_decode(message, 0, given(message, length), &m) < 0)
+    return "is not an innovation_t of this version";
   *out = (wm_innovation){.t_ns = m.t_ns,
                          .source = (uint16_t)m.source,
                          .sensor = (uint16_t)m.sensor,
@@ -129,7 +130,7 @@ const char *wm_lcm_read_innovation(const void *message, size_t length, wm_innova
 const char *wm_lcm_read_refused(const void *message, size_t length, char source[WM_HEALTH_NAME_MAX],
                                 char reason[WM_HEALTH_REASON_MAX]) {
   waymark_refused_t m;
-  if (waymark_refused_t_decode(message, 0, room(length), &m) < 0) return "is not a refused_t of this version";
+  if (waymark_refused_t_decode(message, 0, given(message, length), &m) < 0) return "is not a refused_t of this version";
   take_name(source, WM_HEALTH_NAME_MAX, m.source, sizeof m.source);
   take_name(reason, WM_HEALTH_REASON_MAX, m.reason, sizeof m.reason);
   return NULL;

@@ -51,7 +51,7 @@ const char *wm_lcm_read_sightings(const void *message, size_t length, char *sens
                                   size_t *count) {
   waymark_observations_t m;
   *count = 0;
-  if (waymark_observations_t_decode(message, 0, room(length), &m) < 0) {
+  if (waymark_observations_t_decode(message, 0, given(message, length), &m) < 0) {
     static const waymark_observations_t kNone;
     uint8_t right[sizeof m + sizeof(int64_t)];
     const int bytes = waymark_observations_t_encode(right, 0, sizeof right, &kNone);

@@ -57,7 +57,7 @@ static uint32_t zero_is_absent(const stream_type *type) {
 }
 
 static const stream_type *find(const char *stream) {
-  for (size_t i = 0; i < sizeof kTypes / sizeof kTypes[0]; i++)
+  for (size_t i = 0; stream && i < sizeof kTypes / sizeof kTypes[0]; i++)
     if (strcmp(kTypes[i].stream, stream) == 0) return &kTypes[i];
   return NULL;
 }
@@ -71,7 +71,7 @@ const char *wm_lcm_read_row(const char *stream, const void *message, size_t leng
   any_message m;
   const stream_type *type = find(stream);
   if (!type) return "is of no stream";
-  if (type->decode(message, room(length), &m) < 0) {
+  if (type->decode(message, given(message, length), &m) < 0) {
     const any_message none = {0};
     uint8_t right[sizeof m + sizeof(int64_t)];
     const int bytes = type->encode(right, sizeof right, &none);

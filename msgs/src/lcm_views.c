@@ -29,7 +29,7 @@ size_t wm_lcm_places(const wm_place *places, size_t count, size_t total, wm_time
 
 const char *wm_lcm_read_places(const void *message, size_t length, wm_lcm_part *part, wm_place *out) {
   static _Thread_local waymark_places_t m;
-  if (waymark_places_t_decode(message, 0, room(length), &m) < 0) return "is not a places_t of this version";
+  if (waymark_places_t_decode(message, 0, given(message, length), &m) < 0) return "is not a places_t of this version";
   if (m.count < 0 || m.count > WM_LCM_PLACES_MAX || m.total < m.count) return "has a count beyond its room";
   *part = (wm_lcm_part){.t_ns = m.t_ns, .total = (size_t)m.total, .count = (size_t)m.count};
   for (size_t i = 0; i < part->count; i++) {
@@ -69,7 +69,7 @@ static wm_landmark landmark_at(int32_t id, const double p_m[3]) {
 
 const char *wm_lcm_read_map(const void *message, size_t length, wm_lcm_part *part, wm_landmark *out) {
   static _Thread_local waymark_map_t m;
-  if (waymark_map_t_decode(message, 0, room(length), &m) < 0) return "is not a map_t of this version";
+  if (waymark_map_t_decode(message, 0, given(message, length), &m) < 0) return "is not a map_t of this version";
   if (!is_part(m.total, m.first, m.count)) return "has a count beyond its room";
   *part = (wm_lcm_part){m.t_ns, (size_t)m.total, (size_t)m.first, (size_t)m.count};
   for (size_t i = 0; i < part->count; i++) {
@@ -82,7 +82,8 @@ const char *wm_lcm_read_map(const void *message, size_t length, wm_lcm_part *par
 
 const char *wm_lcm_read_landmarks(const void *message, size_t length, wm_lcm_part *part, wm_landmark *out) {
   static _Thread_local waymark_landmarks_t m;
-  if (waymark_landmarks_t_decode(message, 0, room(length), &m) < 0) return "is not a landmarks_t of this version";
+  if (waymark_landmarks_t_decode(message, 0, given(message, length), &m) < 0)
+    return "is not a landmarks_t of this version";
   if (!is_part(m.total, m.first, m.count)) return "has a count beyond its room";
   *part = (wm_lcm_part){m.t_ns, (size_t)m.total, (size_t)m.first, (size_t)m.count};
   for (size_t i = 0; i < part->count; i++) {

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Structs of msgs/ as LCM messages of the package `waymark` (msgs/lcm/*.lcm): bytes ready to be published. No
 // allocation, no liblcm. One thread at a time: the first call for a type computes its fingerprint. Each writer returns
-// the bytes written, 0 where `capacity` is too small.
+// the bytes written, 0 where `capacity` is too small. Each reader answers with a text where a message is not of its
+// type, cut, NULL, or of more than 2 GiB (a length that was negative).
 #ifndef WAYMARK_LCM_MESSAGES_H
 #define WAYMARK_LCM_MESSAGES_H
 

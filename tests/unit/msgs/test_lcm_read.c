@@ -280,6 +280,30 @@ TEST(identities_of_sightings) {
   }
 }
 
+TEST(no_message_is_not_read) {
+  static wm_published p;
+  static wm_health h;
+  static wm_innovation in;
+  static char name[WM_HEALTH_NAME_MAX], reason[WM_HEALTH_REASON_MAX];
+  static wm_event event;
+  static wm_stream_row row;
+  static wm_sighting seen[WM_LCM_OBSERVATIONS_MAX];
+  size_t count;
+  wm_time_ns t_ns;
+  for (size_t length = 0; length < 100; length += 8) {
+    TEST_ASSERT_NOT_NULL(wm_lcm_read_pose(NULL, length, &p));
+    TEST_ASSERT_NOT_NULL(wm_lcm_read_health(NULL, length, &h));
+    TEST_ASSERT_NOT_NULL(wm_lcm_read_innovation(NULL, length, &in));
+    TEST_ASSERT_NOT_NULL(wm_lcm_read_refused(NULL, length, name, reason));
+    TEST_ASSERT_NOT_NULL(wm_lcm_read_set_pose(NULL, length, &event));
+    TEST_ASSERT_NOT_NULL(wm_lcm_read_reset(NULL, length, &event));
+    TEST_ASSERT_NOT_NULL(wm_lcm_read_sightings(NULL, length, name, &t_ns, seen, &count));
+    TEST_ASSERT_NOT_NULL(wm_lcm_read_row("motion", NULL, length, &row));
+  }
+  TEST_ASSERT_NOT_NULL(wm_lcm_read_row(NULL, bytes, 8, &row));
+  TEST_ASSERT_NOT_NULL(wm_lcm_read_pose(bytes, SIZE_MAX, &p));
+}
+
 // A terminal obeys control characters: C0, DEL, and C1 in UTF-8.
 TEST(control_characters_of_names) {
   static wm_health h, read;
