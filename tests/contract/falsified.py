@@ -205,10 +205,14 @@ def judge(options, case, scratch):
         covariances.copy(folder, scratch / "covariances")
         folder = scratch / "covariances"
     run = Runner(options, case, folder, scratch)
-    plain = run.figures("undisturbed", folder, run.aligned)
+    row = {"case": case.title(), "falsified": "nothing", "position_rmse_m": None, "nees_inside_95": None, "ratio": None, "states": "", "good": None}
+    try:
+        plain = run.figures("undisturbed", folder, run.aligned)
+    except replays.Refused as why:
+        yield row | {"states": f"nothing to compare with: {str(why).splitlines()[0]}"}
+        return
     states = listed(run.health, ("scale", "yaw_rad", "time_offset_s", "lag_s"))
-    yield {"case": case.title(), "falsified": "nothing", "position_rmse_m": plain["position_rmse_m"],
-           "nees_inside_95": plain["nees_inside_95"], "ratio": None, "states": states, "good": None}
+    yield row | {"position_rmse_m": plain["position_rmse_m"], "nees_inside_95": plain["nees_inside_95"], "states": states}
     words = [w for w in options.what.split(",") if w]
     for falsification in FALSIFICATIONS:
         if not words or any(w in falsification[0] for w in words):
