@@ -48,6 +48,13 @@ void position_aid::carry_error(wm_time_ns t_ns, double position_sigma_m, planar_
   filter->turn_test().fade_correlated(factor);
 }
 
+void position_aid::release(planar_motion *filter) const {
+  if (error_ < 0 || !receiver_.is_used()) return;
+  const double variance = square(receiver_.sigma_m()) * filter->noise().scale(noise_adaption::kPlace);
+  for (int k = 0; k < 2; k++) filter->forget(error_ + k, 0.0, variance);
+  filter->noise().begin_correlated(variance);
+}
+
 double position_aid::lasting_error(const planar_motion &filter) const {
   if (error_ < 0 || !receiver_.is_used()) return 0.0;
   return std::sqrt(square(filter.value(error_)) + square(filter.value(error_ + 1))) / receiver_.sigma_m();

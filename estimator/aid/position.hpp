@@ -47,6 +47,8 @@ class position_aid {
   // For a filter whose states wait with variance 0 for the first position or heading, since they cost time.
   bool is_awake() const { return is_awake_ != 0; }
   void wake(planar_motion *filter);
+  // What was learnt of the receiver's time-correlated error does not hold: its states begin anew.
+  void release(planar_motion *filter) const;
 
   // ---- a position ----
   // The robot when it was measured.

@@ -28,13 +28,10 @@ CASES = Path(os.environ.get("WM_CASES_DIR", ROOT / "../shared/cases"))
 OWN_WORDS = re.compile(r"Traceback|Error\b|please report|object at 0x|<_io")
 
 
-AT_ONE_SPEED = "at one speed a receiver's delay and the antenna's place along the way are told apart by noise: the delay is called wrong, while the pose is right"
-
-
 @dataclass
 class Case:
     """What a case has to give. `end`: x, y, heading after the replay; `says`, `never`: patterns over all that was printed; `code`: of check,
-    or of the import where there is no robot.yaml. `open`: why it is not given yet; where it is given, this is to be taken out."""
+    or of the import where there is no robot.yaml."""
 
     end: tuple = None
     delta: float = 0.01
@@ -43,7 +40,6 @@ class Case:
     code: int = None
     look: object = None
     options: tuple = ()
-    open: str = ""
 
 
 class Trial:
@@ -289,7 +285,7 @@ TABLE = {
     "clock-set-forward-can": Case(code=2, says=("clock-jumped", r"1\.69999999e\+09 s"), never=("initial_pose",)),
     "dbc-old-mac-line-ends": at_end(),
     "float-without-valtype": Case(code=2, says=("SIG_VALTYPE_",), never=("km/h",)),
-    "gnss-at-constant-speed": Case(code=0, never=("too late",), open=AT_ONE_SPEED),
+    "gnss-at-constant-speed": Case(code=0, never=("too late",)),
     "gnss-far": Case(look=far),
     "gnss-nan-altitude": Case(look=no_altitude),
     "gpsd-scale-of-gst": Case(look=gpsd),
@@ -300,7 +296,7 @@ TABLE = {
     "j1939-source-address": Case(end=(13.330, 3.102, 1.500), code=0),
     "map-mode-raw": Case(look=map_area(("map.yaml", 33.2))),
     "map-png": Case(look=map_area(*((f"{name}.yaml", 8.4) for name in ("grey8", "grey16", "grey8-gama1", "rgba8", "rgb8")))),
-    "odometry-exact-check-bad": Case(code=0, never=("too late",), open=AT_ONE_SPEED),
+    "odometry-exact-check-bad": Case(code=0, never=("too late",)),
     "odometry-rows-repeated-gyro-ignored": at_end(),
     "photos-one-empty-file": Case(look=photos),
     "python-datetime64-us": Case(look=datetimes),
@@ -344,10 +340,9 @@ def main():
     for name in wrong:
         print(f"{name}: no outcome is stated for it here")
     for name in sys.argv[1:] or sorted(there & set(TABLE)):
-        problem, is_open = outcome(name), TABLE[name].open
-        known = f"open: {is_open}" if problem else "right by now: it is open no more"
-        print(f"{name}: {known if is_open else 'WRONG ' + problem if problem else 'right'}", flush=True)
-        wrong += [name] if bool(problem) != bool(is_open) else []
+        problem = outcome(name)
+        print(f"{name}: {'WRONG ' + problem if problem else 'right'}", flush=True)
+        wrong += [name] if problem else []
     print(f"{len(wrong)} of {len(there)} are not right")
     return 1 if wrong else 0
 

@@ -152,6 +152,7 @@ void landmark_ekf::restore_calibration() {
   rollback_.restore(&filter_);
   filter_.noise().restart(true);
   aid_.release(&filter_);
+  positions_.release(&filter_);
 }
 
 // Is the pose unknown, or so vague (after seconds of blind turning) that observations should find it rather than

@@ -25,16 +25,21 @@ std::unique_ptr<void, void (*)(void *)> state(nullptr, std::free);
 
 void feed(const wm_event &e) { TEST_ASSERT_EQUAL(WM_OK, make::feed(*ekf, state.get(), e)); }
 
-wm_calibration_value found(const std::string &name) {
+std::vector<wm_calibration_value> calibration() {
   std::vector<wm_calibration_value> out(64);
   out.resize(ekf->calibration(state.get(), out.data(), out.size()));
-  for (const wm_calibration_value &v : out)
+  return out;
+}
+
+wm_calibration_value found(const std::string &name) {
+  for (const wm_calibration_value &v : calibration())
     if (name == v.name) return v;
   TEST_FAIL_MESSAGE(name.c_str());
   return {};
 }
 
-// What differs between drives: amplitudes of speed and turn rate, noise of the speed, compass or not, start given or not.
+// What differs between drives: amplitudes of speed and turn rate, noise of the speed, compass or not, start given or
+// not.
 struct kind {
   const char *name;
   double speed_mps, turn_radps, noise_mps;
@@ -65,7 +70,8 @@ struct path {
   }
 };
 
-// Sums of squares of errors over their sigmas, of errors, and of sigmas, for delay (0) and the antenna's place ahead (1).
+// Sums of squares of errors over their sigmas, of errors, and of sigmas, for delay (0) and the antenna's place ahead
+// (1).
 struct sums {
   double normal[2] = {0, 0}, error[2] = {0, 0}, sigma[2] = {0, 0}, together_m2 = 0;
 
@@ -73,6 +79,10 @@ struct sums {
     normal[k] += (v.value - truth) * (v.value - truth) / (v.sigma * v.sigma) / kSeeds;
     error[k] += (v.value - truth) * (v.value - truth) / kSeeds;
     sigma[k] += v.sigma / kSeeds;
+  }
+  void add(const sums &other) {
+    for (int k = 0; k < 2; k++) normal[k] += other.normal[k], error[k] += other.error[k], sigma[k] += other.sigma[k];
+    together_m2 += other.together_m2;
   }
 };
 
@@ -86,12 +96,13 @@ void begin(const kind &k, uint64_t seed) {
 }
 
 // A receiver of 3 cm five times a second, with a delay and an antenna of its own in each drive.
-void drive(const kind &k, uint64_t seed, sums *out) {
+sums drive(const kind &k, uint64_t seed, int steps = kSteps) {
+  sums out;
   const auto noise = [seed](uint64_t of, int i) { return wm_random_normal(of, seed, static_cast<uint64_t>(i)); };
   const double delay_s = 0.2 * noise(103, 0), ahead_m = 0.3 * noise(101, 0), left_m = 0.3 * noise(102, 0);
   const path truth(k);
   begin(k, seed);
-  for (int i = 0; i < kSteps; i++) {
+  for (int i = 0; i < steps; i++) {
     const double t = kStep_s * i;
     const auto at = static_cast<size_t>(i + kAround);
     feed(make::twist(t, truth.v[at] + k.noise_mps * noise(0, i), truth.w[at] + 0.005 * noise(1, i)));
@@ -102,19 +113,30 @@ void drive(const kind &k, uint64_t seed, sums *out) {
     if (k.has_heading) feed(make::heading(t, std::remainder(heading_rad, 2 * M_PI), 0.02));
   }
   const wm_calibration_value delay = found("gnss.time_offset_s"), ahead = found("gnss.antenna_x_m");
-  out->add(0, delay, delay_s);
-  out->add(1, ahead, ahead_m);
+  out.add(0, delay, delay_s);
+  out.add(1, ahead, ahead_m);
   const double off_m = ahead.value - ahead_m - kSpeed_mps * (delay.value - delay_s);
-  out->together_m2 += off_m * off_m / kSeeds;
+  out.together_m2 += off_m * off_m / kSeeds;
+  return out;
 }
 
 sums drives(const kind &k) {
   sums out;
-  for (int seed = 1; seed <= kSeeds; seed++) drive(k, static_cast<uint64_t>(seed), &out);
-  std::printf("%s: delay %.2f sigmas of %.3f s, rms %.3f s; antenna %.2f sigmas of %.3f m, rms %.3f m; sum %.3f m\n", k.name,
-              std::sqrt(out.normal[0]), out.sigma[0], std::sqrt(out.error[0]), std::sqrt(out.normal[1]), out.sigma[1],
-              std::sqrt(out.error[1]), std::sqrt(out.together_m2));
+  for (uint64_t seed = 1; seed <= kSeeds; seed++) out.add(drive(k, seed));
+  std::printf("%s: delay %.2f sigmas of %.3f s, rms %.3f s; antenna %.2f sigmas of %.3f m, rms %.3f m; sum %.3f m\n",
+              k.name, std::sqrt(out.normal[0]), out.sigma[0], std::sqrt(out.error[0]), std::sqrt(out.normal[1]),
+              out.sigma[1], std::sqrt(out.error[1]), std::sqrt(out.together_m2));
   return out;
+}
+
+// A pose that is found takes the calibration back to its start; the receiver's error is no part of that, and keeps the
+// sigma that the receiver states: 0.1 m, not the 2 m that its state begins with before the first position.
+TEST(test_a_found_start_leaves_the_receivers_error_as_it_is) {
+  for (uint64_t seed = 1; seed <= kSeeds; seed++) {
+    drive({"found", 0, 0.4, 0.02, true, false}, seed, 150);
+    for (const wm_calibration_value &v : calibration())
+      TEST_ASSERT_NOT_EQUAL(0, std::string(v.name).compare("gnss.lasting_error"));
+  }
 }
 
 // In curves their sum is found; each keeps what the prior of the other leaves it: 0.3 m over 1.5 m/s are 0.2 s.
