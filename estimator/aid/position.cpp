@@ -61,7 +61,7 @@ double position_aid::lasting_error(const planar_motion &filter) const {
 }
 
 double position_aid::half_chord_s(const planar_motion &filter) const {
-  return std::fmax(std::sqrt(filter.variance(time_)), kLeastChord_s);
+  return larger(std::sqrt(filter.variance(time_)), kLeastChord_s);
 }
 
 // The twist over the chord of two sigmas of the delay: a robot that may have stood then, or driven, has neither's

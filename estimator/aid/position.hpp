@@ -32,7 +32,8 @@ class position_aid {
     error_ = pair_of(std::fabs(params.correlated_m));  // below 0: the first position sets its variance
     if (error_ >= 0) filter->noise().begin_correlated(square(params.correlated_m));
     const antenna mounted = antenna_of(setup, params);
-    antenna_ = pair_of(mounted.sigma_m);
+    // Without motion data the heading is that of nothing: no place in base_link is learnt.
+    antenna_ = setup.motion->model == WM_MOTION_CONSTANT_VELOCITY ? -1 : pair_of(mounted.sigma_m);
     antenna_sigma_m_ = mounted.sigma_m;
     for (int i = 0; i < 2; i++) antenna_m_[i] = mounted.place_m[i];
     heading_bias_ = params.heading_bias_sigma_rad > 0.0 ? add(0.0, params.heading_bias_sigma_rad) : -1;

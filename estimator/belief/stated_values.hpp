@@ -18,9 +18,7 @@ class stated_values {
     checked_ns_ = WM_TIME_NONE;
   }
   // Mean and variance of a state at the start, and the variance of its walk per s.
-  void add(int state, double mean, double variance, double walk) {
-    of_[count_++] = {state, 0, mean, variance, walk};
-  }
+  void add(int state, double mean, double variance, double walk) { of_[count_++] = {state, 0, mean, variance, walk}; }
   void set_variance(int state, double variance) {
     for (int i = 0; i < count_; i++)
       if (of_[i].state == state) of_[i].variance = variance;

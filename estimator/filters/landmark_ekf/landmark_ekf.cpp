@@ -93,6 +93,10 @@ void landmark_ekf::begin_life(bool pose_known) {
 // Known start: track from it. Unknown: the known part of it becomes an observation for the search.
 void landmark_ekf::start_again() {
   const wm_start &start = setup_->start;
+  if (place_is_known(start) && !finite(start.heading_rad) && !needs_heading()) {
+    const double xy = square(given_or_default(start.sigma_xy_m));
+    return begin_at({start.p_m[0], start.p_m[1], 0.0}, xy);
+  }
   begin_life(start_is_known(start));
   if (life_.tracking()) return;
   observation seen = observation_now(filter_, -1);
@@ -116,6 +120,14 @@ void landmark_ekf::start_again() {
   const double covariance[3][3] = {
       {xy, 0, 0}, {0, xy, 0}, {0, 0, square(heading ? sigma_heading : kUnknownHeading_rad)}};
   filter_.set_pose(filter_.pose(), covariance);
+}
+
+// A place with any heading, where none is needed.
+void landmark_ekf::begin_at(const wm_pose2 &pose, double variance_m2) {
+  const double covariance[3][3] = {{variance_m2, 0, 0}, {0, variance_m2, 0}, {0, 0, kAnyHeading_rad2}};
+  filter_.set_pose(pose, covariance);
+  begin_life(true);
+  start_.close();  // another heading is no other start
 }
 
 wm_status landmark_ekf::predict(const wm_event &motion) {

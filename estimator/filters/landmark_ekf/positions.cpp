@@ -17,9 +17,13 @@ wm_status landmark_ekf::fuse_position(const wm_event &event, record_list records
   filter_.move_to(event.t_ns);
   if (!positions_.params().use_position) return reject(records, record, WM_REJECTED_BY_CONFIG);
   const position_aid::view at = positions_.look(p, &filter_);
-  buffer(positions_.observe(p, at, filter_));
+  const observation seen = positions_.observe(p, at, filter_);
+  buffer(seen);
   if (life_.searching()) {
-    search_now(event.t_ns);
+    if (needs_heading())
+      search_now(event.t_ns);
+    else
+      begin_at({p.p_m[0], p.p_m[1], 0.0}, square(seen.sigma_length_m) + square(at.arm_m[0]) + square(at.arm_m[1]));
     return reject(records, record, WM_REJECTED_SEARCHING);
   }
   residual rows[2];

@@ -62,8 +62,9 @@ past_pose pose_before(const Filter &filter, double age_s) {
   }
   const wm_pose2 present = filter.pose();
   out.pose = compose(present, out.step);
-  out.lever_x = out.pose.x_m - present.x_m;
-  out.lever_y = out.pose.y_m - present.y_m;
+  // A velocity on the map's axes does not turn with the heading.
+  out.lever_x = filter.has_velocity() ? 0.0 : out.pose.x_m - present.x_m;
+  out.lever_y = filter.has_velocity() ? 0.0 : out.pose.y_m - present.y_m;
   const sin_cos h = sincos(out.pose.heading_rad);
   put_age(filter.steady(there), h, out.age_by);
   put_age(filter.low_passed(there), h, out.stamp_by);

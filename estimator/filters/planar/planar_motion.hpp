@@ -73,6 +73,8 @@ class planar_motion {
   // What the rounding of the last counts has turned, over the track's scale: the derivative of the heading by that
   // state has it. 0 where the wheels' difference is not the turn.
   double rounding_by_track() const;
+  // Without motion data: the velocity is a state, on the map's axes.
+  bool has_velocity() const { return front_.model() == WM_MOTION_CONSTANT_VELOCITY; }
   // The next motion input is overdue.
   bool is_overdue() const { return front_.is_overdue(now_ns()); }
   wm_pose2 odom() const { return odom_; }  // motion alone, by the calibration as it was at each time
@@ -120,7 +122,6 @@ class planar_motion {
   void set_velocity_states(int first);
   // Whether the motion comes with covariances (motion_kind.hpp), or may yet.
   bool is_calibrated() const { return kind_ == kKindCalibrated || (kind_ == kKindUnknown && !has_velocity()); }
-  bool has_velocity() const { return front_.model() == WM_MOTION_CONSTANT_VELOCITY; }
   // The velocity in the robot's axes at a heading.
   planar_twist velocity_at(double heading_rad) const;
   double velocity_sigma(int k) const { return std::sqrt(start_variance_[kCalibrationCount + k]); }

@@ -8,9 +8,8 @@
 
 namespace wm {
 
-inline bool start_is_known(const wm_start &start) {
-  return finite(start.p_m[0]) && finite(start.p_m[1]) && finite(start.heading_rad);
-}
+inline bool place_is_known(const wm_start &start) { return finite(start.p_m[0]) && finite(start.p_m[1]); }
+inline bool start_is_known(const wm_start &start) { return place_is_known(start) && finite(start.heading_rad); }
 
 // Sigmas of an unknown pose: beyond any map that is searched, and an upper bound of that of a uniform heading.
 inline constexpr double kUnknownPosition_m = 1000.0, kUnknownHeading_rad = kPi;

@@ -180,6 +180,33 @@ TEST(test_turns_and_changes_of_speed_tell_both) {
   }
 }
 
+// A tag that is carried, without motion data: its place is known from the first position on, or from the start, and no
+// heading is claimed.
+TEST(test_without_motion_a_place_is_enough) {
+  for (const bool is_given : {true, false}) {
+    motion.model = WM_MOTION_CONSTANT_VELOCITY;
+    begin({"carried", 0, 0, 0, false, false}, 3);
+    if (is_given) {
+      setup.start.p_m[0] = setup.start.p_m[1] = 0.05;
+      setup.start.sigma_xy_m = 0.1;
+      state.reset(make::begun(*ekf, params.data(), setup));
+    }
+    wm_estimate now{};
+    double worst_m = 0;
+    for (int i = 0; i < 200; i++) {
+      const double t = 0.2 * i, x = std::sin(0.3 * t), y = 1.0 - std::cos(0.3 * t);
+      const auto noise = [i](uint64_t of) { return 0.03 * wm_random_normal(of, 3, static_cast<uint64_t>(i)); };
+      feed(make::position(t, x + noise(1), y + noise(2), 0.03));
+      ekf->estimate(state.get(), &now);
+      TEST_ASSERT_EQUAL(is_given || i > 0 ? WM_STATE_TRACKING : WM_STATE_DEAD_RECKONING, now.state);
+      if (i > 10) worst_m = std::fmax(worst_m, std::hypot(now.pose_map_base.p_m[0] - x, now.pose_map_base.p_m[1] - y));
+    }
+    TEST_ASSERT_LESS_THAN_DOUBLE(3.5 * std::sqrt(now.covariance[0] + now.covariance[wm_cov_index(1, 1)]), worst_m);
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.07, std::sqrt(now.covariance[0]));
+    TEST_ASSERT_DOUBLE_WITHIN(0.01, wm::kPi * wm::kPi / 3, now.covariance[wm_cov_index(5, 5)]);
+  }
+}
+
 }  // namespace
 
 void setUp() {
