@@ -69,7 +69,9 @@ inline double correlated_range(const wm_sighting_params &p, double sigma_m) {
 }
 inline double correlated_range(const wm_sighting_params &p, const sighting_reading &r, double range_m) {
   if (p.correlated_slots == 0 || (r.independent && p.correlated_range_m < 0.0)) return 0.0;
-  return std::sqrt(square(correlated_range(p, r.range_sigma_m)) + square(p.correlated_range_rel * range_m));
+  // Of ranges alone (radio, sound) what grows with the range is the sensor's scale; a landmark has no own one.
+  const double relative_m = r.bearing ? p.correlated_range_rel * range_m : 0.0;
+  return std::sqrt(square(correlated_range(p, r.range_sigma_m)) + square(relative_m));
 }
 
 // The states of a slot of time-correlated errors: `width` of them; the offsets of the bearing's and the range's error

@@ -10,6 +10,7 @@
 #include "common/suite.h"
 #include "events.hpp"
 #include "math/arc.hpp"
+#include "sensors/sighting.hpp"
 #include "waymark/random.h"
 
 namespace {
@@ -89,6 +90,21 @@ TEST(test_more_landmarks_than_slots_are_no_more_certain_than_their_map) {
     TEST_ASSERT_LESS_THAN_DOUBLE_MESSAGE(3.0, nees, text);
     TEST_ASSERT_GREATER_THAN_DOUBLE_MESSAGE(0.05, nees, text);
   }
+}
+
+// A camera takes a landmark's size for its distance; of radio and sound the sensor's scale grows with the range, and a
+// landmark has an offset alone.
+TEST(test_a_lasting_error_that_grows_with_the_range_is_one_of_bearings_beside) {
+  wm_sighting_params p;
+  wm_params_defaults(&wm_sighting_params_table, &p);
+  p.correlated_range_m = 0.3;
+  p.correlated_range_rel = 0.02;
+  wm::sighting_reading r{};
+  r.range = true;
+  r.range_sigma_m = 0.1;
+  TEST_ASSERT_EQUAL_DOUBLE(0.3, wm::correlated_range(p, r, 20.0));
+  r.bearing = true;
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.5, wm::correlated_range(p, r, 20.0));
 }
 
 // Wheels whose radii differ by 1 %: on a straight the counts turn, and the robot doesn't.
