@@ -8,7 +8,6 @@
 #include "aid/residual.hpp"
 #include "filters/core/receiver_error.hpp"
 #include "filters/planar/past_pose.hpp"
-#include "motion/steady_rate.hpp"
 
 namespace wm {
 
@@ -38,8 +37,6 @@ class position_aid {
     for (int i = 0; i < 2; i++) antenna_m_[i] = mounted.place_m[i];
     heading_bias_ = params.heading_bias_sigma_rad > 0.0 ? add(0.0, params.heading_bias_sigma_rad) : -1;
     has_heading_ = has_position_ = is_awake_ = unused_ = 0;
-    held_[0] = held_[1] = {};
-    corrected_rad_ = 0.0;
     receiver_.begin();
   }
   const wm_position_params &params() const { return params_; }
@@ -55,19 +52,13 @@ class position_aid {
   // The robot when it was measured.
   struct view {
     past_pose past;
-    sin_cos h;           // of its heading
-    double arm_m[2];     // the antenna's place in base_link
-    double off_m[2];     // the same on the map's axes
-    double delay_by[2];  // derivatives of the antenna's x and y by the delay
-    double bend_m[2];    // mean of the second order's terms, of delay and arm
-    double bend_m2[2];   // and their variance
-  };
-  // Pairs of states x, y besides the pose's, `width` apart.
-  struct places {
-    int first, width, count;
+    sin_cos h;         // of its heading
+    double arm_m[2];   // the antenna's place in base_link
+    double off_m[2];   // the same on the map's axes
+    double bend_m[2];  // by how much the middle of the delay's chord is off the path
   };
   // The receiver's error goes on to this position; then the robot as it was.
-  view look(const wm_position &p, planar_motion *filter, const places &landmarks = {0, 0, 0});
+  view look(const wm_position &p, planar_motion *filter);
   // x and y. `record`: what is known of them.
   void put_rows(const wm_position &p, const view &at, const planar_motion &filter, const wm_innovation &record,
                 residual rows[2]) const;
@@ -82,11 +73,7 @@ class position_aid {
 
  private:
   void carry_error(wm_time_ns t_ns, double position_sigma_m, planar_motion *filter);
-  double half_chord_s(const planar_motion &filter) const;
-  planar_twist chord(const planar_motion &filter, const wm_pose2 &past, double bend_m[2]) const;
-  void put_delay(const planar_motion &filter, view *at);
-  void put_second_order(const planar_motion &filter, double w_radps, double bend_m[2], double variance_m2[2]) const;
-  void turn_explained(planar_motion *filter, const places &landmarks);
+  void widen_delay(const planar_motion &filter, view *at) const;
   double put_row(int axis, const view &at, const planar_motion &filter, planar_row *row) const;
   double bias(const planar_motion &filter) const { return heading_bias_ < 0 ? 0.0 : filter.value(heading_bias_); }
 
@@ -94,8 +81,6 @@ class position_aid {
   int time_, error_, antenna_, heading_bias_;           // states; -1: none
   int has_heading_, has_position_, is_awake_, unused_;  // has_: one has come; no padding
   double antenna_m_[2], antenna_sigma_m_;               // in base_link, without the states of its error
-  steady_rate held_[2];                                 // the speed ahead and beside, for the delay's derivative
-  double corrected_rad_;                                // of the heading's updates: those that were taken up
   receiver_error receiver_;
 };
 

@@ -22,26 +22,6 @@ struct steady_rate {
   }
 };
 
-// White noise of a rate, by the second differences of its samples, which a steady acceleration does not have.
-struct sample_noise {
-  static constexpr double kTau_s = 5.0, kLongest_s = 0.2;  // low-pass; a longer period is that of an input that holds
-  double newest, before;                                   // the last two values
-  double since_s;                                          // how long the newest has held
-  double density;                                          // variance times period: that of the way in a second
-
-  void step(double value, double dt_s) {
-    density -= density * dt_s / (dt_s + kTau_s);
-    if (value != newest) {
-      const double off = value - 2.0 * newest + before, period_s = since_s < kLongest_s ? since_s : kLongest_s;
-      density += off * off / 6.0 * period_s * period_s / kTau_s;
-      before = newest;
-      newest = value;
-      since_s = 0.0;
-    }
-    since_s += dt_s;
-  }
-};
-
 }  // namespace wm
 
 #endif

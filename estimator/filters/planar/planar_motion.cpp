@@ -31,10 +31,9 @@ void planar_motion::init_motion(const wm_setup &setup) {
   start_ns_ = setup.start.t_ns;
   stated_.clear();
   odom_ = {};
-  travelled_m_ = turned_rad_ = corrected_rad_ = 0.0;
+  travelled_m_ = turned_rad_ = 0.0;
   twist_ = {};
   for (steady_rate &rate : steady_) rate.restart(0.0);
-  speed_noise_ = {};
   noise_.init(0.0);
   turn_test_.init();
   heading_rad_ = twist_heading_rad_ = 0.0;
@@ -130,7 +129,6 @@ void planar_motion::take_step(const motion_segment &segment, const motion_twist 
     twist_ = segment.input.command ? segment.end : twist;
   heading_rad_ += step.turn_rad;
   twist_heading_rad_ = heading_end_rad;
-  speed_noise_.step(twist_.v, segment.dt_s);
   double v_sigma, w_sigma;
   front_.count_noise(&v_sigma, &w_sigma);
   steady_[0].step(twist_.v, segment.dt_s / (segment.dt_s + kSteadySpeed_s), v_sigma);
@@ -195,7 +193,6 @@ void planar_motion::estimate(wm_estimate *out) const {
 }
 
 void planar_motion::propagate(const motion_segment &piece, const motion_twist &twist, const motion_noise &noise) {
-  corrected_rad_ += wrap(value(kHeading) - twist_heading_rad_);
   const pose_step step =
       make_pose_step(piece, twist, noise, value(kHeading), twist_, twist_heading_rad_, motion_state_);
   motion_row f[kPoseStates];
@@ -207,16 +204,6 @@ void planar_motion::propagate(const motion_segment &piece, const motion_twist &t
                                       wrap(value(kHeading) + step.turn_rad)};
   state_.assign_rows(kX, kPoseStates, f, step.noise[0], kPoseStates, values);
   take_step(piece, twist, noise, step, value(kHeading));
-}
-
-void planar_motion::transport_place(int first, const planar_row by[2]) {
-  planar_row rows[2];
-  for (int k = 0; k < 2; k++) {
-    rows[k].add(first + k, 1.0);
-    rows[k].add(by[k], 1.0);
-  }
-  const double values[2] = {value(first), value(first + 1)};
-  state_.assign_rows(first, 2, rows, nullptr, 0, values);
 }
 
 void planar_motion::begin_lag() {

@@ -63,9 +63,7 @@ class planar_motion {
   // A twist for the derivative of a time offset: where counts give the speed or the turn, low-passed, without their
   // steps.
   planar_twist steady(const planar_twist &twist) const;
-  // Variance of the way in a second by the white noise of the speed's samples, m2/s.
-  double way_noise() const { return speed_noise_.density; }
-  // steady() without the dead band, for the error of one stamp: it is new in each, and gains nothing from noise.
+  // The same without the dead band, for the error of one stamp: it is new in each, and gains nothing from noise.
   planar_twist low_passed(const planar_twist &twist) const;
   // Variance of a measurement by the steps of the counts that give the pose at `t_ns`, which may lie ahead of them;
   // `by`: its derivatives by x, y and heading. It is no process noise: a later pose does not have it.
@@ -80,9 +78,6 @@ class planar_motion {
   wm_pose2 odom() const { return odom_; }  // motion alone, by the calibration as it was at each time
   double travelled_m() const { return travelled_m_; }
   double turned_rad() const { return turned_rad_; }
-  double corrected_rad() const { return corrected_rad_; }  // by which updates have turned the heading so far
-  // P <- T P T', T = I but for the rows of the two states from `first` on, which have `by` besides; the mean stays.
-  void transport_place(int first, const planar_row by[2]);
   noise_adaption &noise() { return noise_; }
   const noise_adaption &noise() const { return noise_; }
   turn_check &turn_test() { return turn_test_; }
@@ -252,11 +247,10 @@ class planar_motion {
   int32_t by_kind_[kCalibrationCount];  // a state only with kinds of motion that have the term
   wm_time_ns start_ns_;
   wm_pose2 odom_;
-  double travelled_m_, turned_rad_, corrected_rad_;
+  double travelled_m_, turned_rad_;
   planar_twist twist_;        // of the last segment
   double twist_heading_rad_;  // at its end, as it was predicted
   steady_rate steady_[2];     // of its v and w
-  sample_noise speed_noise_;  // of its v
   noise_adaption noise_;
   turn_check turn_test_;
   double heading_rad_;  // only where has_velocity()

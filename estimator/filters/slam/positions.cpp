@@ -90,8 +90,7 @@ wm_status slam::fuse_position(const wm_event &event, record_list records) {
   if (!positions_.params().use_position) return reject(records, record, WM_REJECTED_BY_CONFIG);
   if (!positions_.is_awake()) positions_.wake(&joint_);
   const bool is_first = !positions_.has_position();
-  const position_aid::view at =
-      positions_.look(p, &joint_, {joint_.landmark_state(0), joint_.layout().landmark_width, joint_.landmarks()});
+  const position_aid::view at = positions_.look(p, &joint_);
   if (is_first) follow_scale();  // positions measure the map's scale
   if (is_placing(p, at) || search_by(positions_.observe(p, at, joint_)))
     return reject(records, record, WM_REJECTED_SEARCHING);
