@@ -92,14 +92,14 @@ class sensor_slots {
       }
   }
 
+  static bool gives_ranges_alone(const wm_sensor &s) {
+    return std::isnan(s.bearing_sigma_rad) && !std::isnan(s.range_sigma_m);
+  }
   // Of the default's sigma of a range's scale, for times of flight without a map: 10 %. The speed of sound varies by
   // that in water and air. Not swept.
   static constexpr double kFlightScale = 2.0;
 
  private:
-  static bool gives_ranges_alone(const wm_sensor &s) {
-    return std::isnan(s.bearing_sigma_rad) && !std::isnan(s.range_sigma_m);
-  }
   static bool is_on(const wm_setup &setup, int sensor, int row) {
     const double sigma = setup.sightings->states.sigma[row];
     if (sigma < 0.0 && row == WM_SENSOR_ROW_kDepthAxis && !setup.sensors[sensor].range_is_depth) return false;

@@ -72,8 +72,13 @@ class landmark_ekf {
   void search(wm_time_ns since_ns, const observation *prior, int prior_count);
   void begin_life(bool pose_known);
   void start_again();
-  // Without motion data the velocity is one of the map's axes, and the heading that of nothing that is observed.
-  bool needs_heading() const { return setup_->motion->model != WM_MOTION_CONSTANT_VELOCITY; }
+  // Without motion data the velocity is one of the map's axes, and positions and ranges have no heading either.
+  bool needs_heading() const {
+    if (setup_->motion->model != WM_MOTION_CONSTANT_VELOCITY) return true;
+    for (size_t i = 0; i < setup_->sensor_count; i++)
+      if (!sensor_slots::gives_ranges_alone(setup_->sensors[i])) return true;
+    return false;
+  }
   void begin_at(const wm_pose2 &pose, double variance_m2);
   void begin_start_test();
   void test_start(wm_time_ns t_ns);
