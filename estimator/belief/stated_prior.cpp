@@ -10,9 +10,9 @@ namespace wm {
 namespace {
 
 constexpr int kMost = stated_prior::kStates;
-
+// A variance that no datum has narrowed is the stated one but for rounding.
 constexpr double kRounding = 1.0 - 1e-9;
-// Blunders whose odds differ by less than 20 to 1 are not told apart.
+// log(20): blunders with odds within 20 to 1 of the most probable one are taken, too.
 constexpr double kAlike = 3.0;
 // Inverse of the information that the wide prior lacks, in units of the stated variance.
 double taken_back(const stated_prior &prior) { return 1.0 / (1.0 - 1.0 / square(prior.wider)); }

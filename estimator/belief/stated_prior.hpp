@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is stated about a robot (its start, a mounting, a scale) may be wrong by far more than its sigma: somebody typed
-// it. So a stated prior has an alternative, a prior that is several times as wide, with a small probability. The data
-// decide between both by their Bayes factor. It needs no second filter: of a Gaussian posterior under the narrow prior
-// the factor and the posterior under the wide one are closed forms [Dickey1971]. A right prior is given up in at most
-// kBlunder of all drives [Ville1939], however often it is tested.
+// A mounting, a scale or a clock may be stated wrongly, by far more than its sigma: a blunder. So a stated prior has an
+// alternative, a prior that is several times as wide, with a small probability. Their Bayes factor decides. It needs no
+// second filter: of a Gaussian posterior under the narrow prior the factor and the posterior under the wide one are
+// closed forms [Dickey1971]. A right prior is given up in at most kBlunder of all drives [Ville1939], however often it
+// is tested.
 #ifndef WAYMARK_ESTIMATOR_BELIEF_STATED_PRIOR_HPP
 #define WAYMARK_ESTIMATOR_BELIEF_STATED_PRIOR_HPP
 

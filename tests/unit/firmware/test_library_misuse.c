@@ -540,7 +540,7 @@ TEST(test_one_stamp_far_ahead_makes_nothing_late) {
   TEST_ASSERT_NOT_NULL_MESSAGE(strstr(health.refused_because[0], "60.0"), health.refused_because[0]);
 }
 
-// Nothing that could tell which clock is right has come yet.
+// Before the first datum the session has no clock.
 TEST(test_a_time_before_the_first_datum_makes_nothing_late) {
   waymark_session *session = open_session();
   ok(waymark_add_source(session, "motion", &motion, &err));
