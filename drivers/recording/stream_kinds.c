@@ -209,6 +209,18 @@ static const char *fill_heading(const fill_context *self, const csv_row *row, wm
   return NULL;
 }
 
+static const char *fill_localizer(const fill_context *self, const csv_row *row, wm_event *out) {
+  (void)self;
+  const double *n = &row->number[FIRST], *cov = n + 3;
+  const int empty = count_empty(row, FIRST + 3, 6);
+  if (empty != 0 && empty != 6) return "a part of the covariance is empty";
+  if (empty == 0 && !(cov[0] > 0 && cov[2] > 0 && cov[5] > 0 && cov[0] * cov[2] > cov[1] * cov[1]))
+    return "the covariance is not positive definite";
+  out->as.localized = (wm_localized){.p_m = {n[0], n[1]}, .heading_rad = wrapped(n[2]), .reset = n[9]};
+  memcpy(out->as.localized.covariance, cov, sizeof out->as.localized.covariance);
+  return NULL;
+}
+
 static const char *fill_depth(const fill_context *self, const csv_row *row, wm_event *out) {
   (void)self;
   out->as.position = (wm_position){.p_m = {(double)NAN, (double)NAN, -row->number[FIRST]},
@@ -270,6 +282,15 @@ static const stream_kind kStreamHeading = {"heading.csv",
                                            WM_EVENT_HEADING,
                                            {{STAMPS, NEEDED("heading_rad", ANGLE), NEEDED("sigma_rad", SIGMA)}},
                                            .fill = fill_heading};
+
+static const stream_kind kStreamLocalizer = {
+    "localizer.csv",
+    "localizer",
+    WM_EVENT_LOCALIZED,
+    {{STAMPS, NEEDED("x_m", PLACE), NEEDED("y_m", PLACE), OPTIONAL("heading_rad", ANGLE), OPTIONAL("cov_xx", VARIANCE),
+      OPTIONAL("cov_xy", COVARIANCE), OPTIONAL("cov_yy", VARIANCE), OPTIONAL("cov_xt", COVARIANCE),
+      OPTIONAL("cov_yt", COVARIANCE), OPTIONAL("cov_tt", VARIANCE), OPTIONAL("reset", PLACE)}},
+    .fill = fill_localizer};
 
 static const stream_kind kStreamDepth = {"depth.csv",
                                          "depth",
@@ -385,17 +406,30 @@ void fill_context_imu(fill_context *self, const wm_mounting *imu) {
 
 // ── rows from elsewhere ─────────────────────────────────────────────────────────────────────────────────────────────
 
-const stream_kind *const kStreams[] = {&kStreamMotion, &kStreamMotion6,   &kStreamIncrements, &kStreamTicks,
-                                       &kStreamSpeeds, &kStreamSteering,  &kStreamImu,        &kStreamHeading,
-                                       &kStreamDepth,  &kStreamSightings, &kStreamMarkers,    &kStreamCorners,
-                                       &kStreamStereo, &kStreamPoints,    &kStreamGnss,       NULL};
+const stream_kind *const kStreams[] = {&kStreamMotion,
+                                       &kStreamMotion6,
+                                       &kStreamIncrements,
+                                       &kStreamTicks,
+                                       &kStreamSpeeds,
+                                       &kStreamSteering,
+                                       &kStreamImu,
+                                       &kStreamHeading,
+                                       &kStreamDepth,
+                                       &kStreamSightings,
+                                       &kStreamMarkers,
+                                       &kStreamCorners,
+                                       &kStreamStereo,
+                                       &kStreamPoints,
+                                       &kStreamGnss,
+                                       &kStreamLocalizer,
+                                       NULL};
 
 // Names for a configuration; the corners of markers have those of the markers.
 const char *const wm_source_names[] = {"can",      "motion", "motion6", "increments", "ticks",     "speeds",
                                        "steering", "imu",    "heading", "depth",      "sightings", "markers",
-                                       "stereo",   "points", "gnss",    NULL};
-const char *const wm_stream_names[] = {"motion", "motion6", "ticks", "speeds", "steering",
-                                       "imu",    "heading", "depth", "gnss",   NULL};
+                                       "stereo",   "points", "gnss",    "localizer",  NULL};
+const char *const wm_stream_names[] = {"motion",  "motion6", "ticks", "speeds",    "steering", "imu",
+                                       "heading", "depth",   "gnss",  "localizer", NULL};
 
 const wm_stream *wm_stream_find(const char *name) {
   for (size_t i = 0; wm_stream_names[i]; i++)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Validation of sightings, markers, positions, headings and stated poses, the same for every filter. WM_NOT_FINITE,
-// WM_OUT_OF_RANGE: the datum cannot be a measurement.
+// Validation of sightings, markers, positions, headings, poses and stated poses, the same for every filter.
+// WM_NOT_FINITE, WM_OUT_OF_RANGE: the datum cannot be a measurement.
 #ifndef WAYMARK_ESTIMATOR_SENSORS_VALIDATION_HPP
 #define WAYMARK_ESTIMATOR_SENSORS_VALIDATION_HPP
 
@@ -56,6 +56,18 @@ inline wm_status check_heading(const wm_heading &h) {
 }
 
 inline double absent_as_zero(double a) { return std::isnan(a) ? 0.0 : a; }
+
+inline wm_status check_localized(const wm_localized &p) {
+  const double *c = p.covariance;
+  const bool is_stated = !std::isnan(c[0]);
+  double sum = p.p_m[0] + p.p_m[1] + absent_as_zero(p.heading_rad);
+  for (int i = 0; i < 6 && is_stated; i++) sum += c[i];
+  if (!finite(sum)) return WM_NOT_FINITE;
+  const bool is_place = std::fabs(p.p_m[0]) <= kMaxPosition_m && std::fabs(p.p_m[1]) <= kMaxPosition_m;
+  const bool is_angle = std::isnan(p.heading_rad) || std::fabs(p.heading_rad) <= kMaxAngle_rad;
+  const bool is_definite = !is_stated || (c[0] > 0.0 && c[5] > 0.0 && c[0] * c[2] > c[1] * c[1]);
+  return is_place && is_angle && is_definite ? WM_OK : WM_OUT_OF_RANGE;
+}
 
 inline wm_status check_marker(const wm_marker &m, size_t sensor_count) {
   const bool two = m.poses == 2;

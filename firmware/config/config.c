@@ -52,6 +52,9 @@ const wm_shared_section wm_config_shared[WM_CONFIG_SHARED] = {
                              &wm_position_params_table, offsetof(wm_config, positions)},
     [WM_CONFIG_MARKERS] = {"markers", "markers.", "For every estimator that takes coded markers (tags): their noise.",
                            &wm_marker_params_table, offsetof(wm_config, markers)},
+    [WM_CONFIG_LOCALIZER] = {"localizer", "localizer.",
+                             "For every estimator that takes poses of another localizer: their frame and noise.",
+                             &wm_localizer_params_table, offsetof(wm_config, localizer)},
 };
 
 void *wm_config_params(const wm_config *config, int i) {
@@ -69,6 +72,7 @@ void wm_config_give_params(const wm_config *config, wm_setup *setup) {
   setup->sightings = config->sightings;
   setup->positions = config->positions;
   setup->markers = config->markers;
+  setup->localizer = config->localizer;
 }
 
 // Opens the shared sections with these structs of theirs.

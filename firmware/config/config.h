@@ -21,7 +21,7 @@
 //   start: {saved_pose: FILE, ...}
 //   black_box: {folder: FOLDER, ...}
 //   motion: {...}                  # wm_motion_params_table
-//   sightings: {...}               # wm_sighting_params_table; likewise positions, markers
+//   sightings: {...}               # wm_sighting_params_table; likewise positions, markers, localizer
 //   vision: {edges: {cameras: [front], ...}}   # detectors on pictures, with their tables
 //   vision: {cascade: {classes: [{file: FILE, height_m: 0.9}]}}
 //   landmark_ekf: {...}            # the estimator's own table
@@ -100,7 +100,14 @@ typedef struct wm_shared_section {
   size_t offset;
 } wm_shared_section;
 
-enum { WM_CONFIG_MOTION = 0, WM_CONFIG_SIGHTINGS, WM_CONFIG_POSITIONS, WM_CONFIG_MARKERS, WM_CONFIG_SHARED };
+enum {
+  WM_CONFIG_MOTION = 0,
+  WM_CONFIG_SIGHTINGS,
+  WM_CONFIG_POSITIONS,
+  WM_CONFIG_MARKERS,
+  WM_CONFIG_LOCALIZER,
+  WM_CONFIG_SHARED
+};
 extern const wm_shared_section wm_config_shared[WM_CONFIG_SHARED];
 
 typedef struct wm_config {
@@ -115,6 +122,7 @@ typedef struct wm_config {
   wm_sighting_params *sightings;
   wm_position_params *positions;
   wm_marker_params *markers;
+  wm_localizer_params *localizer;
   wm_runtime_params runtime;
   int32_t lateness_is_stated;  // merge.lateness_max_ms
   wm_recording_overrides overrides;

@@ -6,7 +6,7 @@
 
 #define BIT(kind) WM_EVENT_BIT(WM_EVENT_##kind)
 #define SEEN (BIT(SIGHTING) | BIT(MARKER))
-#define OBSERVED (SEEN | BIT(POSITION) | BIT(HEADING) | BIT(STEREO) | BIT(POINTS))
+#define OBSERVED (SEEN | BIT(POSITION) | BIT(HEADING) | BIT(LOCALIZED) | BIT(STEREO) | BIT(POINTS))
 #define ON_WHEELS (BIT(QUANTITIES) | BIT(TWIST2) | BIT(INCREMENT))
 
 // What a row asks of the facts beside an observation.
@@ -29,7 +29,8 @@ static const row kRows[] = {
     {SEEN, WITH_LINES, "slam", "upright lines, whose places are unknown"},
     {SEEN, WITH_LANDMARKS, "landmark_ekf", "landmarks whose places are known"},
     {SEEN, WITHOUT_LANDMARKS, "slam", "landmarks whose places are unknown"},
-    {BIT(POSITION) | BIT(HEADING), ALWAYS, "landmark_ekf", "positions or headings, without landmarks"},
+    {BIT(POSITION) | BIT(HEADING) | BIT(LOCALIZED), ALWAYS, "landmark_ekf",
+     "positions, headings or another localizer's poses, without landmarks"},
     {WM_MOTION_EVENTS, ALWAYS, "odometry", "motion alone: no source observes a place"},
     {0, ALWAYS, NULL, "no source is bound: name the robot's `devices`, give a recording, or write `estimator: NAME`"},
 };

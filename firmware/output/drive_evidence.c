@@ -431,6 +431,9 @@ static void calibration(const wm_assembly *assembly, const wm_health *health, wm
       {"noise.", 1, 0, FACTOR_BAD, 0, FACTOR_BAD, "the stated sigma is too small, or what is observed does not fit"},
       // A tenth of a second is more than cameras and lasers need; 0.17 rad of yaw are seen with the naked eye.
       {".time_offset_s", 0, -0.1, 0.1, -0.25, 0.25, "correct the stamps of this sensor by this time"},
+      {"localizer.distrusted_s", 0, 0, 2, 0, INFINITY,
+       "it contradicts the other sources: compare its map and its clock, or write `localizer: {frame: own}`"},
+      {"localizer.jumps", 0, 0, 0, 0, INFINITY, "its frame began anew without a word: its `reset` should say so"},
       {".antenna_", 0, -0.05, 0.05, -0.1, 0.1,
        "measure gnss.mounting of calibration.yaml again: this is where the drive shows the antenna"},
       {".yaw_rad", 0, -0.17, 0.17, -0.8, 0.8, "turn the sensor's mounting (rpy_deg, the last number) by this angle"},

@@ -27,6 +27,9 @@ static const wm_event_field kPosition[] = {NUMBERS(position, p_m, 3, 0, WM_PLACE
                                            NUMBERS(position, sigma_z_m, 1, 0, WM_SIGMA_LIMITS)};
 static const wm_event_field kHeading[] = {NUMBERS(heading, heading_rad, 1, 1, WM_ANGLE_LIMITS),
                                           NUMBERS(heading, sigma_rad, 1, 1, WM_SIGMA_LIMITS)};
+static const wm_event_field kLocalized[] = {
+    NUMBERS(localized, p_m, 2, 2, WM_PLACE_LIMITS), NUMBERS(localized, heading_rad, 1, 0, WM_ANGLE_LIMITS),
+    NUMBERS(localized, covariance, 6, 0, WM_COVARIANCE_LIMITS), NUMBERS(localized, reset, 1, 0, WM_PLACE_LIMITS)};
 static const wm_event_field kMarker[] = {WHOLE(marker, sensor, U16),
                                          WHOLE(marker, poses, U16),
                                          WHOLE(marker, id, I32),
@@ -56,13 +59,21 @@ static const struct {
   const wm_event_field *rows;
   size_t count;
 } kKinds[] = {
-    [WM_EVENT_NONE] = {"none", HOLDS_NO_FIELDS},          [WM_EVENT_QUANTITIES] = {"quantities", HOLDS_NO_FIELDS},
-    [WM_EVENT_TWIST2] = {"twist2", HOLDS(kTwist2)},       [WM_EVENT_TWIST6] = {"twist6", HOLDS(kTwist6)},
-    [WM_EVENT_SIGHTING] = {"sighting", HOLDS(kSighting)}, [WM_EVENT_POSITION] = {"position", HOLDS(kPosition)},
-    [WM_EVENT_HEADING] = {"heading", HOLDS(kHeading)},    [WM_EVENT_MARKER] = {"marker", HOLDS(kMarker)},
-    [WM_EVENT_STEREO] = {"stereo", HOLDS(kStereo)},       [WM_EVENT_POINTS] = {"points", HOLDS_NO_FIELDS},
-    [WM_EVENT_LOOKED] = {"looked", HOLDS(kLooked)},       [WM_EVENT_SET_POSE] = {"set_pose", HOLDS(kSetPose)},
-    [WM_EVENT_RESET] = {"reset", HOLDS_NO_FIELDS},        [WM_EVENT_INCREMENT] = {"increment", HOLDS(kIncrement)},
+    [WM_EVENT_NONE] = {"none", HOLDS_NO_FIELDS},
+    [WM_EVENT_QUANTITIES] = {"quantities", HOLDS_NO_FIELDS},
+    [WM_EVENT_TWIST2] = {"twist2", HOLDS(kTwist2)},
+    [WM_EVENT_TWIST6] = {"twist6", HOLDS(kTwist6)},
+    [WM_EVENT_SIGHTING] = {"sighting", HOLDS(kSighting)},
+    [WM_EVENT_POSITION] = {"position", HOLDS(kPosition)},
+    [WM_EVENT_HEADING] = {"heading", HOLDS(kHeading)},
+    [WM_EVENT_MARKER] = {"marker", HOLDS(kMarker)},
+    [WM_EVENT_STEREO] = {"stereo", HOLDS(kStereo)},
+    [WM_EVENT_POINTS] = {"points", HOLDS_NO_FIELDS},
+    [WM_EVENT_LOOKED] = {"looked", HOLDS(kLooked)},
+    [WM_EVENT_SET_POSE] = {"set_pose", HOLDS(kSetPose)},
+    [WM_EVENT_RESET] = {"reset", HOLDS_NO_FIELDS},
+    [WM_EVENT_INCREMENT] = {"increment", HOLDS(kIncrement)},
+    [WM_EVENT_LOCALIZED] = {"localized", HOLDS(kLocalized)},
 };
 _Static_assert(sizeof kKinds / sizeof kKinds[0] == WM_EVENT_KIND_COUNT, "a row for each kind");
 

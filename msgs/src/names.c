@@ -32,7 +32,7 @@ static const char *const kResiduals[] = {"bearing", "range",      "x",     "y", 
                                          "heading", "standstill", "pixel", "elevation"};
 static const char *const kVerdicts[] = {"fused",      "gate",     "unknown_id", "no_association", "out_of_range",
                                         "not_finite", "singular", "searching",  "by_config",      "numeric"};
-static const char *const kAlarms[] = {"noise", "scale", "lengths", "lasting_error", "turn", "stated"};
+static const char *const kAlarms[] = {"noise", "scale", "lengths", "lasting_error", "turn", "stated", "localizer"};
 static const char *const kCounters[] = {"landmarks",       "landmarks_added",   "landmarks_removed",
                                         "landmarks_moved", "landmarks_merged",  "identities_ambiguous",
                                         "map_full",        "rotation_outliers", "motion_outliers",

@@ -3,12 +3,16 @@
 """A thousand simulated drives over all estimators with random faults: how often a pose is confidently wrong, lost without a word, or
 called lost while it is right.
 
-    campaign.py BIN_DIR SOURCE_DIR OUT [--drives N] [--seed S] [--jobs J] [--part K/N] [--only NUMBER] [--fresh] [--also FILE ...]
+    campaign.py BIN_DIR SOURCE_DIR OUT [--drives N] [--seed S] [--jobs J] [--localizers SHARE] [--part K/N] [--only NUMBER] [--fresh]
+                [--also FILE ...]
                 [--unsaid-most N] [--alarms-most N]
 
 OUT/results.jsonl has a row a drive; the same command goes on where it was stopped. --part runs a share of the drives, for several
 machines; --also adds their results to the tables. A drive is drawn by its number and the seed alone: --only makes one again and
 keeps its recording and run in OUT/drive-NUMBER.
+
+With --localizers this share of the drives that can take one has a second localizer, right or wrong (localizers.py); they are drawn
+beside the rest, which stays the same.
 
 A quarter of the drives has no fault, a tenth has two. Each world has the configuration of a new user: defaults, and the shipped
 config/robot.yaml or car.yaml. Judged at each stamp of the truth (tests/contract/replays.py):
@@ -33,6 +37,7 @@ import tempfile
 import yaml
 
 import kinds
+import localizers
 import scans
 from kinds import KINDS, WORLDS, replays
 
@@ -76,7 +81,7 @@ def simulated(options, name, seed, drive, scratch):
     return scratch / "recording"
 
 
-def configuration(options, name, recording, scratch):
+def configuration(options, name, recording, scratch, more):
     world, config = WORLDS[name], scratch / "robot.yaml"
     text = world.config if ":" in world.config else (options.source_dir / "config" / world.config).read_text()
     for old, new in world.edits:
@@ -84,7 +89,7 @@ def configuration(options, name, recording, scratch):
         text = text.replace(old, new, 1)
     if (recording / "map/map.yaml").exists():
         text += f"map: {recording}/map/map.yaml\n"
-    config.write_text(text.replace("start: {saved_pose: pose.yaml}", ""))
+    config.write_text(text.replace("start: {saved_pose: pose.yaml}", "") + more)
     return config
 
 
@@ -120,8 +125,12 @@ def one(options, number):
     try:
         scratch.mkdir(parents=True, exist_ok=True)
         recording = simulated(options, name, seed, drive, scratch)
-        replays.command(options.bin_dir / "waymark", "replay", recording, "--config", configuration(options, name, recording, scratch), "--out",
-                        scratch / "run")
+        other, more = random.Random(f"{options.seed} {number} localizer"), ""
+        if other.random() < options.localizers and localizers.takes(WORLDS[name].config):
+            row["localizer"], more = localizers.add(recording, other)
+            row["drawn"] += f"; {row['localizer']}"
+        replays.command(options.bin_dir / "waymark", "replay", recording, "--config", configuration(options, name, recording, scratch, more),
+                        "--out", scratch / "run")
         row.update(judge(scratch / "run", recording, names))
     except (replays.Refused, AssertionError) as refused:
         row["refused"] = str(refused)[-300:]
@@ -172,6 +181,7 @@ def main():
     parser.add_argument("--drives", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
+    parser.add_argument("--localizers", type=float, default=0, metavar="SHARE")
     parser.add_argument("--part", default="1/1", metavar="K/N")
     parser.add_argument("--only", type=int, metavar="NUMBER")
     parser.add_argument("--unsaid-most", type=int, default=0, help="what is known and accepted: no more than so many")
@@ -191,6 +201,8 @@ def main():
     rows = [row for row in read([kept, *options.also]).values() if row["number"] <= options.drives]
     table("fault", rows, kind_of)
     table("world", rows, lambda row: row["world"])
+    if options.localizers:
+        table("second localizer", rows, lambda row: row.get("localizer", "none"))
     judged = [row for row in rows if "refused" not in row]
     for row in sorted(judged, key=lambda row: -row["far_s"]):
         if any(v for k, v in verdicts(row).items() if k not in ("adrift", "doubted")):

@@ -11,9 +11,9 @@
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
 static const char *const kEstimators[] = {"landmark_ekf", "slam", "odometry", "stereo_ekf"};
-static const char *const kSources[] = {"motion",        "imu",      "gnss",       "sightings:front",
-                                       "markers:front", "commands", "stereo",     "heading",
-                                       "increments",    "points",   "sightings:", "nothing"};
+static const char *const kSources[] = {"motion",     "imu",     "gnss",     "sightings:front", "markers:front",
+                                       "commands",   "stereo",  "heading",  "increments",      "points",
+                                       "sightings:", "nothing", "localizer"};
 enum { ESTIMATORS = sizeof kEstimators / sizeof kEstimators[0], SOURCES = sizeof kSources / sizeof kSources[0] };
 
 typedef struct input {

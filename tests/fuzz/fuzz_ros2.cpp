@@ -107,6 +107,13 @@ void take_imu(const Imu &message) {
   check_row("imu", &row);
 }
 
+void take_localizer(const PoseStamped &message) {
+  wm_stream_row row{};
+  if (localized_of(message.pose, &row)) return;
+  row.t_ns = monotonic_stamp(message.header.stamp, 5);
+  check_row("localizer", &row);
+}
+
 void take_fix(const Fix &message) {
   const double origin[3] = {48, 11, 500};
   wm_can_gnss gnss;
@@ -155,7 +162,7 @@ void send_health(const uint8_t *data, size_t size) {
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
   using namespace wm::ros2;
   if (size == 0) return 0;
-  const unsigned kind = data[0] % 6;
+  const unsigned kind = data[0] % 7;
   data++, size--;
   switch (kind) {
     case 0:
@@ -165,6 +172,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     case 2: incoming<Imu>(sensor_msgs_msg_dds__Imu__desc, data, size, take_imu); break;
     case 3: incoming<Fix>(sensor_msgs_msg_dds__NavSatFix__desc, data, size, take_fix); break;
     case 4: send_pose(data, size); break;
+    case 5:
+      incoming<PoseStamped>(geometry_msgs_msg_dds__PoseWithCovarianceStamped__desc, data, size, take_localizer);
+      break;
     default: send_health(data, size); break;
   }
   return 0;

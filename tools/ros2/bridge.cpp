@@ -66,6 +66,9 @@ Bridge::Bridge(const Wishes &wishes, Participant *participant, lcm_t *lcm)
   listen(wishes.odom, nav_msgs_msg_dds__Odometry__desc, Quality::kSensor, &Bridge::take_odometry);
   listen(wishes.imu, sensor_msgs_msg_dds__Imu__desc, Quality::kSensor, &Bridge::take_imu);
   listen(wishes.fix, sensor_msgs_msg_dds__NavSatFix__desc, Quality::kSensor, &Bridge::take_fix);
+  listen(wishes.localizer, geometry_msgs_msg_dds__PoseWithCovarianceStamped__desc, Quality::kSensor,
+         &Bridge::take_localizer);
+  listen(wishes.visual_odom, nav_msgs_msg_dds__Odometry__desc, Quality::kSensor, &Bridge::take_visual_odometry);
 
   const auto on_message = [](const lcm_recv_buf_t *message, const char *channel, void *context) {
     auto *self = static_cast<Bridge *>(context);
@@ -247,6 +250,23 @@ Fault Bridge::take_fix(const Fix &message) {
   wm_stream_row row{};
   if (Fault fault = position_of(message, &gnss_, &row)) return fault;
   return send_row("gnss", "GNSS", message.header.stamp, &row);
+}
+
+Fault Bridge::send_localized(const Time &stamp, const RosPoseCovariance &pose) {
+  wm_stream_row row{};
+  if (Fault fault = localized_of(pose, &row)) return fault;
+  return send_row("localizer", "LOCALIZER", stamp, &row);
+}
+
+Fault Bridge::take_localizer(const PoseStamped &message) { return send_localized(message.header.stamp, message.pose); }
+
+// A camera's pose is not the robot's.
+Fault Bridge::take_visual_odometry(const Odometry &message) {
+  const std::string child = message.child_frame_id;
+  if (child != wishes_.frames.base && child != "/" + wishes_.frames.base)
+    return "its child_frame_id is '" + child + "', not '" + wishes_.frames.base +
+           "' (--base-frame): the poses are not the robot's";
+  return send_localized(message.header.stamp, message.pose);
 }
 
 }  // namespace wm::ros2

@@ -24,8 +24,8 @@ struct Wishes {
   std::string prefix = "WAYMARK_", name_space;
   Frames frames;
   std::string tf = "waymark";  // who has odom -> base_link: "waymark", "robot"; "none": nothing is sent
-  std::string initialpose = "/initialpose", odom, imu, fix;  // topics that are taken; "": not
-  double origin[3];                                          // of fixes: degrees, degrees, m; NaN: the first fix
+  std::string initialpose = "/initialpose", odom, imu, fix, localizer, visual_odom;  // topics that are taken; "": not
+  double origin[3];  // of fixes: degrees, degrees, m; NaN: the first fix
 };
 
 struct Counts {
@@ -67,6 +67,9 @@ class Bridge {
   Fault take_odometry(const Odometry &message);
   Fault take_imu(const Imu &message);
   Fault take_fix(const Fix &message);
+  Fault take_localizer(const PoseStamped &message);
+  Fault take_visual_odometry(const Odometry &message);
+  Fault send_localized(const Time &stamp, const RosPoseCovariance &pose);
   Fault send_row(const char *stream, const char *channel, const Time &stamp, wm_stream_row *row);
   Fault publish(const std::string &channel, size_t bytes);
 

@@ -80,6 +80,23 @@ Fault motion_of(const Odometry &message, wm_stream_row *out) {
 
 Fault pose_of(const Odometry &message, Eigen::Isometry3d *out) { return read(message.pose.pose, out); }
 
+Fault localized_of(const RosPoseCovariance &pose, wm_stream_row *out) {
+  Eigen::Isometry3d at;
+  if (Fault fault = read(pose.pose, &at)) return fault;
+  const auto &r = at.linear();
+  const double *c = pose.covariance;
+  const double covariance[6] = {c[0], (c[1] + c[6]) / 2, c[7], (c[5] + c[30]) / 2, (c[11] + c[31]) / 2, c[35]};
+  const bool is_one =
+      std::all_of(std::begin(covariance), std::end(covariance), [](double v) { return std::isfinite(v); }) &&
+      c[0] > 0 && c[35] > 0 && c[0] * c[7] > covariance[1] * covariance[1];
+  out->number[0] = at.translation().x();
+  out->number[1] = at.translation().y();
+  out->number[2] = std::atan2(r(1, 0), r(0, 0));
+  for (int i = 0; i < 6; i++) out->number[3 + i] = is_one ? covariance[i] : kAbsent;
+  out->number[9] = kAbsent;  // it says nothing of a reset
+  return std::nullopt;
+}
+
 Fault imu_of(const Imu &message, wm_stream_row *out) {
   const Vector3 &w = message.angular_velocity, &a = message.linear_acceleration;
   const double *w_variance = message.angular_velocity_covariance, *a_variance = message.linear_acceleration_covariance;

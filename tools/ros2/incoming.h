@@ -28,6 +28,8 @@ using Fault = std::optional<std::string>;
 [[nodiscard]] Fault motion_of(const Odometry &message, wm_stream_row *out);
 // base_link in the robot's own odom.
 [[nodiscard]] Fault pose_of(const Odometry &message, Eigen::Isometry3d *out);
+// Another localizer's pose, as it is in its frame. Zeros and other covariances that are none count as absent.
+[[nodiscard]] Fault localized_of(const RosPoseCovariance &pose, wm_stream_row *out);
 [[nodiscard]] Fault imu_of(const Imu &message, wm_stream_row *out);
 // Metres from the origin of `gnss`, as of GNSS over CAN. A message without a fix is a fault with an empty text.
 [[nodiscard]] Fault position_of(const Fix &message, wm_can_gnss *gnss, wm_stream_row *out);

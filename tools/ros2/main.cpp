@@ -52,11 +52,13 @@ void check(const Options &options) {
   const auto is_topic = [](const std::string &name) {
     return !name.empty() && name.back() != '/' && name.find_first_of(" \t") == std::string::npos;
   };
-  for (const std::string *topic : {&b.initialpose, &b.odom, &b.imu, &b.fix})
+  for (const std::string *topic : {&b.initialpose, &b.odom, &b.imu, &b.fix, &b.localizer, &b.visual_odom})
     if (!topic->empty() && ((*topic)[0] != '/' || !is_topic(*topic)))
       throw Failure("'" + *topic + "' is not a topic: it has to begin with '/', as /odom", tools::kUsage);
   if (!b.name_space.empty() && (b.name_space[0] == '/' || !is_topic(b.name_space)))
     throw Failure("--namespace: '" + b.name_space + "' is not a namespace; write it as robot1", tools::kUsage);
+  if (!b.localizer.empty() && !b.visual_odom.empty())
+    throw Failure("--localizer and --visual-odom are one stream of the run: give one of them", tools::kUsage);
   if (b.tf == "robot" && b.odom.empty())
     throw Failure("--tf robot needs the robot's odometry: --odom TOPIC", tools::kUsage);
 }
@@ -77,7 +79,8 @@ void refuse_second(const Participant &participant, const Peer &self) {
 
 std::string sources(const Wishes &wishes) {
   std::string out;
-  for (const std::string *topic : {&wishes.initialpose, &wishes.odom, &wishes.imu, &wishes.fix})
+  for (const std::string *topic :
+       {&wishes.initialpose, &wishes.odom, &wishes.imu, &wishes.fix, &wishes.localizer, &wishes.visual_odom})
     if (!topic->empty()) out += " " + *topic;
   return out.empty() ? " nothing" : out;
 }
@@ -150,6 +153,10 @@ int main(int argc, char **argv) {
   app.add_option("--odom", b.odom, "topic of nav_msgs/Odometry: its twist is sent as motion");
   app.add_option("--imu", b.imu, "topic of sensor_msgs/Imu: sent as imu");
   app.add_option("--fix", b.fix, "topic of sensor_msgs/NavSatFix: sent as gnss, in metres of --origin");
+  app.add_option("--localizer", b.localizer,
+                 "topic of geometry_msgs/PoseWithCovarianceStamped, another localizer's: sent as localizer");
+  app.add_option("--visual-odom", b.visual_odom,
+                 "topic of nav_msgs/Odometry whose poses are sent as localizer (localizer: {frame: own})");
   app.add_option("--origin", options.origin,
                  "LATITUDE,LONGITUDE[,ALTITUDE] of the map's zero in degrees and m (default: the first fix)")
       ->delimiter(',')
@@ -160,6 +167,7 @@ int main(int argc, char **argv) {
       "  waymark ros2\n"
       "  waymark ros2 --tf robot --odom /odom --imu /imu/data\n"
       "  waymark ros2 --fix /fix --origin 48.1,11.6,520\n"
+      "  waymark ros2 --localizer /amcl_pose\n"
       "\n"
       "The run takes what devices.lcm in its configuration lists (docs/motion-sources.md).");
   struct sigaction action {};

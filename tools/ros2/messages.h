@@ -12,6 +12,7 @@ namespace wm::ros2 {
 using Time = builtin_interfaces_msg_dds__Time_;
 using Header = std_msgs_msg_dds__Header_;
 using RosPose = geometry_msgs_msg_dds__Pose_;
+using RosPoseCovariance = geometry_msgs_msg_dds__PoseWithCovariance_;
 using Quaternion = geometry_msgs_msg_dds__Quaternion_;
 using Vector3 = geometry_msgs_msg_dds__Vector3_;
 using PoseStamped = geometry_msgs_msg_dds__PoseWithCovarianceStamped_;

@@ -310,7 +310,7 @@ int32_t silent_source(const wm_monitor &self, wm_time_ns t_ns) {
 bool test_calibration(wm_monitor *self, const wm_alarm *alarms, size_t count) {
   self->is_calibration_contradicted = 0;
   for (size_t i = 0; i < count; i++) {
-    if (alarms[i].kind == WM_ALARM_TURN) continue;
+    if (alarms[i].kind == WM_ALARM_TURN || alarms[i].kind == WM_ALARM_LOCALIZER) continue;  // the latter is left out
     const bool is_decided_by_others = alarms[i].kind == WM_ALARM_LENGTHS && (self->is_map_known || self->has_positions);
     if (!is_decided_by_others) self->is_calibration_contradicted = 1;
   }

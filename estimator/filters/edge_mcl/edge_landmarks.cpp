@@ -134,6 +134,7 @@ void edge_mcl::adopt_found(const search_result &found) {
   for (int i = 0; i < 3; i++)
     for (int j = 0; j < 3; j++) covariance[i][j] = found.covariance[i][j];
   begin_tentative(found.pose);
+  localizer_.release();
   // The found heading has the error of the mounting's yaw.
   for (int i = 0; i < static_cast<int>(setup_->sensor_count); i++)
     if (const int yaw = landmarks_.slots().at(i, kYaw); yaw >= 0) covariance[2][2] += filter_.variance(yaw);

@@ -17,14 +17,8 @@ namespace {
 constexpr double kMotionGap_s = 1.0;      // between two motion messages, beyond which the way is unknown; not swept
 constexpr double kUnknownSigma_m = 0.03;  // of a point without a sigma and a camera: a pixel at 4 m
 
-const char *const kReads[] = {"!motion.noise.adapt",
-                              "!markers.stamp",
-                              "!markers.correlated",
-                              "motion.",
-                              "sightings.",
-                              "positions.",
-                              "markers.",
-                              nullptr};
+const char *const kReads[] = {"!motion.noise.adapt", "!markers.stamp", "!markers.correlated", "motion.", "sightings.",
+                              "positions.",          "markers.",       "localizer.",          nullptr};
 
 bool has_landmarks(const wm_setup &setup) { return setup.landmark_count > 0 && setup.sensor_count > 0; }
 
@@ -35,7 +29,7 @@ int count_states(const wm_edge_mcl_params &params, const wm_setup &setup) {
   return kPoseStates + planar_filter::count_motion_states(setup.motion->states, setup.motion->model) +
          (params.sigma[kEdgeOffset] > 0.0) + each_camera * cameras +
          (has_landmarks(setup) ? sighting_aid::count_states(setup) : 0) + position_aid::count_states(setup) +
-         (params.wall_sigma_m > 0.0) * wall_list::kCapacity;
+         localizer_aid::count_states(setup) + (params.wall_sigma_m > 0.0) * wall_list::kCapacity;
 }
 
 }  // namespace
@@ -103,6 +97,7 @@ void edge_mcl::init(const wm_edge_mcl_params &params, const wm_setup &setup) {
   for (int k = 0; wall_state_ >= 0 && k < wall_list::kCapacity; k++) filter_.add_state(0.0, params.wall_sigma_m);
   positions_.init(setup, &filter_, [this](double value, double) { return filter_.add_state(value, 0.0); });
   filter_.set_correlated_position(positions_.error_state());
+  localizer_.init(setup, &filter_, [this](double value, double) { return filter_.add_state(value, 0.0); });
   start_again(start_is_known(setup.start));
 }
 
@@ -122,6 +117,7 @@ void edge_mcl::start_again(bool known) {
   aliases_m_ = filter_.travelled_m();
   nominal_ = map_searched_ = tentative_ = false;
   suspicious_ = !known;
+  localizer_.release();
 }
 
 wm_status edge_mcl::predict(const wm_event &motion) {
@@ -142,6 +138,7 @@ wm_status edge_mcl::correct(const wm_event &event, record_list records) {
     case WM_EVENT_MARKER: return take_landmark(event, records);
     case WM_EVENT_POSITION: return take_position(event, records);
     case WM_EVENT_HEADING: return take_heading(event, records);
+    case WM_EVENT_LOCALIZED: return take_localized(event, records);
     case WM_EVENT_SET_POSE:
     case WM_EVENT_RESET: return take_pose(event);
     case WM_EVENT_LOOKED: {
@@ -169,7 +166,7 @@ wm_status edge_mcl::take_points(const wm_event &event, record_list records) {
   // Of the first scan: since the motion began; 0 where nothing came before it.
   const double dt = watched_ns_ == WM_TIME_NONE ? 0.0 : wm_seconds_between(watched_ns_, event.t_ns);
   watched_ns_ = event.t_ns;
-  if (has_landmarks_ || positions_.is_awake()) landmark_fit_.forget(event.t_ns);
+  if (has_landmarks_ || positions_.is_awake() || localizer_.is_used()) landmark_fit_.forget(event.t_ns);
 
   const int camera = camera_of(points);
   place_scan(points, camera);
@@ -271,6 +268,7 @@ void edge_mcl::list_calibration(calibration_list *list) const {
   if (edge_state_ >= 0)
     list->add("edges", kNames[kEdgeOffset], filter_.value(edge_state_), std::sqrt(filter_.variance(edge_state_)));
   if (positions_.is_awake()) positions_.list(filter_, list);
+  localizer_.list(list);
   if (has_landmarks_) landmarks_.slots().list(*setup_, filter_, list);
 }
 
@@ -307,6 +305,6 @@ const wm_estimator wm_edge_mcl_estimator = wm::estimator_of<wm::edge_mcl, wm_edg
     "sensors, and finds the pose when lost. Sightings and coded markers of known landmarks, positions and headings "
     "beside.",
     WM_EVENT_BIT(WM_EVENT_POINTS) | WM_EVENT_BIT(WM_EVENT_SIGHTING) | WM_EVENT_BIT(WM_EVENT_MARKER) |
-        WM_EVENT_BIT(WM_EVENT_POSITION) | WM_EVENT_BIT(WM_EVENT_HEADING) | WM_EVENT_BIT(WM_EVENT_LOOKED) |
-        WM_EVENT_BIT(WM_EVENT_SET_POSE) | WM_EVENT_BIT(WM_EVENT_RESET),
+        WM_EVENT_BIT(WM_EVENT_POSITION) | WM_EVENT_BIT(WM_EVENT_HEADING) | WM_EVENT_BIT(WM_EVENT_LOCALIZED) |
+        WM_EVENT_BIT(WM_EVENT_LOOKED) | WM_EVENT_BIT(WM_EVENT_SET_POSE) | WM_EVENT_BIT(WM_EVENT_RESET),
     wm_edge_mcl_params_table, wm::kReads);

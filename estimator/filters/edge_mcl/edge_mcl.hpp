@@ -5,6 +5,7 @@
 #ifndef WAYMARK_ESTIMATOR_EDGE_MCL_HPP
 #define WAYMARK_ESTIMATOR_EDGE_MCL_HPP
 
+#include "aid/localizer.hpp"
 #include "aid/position.hpp"
 #include "aid/sighting.hpp"
 #include "filters/core/landmark_evidence.hpp"
@@ -107,6 +108,7 @@ class edge_mcl {
   // edge_positions.cpp
   wm_status take_position(const wm_event &event, record_list records);
   wm_status take_heading(const wm_event &event, record_list records);
+  wm_status take_localized(const wm_event &event, record_list records);
   bool is_found_by(const observation &seen);
   void fuse_given(residual *rows, int count, int key, double clutter_volume, record_list records);
   void start_again(bool known);
@@ -183,6 +185,7 @@ class edge_mcl {
   sighting_aid landmarks_;
   relative_array<landmark_record> records_;
   position_aid positions_;
+  localizer_aid localizer_;
   landmark_evidence landmark_fit_;
   pose_search landmarks_seen_;
   wm_time_ns refuted_ns_;       // when scans refuted a pose that landmarks found

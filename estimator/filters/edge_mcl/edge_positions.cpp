@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Positions (GNSS) and headings beside the floor plan: as landmarks, they correct the pose between the scans, are
-// evidence for or against it, and help to find it.
+// Positions (GNSS), headings and poses of another localizer beside the floor plan: as landmarks, they correct the pose
+// between the scans, are evidence for or against it, and help to find it.
 #include "filters/edge_mcl/edge_mcl.hpp"
 #include "math/arc.hpp"
 #include "sensors/validation.hpp"
@@ -44,6 +44,32 @@ wm_status edge_mcl::take_heading(const wm_event &event, record_list records) {
   return WM_OK;
 }
 
+wm_status edge_mcl::take_localized(const wm_event &event, record_list records) {
+  const wm_localized &seen = event.as.localized;
+  wm_innovation record = record_of(event, WM_RESIDUAL_X);
+  record.observed = seen.p_m[0];
+  wm_status status = check_localized(seen);
+  if (status != WM_OK) return refuse(records, record, status);
+  status = filter_.check_time(event.t_ns);
+  if (status != WM_OK) return status;
+  filter_.move_to(event.t_ns);
+  const bool is_known = !life_.searching() || tentative_;
+  if (!is_known && !localizer_.is_in_map()) return reject(records, record, WM_REJECTED_SEARCHING);
+  localizer_aid::view at;
+  if (!localizer_.look(seen, &filter_, &at)) return WM_OK;
+  if (localizer_.is_for_search(at, life_.tracking())) {
+    if (at.rows == localizer_aid::kRows) landmarks_seen_.add(localizer_.observe_heading(at, filter_));
+    if (is_found_by(localizer_.observe(at, filter_))) return reject(records, record, WM_REJECTED_SEARCHING);
+  } else if (!is_known) {
+    return reject(records, record, WM_REJECTED_SEARCHING);
+  }
+  residual rows[localizer_aid::kRows];
+  localizer_.put_rows(at, filter_, record, rows);
+  if (!localizer_.is_trusted(at, rows, &filter_)) return reject(records, record, WM_REJECTED_SEARCHING);
+  fuse_given(rows, at.rows, localizer_.key(), at.clutter_volume(), records);
+  return WM_OK;
+}
+
 // Keeps it for the search. True: the pose was just found by it, or is not known yet.
 bool edge_mcl::is_found_by(const observation &seen) {
   landmarks_seen_.add(seen);
@@ -54,7 +80,7 @@ void edge_mcl::fuse_given(residual *rows, int count, int key, double clutter_vol
   const fuse_result done = fuse(&filter_, rows, count, clutter_volume, landmark_policy(true), records);
   const wm_time_ns now = filter_.now_ns();
   if (done.verdict == WM_FUSED) life_.fused(now);
-  landmark_fit_.note(now, key, done.log_bayes, std::nan(""), std::nan(""), nullptr);
+  if (key != kNoKey) landmark_fit_.note(now, key, done.log_bayes, std::nan(""), std::nan(""), nullptr);
   update_state(0.0);
   update_suspicion();
 }

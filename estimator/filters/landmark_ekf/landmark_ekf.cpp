@@ -17,12 +17,12 @@ namespace {
 constexpr double kDoubtedStart = 0.1;
 constexpr double kAround_m = 5.0;  // sigma of a lost robot's distance from the landmarks; not swept
 
-const char *const kReads[] = {
-    "!markers.stamp", "!markers.correlated", "motion.", "sightings.", "positions.", "markers.", nullptr};
+const char *const kReads[] = {"!markers.stamp", "!markers.correlated", "motion.", "sightings.", "positions.",
+                              "markers.",       "localizer.",          nullptr};
 
 int count_states(const wm_setup &setup) {
   return kPoseStates + planar_filter::count_motion_states(setup.motion->states, setup.motion->model) +
-         sighting_aid::count_states(setup) + position_aid::count_states(setup);
+         sighting_aid::count_states(setup) + position_aid::count_states(setup) + localizer_aid::count_states(setup);
 }
 
 // Variance of a place anywhere among the landmarks, each axis, m2.
@@ -68,6 +68,7 @@ void landmark_ekf::init(const wm_landmark_ekf_params &params, const wm_setup &se
   positions_.init(setup, &filter_, add);
   filter_.set_correlated_position(positions_.error_state());
   calibration_states_ = filter_.states();
+  localizer_.init(setup, &filter_, add);
   aid_.add_lent(&filter_);
   records_.set(behind.records);
   std::memset(behind.records, 0, setup.landmark_count * sizeof(landmark_record));
@@ -143,6 +144,7 @@ wm_status landmark_ekf::correct(const wm_event &event, record_list records) {
     case WM_EVENT_MARKER: return fuse_landmark(event, records);
     case WM_EVENT_POSITION: return fuse_position(event, records);
     case WM_EVENT_HEADING: return fuse_heading(event, records);
+    case WM_EVENT_LOCALIZED: return fuse_localized(event, records);
     case WM_EVENT_SET_POSE:
     case WM_EVENT_RESET: return take_pose(event);
     case WM_EVENT_LOOKED: {
@@ -203,6 +205,7 @@ void landmark_ekf::list_calibration(calibration_list *list) const {
   filter_.list_motion_states(list);
   aid_.slots().list(*setup_, filter_, list);
   positions_.list(filter_, list);
+  localizer_.list(list);
   filter_.noise().list(list);
   filter_.turn_test().list(list);
   list_lasting_error(positions_.lasting_error(filter_), list);
@@ -224,6 +227,6 @@ const wm_estimator wm_landmark_ekf_estimator = wm::estimator_of<wm::landmark_ekf
     "bearings and ranges to known landmarks, positions, "
     "headings. Finds the pose when lost.",
     WM_EVENT_BIT(WM_EVENT_SIGHTING) | WM_EVENT_BIT(WM_EVENT_MARKER) | WM_EVENT_BIT(WM_EVENT_POSITION) |
-        WM_EVENT_BIT(WM_EVENT_HEADING) | WM_EVENT_BIT(WM_EVENT_LOOKED) | WM_EVENT_BIT(WM_EVENT_SET_POSE) |
-        WM_EVENT_BIT(WM_EVENT_RESET),
+        WM_EVENT_BIT(WM_EVENT_HEADING) | WM_EVENT_BIT(WM_EVENT_LOCALIZED) | WM_EVENT_BIT(WM_EVENT_LOOKED) |
+        WM_EVENT_BIT(WM_EVENT_SET_POSE) | WM_EVENT_BIT(WM_EVENT_RESET),
     wm_landmark_ekf_params_table, wm::kReads);

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "aid/fuse.hpp"
+#include "aid/localizer.hpp"
 #include "aid/position.hpp"
 #include "aid/sighting.hpp"
 #include "filters/core/first_sightings.hpp"
@@ -46,6 +47,7 @@ class landmark_ekf {
   wm_status fuse_landmark(const wm_event &event, record_list records);
   wm_status fuse_position(const wm_event &event, record_list records);
   wm_status fuse_heading(const wm_event &event, record_list records);
+  wm_status fuse_localized(const wm_event &event, record_list records);
   wm_status take_pose(const wm_event &event);
 
   first_sightings::row row_at_prior(const residual &r, int sensor) const;
@@ -105,6 +107,7 @@ class landmark_ekf {
   const wm_setup *setup_;
   wm_landmark_ekf_params params_;
   position_aid positions_;
+  localizer_aid localizer_;
   rollback<kMaxCalibration> rollback_;
   int calibration_states_;  // pose and calibration; the lent states come behind
   lifecycle life_;

@@ -153,6 +153,7 @@ void landmark_ekf::restore_calibration() {
   filter_.noise().restart(true);
   aid_.release(&filter_);
   positions_.release(&filter_);
+  localizer_.release();
 }
 
 // Is the pose unknown, or so vague (after seconds of blind turning) that observations should find it rather than

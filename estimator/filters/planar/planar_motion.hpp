@@ -97,6 +97,18 @@ class planar_motion {
   void fade(int state, double factor, double added_variance) { state_.fade(state, factor, added_variance); }
   // The state becomes `value` with `variance`; its correlations are cut.
   void forget(int state, double value, double variance);
+  // States that become linear functions of the state plus noise, as error_state does.
+  void assign(int first, int count, const planar_row *rows, const double *noise, int stride, const double *values) {
+    state_.assign_rows(first, count, rows, noise, stride, values);
+  }
+  // Where these states' prior was a blunder, the filter becomes as if it had begun with the wide one; then true.
+  bool take_blunder(const stated_prior &prior) {
+    blunder_search search;
+    search.weigh(state_, prior, 0);
+    if (search.take(&state_) == 0) return false;
+    state_.set_value(kHeading, wrap(value(kHeading)));
+    return true;
+  }
   // Adds variances of x and y, and of the heading, as noise of the motion does.
   void inflate_pose(double xy_m2, double heading_rad2);
   // A value of the calibration that the configuration states is wrong, and not known as well yet as it was stated.

@@ -84,6 +84,7 @@ void slam::search_pattern() {
   const line_search_result found = line_search_.step(bearings_, bearings_odom_, joint_.places());
   if (!found.found) return;
   joint_.set_pose(compose(found.pose, between(bearings_odom_, joint_.odom())), found.covariance);
+  localizer_.release();
   take_found(kOwnFramePrior);  // no identity proves a pose found by a pattern
 }
 

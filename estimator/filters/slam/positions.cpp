@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Positions and headings while mapping. A map that began at the start's pose lies in a frame of its own: the first
-// heading turns it, and the first position, or enough of the path, puts it where it belongs.
+// Positions, headings and poses of another localizer while mapping. A map that began at the start's pose lies in a
+// frame of its own: the first heading turns it, and the first position, or enough of the path, puts it where it
+// belongs.
 #include "aid/frame_fit.hpp"
 #include "filters/slam/slam.hpp"
 #include "math/arc.hpp"
@@ -67,7 +68,7 @@ void slam::fuse_given(const residual *rows, int count, int key, double clutter_v
   const gate_result g = gate(block.nis, count, gates());
   const double log_bayes = g.passed ? landmark_evidence::log_bayes_factor(block.density(), clutter_volume)
                                     : landmark_evidence::max_log_bayes_factor();
-  if (!weigh_source(key, nullptr, g.passed, true, log_bayes, std::nan(""), std::nan("")))
+  if (key != kNoKey && !weigh_source(key, nullptr, g.passed, true, log_bayes, std::nan(""), std::nan("")))
     return (void)reject(records, at.record, WM_REJECTED_SEARCHING);
   if (fuse_rows(at, v, g, &block) == WM_FUSED) life_.fused(joint_.now_ns());
 }
@@ -123,6 +124,43 @@ wm_status slam::fuse_heading(const wm_event &event, record_list records) {
   if (search_by(seen)) return reject(records, r.record, WM_REJECTED_SEARCHING);
   positions_.put_row(h, joint_, &r);
   fuse_given(&r, 1, kHeadingKey, kTwoPi, records);
+  return WM_OK;
+}
+
+// A pose in the map's frame that places it, and turns it where it has a heading.
+bool slam::is_placing(const localizer_aid::view &at) {
+  if (!localizer_.is_in_map() || (is_placed_ && is_turned_)) return false;
+  wm_pose2 there = at.there;
+  if (at.rows < localizer_aid::kRows) {
+    if (!is_turned_ || is_placed_) return !is_placed_;
+    there.heading_rad = at.past.pose.heading_rad;
+  }
+  const double about_m[2] = {there.x_m, there.y_m}, lasting_m = std::sqrt(at.variance[0]);
+  place_map(compose(there, between(at.past.pose, wm_pose2{})), about_m, is_turned_ ? 0.0 : std::sqrt(at.variance[2]),
+            lasting_m, 0.0);
+  is_placed_ = is_turned_ = true;
+  return true;
+}
+
+wm_status slam::fuse_localized(const wm_event &event, record_list records) {
+  const wm_localized &seen = event.as.localized;
+  wm_innovation record = record_of(event, WM_RESIDUAL_X);
+  record.observed = seen.p_m[0];
+  wm_status status = check_localized(seen);
+  if (status != WM_OK) return refuse(records, record, status);
+  status = begin_observation(event.t_ns);
+  if (status != WM_OK) return status;
+  localizer_aid::view at;
+  const bool is_first = !localizer_.is_used();
+  if (!localizer_.look(seen, &joint_, &at)) return WM_OK;
+  if (is_placing(at)) return reject(records, record, WM_REJECTED_SEARCHING);
+  if (is_first) follow_scale();
+  if (localizer_.is_for_search(at, life_.tracking()) && search_by(localizer_.observe(at, joint_)))
+    return reject(records, record, WM_REJECTED_SEARCHING);
+  residual rows[localizer_aid::kRows];
+  localizer_.put_rows(at, joint_, record, rows);
+  if (!localizer_.is_trusted(at, rows, &joint_)) return reject(records, record, WM_REJECTED_SEARCHING);
+  fuse_given(rows, at.rows, localizer_.key(), at.clutter_volume(), records);
   return WM_OK;
 }
 

@@ -221,6 +221,7 @@ bool slam::relocalize() {
     if (const int yaw = slots_.at((int)i, kYaw); yaw >= 0) found.covariance[2][2] += joint_.variance(yaw);
   for (int k = 0; k < 3; k++) found.covariance[k][k] += square(k < 2 ? kLoose_m : kLoose_rad);
   joint_.set_pose(found.pose, found.covariance);
+  localizer_.release();
   const pose_search used = observations_;
   take_found(by_one ? kByOnePrior : kFoundWrong);
   found_by_ = used;

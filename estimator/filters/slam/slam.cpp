@@ -34,6 +34,7 @@ const char *const kReads[] = {"!motion.states.wheel_difference",
                               "sightings.",
                               "positions.",
                               "markers.",
+                              "localizer.",
                               nullptr};
 
 // Markers' errors take two states: along the line of sight, and of the heading.
@@ -52,7 +53,8 @@ int states_that_last(const wm_slam_params &p, const wm_setup &setup) {
 
 int states_before_clones(const wm_slam_params &p, const wm_setup &setup) {
   return states_that_last(p, setup) + (p.sensor_stamp_sigma_s > 0.0) * (int)setup.sensor_count +
-         setup.sightings->correlated_slots * error_slot_of(setup).width + position_aid::count_states(setup);
+         setup.sightings->correlated_slots * error_slot_of(setup).width + position_aid::count_states(setup) +
+         localizer_aid::count_states(setup);
 }
 
 // Azimuth and inverse distance of a ray, of which there are as many as clones.
@@ -166,6 +168,7 @@ void slam::init(const wm_slam_params &params, const wm_setup &setup) {
   for (int i = 0; i < sightings().correlated_slots && error_.width > 0; i++, next += error_.width) errors_.add(next);
   markers_ = marker_params_of(setup);
   positions_.init(setup, &joint_, [&next](double, double) { return next++; });
+  localizer_.init(setup, &joint_, [&next](double, double) { return next++; });
   follow_scale();
   life_ = {};
   start_again();
@@ -217,7 +220,7 @@ bool slam::has_standard() const {
 // transported from the first one on.
 void slam::follow_scale() {
   joint_.leave_scale();
-  const bool by_positions = is_placed_ && positions_.has_position();
+  const bool by_positions = is_placed_ && (positions_.has_position() || localizer_.places());
   const bool is_observed = by_positions || (!by_bearings_ && sightings().use_range && has_standard());
   if (is_observed || params_.map != WM_SLAM_MAP_NONE || !joint_.find_scale(!has_headings())) return;
   for (int i = 0; i < static_cast<int>(setup_->sensor_count); i++) {
@@ -270,6 +273,7 @@ void slam::start_again() {
   joint_.set_pose({place ? start.p_m[0] : 0.0, place ? start.p_m[1] : 0.0, heading ? start.heading_rad : 0.0},
                   covariance);
   begin_frame();
+  localizer_.release();
   forget_lines();
   errors_.release_all();
   next_id_ = members_ = 0;
@@ -347,6 +351,7 @@ wm_status slam::correct(const wm_event &event, record_list records) {
     case WM_EVENT_MARKER: return fuse_marker(event, records);
     case WM_EVENT_POSITION: return fuse_position(event, records);
     case WM_EVENT_HEADING: return fuse_heading(event, records);
+    case WM_EVENT_LOCALIZED: return fuse_localized(event, records);
     case WM_EVENT_SET_POSE:
     case WM_EVENT_RESET: return take_pose(event);
     case WM_EVENT_LOOKED: {
@@ -373,6 +378,7 @@ wm_status slam::take_pose(const wm_event &event) {
   const double xy = square(given.sigma_xy_m);
   const double covariance[3][3] = {{xy, 0, 0}, {0, xy, 0}, {0, 0, square(given.sigma_heading_rad)}};
   joint_.set_pose(given.pose, covariance);
+  localizer_.release();
   forget_tracks();
   life_.begin(true);
   begin_evidence(kStartWrong);
@@ -399,6 +405,7 @@ void slam::list_calibration(calibration_list *list) const {
   joint_.list_motion_states(list);
   slots_.list(*setup_, joint_, list);
   if (positions_.is_awake()) positions_.list(joint_, list);
+  localizer_.list(list);
   for (size_t i = 0; i < setup_->sensor_count; i++)
     if (finite(bloom_px_[i])) list->add(setup_->sensors[i].name, "bloom_px", bloom_px_[i], std::nan(""));
 }
@@ -531,6 +538,6 @@ const wm_estimator wm_slam_estimator = wm::estimator_of<wm::slam, wm_slam_params
     "from coded markers, bearings and ranges, or bearings alone, with or without identities; with positions and "
     "headings.",
     WM_EVENT_BIT(WM_EVENT_SIGHTING) | WM_EVENT_BIT(WM_EVENT_MARKER) | WM_EVENT_BIT(WM_EVENT_POSITION) |
-        WM_EVENT_BIT(WM_EVENT_HEADING) | WM_EVENT_BIT(WM_EVENT_LOOKED) | WM_EVENT_BIT(WM_EVENT_SET_POSE) |
-        WM_EVENT_BIT(WM_EVENT_RESET),
+        WM_EVENT_BIT(WM_EVENT_HEADING) | WM_EVENT_BIT(WM_EVENT_LOCALIZED) | WM_EVENT_BIT(WM_EVENT_LOOKED) |
+        WM_EVENT_BIT(WM_EVENT_SET_POSE) | WM_EVENT_BIT(WM_EVENT_RESET),
     wm_slam_params_table, wm::kReads);

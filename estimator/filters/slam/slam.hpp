@@ -6,6 +6,7 @@
 #define WAYMARK_ESTIMATOR_SLAM_SLAM_HPP
 
 #include "aid/frame_fit.hpp"
+#include "aid/localizer.hpp"
 #include "aid/position.hpp"
 #include "aid/tag.hpp"
 #include "filters/core/gate.hpp"
@@ -300,6 +301,8 @@ class slam {
   bool search_by(const observation &seen);
   wm_status fuse_position(const wm_event &event, record_list records);
   wm_status fuse_heading(const wm_event &event, record_list records);
+  bool is_placing(const localizer_aid::view &at);
+  wm_status fuse_localized(const wm_event &event, record_list records);
   bool is_frame_unknown() const { return !is_placed_ && positions_.has_position(); }
 
   // trust.cpp
@@ -375,6 +378,7 @@ class slam {
   state_pool<24> errors_;                // time-correlated errors of a sensor on a landmark
   correlated_slot error_;                // a slot of these
   position_aid positions_;
+  localizer_aid localizer_;
   frame_fit frame_;
   bearing_tracks tracks_;
   int first_ray_, first_clone_;

@@ -29,13 +29,17 @@ typedef struct wm_position_params wm_position_params;
 extern const wm_param_table wm_position_params_table;
 typedef struct wm_marker_params wm_marker_params;
 extern const wm_param_table wm_marker_params_table;
+// `localizer:`, of the poses of another localizer.
+typedef struct wm_localizer_params wm_localizer_params;
+extern const wm_param_table wm_localizer_params_table;
 
 // What belongs to a robot and a place. Must live, unchanged, as long as the estimator's state.
 typedef struct wm_setup {
   const wm_motion_params *motion;
   const wm_sighting_params *sightings;
-  const wm_position_params *positions;  // NULL: the defaults
-  const wm_marker_params *markers;      // NULL: the defaults
+  const wm_position_params *positions;   // NULL: the defaults
+  const wm_marker_params *markers;       // NULL: the defaults
+  const wm_localizer_params *localizer;  // NULL: the defaults
   wm_wheels wheels;
   const wm_sensor *sensors;
   size_t sensor_count;

@@ -34,6 +34,7 @@ typedef enum wm_event_kind {
   WM_EVENT_SET_POSE,    // the robot's pose, given by a person or a program
   WM_EVENT_RESET,       // start again from the start pose of the setup
   WM_EVENT_INCREMENT,   // motion: how base_link moved from one time to another
+  WM_EVENT_LOCALIZED,   // base_link's pose by another localizer
   WM_EVENT_KIND_COUNT
 } wm_event_kind;
 
@@ -117,6 +118,14 @@ typedef struct wm_heading {
   double sigma_rad;
 } wm_heading;
 
+// A pose of base_link by another localizer, in map or in a frame of its own (localizer.frame of the configuration).
+typedef struct wm_localized {
+  double p_m[2];
+  double heading_rad;    // NaN where absent
+  double covariance[6];  // xx, xy, yy, x heading, y heading, heading heading; NaN: not given
+  double reset;          // another number than before: its frame begins anew; NaN: it never does
+} wm_localized;
+
 // A coded marker.
 typedef struct wm_marker {
   uint16_t sensor;
@@ -173,6 +182,7 @@ typedef struct wm_event {
     wm_sighting sighting;
     wm_position position;
     wm_heading heading;
+    wm_localized localized;
     wm_marker marker;
     wm_stereo stereo;
     wm_looked looked;

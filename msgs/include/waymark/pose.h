@@ -82,7 +82,7 @@ typedef enum wm_verdict {
   WM_REJECTED_OUT_OF_RANGE,    // beyond the sensor's range, or behind it
   WM_REJECTED_NOT_FINITE,
   WM_REJECTED_SINGULAR,   // the geometry gives no information (robot on the landmark)
-  WM_REJECTED_SEARCHING,  // kept for the search, not fused
+  WM_REJECTED_SEARCHING,  // kept for the search, not fused; or its source is not trusted
   WM_REJECTED_BY_CONFIG,  // switched off by the configuration
   WM_REJECTED_NUMERIC,    // the update failed numerically (the innovation's covariance is not positive definite)
   WM_VERDICT_COUNT
@@ -142,6 +142,7 @@ typedef enum wm_alarm_kind {
   WM_ALARM_LASTING_ERROR,  // a receiver's lasting error is far larger than stated; value: over its sigma
   WM_ALARM_TURN,           // the measured turn has another sign or unit; value: the factor that explains the rest
   WM_ALARM_STATED,         // a stated value is wrong, and not known as well yet as it was stated; value: the value
+  WM_ALARM_LOCALIZER,      // another localizer contradicts and is not followed; value: the probability that it is wrong
   WM_ALARM_KIND_COUNT
 } wm_alarm_kind;
 

@@ -11,6 +11,7 @@
 
 #include "filters/landmark_ekf/params.h"
 #include "motion/motion_params.h"
+#include "sensors/localizer_params.h"
 #include "sensors/marker_params.h"
 #include "sensors/position_params.h"
 #include "sensors/sighting_params.h"

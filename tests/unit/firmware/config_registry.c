@@ -43,6 +43,7 @@ const wm_param_table wm_motion_params_table = {kMotionParams, 3, 3 * sizeof(doub
 const wm_param_table wm_sighting_params_table = {kSightingParams, 2, 2 * sizeof(double), NULL};
 const wm_param_table wm_position_params_table = {NULL, 0, 0, NULL};
 const wm_param_table wm_marker_params_table = {NULL, 0, 0, NULL};
+const wm_param_table wm_localizer_params_table = {NULL, 0, 0, NULL};
 const char *wm_motion_params_clash(const wm_motion_params *params, const char **key) {
   double noise;
   memcpy(&noise, params, sizeof noise);

@@ -74,6 +74,10 @@ static void ticks(int step, double *n) { n[0] = n[1] = round(step * 0.02 * SPEED
 static void steering(int step, double *n) { (void)step, n[0] = SPEED_MPS, n[1] = 0; }
 static void heading(int step, double *n) { (void)step, n[0] = 0, n[1] = 0.02; }
 static void gnss(int step, double *n) { n[0] = step * 0.02 * SPEED_MPS, n[1] = 0, n[2] = 0, n[3] = 0.05, n[4] = 0.1; }
+static void localizer(int step, double *n) {
+  const double row[] = {step * 0.02 * SPEED_MPS, 0, 0, 0.01, 0, 0.01, 0, 0, 1e-3, 1};
+  memcpy(n, row, sizeof row);
+}
 static void imu(int step, double *n) {
   (void)step;
   for (int i = 0; i < 6; i++) n[i] = i == 5 ? 9.81 : 0;
@@ -105,6 +109,7 @@ static const given kGiven[] = {
     {"steering", 2, 1, steering, NULL, "rr", {0}},
     {"heading", 2, 0, heading, NULL, "rr", {0}},
     {"gnss", 5, 0, gnss, NULL, "rrara", {0}},
+    {"localizer", 10, 0, localizer, NULL, "rra", {0}},
     {"imu", 6, 0, imu, NULL, "rrraaa", {0}},
     {"increments",
      0,
@@ -136,7 +141,7 @@ static const given kGiven[] = {
 static wm_status push(waymark_session *session, uint32_t source, const given *of, int step, int broken) {
   const int is_broken = step == BROKEN_STEP && broken >= 0;
   if (of->row) {
-    double row[8];
+    double row[WM_STREAM_NUMBERS_MAX];
     of->row(step, row);
     if (is_broken) row[broken] = (double)NAN;
     return waymark_push_row(session, source, step * STEP_NS, WM_TIME_NONE, row, of->numbers, &err);
@@ -265,9 +270,16 @@ static size_t numbers_of(const wm_event *event) {
   return out;
 }
 
+// Numbers that are a row of each stream: the covariance is the identity.
+static double usual(const wm_stream *stream, size_t column) {
+  const char *name = wm_stream_number(stream, column);
+  return name && (strcmp(name, "cov_xy") == 0 || strcmp(name, "cov_xt") == 0 || strcmp(name, "cov_yt") == 0) ? 0.0
+                                                                                                             : 1.0;
+}
+
 static wm_status event_of(const wm_stream *stream, size_t column, double number, wm_event *out) {
   wm_stream_row row = {.t_ns = STEP_NS, .arrival_ns = STEP_NS};
-  for (size_t i = 0; i < WM_STREAM_NUMBERS_MAX; i++) row.number[i] = 1.0;
+  for (size_t i = 0; i < WM_STREAM_NUMBERS_MAX; i++) row.number[i] = usual(stream, i);
   row.number[column] = number;
   memset(out, 0, sizeof *out);
   return wm_stream_event(stream, &row, &(wm_mounting){.xyz_m = {0}}, out, &err);
@@ -281,7 +293,7 @@ TEST(test_each_column_of_each_stream) {
     for (size_t i = 0; wm_stream_number(stream, i); i++) {
       const char *name = wm_stream_number(stream, i);
       wm_event whole, other, lacking;
-      ok(event_of(stream, i, 1.0, &whole));
+      ok(event_of(stream, i, usual(stream, i), &whole));
       const wm_status status = event_of(stream, i, (double)NAN, &lacking);
       ok(event_of(stream, i, 0.5, &other));
       if (status != WM_OK)

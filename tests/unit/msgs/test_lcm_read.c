@@ -334,7 +334,10 @@ TEST(rows_of_streams) {
     const char *stream, *type;
     int numbers;
     uint32_t zero_is_absent;  // a bit for each number whose 0 means that there is none
-  } rows[] = {{"motion", "motion_t", 3, 0}, {"imu", "imu_t", 13, 0xfc0}, {"gnss", "gnss_t", 5, 0x10}};
+  } rows[] = {{"motion", "motion_t", 3, 0},
+              {"imu", "imu_t", 13, 0xfc0},
+              {"gnss", "gnss_t", 5, 0x10},
+              {"localizer", "localizer_t", 10, 0}};
   wm_stream_row read;
   for (size_t r = 0; r < sizeof rows / sizeof rows[0]; r++) {
     TEST_ASSERT_EQUAL_STRING(rows[r].type, wm_lcm_stream_type(rows[r].stream));

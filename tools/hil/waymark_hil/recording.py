@@ -10,7 +10,7 @@ import yaml
 from . import HilError
 
 # Streams that another program sends over LCM (docs/motion-sources.md), and sightings (docs/live.md).
-LCM_STREAMS = ["motion", "motion6", "ticks", "speeds", "steering", "imu", "heading", "depth", "gnss"]
+LCM_STREAMS = ["motion", "motion6", "ticks", "speeds", "steering", "imu", "heading", "depth", "gnss", "localizer"]
 # Streams of the format that no interface of a robot carries: they come out of its own detectors.
 NOT_PLAYED = ["markers", "stereo", "points", "increments"]
 _FRAME = re.compile(rb"^\((\d+)\.(\d+)\) (\S+) ([0-9A-Fa-f]+)(##?)(\S*)")

@@ -88,10 +88,10 @@ typedef struct waymark_options {
 wm_status waymark_open(const waymark_options *options, waymark_session **out, wm_error *err);
 
 // Adds a source before the start; *out is its number for pushing. Its name is as in `sources:` of a configuration:
-// "motion", "motion6", "ticks", "speeds", "steering", "imu", "heading", "depth", "gnss", "increments", "stereo",
-// "points", "sightings:SENSOR", "markers:SENSOR", "commands", or "can" (the DBC of `devices: can` or of the site;
-// "can:can1" where there are several). WM_NOT_FOUND: no such name. waymark_start refuses one that the estimator has no
-// use for.
+// "motion", "motion6", "ticks", "speeds", "steering", "imu", "heading", "depth", "gnss", "localizer", "increments",
+// "stereo", "points", "sightings:SENSOR", "markers:SENSOR", "commands", or "can" (the DBC of `devices: can` or of the
+// site; "can:can1" where there are several). WM_NOT_FOUND: no such name. waymark_start refuses one that the estimator
+// has no use for.
 wm_status waymark_add_source(waymark_session *session, const char *name, uint32_t *out, wm_error *err);
 
 // After the sources: allocates, prepares the estimator, opens the files. From here on data are taken.
@@ -111,8 +111,9 @@ wm_status waymark_start(waymark_session *session, wm_error *err);
 // whole program all times are farther ahead: they are taken again once they went on for 1 s without one that is nearer.
 // The first datum sets the session's clock; waymark_advance and waymark_pose before it do not.
 //
-// A row of "motion", "motion6", "ticks", "speeds", "steering", "imu", "heading", "depth" or "gnss": the numbers of the
-// table's columns behind the stamps (docs/recording-format.md), NaN where absent; missing ones at the end are absent.
+// A row of "motion", "motion6", "ticks", "speeds", "steering", "imu", "heading", "depth", "gnss" or "localizer": the
+// numbers of the table's columns behind the stamps (docs/recording-format.md), NaN where absent; missing ones at the
+// end are absent.
 wm_status waymark_push_row(waymark_session *session, uint32_t source, wm_time_ns t_ns, wm_time_ns arrival_ns,
                            const double *numbers, size_t count, wm_error *err);
 // Any event of a kind that the source gives. `source`, `seq` and, with "NAME:SENSOR", the sensor are set here.

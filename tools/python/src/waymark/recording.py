@@ -22,7 +22,7 @@ from .tables import Array, Table, as_table, read_table, write_table
 
 FORMAT = "waymark-recording/1"
 STREAMS = ("motion.csv", "motion6.csv", "increments.csv", "ticks.csv", "speeds.csv", "steering.csv", "imu.csv", "heading.csv",
-           "depth.csv", "sightings.csv", "markers.csv", "marker-corners.csv", "stereo.csv", "points.csv", "gnss.csv")
+           "depth.csv", "sightings.csv", "markers.csv", "marker-corners.csv", "stereo.csv", "points.csv", "gnss.csv", "localizer.csv")
 """Streams of sensors that are tables, in the order of the format's table."""
 
 _COVARIANCE = ("cov_xx", "cov_xy", "cov_yy", "cov_xt", "cov_yt", "cov_tt")
@@ -45,6 +45,7 @@ COLUMNS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "stereo.csv": (("id", "ul_px", "vl_px", "ur_px", "vr_px"), ("appearance",)),
     "points.csv": (("x_m", "y_m"), ()),
     "gnss.csv": (("x_m", "y_m", "sigma_xy_m"), ("z_m", "sigma_z_m")),
+    "localizer.csv": (("x_m", "y_m"), ("heading_rad", *_COVARIANCE, "reset")),
     "truth.csv": ((*_PLACED, "qx", "qy", "qz", "qw"), ()),
 }
 """Columns of each table of the format beside t_ns and arrival_ns: needed ones, and others that it may have."""
