@@ -14,7 +14,9 @@ constexpr double kFullWeight_s = 0.3;   // as of landmarks: evidence nearer in t
 constexpr double kHazard_per_s = 1e-3;  // that a localizer which was right becomes wrong
 // 99.9 % for two numbers. There is no soft gate: it would follow a localizer that stands still.
 constexpr double kGate = 13.8;
-constexpr double kMostBayes = 4.0;      // nats of a pose of full weight: one in fifty is wrong by chance
+constexpr double kNear = 2.0;       // sigmas of a localizer's own error within which it is right again
+constexpr double kFollows_s = 5.0;  // time constant with which the error of a wrong one is followed
+constexpr double kMostBayes = 4.0;  // nats of a pose of full weight: one in fifty is wrong by chance
 
 // The ellipse of the place: variances along its axes, and the direction of the first.
 void put_ellipse(const double covariance[6], localizer_aid::view *out) {
@@ -39,6 +41,7 @@ bool localizer_aid::look(const wm_localized &seen, planar_motion *filter, view *
   out->there = now;
   out->rows = has_heading ? 3 : 2;
   out->weight = !is_used() || dt_s > kFullWeight_s ? 1.0 : dt_s / kFullWeight_s;
+  out->follows = dt_s < kFollows_s ? dt_s / kFollows_s : 1.0;
   out->is_new = kept_ns_ == WM_TIME_NONE || !(wm_seconds_between(kept_ns_, t_ns) < kFullWeight_s);
   if (out->is_new) kept_ns_ = t_ns;
   const double xy = square(params_.sigma_xy_m), heading = square(params_.sigma_heading_rad);
@@ -97,8 +100,8 @@ bool localizer_aid::begin_frame(const wm_pose2 &now, const view &at, planar_moti
 
 // Its frame drifts with the way.
 void localizer_aid::carry_frame(const wm_pose2 &now, planar_motion *filter) {
-  const wm_pose2 step = between(newest_, now), at = {filter->value(first_), filter->value(first_ + 1),
-                                                     filter->value(first_ + 2)};
+  const wm_pose2 step = between(newest_, now),
+                 at = {filter->value(first_), filter->value(first_ + 1), filter->value(first_ + 2)};
   const wm_pose2 then = compose(at, step);
   const double way_m = std::sqrt(square(step.x_m) + square(step.y_m));
   planar_row rows[kStates];
@@ -154,29 +157,42 @@ observation localizer_aid::observe_heading(const view &at, const planar_motion &
   return out;
 }
 
-// Of a wrong localizer the error is several times as large as stated, or its pose is anywhere.
-double localizer_aid::log_bayes_of_wrong(const view &at, const residual rows[kRows], const planar_motion &filter,
-                                         double *nis) const {
-  *nis = 0.0;
-  double log_density[2];
-  for (const bool is_wide : {false, true}) {
-    double s[kRows][kRows], r[kRows];
-    for (int i = 0; i < at.rows; i++) {
-      for (int j = 0; j <= i; j++) s[i][j] = filter.covariance_of(rows[i].row, rows[j].row);
-      const double stated = is_in_map() && first_ >= 0 ? lasting_variance_[i] : rows[i].noise;
-      s[i][i] += rows[i].noise + is_wide * square(kWider) * stated;
-      r[i] = rows[i].innovation;
-    }
-    if (!factorize(at.rows, s[0], kRows)) return 0.0;
-    substitute_forward(at.rows, s[0], kRows, r);
-    log_density[is_wide] = 0.0;
-    for (int i = 0; i < at.rows; i++) {
-      log_density[is_wide] -= 0.5 * (square(r[i]) + log(kTwoPi)) + log(s[i][i]);
-      if (!is_wide) *nis += square(r[i]);
-    }
+// Log density of the rows less `off`, whose sigmas beside the pose's are `wider` times as large; *nis: of the rows.
+double localizer_aid::log_density(const view &at, const residual rows[kRows], const double off[kRows], double wider,
+                                  const planar_motion &filter, double *nis) const {
+  double s[kRows][kRows], r[kRows], out = 0.0;
+  *nis = INFINITY;
+  for (int i = 0; i < at.rows; i++) {
+    for (int j = 0; j <= i; j++) s[i][j] = filter.covariance_of(rows[i].row, rows[j].row);
+    s[i][i] += rows[i].noise + (square(wider) - 1.0) * own_variance(i, rows[i]);
+    r[i] = rows[i].innovation - off[i];
   }
-  const double anywhere = -log(at.clutter_volume());
-  const double wrong = log_density[1] > anywhere ? log_density[1] : anywhere, of = wrong - log_density[0];
+  if (!factorize(at.rows, s[0], kRows)) return -INFINITY;
+  substitute_forward(at.rows, s[0], kRows, r);
+  *nis = 0.0;
+  for (int i = 0; i < at.rows; i++) {
+    out -= 0.5 * (square(r[i]) + log(kTwoPi)) + log(s[i][i]);
+    *nis += square(r[i]);
+  }
+  return out;
+}
+
+// Of a wrong localizer the error is several times as large as stated, or its pose is anywhere. One that is known to be
+// wrong is still off by as much, until it is near: while the robot's own pose becomes vague, any pose would fit.
+double localizer_aid::log_bayes_of_wrong(const view &at, const residual rows[kRows], const planar_motion &filter,
+                                         double *nis) {
+  constexpr double kNone[kRows] = {};
+  double unused;
+  const double right = log_density(at, rows, kNone, 1.0, filter, nis), anywhere = -log(at.clutter_volume());
+  const double still = is_wrong_ ? log_density(at, rows, off_, 1.0, filter, &unused)
+                                 : log_density(at, rows, kNone, kWider, filter, &unused);
+  bool is_near = true;
+  for (int i = 0; i < at.rows; i++) {
+    is_near = is_near && square(rows[i].innovation) < square(kNear) * (rows[i].noise + own_variance(i, rows[i]));
+    if (!is_wrong_ || still > right) off_[i] += (is_wrong_ ? at.follows : 1.0) * (rows[i].innovation - off_[i]);
+  }
+  if (is_wrong_ && is_near) return -kMostBayes;
+  const double wrong = still > anywhere ? still : anywhere, of = wrong - right;
   return of > kMostBayes ? kMostBayes : of < -kMostBayes ? -kMostBayes : of;
 }
 

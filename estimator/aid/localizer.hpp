@@ -54,6 +54,7 @@ class localizer_aid {
     double axis[2];      // cos and sin of the direction of its ellipse's first axis in map
     double variance[3];  // along that axis, across, of the heading
     double weight;       // of its evidence: poses nearer in time share their errors
+    double follows;      // share by which the error of a wrong localizer is followed
     int rows;            // 2: it has no heading
     bool is_new;         // it shares its errors with none that was kept for the search
     double clutter_volume() const { return kClutterPlace_m * kClutterPlace_m * (rows == kRows ? kTwoPi : 1.0); }
@@ -86,16 +87,23 @@ class localizer_aid {
   bool begin_frame(const wm_pose2 &now, const view &at, planar_motion *filter);
   void carry_frame(const wm_pose2 &now, planar_motion *filter);
   void carry_error(double dt_s, const double stated[3], planar_motion *filter);
-  double log_bayes_of_wrong(const view &at, const residual rows[kRows], const planar_motion &filter, double *nis) const;
+  // Of the error that the localizer's poses have in common, or else of their own.
+  double own_variance(int i, const residual &row) const {
+    return is_in_map() && first_ >= 0 ? lasting_variance_[i] : row.noise;
+  }
+  double log_density(const view &at, const residual rows[kRows], const double off[kRows], double wider,
+                     const planar_motion &filter, double *nis) const;
+  double log_bayes_of_wrong(const view &at, const residual rows[kRows], const planar_motion &filter, double *nis);
   bool has_drifted_off(planar_motion *filter);
 
   wm_localizer_params params_;
-  int first_, has_begun_;       // of its states; -1: none
-  int is_wrong_, jumps_;        // jumps_: how often an own frame began anew
-  double reset_;                // of the newest pose
-  double distrusted_s_;         // for so long in all it was not followed
-  double lasting_variance_[3];  // of the states of its error in map
-  wm_pose2 newest_;             // in the localizer's frame
+  int first_, has_begun_;                        // of its states; -1: none
+  int is_wrong_, jumps_;                         // jumps_: how often an own frame began anew
+  double reset_;                                 // of the newest pose
+  double distrusted_s_;                          // for so long in all it was not followed
+  double lasting_variance_[3];                   // of the states of its error in map
+  double off_[kRows];                            // the innovations, which a wrong one is off by
+  wm_pose2 newest_;                              // in the localizer's frame
   wm_time_ns newest_ns_, kept_ns_, checked_ns_;  // kept: the last one for the search
   evidence wrong_;
 };

@@ -16,7 +16,8 @@ static const wm_param kParams[] = {
         "their covariance is that of the whole way."),
     F64("sigma_heading_rad", sigma_heading_rad, 0.03, 1e-5, 3, "The same of its heading, rad."),
     F64("lasting", lasting, 2, 0, 100,
-        "In the map: sigma of the error that its poses have in common for a while, over the stated sigma. A localizer is a "
+        "In the map: sigma of the error that its poses have in common for a while, over the stated sigma. A localizer "
+        "is a "
         "filter: its poses are not independent. 0: they are."),
     F64("lasting_s", lasting_s, 10, 0.1, 1e6, "Time constant of that error, s."),
     F64("drift_m", drift_m, 0.03, 0, 10,

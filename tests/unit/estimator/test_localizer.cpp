@@ -30,8 +30,8 @@ struct robot {
   double drift_m = 0;                  // of the localizer's frame in a step
   bool sees = true, is_stuck = false;
   int every = 1, step = 0;  // landmarks are seen in one step of so many
-  wm_pose2 frame{};     // of the localizer, in map
-  wm_pose2 wrong{};     // by which its poses are off, in map
+  wm_pose2 frame{};         // of the localizer, in map
+  wm_pose2 wrong{};         // by which its poses are off, in map
   wm_pose2 stuck{};
   double reset = NAN, heading_sigma = 0.01;
   wm_random noise = {7, 1, 0};
@@ -40,7 +40,8 @@ struct robot {
     make::exact_sensors(&motion);
     params.resize(estimator->params.bytes);
     wm_params_defaults(&estimator->params, params.data());
-    for (int i = 0; i < 5; i++) landmarks[i] = {i + 1, {kPlaces[i][0], kPlaces[i][1], 0}, 0.02, NAN, {NAN, NAN, NAN}, NAN};
+    for (int i = 0; i < 5; i++)
+      landmarks[i] = {i + 1, {kPlaces[i][0], kPlaces[i][1], 0}, 0.02, NAN, {NAN, NAN, NAN}, NAN};
     setup = make::setup(motion, sensor);
     setup.localizer = &localizer;
     setup.landmarks = landmarks;
@@ -70,7 +71,8 @@ struct robot {
       for (int i = 0; sees && step % every == 0 && i < 5; i++) {
         const double dx = kPlaces[i][0] - truth.x_m, dy = kPlaces[i][1] - truth.y_m;
         const double bearing = wm::wrap(std::atan2(dy, dx) - truth.heading_rad + 0.005 * normal());
-        (void)make::feed(*estimator, state.get(), make::sighting(now_s, i + 1, bearing, std::hypot(dx, dy) + 0.05 * normal()));
+        (void)make::feed(*estimator, state.get(),
+                         make::sighting(now_s, i + 1, bearing, std::hypot(dx, dy) + 0.05 * normal()));
       }
       if (has_poses) TEST_ASSERT_EQUAL(WM_OK, make::feed(*estimator, state.get(), pose()));
     }
