@@ -44,6 +44,11 @@ def compose(a, b):
 def add(recording, r):
     """Into a recording with truth. Returns (what was drawn, lines for the configuration)."""
     kind = r.choice(("right", "drifts", "jumps", "lies", "stuck", "own"))
+    write(recording, kind, r)
+    return f"localizer: {kind}", "localizer: {frame: own}\n" if kind == "own" else ""
+
+
+def write(recording, kind, r):
     truth = replays.rows(recording / "truth.csv")
     begin_ns = int(truth[0]["t_ns"])
     wrong = wrong_by(kind, r, (int(truth[-1]["t_ns"]) - begin_ns) * 1e-9)
@@ -80,4 +85,3 @@ def add(recording, r):
     replays.write_rows(recording / "localizer.csv", out)
     about = recording / "recording.yaml"
     about.write_text(about.read_text().replace("streams: [", "streams: [localizer.csv, ", 1))
-    return f"localizer: {kind}", "localizer: {frame: own}\n" if kind == "own" else ""

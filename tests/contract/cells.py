@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """Each observation in each planar estimator: the hospital's building with every source everywhere (bearings and ranges of
-landmarks, tags, positions, headings, edge points). Each estimator is replayed with wheels and gyro and one source, and with
+landmarks, tags, positions, headings, edge points, poses of another localizer). Each estimator is replayed with wheels and gyro and one source, and with
 all that it takes. A row: root mean square error of place and heading, mean NEES (3 is ideal, less is too careful), shares of
 the time in which truth is within the 95 % region of the pose and in which the pose is called lost. Exit code 1 where all sources are worse
 than the best one by more than a fifth and a centimetre, or the region holds truth for less than 85 % of the time; 77
@@ -19,9 +19,11 @@ import tempfile
 import replays
 from rooms import POSE_95_CHI2, normalised, pose_of, truth_at, wrap
 
-SOURCES = {"sightings": "sightings", "tags": "markers", "positions": "gnss", "headings": "heading", "edge points": "points"}
-TAKES = {"landmark_ekf": ("sightings", "tags", "positions", "headings"), "slam": ("sightings", "tags", "positions", "headings"),
-         "edge_mcl": tuple(SOURCES)}
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "campaign"))
+import localizers  # noqa: E402
+
+SOURCES = {"sightings": "sightings", "tags": "markers", "positions": "gnss", "headings": "heading", "poses": "localizer", "edge points": "points"}
+TAKES = {"landmark_ekf": tuple(SOURCES)[:-1], "slam": tuple(SOURCES)[:-1], "edge_mcl": tuple(SOURCES)}
 HEADING_SIGMA_RAD, HEADING_HZ = 0.02, 5
 SETTLED_S = 5.0  # from the start, before which nothing is judged
 EVERY = 10       # rows of the trajectory (100 Hz); each of these is judged
@@ -45,7 +47,7 @@ def scenario(source):
 
 def recording(a, seed):
     folder = a.cache / f"cells-{seed}"
-    if (folder / "heading.csv").exists():
+    if (folder / "localizer.csv").exists():
         return folder
     (a.cache / "cells.yaml").write_text(scenario(a.source))
     replays.command(a.bin / "waymark-simulate", a.cache / "cells.yaml", "--no-video", "--seed", seed, "--out", folder)
@@ -55,6 +57,7 @@ def recording(a, seed):
     replays.write_rows(folder / "heading.csv", [
         {"t_ns": r["t_ns"], "heading_rad": f"{wrap(pose_of(r)[2] + draw.gauss(0, HEADING_SIGMA_RAD)):.6f}", "sigma_rad": str(HEADING_SIGMA_RAD)}
         for r in truth[::step]])
+    localizers.write(folder, "right", draw)
     return folder
 
 
