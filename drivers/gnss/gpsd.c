@@ -34,12 +34,16 @@
 #define UP_SIGMAS 2.0                    // the altitude's sigma in horizontal ones, by the satellites' geometry
 #define DEVIATIONS_NS (3 * WM_NS_PER_S)  // receivers send theirs with each position, or once a second
 #define VELOCITY_SIGMA_MPS 0.1           // of a receiver's speed over ground, by data sheets
+#define TURN_MEAN_S 1.0                  // of the turn rate by courses: they come 1 to 10 times a second
 #define DEGREE (M_PI / 180.0)
 
 typedef struct gpsd {
   wm_row_device base;
   wm_gpsd_device_config config;
   double origin[3];
+  double ahead_m;                 // of the antenna in base_link; 0 where it is not given
+  wm_time_ns course_ns;           // of the newest course; WM_TIME_NONE: none
+  double course_rad, turn_radps;  // that course, and the mean turn rate by the courses
   int fd, is_connected;
   wm_time_ns next_try_ns, read_ns;  // the next connection; the last byte
   char line[LINE_BYTES_MAX];
@@ -67,7 +71,7 @@ static void disconnect(gpsd *self) {
   self->used = self->taken = 0;
   self->fix = -1;
   self->is_stored = 0;
-  self->deviations_ns = self->taken_ns = WM_TIME_NONE;
+  self->deviations_ns = self->taken_ns = self->course_ns = WM_TIME_NONE;
   self->gone[0] = '\0';
 }
 
@@ -215,12 +219,29 @@ static void position(const gpsd *self, const gpsd_report *report, wm_stream_row 
   out->number[4] = has_altitude ? up_m : (double)NAN;
 }
 
-// A heading in the map, whose x axis points east.
-static int course(const gpsd *self, const gpsd_report *report, wm_stream_row *out) {
+static void watch_turn(gpsd *self, double course_rad, wm_time_ns t_ns) {
+  const double dt_s = self->course_ns == WM_TIME_NONE ? HUGE_VAL : wm_seconds_between(self->course_ns, t_ns);
+  if (dt_s > 0.0 && dt_s <= 2.0 * TURN_MEAN_S) {
+    const double rate_radps = remainder(course_rad - self->course_rad, 2.0 * M_PI) / dt_s;
+    self->turn_radps += (rate_radps - self->turn_radps) * fmin(dt_s / TURN_MEAN_S, 1.0);
+  } else if (dt_s != 0.0) {
+    self->turn_radps = 0.0;
+  }
+  self->course_ns = t_ns;
+  self->course_rad = course_rad;
+}
+
+// A heading in the map, whose x axis points east. The course is the antenna's. One that is x ahead of base_link moves
+// to the side by w x in a turn, so that sin(course - heading) = w x / speed.
+static int course(gpsd *self, const gpsd_report *report, wm_stream_row *out) {
   if (!(report->speed_mps >= self->config.course_min_mps) || isnan(report->track_deg)) return 0;
-  out->number[0] = M_PI_2 - report->track_deg * DEGREE;
-  out->number[1] = report->track_error_deg > 0.0 ? self->config.accuracy_scale * report->track_error_deg * DEGREE
-                                                 : atan2(VELOCITY_SIGMA_MPS, report->speed_mps);
+  const double course_rad = M_PI_2 - report->track_deg * DEGREE, lever_s = self->ahead_m / report->speed_mps;
+  const double sigma_rad = report->track_error_deg > 0.0
+                               ? self->config.accuracy_scale * report->track_error_deg * DEGREE
+                               : atan2(VELOCITY_SIGMA_MPS, report->speed_mps);
+  watch_turn(self, course_rad, report->time_ns != WM_TIME_NONE ? report->time_ns : out->arrival_ns);
+  out->number[0] = course_rad - asin(fmax(-1.0, fmin(lever_s * self->turn_radps, 1.0)));
+  out->number[1] = sigma_rad * hypot(1.0, lever_s / TURN_MEAN_S);
   return 1;
 }
 
@@ -333,7 +354,7 @@ static void close_gpsd(wm_row_device *base) {
 
 static const wm_row_device_ops kGpsd = {next_row, note, close_gpsd};
 
-wm_status wm_gpsd_open(const wm_gpsd_device_config *config, const double origin[3], wm_row_device **out,
+wm_status wm_gpsd_open(const wm_gpsd_device_config *config, const double origin[3], double ahead_m, wm_row_device **out,
                        wm_error *err) {
   *out = NULL;
   if (config->from == WM_GPSD_POSITION && isnan(origin[0] + origin[1] + origin[2]))
@@ -344,8 +365,9 @@ wm_status wm_gpsd_open(const wm_gpsd_device_config *config, const double origin[
   if (!self) return wm_fail(err, WM_IO, "no memory for gpsd's reports");
   self->config = *config;
   memcpy(self->origin, origin, sizeof self->origin);
+  self->ahead_m = isnan(ahead_m) ? 0.0 : ahead_m;
   self->fd = self->fix = -1;
-  self->deviations_ns = self->taken_ns = WM_TIME_NONE;
+  self->deviations_ns = self->taken_ns = self->course_ns = WM_TIME_NONE;
   self->base.ops = &kGpsd;
   (void)snprintf(self->base.stream, sizeof self->base.stream, "%s", wm_gpsd_stream(config));
   (void)snprintf(self->base.where, sizeof self->base.where, "%.50s:%d", config->host, (int)config->port);

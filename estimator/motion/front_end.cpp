@@ -181,9 +181,11 @@ bool motion_front_end::twist_gives_speed() const {
          now_ns_ - twist_sample_ns_ <= hold_max_ns_;
 }
 
-// The newest speed is below the threshold; of a twist also its turn rate, as it may turn on the spot.
+// The newest speed is below the threshold; of a twist also its turn rate, as it may turn on the spot. So may a robot
+// whose front wheels roll.
 bool motion_front_end::is_still(double speed_mps) const {
-  if (speed_source_ != kOfTwist) return std::fabs(speed_mps) < params_->standstill_speed_mps;
+  const double rolled_mps = speed_source_ == kFrontWheels ? front_mps_ : speed_mps;
+  if (speed_source_ != kOfTwist) return std::fabs(rolled_mps) < params_->standstill_speed_mps;
   return speed_of(twist_) < params_->standstill_speed_mps && std::fabs(twist_.w) < params_->standstill_yaw_rate_radps;
 }
 
@@ -301,8 +303,19 @@ double motion_front_end::by_gear(double value, bool is_signed) const {
   return reverse && !is_signed ? -value : value;
 }
 
+// Of base_link, by the speed of the front axle's middle, which is along the road wheels: v = v_f cos(angle). By the
+// gyro v^2 = v_f^2 - (w L)^2. Wheels that do not steer measure v.
+double motion_front_end::behind_front_wheels(double front_mps) const {
+  double angle;
+  if (params_->states.drive == WM_DRIVE_SKID_STEER) return front_mps;
+  if (read_road_wheel(&angle)) return front_mps * cos(angle);
+  if (!finite(wheels_.wheelbase_m) || !gyro_is_alive()) return front_mps;
+  const double square_mps2 = square(front_mps) - square(value_[WM_Q_YAW_RATE] * wheels_.wheelbase_m);
+  return square_mps2 > 0.0 ? std::copysign(std::sqrt(square_mps2), front_mps) : 0.0;
+}
+
 // The rear wheels' mean is base_link's own speed; ticks come next (no rounding), then the dashboard's speed, then the
-// front wheels, whose path is longer in turns. A source that fell silent yields to the next.
+// front wheels. A source that fell silent yields to the next.
 bool motion_front_end::read_speed(double *speed_mps) {
   const auto mean_of = [this](int left, int right, double *out) {
     const wm_time_ns now = now_ns_;
@@ -334,6 +347,7 @@ bool motion_front_end::read_speed(double *speed_mps) {
     speed_is_signed_ |= speed < kSignedBelow_mps;
     speed = by_gear(speed, speed_is_signed_);
   }
+  if (source == kFrontWheels) speed = behind_front_wheels(front_mps_ = speed);
   *speed_mps = speed;
   return true;
 }

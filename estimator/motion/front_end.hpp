@@ -186,6 +186,7 @@ class motion_front_end {
   void watch_yaw_rate(wm_time_ns t_ns, double speed_mps, bool fresh);
   bool watch_standstill(wm_time_ns t_ns, bool still);
   bool read_speed(double *speed_mps);
+  double behind_front_wheels(double front_mps) const;
   bool read_road_wheel(double *angle_rad) const;
   bool read_other_turn_rate(double speed_mps, double *rate_radps) const;
   double counted_turn_rate() const;
@@ -244,6 +245,7 @@ class motion_front_end {
     wm_time_ns moved_ns;   // the newest sample at which the robot moved
     double explained_rad;  // of the turn by the other sensor less the gyro's, by that sensor's errors
   } yaw_watch_;
+  double front_mps_;         // newest speed of the front wheels, along them
   double missed_turn_rad2_;  // variance of the heading for the next input: what the gyro has missed
   double stand_in_rad_;      // error of the heading since the wheels' difference stands in for the gyro
   uint64_t outliers_;

@@ -147,7 +147,8 @@ static wm_status open_device(const wm_config *config, const wm_site *site, size_
   if (index < devices->lcm_count)
     return lcm_device_open(&devices->lcm[index], config->lcm_url, config->channel_prefix, NULL, out, err);
   index -= devices->lcm_count;
-  if (index < devices->gpsd_count) return wm_gpsd_open(&devices->gpsd[index], wm_site_gnss_origin(site), out, err);
+  if (index < devices->gpsd_count)
+    return wm_gpsd_open(&devices->gpsd[index], wm_site_gnss_origin(site), wm_site_rig(site)->antenna_m[0], out, err);
   return wm_iio_open(&devices->iio, "", out, err);
 }
 

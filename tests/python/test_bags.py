@@ -18,6 +18,7 @@ import numpy as np
 from common import BIN, Drive
 from mcap.writer import Writer as McapWriter
 from PIL import Image
+from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import get_types_from_msg
 
@@ -229,6 +230,36 @@ class OwnExports(unittest.TestCase):
         done = subprocess.run([BIN / "waymark", "check", drive.folder / "robot.yaml", drive.folder / "again", "--quick"],
                               capture_output=True, text=True, check=False)
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+
+    def test_frames_of_errors_and_axes_of_mounted_sensors_stay_what_they_are(self):
+        drive = Drive()
+        self.addCleanup(drive.close)
+        kept = waymark.Recording(drive.recording)
+        lines = ["20000080#0000080000000000", "100##1" + "11" * 12, "100#" + "22" * 12, "102#R"]
+        last = list(kept.can())[-1].t_ns // 1000
+        with (drive.recording / "can.log").open("a") as log:
+            log.writelines(f"({(last + k) // 10**6}.{(last + k) % 10**6:06d}) can0 {line}\n" for k, line in enumerate(lines))
+        with (drive.recording / "calibration.yaml").open("a") as calibration:
+            calibration.write("imu: {mounting: {rpy_deg: [180, 0, 90]}}\ngnss: {mounting: {xyz_m: [0.1, -0.2, 1.5]}}\n")
+        waymark.write_table(drive.recording / "imu.csv", {"t_ns": np.array([last * 1000]), **{f"w{axis}_radps": np.zeros(1) for axis in "xyz"}})
+        meta = drive.recording / "recording.yaml"
+        meta.write_text(meta.read_text().replace("streams: [", "streams: [imu.csv, "))
+        export(waymark.Run(drive.run), drive.folder / "run.mcap", waymark.Recording(drive.recording), can=True)
+        read = {}
+        with AnyReader([drive.folder / "run.mcap"], default_typestore=Messages().store) as bag:
+            for connection, _, data in bag.messages():
+                read.setdefault(connection.topic, []).append(bag.deserialize(data, connection.msgtype))
+        mounted = {t.child_frame_id: t for message in read["/tf_static"] for t in message.transforms}
+        turn = mounted["imu_link"].transform.rotation  # Rz(90) Rx(180): half a turn about (1, 1, 0)
+        np.testing.assert_allclose(np.abs([turn.x, turn.y, turn.z, turn.w]), [0.5**0.5, 0.5**0.5, 0, 0], atol=1e-9)
+        self.assertGreater(turn.x * turn.y, 0)
+        place = mounted["gnss_link"].transform.translation
+        np.testing.assert_allclose([place.x, place.y, place.z], [0.1, -0.2, 1.5], atol=1e-12)
+        self.assertEqual({message.header.frame_id for message in read["/recording/imu"]}, {"imu_link"})
+        self.assertEqual([message.id for message in read["/can0/frames"] if message.is_error], [0x80])
+        self.assertEqual(imported(drive.folder / "run.mcap", "--out", drive.folder / "again")[0], 0)
+        frames = lambda folder: [(f.id, f.extended, f.error, f.remote, f.data) for f in waymark.Recording(folder).can()]  # noqa: E731
+        self.assertEqual(sorted(frames(drive.recording)), sorted(frames(drive.folder / "again")))
 
 
 if __name__ == "__main__":

@@ -66,6 +66,12 @@ Eigen::Vector3d load_truth_offset(const fs::path &recording) {
   return Eigen::Vector3d::Zero();
 }
 
+Eigen::Vector3d load_antenna(const fs::path &recording) {
+  const Yaml calibration(recording / "calibration.yaml");
+  const auto xyz = calibration.numbers("gnss.mounting.xyz_m");
+  return xyz.size() == 3 ? Eigen::Vector3d(xyz[0], xyz[1], xyz[2]) : Eigen::Vector3d::Zero();
+}
+
 std::vector<Pose> load_gnss(const fs::path &recording) {
   need_folder(recording);
   auto out = load_positions(recording / "gnss.csv", false);

@@ -101,24 +101,31 @@ Trajectory load_csv(const fs::path &file) {
   return out;
 }
 
+// `t x y z qx qy qz qw` in seconds and metres, as evo and others write it; lines of # are comments.
 Trajectory load_tum(const fs::path &file) {
+  constexpr long double kLatest_s = 4e9L;  // its nanoseconds fit into 64 bits
   std::ifstream in(file);
   Trajectory out;
   std::string line;
   for (size_t number = 1; std::getline(in, line); ++number) {
-    if (line.empty() || line[0] == '#') continue;
+    const std::string at = file.string() + ":" + std::to_string(number) + ": ";
+    if (number == 1 && line.starts_with("\xEF\xBB\xBF")) line.erase(0, 3);
+    const size_t begin = line.find_first_not_of(" \t\r");
+    if (begin == std::string::npos || line[begin] == '#') continue;
     std::istringstream fields(line);
     long double t_s = 0;
     Pose pose;
     Eigen::Vector4d q;
+    std::string rest;
     if (!(fields >> t_s >> pose.p_m.x() >> pose.p_m.y() >> pose.p_m.z() >> q[0] >> q[1] >> q[2] >> q[3]) ||
-        q.norm() < 0.5)
-      throw Failure(file.string() + ":" + std::to_string(number) + ": not a pose; 't x y z qx qy qz qw' is expected");
+        q.norm() < 0.5 || fields >> rest)
+      throw Failure(at + "not a pose; 't x y z qx qy qz qw' is expected, parted by blanks");
+    if (std::fabs(t_s) > kLatest_s)
+      throw Failure(at + "its time is beyond 4e9 s; seconds are expected: are these milliseconds or nanoseconds?");
     pose.t_ns = std::llroundl(t_s * 1e9L);
     pose.q = Eigen::Quaterniond(q).normalized();
     if (pose.p_m.z() != 0 || q[0] != 0 || q[1] != 0) out.planar = false;
-    if (!out.poses.empty() && pose.t_ns < out.poses.back().t_ns)
-      throw Failure(file.string() + ":" + std::to_string(number) + ": time runs back");
+    if (!out.poses.empty() && pose.t_ns < out.poses.back().t_ns) throw Failure(at + "time runs back");
     if (!out.poses.empty() && pose.t_ns == out.poses.back().t_ns) out.poses.pop_back();
     out.poses.push_back(pose);
   }

@@ -95,7 +95,7 @@ Figures evaluate(const Arguments &a) {
   CompareOptions options = a.compare;
   options.align = alignment_of(a.align);
   options.against_gnss = gnss;
-  if (!gnss) options.truth_offset_m = load_truth_offset(recording);
+  options.truth_offset_m = gnss ? load_antenna(recording) : load_truth_offset(recording);
 
   std::vector<Pose> places = gnss ? load_gnss(recording) : load_truth(recording);
   std::optional<GnssDelay> delay;

@@ -192,8 +192,9 @@ const char *wm_iio_inspect(const wm_iio_device_config *config, const char *root,
                            char *text, size_t room);
 
 // A receiver by gpsd as rows of `gnss` or `heading`, in metres east and north of `origin` (degrees, degrees, metres
-// above the ellipsoid). WM_BAD_CONFIG without one. Allocates.
-wm_status wm_gpsd_open(const wm_gpsd_device_config *config, const double origin[3], wm_row_device **out, wm_error *err);
+// above the ellipsoid), WM_BAD_CONFIG without one. `ahead_m`: the antenna's x in base_link; NaN: not given. Allocates.
+wm_status wm_gpsd_open(const wm_gpsd_device_config *config, const double origin[3], double ahead_m, wm_row_device **out,
+                       wm_error *err);
 
 #ifdef __cplusplus
 }

@@ -154,7 +154,7 @@ static void receiver(const wm_gpsd_device_config *config, double seconds, wm_fin
   wm_source_counts counts = {0};
   char text[160];
   wm_error err;
-  if (wm_gpsd_open(config, anywhere, &device, &err) != WM_OK) {
+  if (wm_gpsd_open(config, anywhere, (double)NAN, &device, &err) != WM_OK) {
     wm_find_error(out, "gnss", &err);
     return;
   }

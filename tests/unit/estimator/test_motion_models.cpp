@@ -52,6 +52,44 @@ TEST(test_what_a_model_lacks) {
   TEST_ASSERT_EQUAL_STRING("yaw_rate over CAN", lacks(WM_MOTION_AUTO, make::car(), speed));
 }
 
+// Front wheels roll along the road wheels. By the angle or by the gyro it is the rear axle that moves; on the spot it
+// stands, and turns. Wheels that do not steer are as they were.
+TEST(test_the_speed_of_front_wheels) {
+  const double angle = 0.9, front_mps = 0.7, wheelbase_m = make::car().wheelbase_m;
+  const double turn_radps = front_mps * std::sin(angle) / wheelbase_m;
+  const auto pose_after = [](double mps, std::pair<wm_quantity, double> turn, int drive) {
+    wm_wheels w = make::car();
+    wm_motion_params params;
+    wm_params_defaults(&wm_motion_params_table, &params);
+    params.states.drive = drive;
+    wm::motion_front_end front;
+    front.init(&params, &w);
+    wm_pose2 pose{};
+    for (int k = 0; k <= 200; k++) {
+      front.feed(make::quantities(0.02 * k, {{WM_Q_WHEEL_SPEED_FRONT_LEFT, mps}, turn}));
+      front.advance(make::at(0.02 * k), wm::kNeutralCalibration,
+                    [&](const wm::motion_segment &s, const wm::motion_twist &t, const wm::motion_noise &) {
+                      const wm::arc a = wm::make_arc(t.v * s.dt_s, t.w * s.dt_s);
+                      pose = wm::compose(pose, {a.x_m, a.y_m, a.turn_rad});
+                    });
+    }
+    return pose;
+  };
+  const auto is_at = [](const wm_pose2 &pose, double v, double w) {
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, std::remainder(4 * w, 2 * M_PI), pose.heading_rad);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, v / w * std::sin(4 * w), pose.x_m);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, v / w * (1 - std::cos(4 * w)), pose.y_m);
+  };
+  for (const double sign : {1.0, -1.0}) {
+    is_at(pose_after(sign * front_mps, {WM_Q_ROAD_WHEEL, angle}, WM_DRIVE_ROLLING), sign * front_mps * std::cos(angle),
+          sign * turn_radps);
+    is_at(pose_after(sign * front_mps, {WM_Q_YAW_RATE, turn_radps}, WM_DRIVE_ROLLING),
+          sign * front_mps * std::cos(angle), turn_radps);
+  }
+  is_at(pose_after(front_mps, {WM_Q_YAW_RATE, front_mps / wheelbase_m}, WM_DRIVE_ROLLING), 0, front_mps / wheelbase_m);
+  is_at(pose_after(front_mps, {WM_Q_YAW_RATE, turn_radps}, WM_DRIVE_SKID_STEER), front_mps, turn_radps);
+}
+
 constexpr double kTick = 2 * M_PI * 0.1 / 1000;  // of make::two_wheels()
 
 // A robot with ticks whose right wheel is 4 % larger than its calibration, and a gyro that may fall silent.

@@ -20,6 +20,7 @@
 
 static int server, client;
 static wm_gpsd_device_config config;
+static double ahead_m;
 static wm_source *source;
 static wm_event event;
 static wm_error err;
@@ -47,6 +48,7 @@ void setUp(void) {
   config = (wm_gpsd_device_config){
       .host = "127.0.0.1", .accuracy_scale = 1, .course_min_mps = 1, .sigma_deg = 1, .device = "/dev/ttyACM0"};
   server = client = -1;
+  ahead_m = (double)NAN;
   listen_again();
 }
 
@@ -76,7 +78,7 @@ static void begin(void) {
   static const double kOrigin[3] = {ORIGIN_DEG, 500};
   const wm_mounting none = {0};
   wm_row_device *device;
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_gpsd_open(&config, kOrigin, &device, &err), err.text);
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_gpsd_open(&config, kOrigin, ahead_m, &device, &err), err.text);
   TEST_ASSERT_EQUAL(WM_OK, row_source_open(device, &none, &source, &err));
 }
 
@@ -218,6 +220,25 @@ TEST(a_course_is_a_heading) {
   expect(WM_OK);
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 100 * M_PI / 180, event.as.heading.heading_rad);
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 5 * M_PI / 180, event.as.heading.sigma_rad);
+}
+
+// The course of an antenna that is ahead of base_link is to the side of the heading in a turn.
+TEST(the_course_is_the_antennas) {
+  const double speed_mps = 5, turn_radps = -0.3;
+  char members[400];
+  config.from = WM_GPSD_COURSE;
+  ahead_m = 1.5;
+  begin_connected();
+  const wm_time_ns begin_ns = utc_ns() - 7 * WM_NS_PER_S;
+  for (int k = 0; k <= 60; k++) {
+    const double heading = 0.1 * k * turn_radps, course = heading + atan2(turn_radps * ahead_m, speed_mps);
+    (void)snprintf(members, sizeof members, FIX ",\"speed\":%.4f,\"track\":%.4f",
+                   hypot(speed_mps, turn_radps * ahead_m), fmod(810 - course * 180 / M_PI, 360));
+    report(begin_ns + k * 100 * MS, members);
+    expect(WM_OK);
+    if (k >= 40) TEST_ASSERT_DOUBLE_WITHIN(0.004, 0, remainder(event.as.heading.heading_rad - heading, 2 * M_PI));
+  }
+  TEST_ASSERT_DOUBLE_WITHIN(1e-3, 0.02, event.as.heading.sigma_rad);
 }
 
 TEST(antennas_give_a_heading) {
@@ -380,7 +401,7 @@ TEST(unplugged_silent_and_back) {
 TEST(the_maps_origin_is_needed) {
   static const double kNone[3] = {NAN, NAN, NAN};
   wm_row_device *device;
-  TEST_ASSERT_EQUAL(WM_BAD_CONFIG, wm_gpsd_open(&config, kNone, &device, &err));
+  TEST_ASSERT_EQUAL(WM_BAD_CONFIG, wm_gpsd_open(&config, kNone, ahead_m, &device, &err));
   TEST_ASSERT_NOT_NULL(strstr(err.text, "calibration.yaml has no `gnss: {origin:"));
 }
 

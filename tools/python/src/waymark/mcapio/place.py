@@ -29,8 +29,9 @@ def mounting_matrix(mounting: dict[str, Any]) -> Array:
 
 
 def mountings(messages: Messages, calibration: dict[str, Any], t_ns: int) -> Iterator[Item]:
-    """Where the sensors and cameras of a calibration sit, as static transforms."""
-    transforms = []
+    """Where the sensors, cameras, IMU and antenna of a calibration sit, as static transforms."""
+    transforms = [messages.transform(t_ns, "base_link", kind + "_link", mounting_matrix(calibration[kind]["mounting"]))
+                  for kind in ("imu", "gnss") if "mounting" in (calibration.get(kind) or {})]
     for kind in ("sensors", "cameras"):
         for name, sensor in (calibration.get(kind) or {}).items():
             matrix = mounting_matrix(sensor.get("mounting") or {})

@@ -14,6 +14,7 @@ from . import streams
 from .estimates import topic_name
 from .writer import Item
 
+_CLASSIC_BYTES = 8  # of a CAN frame; longer ones are of CAN FD
 LENSES = {"pinhole-radtan": "plumb_bob", "equidistant": "equidistant"}
 """Our models of lenses that ROS has, by its name."""
 
@@ -86,12 +87,12 @@ def _corners(messages: Messages, camera: str, table: Table) -> Iterator[Item]:
                        messages.make("ImageAnnotations", points=outlines, texts=texts))
 
 
-def _table(messages: Messages, file: str, table: Table) -> Iterator[Item]:
+def _table(messages: Messages, file: str, table: Table, usual: str) -> Iterator[Item]:
     kind = streams.register(messages, file, list(table))
     metadata = {streams.FILE_KEY: file, streams.COLUMNS_KEY: ",".join(table)}
     log_ns = table.get("arrival_ns", table["t_ns"])
     for i in np.argsort(log_ns, kind="stable"):
-        frame = topic_name(str(table["sensor"][i])) if "sensor" in table else "map" if file == "gnss.csv" else "base_link"
+        frame = topic_name(str(table["sensor"][i])) if "sensor" in table else usual
         yield Item(int(log_ns[i]), f"/recording/{topic_name(file.removesuffix('.csv'))}", kind,
                    streams.row(messages, kind, table, i, frame), metadata)
 
@@ -100,19 +101,19 @@ def _can(messages: Messages, recording: Recording) -> Iterator[Item]:
     for frame in recording.can():
         header, topic = messages.header(frame.t_ns, frame.interface), f"/{topic_name(frame.interface)}/frames"
         data = np.frombuffer(frame.data, dtype=np.uint8)
-        if frame.flags is None:
+        about = {"header": header, "id": frame.id, "is_extended": frame.extended, "is_error": frame.error}
+        if frame.flags is None and len(data) <= _CLASSIC_BYTES:
             yield Item(frame.t_ns, topic, "can_msgs/msg/Frame", messages.make(
-                "can_msgs/Frame", header=header, id=frame.id, is_rtr=frame.remote, is_extended=frame.extended, dlc=len(data),
-                data=np.pad(data, (0, 8 - len(data)))))
+                "can_msgs/Frame", **about, is_rtr=frame.remote, dlc=len(data), data=np.pad(data, (0, _CLASSIC_BYTES - len(data)))))
         else:
-            yield Item(frame.t_ns, topic + "_fd", "ros2_socketcan_msgs/msg/FdFrame", messages.make(
-                "FdFrame", header=header, id=frame.id, is_extended=frame.extended, len=len(data), data=data))
+            yield Item(frame.t_ns, topic + "_fd", "ros2_socketcan_msgs/msg/FdFrame", messages.make("FdFrame", **about, len=len(data), data=data))
 
 
 def sensor_streams(messages: Messages, recording: Recording, pictures: bool, can: bool, run: Run) -> list[Iterator[Item]]:
     """The streams of a recording, one a table, a camera, and CAN."""
     tables = {file: recording.table(file) for file in recording.streams()}
-    out = [_table(messages, file, table) for file, table in tables.items()]
+    axes = {"gnss.csv": "map", "imu.csv": "imu_link" if "mounting" in (recording.calibration.get("imu") or {}) else "base_link"}
+    out = [_table(messages, file, table, axes.get(file, "base_link")) for file, table in tables.items()]
     if pictures:
         for camera in recording.cameras():
             out.append(_pictures(messages, recording, camera))
