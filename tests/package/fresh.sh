@@ -21,8 +21,9 @@ if [ -z "$(find "$tar" -mtime -7 2>/dev/null)" ]; then
   mv "$roots/minbase.new.tar" "$tar"
 fi
 root=$(mktemp -d "$roots/fresh.XXXXXX")
-trap 'umount -R "$root" 2>/dev/null || true; rm -rf --one-file-system "$root"' EXIT
 mount --bind "$root" "$root"
+# Lazily: what still runs in it keeps no mount there, or a bound folder of this file system would be removed with it.
+trap 'umount -R -l "$root" && rm -rf --one-file-system "$root"' EXIT
 chmod 755 "$root"
 tar -C "$root" -xf "$tar" --exclude='./dev/*'
 mkdir -p "$root/dev/shm" "$root/etc/ssl/certs"
