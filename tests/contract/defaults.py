@@ -35,7 +35,7 @@ motion: {states: {speed_scale_sigma: 0.03, yaw_rate_bias_sigma_radps: 0.02}}
 sightings: {states: {sensor_yaw_sigma_rad: 0.05}, gate: {hard: 1000}}
 slam: {landmarks: {capacity: 700}}
 """
-# landmark_ekf by its defaults before calibration states were among them (docs/reports/2026-11-23-defaults.md).
+# landmark_ekf by its defaults before calibration states were among them (docs/reports/archive-motion.md).
 DEFAULTS_BEFORE_M = {"r1": 0.17, "r2": 0.24, "r3": 0.145, "r4": 0.31, "r5": 0.128,
                      "t1": 0.102, "t2": 0.26, "t3": 0.133, "t4": 0.194, "t5": 0.144}
 SE2 = ("--align", "se2")
@@ -149,7 +149,7 @@ def figures(runs, case, recording, config, what=""):
     out, folder = runs.judge(", ".join(filter(None, [case.title(), what])), recording, config, case.options)
     out["run"] = folder
     # The covariances are those of the frame of the start. An alignment leaves it: of an exact filter 0.82 to 0.90 are inside then
-    # (docs/reports/2026-11-27-mrclam-slam.md).
+    # (docs/reports/archive-slam.md).
     if case.options == SE2 and "initial_pose" in (recording / "recording.yaml").read_text():
         at_start, _ = runs.judge(", ".join(filter(None, [case.title(), what, "unaligned"])), recording, config)
         out["nees_inside_95"] = at_start["nees_inside_95"]
