@@ -60,7 +60,7 @@ static void try_open(iio *self, wm_time_ns now_ns) {
   if (self->fd < 0)
     (void)snprintf(self->fault, sizeof self->fault, "%.60s can't be opened: %s%s", path, strerror(errno),
                    errno == EBUSY    ? ": another program reads it"
-                   : errno == EACCES ? ": a udev rule gives it to a group (motion-sources.md)"
+                   : errno == EACCES ? ": a udev rule gives it to a group (docs/imu-gnss.md)"
                                      : "");
 }
 

@@ -3,19 +3,7 @@
 #include <math.h>
 
 #include "waymark/faults.h"
-
-void wm_json_text(const char *text, FILE *to) {
-  (void)fputc('"', to);
-  for (const unsigned char *c = (const unsigned char *)text; *c; c++) {
-    if (*c == '"' || *c == '\\')
-      (void)fprintf(to, "\\%c", *c);
-    else if (*c < ' ')
-      (void)fprintf(to, "\\u%04x", *c);
-    else
-      (void)fputc(*c, to);
-  }
-  (void)fputc('"', to);
-}
+#include "waymark/text.h"
 
 static void put_value(double value, FILE *to) {
   if (isfinite(value))

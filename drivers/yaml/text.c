@@ -186,3 +186,16 @@ wm_status wm_text_read_file(const char *path, size_t max_bytes, char **out, size
   close(fd);
   return status;
 }
+
+void wm_json_text(const char *text, FILE *to) {
+  (void)fputc('"', to);
+  for (const unsigned char *c = (const unsigned char *)text; *c; c++) {
+    if (*c == '"' || *c == '\\')
+      (void)fprintf(to, "\\%c", *c);
+    else if (*c < ' ')
+      (void)fprintf(to, "\\u%04x", *c);
+    else
+      (void)fputc(*c, to);
+  }
+  (void)fputc('"', to);
+}

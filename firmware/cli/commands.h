@@ -16,6 +16,7 @@ int command_record(int argc, char *const *argv);
 int command_watch(int argc, char *const *argv);
 int command_doctor(int argc, char *const *argv);
 int command_stamps(int argc, char *const *argv);
+int command_config(int argc, char *const *argv);
 
 // ── shared by the commands ──────────────────────────────────────────────────────────────────────────────────────────
 

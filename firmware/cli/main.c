@@ -21,6 +21,7 @@ static const char kHelp[] =
     "  check     find mistakes in a configuration and a recording before driving\n"
     "  doctor    find what is wrong with this computer, and how to mend it\n"
     "  stamps    switch the clocks of CAN adapters on, before a run\n"
+    "  config    print what a configuration may have, for editors (JSON schema)\n"
     "  help      this text; `waymark COMMAND --help` has the options\n"
     "\n"
     "at the desk (programs named waymark-COMMAND, beside this one or in PATH):\n";
@@ -63,7 +64,7 @@ static const struct {
   int (*run)(int argc, char *const *argv);
 } kCommands[] = {{"run", command_run},       {"replay", command_replay}, {"check", command_check},
                  {"record", command_record}, {"watch", command_watch},   {"doctor", command_doctor},
-                 {"stamps", command_stamps}};
+                 {"stamps", command_stamps}, {"config", command_config}};
 #define COMMANDS (sizeof kCommands / sizeof kCommands[0])
 
 static void print_help(FILE *to) {

@@ -167,6 +167,8 @@ void wm_config_each_warning(const wm_config *config, void (*say)(void *context, 
 void wm_config_source(const wm_config *config, const char *name, wm_source_config *out, int *rank);
 // Every key with its range, default, unit and meaning as markdown, from the tables that read them.
 void wm_config_reference(FILE *to);
+// The same as a JSON schema.
+void wm_config_schema(FILE *to);
 
 #ifdef __cplusplus
 }

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // `devices:` of a configuration.
 #include "config/devices.h"
+#include "config/keys.h"
 
 #include <ctype.h>
-#include <float.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -32,11 +32,10 @@ static wm_status file_of(const wm_yaml_node *item, const char *key, const char *
 }
 
 static wm_status read_can(const wm_yaml_node *item, wm_config *config, wm_error *err) {
-  static const char *const kKeys[] = {"interface", "dbc", "can_signals", NULL};
   wm_can_device_config *out = &config->devices.can[config->devices.can_count];
   out->line = wm_yaml_line(item);
   if (!wm_yaml_is_map(item)) return wm_yaml_fail(item, err, "a map {interface: can0, ...} is needed");
-  wm_status status = wm_yaml_check_keys(item, kKeys, WM_YAML_STRICT, NULL, err);
+  wm_status status = config_check_keys(item, kConfigCanDeviceKeys, err);
   if (status != WM_OK) return status;
   wm_yaml_node interface = wm_yaml_get(item, "interface");
   if (!wm_yaml_there(&interface)) return wm_yaml_fail(item, err, "interface: is missing; `ip link` lists them");
@@ -57,22 +56,6 @@ static wm_status read_can(const wm_yaml_node *item, wm_config *config, wm_error 
 static wm_status text(const wm_yaml_node *item, const char *key, char *out, size_t capacity, wm_error *err) {
   wm_yaml_node node = wm_yaml_get(item, key);
   return wm_yaml_there(&node) ? wm_yaml_string(&node, out, capacity, err) : WM_OK;
-}
-
-static wm_status number(const wm_yaml_node *item, const char *key, double max, double *out, wm_error *err) {
-  wm_yaml_node node = wm_yaml_get(item, key);
-  return wm_yaml_there(&node) ? wm_yaml_f64(&node, 0, max, out, err) : WM_OK;
-}
-
-static wm_status above_0(const wm_yaml_node *item, const char *key, double max, double *out, wm_error *err) {
-  wm_yaml_node node = wm_yaml_get(item, key);
-  return wm_yaml_there(&node) ? wm_yaml_f64(&node, DBL_MIN, max, out, err) : WM_OK;
-}
-
-static wm_status choice(const wm_yaml_node *item, const char *key, const char *const *names, int32_t *out,
-                        wm_error *err) {
-  wm_yaml_node node = wm_yaml_get(item, key);
-  return wm_yaml_there(&node) ? wm_yaml_choice(&node, names, out, err) : WM_OK;
 }
 
 static wm_status read_controls(const wm_yaml_node *item, wm_camera_device_config *out, wm_error *err) {
@@ -132,24 +115,21 @@ static wm_status read_which(const wm_yaml_node *item, wm_camera_device_config *o
 }
 
 static wm_status read_camera(const wm_yaml_node *item, wm_config *config, wm_error *err) {
-  static const char *const kKeys[] = {"name",    "device",      "card",       "bus",   "libcamera", "format",
-                                      "rate_hz", "exposure_ms", "latency_ms", "stamp", "controls",  NULL};
-  static const char *const kStamps[] = {"auto", "start", "end", NULL};  // wm_stamp_point
   wm_camera_device_config *out = &config->devices.cameras[config->devices.camera_count];
   int32_t format = -1;
   out->line = wm_yaml_line(item);
   if (!wm_yaml_is_map(item)) return wm_yaml_fail(item, err, "a map {name: CAMERA, device: /dev/video0, ...} is needed");
-  wm_status status = wm_yaml_check_keys(item, kKeys, WM_YAML_STRICT, NULL, err);
+  wm_status status = config_check_keys(item, kConfigCameraDeviceKeys, err);
   if (status == WM_OK) status = text(item, "name", out->name, sizeof out->name, err);
   if (status == WM_OK && !out->name[0])
     return wm_yaml_fail(item, err, "name: is missing: the camera's name in calibration.yaml");
   if (status == WM_OK) status = read_which(item, out, err);
-  if (status == WM_OK) status = choice(item, "format", wm_camera_formats, &format, err);
+  if (status == WM_OK) status = config_choice(item, kConfigCameraDeviceKeys, "format", &format, err);
   if (format >= 0) snprintf(out->format, sizeof out->format, "%s", wm_camera_formats[format]);
-  if (status == WM_OK) status = number(item, "rate_hz", 1000, &out->rate_hz, err);
-  if (status == WM_OK) status = number(item, "exposure_ms", 1000, &out->exposure_ms, err);
-  if (status == WM_OK) status = number(item, "latency_ms", 1000, &out->latency_ms, err);
-  if (status == WM_OK) status = choice(item, "stamp", kStamps, &out->stamp, err);
+  if (status == WM_OK) status = config_number(item, kConfigCameraDeviceKeys, "rate_hz", &out->rate_hz, err);
+  if (status == WM_OK) status = config_number(item, kConfigCameraDeviceKeys, "exposure_ms", &out->exposure_ms, err);
+  if (status == WM_OK) status = config_number(item, kConfigCameraDeviceKeys, "latency_ms", &out->latency_ms, err);
+  if (status == WM_OK) status = config_choice(item, kConfigCameraDeviceKeys, "stamp", &out->stamp, err);
   if (status == WM_OK) status = read_controls(item, out, err);
   if (status == WM_OK) status = camera_is_new(item, config, out, err);
   config->devices.camera_count++;
@@ -168,14 +148,12 @@ static wm_status stream_is_new(const wm_yaml_node *item, const wm_config *config
 }
 
 static wm_status read_lcm(const wm_yaml_node *item, wm_config *config, wm_error *err) {
-  static const char *const kKeys[] = {"stream", "channel", "clock", "rate_max_hz", NULL};
-  static const char *const kClocks[] = {"here", "sender", NULL};  // wm_lcm_clock
   wm_lcm_device_config *out = &config->devices.lcm[config->devices.lcm_count];
   int32_t stream = -1;
   *out = (wm_lcm_device_config){.line = wm_yaml_line(item), .rate_max_hz = 1000};
   if (!wm_yaml_is_map(item)) return wm_yaml_fail(item, err, "a map {stream: motion, ...} is needed");
-  wm_status status = wm_yaml_check_keys(item, kKeys, WM_YAML_STRICT, NULL, err);
-  if (status == WM_OK) status = choice(item, "stream", wm_stream_names, &stream, err);
+  wm_status status = config_check_keys(item, kConfigLcmDeviceKeys, err);
+  if (status == WM_OK) status = config_choice(item, kConfigLcmDeviceKeys, "stream", &stream, err);
   if (status != WM_OK) return status;
   if (stream < 0) return wm_yaml_fail(item, err, "stream: is missing, e.g. {stream: motion}");
   const char *name = wm_stream_names[stream];
@@ -184,56 +162,53 @@ static wm_status read_lcm(const wm_yaml_node *item, wm_config *config, wm_error 
   snprintf(out->stream, sizeof out->stream, "%s", name);
   for (size_t i = 0; out->stream[i]; i++) out->channel[i] = (char)toupper((unsigned char)out->stream[i]);
   status = text(item, "channel", out->channel, sizeof out->channel, err);
-  if (status == WM_OK) status = choice(item, "clock", kClocks, &out->clock, err);
-  if (status == WM_OK) status = number(item, "rate_max_hz", 10000, &out->rate_max_hz, err);
+  if (status == WM_OK) status = config_choice(item, kConfigLcmDeviceKeys, "clock", &out->clock, err);
+  if (status == WM_OK) status = config_number(item, kConfigLcmDeviceKeys, "rate_max_hz", &out->rate_max_hz, err);
   config->devices.lcm_count++;
   return status;
 }
 
 static wm_status read_gpsd(const wm_yaml_node *item, wm_config *config, wm_error *err) {
-  static const char *const kKeys[] = {"take",       "host",           "port",           "device",    "clock",
-                                      "latency_ms", "accuracy_scale", "course_min_mps", "sigma_deg", NULL};
-  static const char *const kTake[] = {"position", "course", "antennas", NULL};  // wm_gpsd_from
-  static const char *const kClocks[] = {"receiver", "utc", NULL};               // wm_gpsd_clock
   wm_gpsd_device_config *out = &config->devices.gpsd[config->devices.gpsd_count];
-  int64_t port = 2947;  // gpsd's, by IANA
-  // A velocity of 1 m/s has a direction to 6 degrees where its error is 0.1 m/s; antennas 1 m apart reach 0.2 degrees.
-  *out = (wm_gpsd_device_config){
-      .line = wm_yaml_line(item), .host = "localhost", .accuracy_scale = 1, .course_min_mps = 1, .sigma_deg = 1};
+  // 2947 is gpsd's port by IANA. A velocity of 1 m/s has a direction to 6 degrees where its error is 0.1 m/s; antennas
+  // 1 m apart reach 0.2 degrees.
+  *out = (wm_gpsd_device_config){.line = wm_yaml_line(item),
+                                 .host = "localhost",
+                                 .port = 2947,
+                                 .accuracy_scale = 1,
+                                 .course_min_mps = 1,
+                                 .sigma_deg = 1};
   if (!wm_yaml_is_map(item)) return wm_yaml_fail(item, err, "a map {take: position, ...} is needed");
-  wm_status status = wm_yaml_check_keys(item, kKeys, WM_YAML_STRICT, NULL, err);
-  if (status == WM_OK) status = choice(item, "take", kTake, &out->from, err);
+  wm_status status = config_check_keys(item, kConfigGpsdDeviceKeys, err);
+  if (status == WM_OK) status = config_choice(item, kConfigGpsdDeviceKeys, "take", &out->from, err);
   if (status == WM_OK) status = text(item, "host", out->host, sizeof out->host, err);
-  wm_yaml_node node = wm_yaml_get(item, "port");
-  if (status == WM_OK && wm_yaml_there(&node)) status = wm_yaml_i64(&node, 1, 65535, &port, err);
-  out->port = (int32_t)port;
+  if (status == WM_OK) status = config_whole(item, kConfigGpsdDeviceKeys, "port", &out->port, err);
   if (status == WM_OK) status = text(item, "device", out->device, sizeof out->device, err);
-  node = wm_yaml_get(item, "device");
+  wm_yaml_node node = wm_yaml_get(item, "device");
   if (status == WM_OK && strpbrk(out->device, "\"\\"))
     status = wm_yaml_fail(&node, err, "no path has a quote or a backslash");
-  if (status == WM_OK) status = choice(item, "clock", kClocks, &out->clock, err);
-  if (status == WM_OK) status = number(item, "latency_ms", 5000, &out->latency_ms, err);
-  if (status == WM_OK) status = above_0(item, "accuracy_scale", 100, &out->accuracy_scale, err);
-  if (status == WM_OK) status = above_0(item, "course_min_mps", 100, &out->course_min_mps, err);
-  if (status == WM_OK) status = above_0(item, "sigma_deg", 90, &out->sigma_deg, err);
+  if (status == WM_OK) status = config_choice(item, kConfigGpsdDeviceKeys, "clock", &out->clock, err);
+  if (status == WM_OK) status = config_number(item, kConfigGpsdDeviceKeys, "latency_ms", &out->latency_ms, err);
+  if (status == WM_OK) status = config_number(item, kConfigGpsdDeviceKeys, "accuracy_scale", &out->accuracy_scale, err);
+  if (status == WM_OK) status = config_number(item, kConfigGpsdDeviceKeys, "course_min_mps", &out->course_min_mps, err);
+  if (status == WM_OK) status = config_number(item, kConfigGpsdDeviceKeys, "sigma_deg", &out->sigma_deg, err);
   if (status == WM_OK) status = stream_is_new(item, config, wm_gpsd_stream(out), err);
   config->devices.gpsd_count++;
   return status;
 }
 
 static wm_status read_iio(const wm_yaml_node *item, wm_config *config, wm_error *err) {
-  static const char *const kKeys[] = {"device", "trigger", "rate_hz", NULL};
   wm_iio_device_config *out = &config->devices.iio;
   if (!wm_yaml_there(item)) return WM_OK;
   out->line = wm_yaml_line(item);
   if (!wm_yaml_is_map(item)) return wm_yaml_fail(item, err, "a map {device: NAME, ...} is needed");
-  wm_status status = wm_yaml_check_keys(item, kKeys, WM_YAML_STRICT, NULL, err);
+  wm_status status = config_check_keys(item, kConfigIioDeviceKeys, err);
   if (status == WM_OK) status = text(item, "device", out->device, sizeof out->device, err);
   if (status == WM_OK && !out->device[0])
     return wm_yaml_fail(item, err,
                         "device: is missing: a name as `cat /sys/bus/iio/devices/*/name` prints them, e.g. bmi160");
   if (status == WM_OK) status = text(item, "trigger", out->trigger, sizeof out->trigger, err);
-  if (status == WM_OK) status = number(item, "rate_hz", 10000, &out->rate_hz, err);
+  if (status == WM_OK) status = config_number(item, kConfigIioDeviceKeys, "rate_hz", &out->rate_hz, err);
   return status == WM_OK ? stream_is_new(item, config, "imu", err) : status;
 }
 
@@ -252,19 +227,18 @@ static wm_status read_list(const wm_yaml_node *list, size_t max, const char *wha
 }
 
 wm_status config_read_devices(const wm_yaml_node *root, wm_config *out, wm_error *err) {
-  static const char *const kKeys[] = {"can", "cameras", "lcm", "gpsd", "iio", "sightings", NULL};
-  static const char *const kSightings[] = {"none", "lcm", NULL};
   wm_yaml_node devices = wm_yaml_get(root, "devices"), can = wm_yaml_get(root, "devices.can"),
                cameras = wm_yaml_get(root, "devices.cameras"), lcm = wm_yaml_get(root, "devices.lcm"),
                gpsd = wm_yaml_get(root, "devices.gpsd"), iio = wm_yaml_get(root, "devices.iio");
   if (!wm_yaml_there(&devices)) return WM_OK;
-  wm_status status = wm_yaml_check_keys(&devices, kKeys, WM_YAML_STRICT, NULL, err);
+  wm_status status = config_check_keys(&devices, kConfigDevicesKeys, err);
   if (status == WM_OK) status = read_list(&can, WM_CAN_DEVICES_MAX, "{interface: NAME, ...}", read_can, out, err);
   if (status == WM_OK)
     status = read_list(&cameras, WM_CAMERA_DEVICES_MAX, "{name: CAMERA, device: PATH, ...}", read_camera, out, err);
   if (status == WM_OK) status = read_list(&lcm, WM_LCM_DEVICES_MAX, "{stream: NAME, ...}", read_lcm, out, err);
   if (status == WM_OK) status = read_list(&gpsd, WM_GPSD_DEVICES_MAX, "{take: position, ...}", read_gpsd, out, err);
   if (status == WM_OK) status = read_iio(&iio, out, err);
-  if (status == WM_OK) status = choice(&devices, "sightings", kSightings, &out->devices.sightings_by_lcm, err);
+  if (status == WM_OK)
+    status = config_choice(&devices, kConfigDevicesKeys, "sightings", &out->devices.sightings_by_lcm, err);
   return status;
 }

@@ -2,155 +2,254 @@
 #include "config/keys.h"
 #include "config/detectors.h"
 
+#include <float.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "waymark/recording.h"
+#include "waymark/streams.h"
 #include "waymark/text.h"
 
-#define KEY_MAX 96       // bytes of a dotted key
 #define NO_LIKENESS 100  // above any distance of two keys
 
+static const char *const kFormats[] = {"waymark-config/1", NULL};
+static const char *const kSampleAt[] = {"stamp", "next_stamp", NULL};
+static const char *const kSightings[] = {"none", "lcm", NULL};
+static const char *const kLcmClocks[] = {"here", "sender", NULL};             // wm_lcm_clock
+static const char *const kTake[] = {"position", "course", "antennas", NULL};  // wm_gpsd_from
+static const char *const kGpsdClocks[] = {"receiver", "utc", NULL};           // wm_gpsd_clock
+static const char *const kStamps[] = {"auto", "start", "end", NULL};          // wm_stamp_point
+
 const config_key kConfigKeys[] = {
-    {"format", "text", "needed", "`waymark-config/1`."},
-    {"estimator", "text", "by sources and maps",
-     "Name of the estimator; its parameters stand under the key of its name. Left out, the program chooses "
-     "(docs/estimators.md), and reports which."},
-    {"sources", "list", "none", "Settings of sources, in the order that holds at equal stamps. See below."},
-    {"calibration", "file", "the recording's", "calibration.yaml to take instead of the recording's."},
-    {"landmarks", "file", "the recording's", "landmarks.csv to take instead of the recording's."},
-    {"dbc", "file", "the recording's", "DBC file to take instead of the recording's vehicle.dbc."},
-    {"can_signals", "file", "the recording's", "can-signals.yaml to take instead of the recording's."},
-    {"devices", "map", "none",
-     "The robot's own devices, for `waymark run` without a recording: `can`, `cameras`, `lcm` (see below), and "
-     "`sightings: lcm` where another program sends sightings of landmarks (docs/live.md)."},
-    {"map", "file", "the recording's map/map.yaml", "Raster map (a map.yaml) to take instead of the recording's."},
-    {"initial_pose", "map", "the recording's",
-     "Start pose: `t_ns`, `x_m`, `y_m`, `z_m`, `heading_rad` or `heading_deg`, `qx`, `qy`, `qz`, `qw`, `sigma_xy_m`, "
-     "`sigma_heading_rad` or `sigma_heading_deg`; what is absent is unknown."},
-    {"vision", "map", "none",
-     "Detectors on pictures, each with its parameters: `{edges: {}}`. See below. Beside the parameters `cameras: "
-     "[NAME]` names the cameras; without it all cameras with pictures are used."},
-    {"vision.cascade.classes", "list", "needed for `vision.cascade`",
-     "Classes of landmarks, at most 8: `{file: FILE, height_m: H}`, a cascade in OpenCV's format and the height of its "
-     "window's content in m (docs/landmarks.md)."},
-    {"start.saved_pose", "path", "none",
-     "File that keeps the robot's last pose, on devices: a run begins there, if it isn't older than start.max_age_s, "
-     "whatever `initial_pose` is."},
-    {"start.saved_map", "path", "none",
-     "File for the map of `slam`, or of `stereo_ekf` with slam.key_frames, on devices, with its covariances and the "
-     "calibration states. The next run continues "
-     "with it, if estimator, parameters and calibration are the same. Its start pose is `start.saved_pose`; without "
-     "one the robot is relocalized in the map."},
-    {"black_box.folder", "path", "none",
-     "Folder, on devices, for event logs of the last seconds. They are kept when the robot gets lost or a run was "
-     "killed, the newest 20 times."},
-    {"publish.picture_socket", "path", "none",
-     "Local socket over which `waymark web` gets pictures with what the detectors found, twice a second while a person "
-     "looks (docs/live.md). Its owner and group may read it."},
-    {"publish.lcm_url", "text", "LCM's own", "LCM provider, e.g. `udpm://239.255.76.67:7667?ttl=0`."},
-    {"publish.channel_prefix", "text", "WAYMARK_", "What each channel's name begins with."},
-    {"commands.socket", "path", "none",
-     "Local datagram socket (a file) on which a run takes set_pose_t and reset_t, encoded as for LCM: from programs of "
-     "this computer that may write the file (owner and group)."},
-    {NULL, NULL, NULL, NULL},
+    {"format", CONFIG_CHOICE, CONFIG_NEEDED, .about = "Version of the format.", .names = kFormats},
+    {"estimator", CONFIG_ESTIMATOR, "by sources and maps",
+     .about = "Name of the estimator; its parameters stand under the key of its name. Left out, the program chooses "
+              "(docs/estimators.md), and reports which."},
+    {"sources", CONFIG_LIST, "none",
+     .about = "Settings of sources, in the order that holds at equal stamps. See below.", .of = kConfigSourceKeys,
+     .max = WM_SOURCES_MAX},
+    {"calibration", CONFIG_FILE, "the recording's", .about = "calibration.yaml to take instead of the recording's."},
+    {"landmarks", CONFIG_FILE, "the recording's", .about = "landmarks.csv to take instead of the recording's."},
+    {"dbc", CONFIG_FILE, "the recording's", .about = "DBC file to take instead of the recording's vehicle.dbc."},
+    {"can_signals", CONFIG_FILE, "the recording's", .about = "can-signals.yaml to take instead of the recording's."},
+    {"devices", CONFIG_MAP, "none",
+     .about = "The robot's own devices, for `waymark run` without a recording. See below.", .of = kConfigDevicesKeys},
+    {"map", CONFIG_FILE, "the recording's map/map.yaml",
+     .about = "Raster map (a map.yaml) to take instead of the recording's."},
+    {"initial_pose", CONFIG_MAP, "the recording's",
+     .about = "Start pose: `t_ns`, `x_m`, `y_m`, `z_m`, `heading_rad` or `heading_deg`, `qx`, `qy`, `qz`, `qw`, "
+              "`sigma_xy_m`, "
+              "`sigma_heading_rad` or `sigma_heading_deg`; what is absent is unknown.",
+     .names = wm_start_keys},
+    {"vision", CONFIG_MAP, "none",
+     .about =
+         "Detectors on pictures, each with its parameters: `{edges: {}}`. See below. Beside the parameters `cameras: "
+         "[NAME]` names the cameras; without it all cameras with pictures are used."},
+    {"vision.cascade.classes", CONFIG_LIST, CONFIG_NEEDED,
+     .about = "Classes of landmarks, at most 8 (docs/landmarks.md).", .of = kConfigClassKeys,
+     .max = WM_CONFIG_CASCADES_MAX},
+    {"start.saved_pose", CONFIG_PATH, "none",
+     .about = "File that keeps the robot's last pose, on devices: a run begins there, if it isn't older than "
+              "start.max_age_s, "
+              "whatever `initial_pose` is."},
+    {"start.saved_map", CONFIG_PATH, "none",
+     .about = "File for the map of `slam`, or of `stereo_ekf` with slam.key_frames, on devices, with its covariances "
+              "and the "
+              "calibration states. The next run continues "
+              "with it, if estimator, parameters and calibration are the same. Its start pose is `start.saved_pose`; "
+              "without "
+              "one the robot is relocalized in the map."},
+    {"black_box.folder", CONFIG_PATH, "none",
+     .about =
+         "Folder, on devices, for event logs of the last seconds. They are kept when the robot gets lost or a run was "
+         "killed, the newest 20 times."},
+    {"publish.picture_socket", CONFIG_PATH, "none",
+     .about = "Local socket over which `waymark web` gets pictures with what the detectors found, twice a second while "
+              "a person "
+              "looks (docs/live.md). Its owner and group may read it."},
+    {"publish.lcm_url", CONFIG_TEXT, "LCM's own", .about = "LCM provider, e.g. `udpm://239.255.76.67:7667?ttl=0`."},
+    {"publish.channel_prefix", CONFIG_TEXT, "WAYMARK_", .about = "What each channel's name begins with."},
+    {"commands.socket", CONFIG_PATH, "none",
+     .about = "Local datagram socket (a file) on which a run takes set_pose_t and reset_t, encoded as for LCM: from "
+              "programs of "
+              "this computer that may write the file (owner and group)."},
+    {0},
 };
 
 const config_key kConfigSourceKeys[] = {
-    {"name", "text", "needed",
-     "`can`, `motion`, `motion6`, `increments`, `ticks`, `speeds`, `steering`, `imu`, `heading`, `depth`, "
-     "`sightings`, `markers`, `stereo`, `points` or `gnss`; "
-     "`sightings:SENSOR` for one "
-     "sensor; a detector under `vision`, or `DETECTOR:CAMERA`."},
-    {"use", "true or false", "true", "false: the source is not opened."},
-    {"lateness_max_ms", "number from 0 to merge.horizon_ms", "merge.lateness_max_ms",
-     "ms. A datum that arrives later than this after its stamp is late, and dropped. Where neither this nor "
-     "merge.lateness_max_ms is given, three late data in a row raise it, up to merge.horizon_ms."},
-    {"period_ms", "number from 0 to 60000", "0",
-     "ms. Above 0: the source sends nothing within this time after a datum, and the merge does not wait for it."},
-    {"ready_after_ms", "number from 0 to 60000", "0",
-     "ms. A detector on recorded pictures, in a replay: the arrival of its observations after the picture's. On "
-     "devices the measured time of detection counts (`detect` in timing.json)."},
-    {"sample_at", "`stamp`, `next_stamp`", "stamp",
-     "`motion` and `motion6` of a recording. next_stamp: a row is stamped with the beginning of the interval over "
-     "which "
-     "it was measured; its values get the stamp of the next row."},
-    {"from_s", "number", "the beginning", "s from the run's first stamp. Earlier data are not taken."},
-    {"until_s", "number", "the end", "s from the run's first stamp. Later data are not taken."},
-    {NULL, NULL, NULL, NULL},
+    {"name", CONFIG_SOURCE, CONFIG_NEEDED,
+     .about = "`can`, `motion`, `motion6`, `increments`, `ticks`, `speeds`, `steering`, `imu`, `heading`, `depth`, "
+              "`sightings`, `markers`, `stereo`, `points` or `gnss`; "
+              "`sightings:SENSOR` for one "
+              "sensor; a detector under `vision`, or `DETECTOR:CAMERA`."},
+    {"use", CONFIG_BOOL, "true", .about = "false: the source is not opened."},
+    {"lateness_max_ms", CONFIG_NUMBER, "merge.lateness_max_ms",
+     .about = "ms, at most merge.horizon_ms. A datum that arrives later than this after its stamp is late, and "
+              "dropped. Where neither this nor "
+              "merge.lateness_max_ms is given, three late data in a row raise it, up to merge.horizon_ms.",
+     .max = 60000},
+    {"period_ms", CONFIG_NUMBER, "0",
+     .about =
+         "ms. Above 0: the source sends nothing within this time after a datum, and the merge does not wait for it.",
+     .max = 60000},
+    {"ready_after_ms", CONFIG_NUMBER, "0",
+     .about =
+         "ms. A detector on recorded pictures, in a replay: the arrival of its observations after the picture's. On "
+         "devices the measured time of detection counts (`detect` in timing.json).",
+     .max = 60000},
+    {"sample_at", CONFIG_CHOICE, "stamp",
+     .about =
+         "`motion` and `motion6` of a recording. next_stamp: a row is stamped with the beginning of the interval over "
+         "which "
+         "it was measured; its values get the stamp of the next row.",
+     .names = kSampleAt},
+    {"from_s", CONFIG_NUMBER, "the beginning", .about = "s from the run's first stamp. Earlier data are not taken.",
+     .min = -HUGE_VAL, .max = HUGE_VAL},
+    {"until_s", CONFIG_NUMBER, "the end", .about = "s from the run's first stamp. Later data are not taken.",
+     .min = -HUGE_VAL, .max = HUGE_VAL},
+    {0},
+};
+
+const config_key kConfigClassKeys[] = {
+    {"file", CONFIG_FILE, CONFIG_NEEDED, .about = "Cascade in OpenCV's format (XML)."},
+    {"height_m", CONFIG_NUMBER, CONFIG_NEEDED, .about = "m. Height of what the cascade's window shows.", .min = 0.01,
+     .max = 100},
+    {0},
+};
+
+const config_key kConfigDevicesKeys[] = {
+    {"can", CONFIG_LIST, "none", .about = "CAN interfaces.", .of = kConfigCanDeviceKeys, .max = WM_CAN_DEVICES_MAX},
+    {"cameras", CONFIG_LIST, "none", .about = "Cameras.", .of = kConfigCameraDeviceKeys, .max = WM_CAMERA_DEVICES_MAX},
+    {"lcm", CONFIG_LIST, "none", .about = "Streams that other programs send over LCM.", .of = kConfigLcmDeviceKeys,
+     .max = WM_LCM_DEVICES_MAX},
+    {"gpsd", CONFIG_LIST, "none", .about = "GNSS receivers, by gpsd.", .of = kConfigGpsdDeviceKeys,
+     .max = WM_GPSD_DEVICES_MAX},
+    {"iio", CONFIG_MAP, "none", .about = "The IMU, by the kernel's IIO.", .of = kConfigIioDeviceKeys},
+    {"sightings", CONFIG_CHOICE, "none", .about = "lcm: another program sends sightings of landmarks (docs/live.md).",
+     .names = kSightings},
+    {0},
 };
 
 const config_key kConfigCanDeviceKeys[] = {
-    {"interface", "text", "needed", "SocketCAN's name of it, e.g. `can0`. It needn't be there yet."},
-    {"dbc", "file", "`dbc` at the top", "DBC file of this bus."},
-    {"can_signals", "file", "`can_signals` at the top", "Which signals of this bus are which quantities."},
-    {NULL, NULL, NULL, NULL},
+    {"interface", CONFIG_TEXT, CONFIG_NEEDED, .about = "SocketCAN's name of it, e.g. `can0`. It needn't be there yet."},
+    {"dbc", CONFIG_FILE, "`dbc` at the top", .about = "DBC file of this bus."},
+    {"can_signals", CONFIG_FILE, "`can_signals` at the top",
+     .about = "Which signals of this bus are which quantities."},
+    {0},
 };
 
 const config_key kConfigLcmDeviceKeys[] = {
-    {"stream", "`motion`, `motion6`, `ticks`, `speeds`, `steering`, `imu`, `heading`, `depth`, `gnss`", "needed",
-     "The stream of a recording that another program sends over LCM: motion.csv as motion_t, imu.csv as imu_t ... "
-     "(motion-sources.md)."},
-    {"channel", "text", "the stream's name in capitals", "LCM channel, behind publish.channel_prefix."},
-    {"clock", "`here`, `sender`", "here",
-     "Whose clock `t_ns` is of. here: CLOCK_MONOTONIC of this computer. sender: a monotonic clock of the sender's own, "
-     "followed by the smallest delay."},
-    {"rate_max_hz", "number from 0 to 10000", "1000", "Messages beyond this rate are dropped."},
-    {NULL, NULL, NULL, NULL},
+    {"stream", CONFIG_CHOICE, CONFIG_NEEDED,
+     .about =
+         "The stream of a recording that another program sends over LCM: motion.csv as motion_t, imu.csv as imu_t ... "
+         "(motion-sources.md).",
+     .names = wm_stream_names},
+    {"channel", CONFIG_TEXT, "the stream's name in capitals", .about = "LCM channel, behind publish.channel_prefix."},
+    {"clock", CONFIG_CHOICE, "here",
+     .about = "Whose clock `t_ns` is of. here: CLOCK_MONOTONIC of this computer. sender: a monotonic clock of the "
+              "sender's own, "
+              "followed by the smallest delay.",
+     .names = kLcmClocks},
+    {"rate_max_hz", CONFIG_NUMBER, "1000", .about = "Messages beyond this rate are dropped.", .max = 10000},
+    {0},
 };
 
 const config_key kConfigGpsdDeviceKeys[] = {
-    {"take", "`position`, `course`, `antennas`", "position",
-     "position: the stream gnss, in metres about `gnss: {origin}` of calibration.yaml. course: the stream heading by "
-     "the "
-     "velocity's direction, for a robot that only drives forwards. antennas: the stream heading, of a receiver with "
-     "two antennas."},
-    {"host", "text", "localhost", "Computer on which gpsd runs."},
-    {"port", "whole number from 1 to 65535", "2947", "Its port."},
-    {"device", "path", "any", "Of several receivers this one, as gpsd names it, e.g. `/dev/ttyACM0`."},
-    {"clock", "`receiver`, `utc`", "receiver",
-     "receiver: the receiver's UTC is followed by the smallest delay. utc: this computer's wall clock is set (chrony "
-     "with "
-     "the receiver's pulse, NTP), and a delay of the receiver does no harm."},
-    {"latency_ms", "number from 0 to 5000", "0",
-     "ms. Least time from the measurement to its arrival, by the receiver's data sheet and its line: 20 to 200."},
-    {"accuracy_scale", "number above 0 to 100", "1",
-     "Sigmas in gpsd's accuracies (epx, epy, eph, epv, epd), whose confidence depends on the receiver."},
-    {"course_min_mps", "number above 0 to 100", "1", "m/s. `take: course`: slower, the velocity's direction is noise."},
-    {"sigma_deg", "number above 0 to 90", "1", "deg. `take: antennas`: sigma of the heading."},
-    {NULL, NULL, NULL, NULL},
+    {"take", CONFIG_CHOICE, "position",
+     .about = "position: the stream gnss, in metres about `gnss: {origin}` of calibration.yaml. course: the stream "
+              "heading by "
+              "the "
+              "velocity's direction, for a robot that only drives forwards. antennas: the stream heading, of a "
+              "receiver with "
+              "two antennas.",
+     .names = kTake},
+    {"host", CONFIG_TEXT, "localhost", .about = "Computer on which gpsd runs."},
+    {"port", CONFIG_WHOLE, "2947", .about = "Its port.", .min = 1, .max = 65535},
+    {"device", CONFIG_PATH, "any", .about = "Of several receivers this one, as gpsd names it, e.g. `/dev/ttyACM0`."},
+    {"clock", CONFIG_CHOICE, "receiver",
+     .about = "receiver: the receiver's UTC is followed by the smallest delay. utc: this computer's wall clock is set "
+              "(chrony "
+              "with "
+              "the receiver's pulse, NTP), and a delay of the receiver does no harm.",
+     .names = kGpsdClocks},
+    {"latency_ms", CONFIG_NUMBER, "0",
+     .about =
+         "ms. Least time from the measurement to its arrival, by the receiver's data sheet and its line: 20 to 200.",
+     .max = 5000},
+    {"accuracy_scale", CONFIG_NUMBER, "1",
+     .about = "Sigmas in gpsd's accuracies (epx, epy, eph, epv, epd), whose confidence depends on the receiver.",
+     .min = DBL_MIN, .max = 100},
+    {"course_min_mps", CONFIG_NUMBER, "1", .about = "m/s. `take: course`: slower, the velocity's direction is noise.",
+     .min = DBL_MIN, .max = 100},
+    {"sigma_deg", CONFIG_NUMBER, "1", .about = "deg. `take: antennas`: sigma of the heading.", .min = DBL_MIN,
+     .max = 90},
+    {0},
 };
 
 const config_key kConfigIioDeviceKeys[] = {
-    {"device", "text", "needed",
-     "Name of the IMU, as `cat /sys/bus/iio/devices/*/name` prints it. It needn't be there yet."},
-    {"trigger", "text", "its own", "Name of the trigger that samples it, e.g. of an iio-trig-hrtimer."},
-    {"rate_hz", "number from 0 to 10000", "the driver's", "Sampling rate, one that the driver has."},
-    {NULL, NULL, NULL, NULL},
+    {"device", CONFIG_TEXT, CONFIG_NEEDED,
+     .about = "Name of the IMU, as `cat /sys/bus/iio/devices/*/name` prints it. It needn't be there yet."},
+    {"trigger", CONFIG_TEXT, "its own", .about = "Name of the trigger that samples it, e.g. of an iio-trig-hrtimer."},
+    {"rate_hz", CONFIG_NUMBER, "the driver's", .about = "Sampling rate, one that the driver has.", .max = 10000},
+    {0},
 };
 
 const config_key kConfigCameraDeviceKeys[] = {
-    {"name", "text", "needed", "The camera's name in calibration.yaml, which has its size."},
-    {"device", "path", "by card and bus",
-     "`/dev/video0`, or a name that stays the same when it is plugged in again: `/dev/v4l/by-id/...`."},
-    {"card", "text", "as first opened",
-     "The model, as `v4l2-ctl -D` prints it: another camera is not taken for this one."},
-    {"bus", "text", "as first opened", "Where it is plugged in, as `v4l2-ctl -D` prints it."},
-    {"libcamera", "text", "by V4L2",
-     "Instead of device, card and bus: libcamera's identifier, as `cam -l` prints it in brackets (live.md)."},
-    {"format", "`GREY`, `YUYV`, `UYVY`, `NV12`, `Y10`, `Y16`, `MJPG`, `RGB3`, `BGR3`", "the driver's",
-     "What the camera sends."},
-    {"rate_hz", "number from 0 to 1000", "the driver's", "Pictures a second."},
-    {"exposure_ms", "number from 0 to 1000", "the driver's",
-     "ms. Exposure, where the driver does not report it: a picture's time is the middle of it."},
-    {"latency_ms", "number from 0 to 1000", "0", "ms. From the exposure's start or end to the driver's stamp."},
-    {"stamp", "`auto`, `start`, `end`", "auto",
-     "The moment that the driver's stamp marks; auto: as the driver reports it."},
-    {"controls", "map", "none",
-     "V4L2 controls by the names of `v4l2-ctl -l`, e.g. `{auto_exposure: 1, gain: 20}`; libcamera's by its own, "
-     "whole numbers, e.g. `{AeEnable: 0, ExposureTime: 4000}`."},
-    {NULL, NULL, NULL, NULL},
+    {"name", CONFIG_TEXT, CONFIG_NEEDED, .about = "The camera's name in calibration.yaml, which has its size."},
+    {"device", CONFIG_PATH, "by card and bus",
+     .about = "`/dev/video0`, or a name that stays the same when it is plugged in again: `/dev/v4l/by-id/...`."},
+    {"card", CONFIG_TEXT, "as first opened",
+     .about = "The model, as `v4l2-ctl -D` prints it: another camera is not taken for this one."},
+    {"bus", CONFIG_TEXT, "as first opened", .about = "Where it is plugged in, as `v4l2-ctl -D` prints it."},
+    {"libcamera", CONFIG_TEXT, "by V4L2",
+     .about = "Instead of device, card and bus: libcamera's identifier, as `cam -l` prints it in brackets (live.md)."},
+    {"format", CONFIG_CHOICE, "the driver's", .about = "What the camera sends.", .names = wm_camera_formats},
+    {"rate_hz", CONFIG_NUMBER, "the driver's", .about = "Pictures a second.", .max = 1000},
+    {"exposure_ms", CONFIG_NUMBER, "the driver's",
+     .about = "ms. Exposure, where the driver does not report it: a picture's time is the middle of it.", .max = 1000},
+    {"latency_ms", CONFIG_NUMBER, "0", .about = "ms. From the exposure's start or end to the driver's stamp.",
+     .max = 1000},
+    {"stamp", CONFIG_CHOICE, "auto",
+     .about = "The moment that the driver's stamp marks; auto: as the driver reports it.", .names = kStamps},
+    {"controls", CONFIG_MAP, "none",
+     .about =
+         "V4L2 controls by the names of `v4l2-ctl -l`, e.g. `{auto_exposure: 1, gain: 20}`; libcamera's by its own, "
+         "whole numbers, e.g. `{AeEnable: 0, ExposureTime: 4000}`."},
+    {0},
 };
+
+static const config_key *find_key(const config_key *keys, const char *key) {
+  while (strcmp(keys->key, key) != 0) keys++;
+  return keys;
+}
+
+wm_status config_check_keys(const wm_yaml_node *map, const config_key *keys, wm_error *err) {
+  const char *names[32] = {NULL};
+  for (size_t i = 0; keys[i].key && i + 1 < sizeof names / sizeof names[0]; i++) names[i] = keys[i].key;
+  return wm_yaml_check_keys(map, names, WM_YAML_STRICT, NULL, err);
+}
+
+wm_status config_number(const wm_yaml_node *map, const config_key *keys, const char *key, double *out, wm_error *err) {
+  const config_key *const of = find_key(keys, key);
+  wm_yaml_node node = wm_yaml_get(map, key);
+  return wm_yaml_there(&node) ? wm_yaml_f64(&node, of->min, of->max, out, err) : WM_OK;
+}
+
+wm_status config_whole(const wm_yaml_node *map, const config_key *keys, const char *key, int32_t *out, wm_error *err) {
+  const config_key *const of = find_key(keys, key);
+  wm_yaml_node node = wm_yaml_get(map, key);
+  int64_t value = *out;
+  wm_status status = wm_yaml_there(&node) ? wm_yaml_i64(&node, (int64_t)of->min, (int64_t)of->max, &value, err) : WM_OK;
+  if (status == WM_OK) *out = (int32_t)value;
+  return status;
+}
+
+wm_status config_choice(const wm_yaml_node *map, const config_key *keys, const char *key, int32_t *out, wm_error *err) {
+  wm_yaml_node node = wm_yaml_get(map, key);
+  return wm_yaml_there(&node) ? wm_yaml_choice(&node, find_key(keys, key)->names, out, err) : WM_OK;
+}
 
 size_t config_sections(config_section out[CONFIG_SECTIONS_MAX]) {
   out[0] = (config_section){"runtime", "", "", &wm_runtime_params_table};
@@ -180,7 +279,7 @@ static void each_key(void (*take)(void *context, const char *key), void *context
   for (size_t i = 0; kConfigKeys[i].key; i++) take(context, kConfigKeys[i].key);
   for (size_t s = 0; s < count; s++)
     for (size_t i = 0; i < sections[s].table->count; i++) {
-      char full[KEY_MAX];
+      char full[CONFIG_KEY_MAX];
       snprintf(full, sizeof full, "%s%s", sections[s].prefix, sections[s].table->params[i].key);
       take(context, full);
     }
@@ -191,7 +290,7 @@ static void each_key(void (*take)(void *context, const char *key), void *context
 typedef struct search {
   const char *wrong;
   int best;  // lower is nearer
-  char found[KEY_MAX];
+  char found[CONFIG_KEY_MAX];
 } search;
 
 static const char *last_part(const char *key) {
@@ -218,7 +317,7 @@ static void consider_one(search *self, const char *full) {
 
 // The key and the sections that it stands in.
 static void consider(void *context, const char *key) {
-  char full[KEY_MAX];
+  char full[CONFIG_KEY_MAX];
   snprintf(full, sizeof full, "%s", key);
   for (char *dot = full; dot; dot = strrchr(full, '.')) {
     if (dot != full) *dot = '\0';
@@ -242,7 +341,7 @@ static int is_listed(const char *names, const char *name, size_t length) {
 
 static void add_neighbour(void *context, const char *key) {
   neighbours *self = context;
-  char name[KEY_MAX];
+  char name[CONFIG_KEY_MAX];
   if (strncmp(key, self->wrong, self->level) != 0) return;
   int n = snprintf(name, sizeof name, "%.*s", (int)strcspn(key + self->level, "."), key + self->level);
   if (n <= 0 || is_listed(self->names, name, (size_t)n) || self->used + (size_t)n + 3 > sizeof self->names) return;
@@ -336,7 +435,7 @@ static void warn(char *to, const wm_yaml_node *value, int line, const char *text
 
 static void warn_if_not_read(const reading *self, const config_filling *of, const wm_yaml_node *value, int line,
                              const wm_param *param) {
-  char key[KEY_MAX], text[200];
+  char key[CONFIG_KEY_MAX], text[200];
   const wm_estimator *reader = self->shared ? self->shared->reader : NULL;
   if (!reader || of < self->shared->of || of >= self->shared->of + WM_CONFIG_SHARED) return;
   snprintf(key, sizeof key, "%s%s", of->prefix, param->key);
@@ -372,7 +471,7 @@ static int is_of(const wm_param_old *old, const char *key, const char **tail) {
 
 // The section and the parameter of the row, -1: no parameter.
 static int new_place(const reading *self, const wm_param_old *old, const char *tail, config_filling **to) {
-  char key[KEY_MAX];
+  char key[CONFIG_KEY_MAX];
   *to = self->own;
   if (!old->new_key) return -1;
   snprintf(key, sizeof key, "%.*s%s", (int)strcspn(old->new_key, "*"), old->new_key, tail);

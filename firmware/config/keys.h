@@ -6,22 +6,50 @@
 #include "config/config.h"
 #include "waymark/yaml.h"
 
-// A key of a configuration that no table has.
+typedef enum config_kind {
+  CONFIG_TEXT,
+  CONFIG_FILE,
+  CONFIG_PATH,
+  CONFIG_ESTIMATOR,  // name of one
+  CONFIG_SOURCE,     // name of one, or NAME:SENSOR
+  CONFIG_BOOL,
+  CONFIG_NUMBER,
+  CONFIG_WHOLE,
+  CONFIG_CHOICE,
+  CONFIG_LIST,
+  CONFIG_MAP
+} config_kind;
+
+// A key of a configuration that no table of parameters has.
 typedef struct config_key {
-  const char *key;      // dotted, from the top
-  const char *type;     // "text", "list", "map", "file"
-  const char *initial;  // for the reference
+  const char *key;  // dotted, from the top or from the entry of a list
+  config_kind kind;
+  const char *initial;  // for the reference; CONFIG_NEEDED
   const char *about;
+  const char *const *names;     // CHOICE: its values; MAP without `of`: its keys, of numbers. NULL-terminated
+  double min, max;              // NUMBER, WHOLE: inclusive limits; LIST: max entries, 0: any
+  const struct config_key *of;  // LIST: keys of each entry; MAP: its own; NULL: any
 } config_key;
+#define CONFIG_NEEDED "needed"
+#define CONFIG_KEY_MAX 96  // bytes of a dotted key
 
 // Ends with a NULL key.
 extern const config_key kConfigKeys[];
 extern const config_key kConfigSourceKeys[];
+extern const config_key kConfigClassKeys[];
+extern const config_key kConfigDevicesKeys[];
 extern const config_key kConfigCanDeviceKeys[];
 extern const config_key kConfigLcmDeviceKeys[];
 extern const config_key kConfigGpsdDeviceKeys[];
 extern const config_key kConfigIioDeviceKeys[];
 extern const config_key kConfigCameraDeviceKeys[];
+
+// Reading by these tables. `map` has no other keys.
+wm_status config_check_keys(const wm_yaml_node *map, const config_key *keys, wm_error *err);
+// A NUMBER, WHOLE or CHOICE of `map`, within its limits; *out is unchanged where it isn't given.
+wm_status config_number(const wm_yaml_node *map, const config_key *keys, const char *key, double *out, wm_error *err);
+wm_status config_whole(const wm_yaml_node *map, const config_key *keys, const char *key, int32_t *out, wm_error *err);
+wm_status config_choice(const wm_yaml_node *map, const config_key *keys, const char *key, int32_t *out, wm_error *err);
 
 // A table and where it stands in the file: `prefix` is "" for the runtime's, else "motion.", "ESTIMATOR."
 // or "vision.DETECTOR.".

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "config/detectors.h"
+#include "config/keys.h"
 #include "config/sources.h"
 #include "waymark/streams.h"
 #include "waymark/text.h"
@@ -42,11 +43,6 @@ static wm_status read_name(const wm_yaml_node *item, const wm_config *config, wm
   return WM_OK;
 }
 
-static wm_status number(const wm_yaml_node *item, const char *key, double min, double max, double *out, wm_error *err) {
-  wm_yaml_node node = wm_yaml_get(item, key);
-  return wm_yaml_there(&node) ? wm_yaml_f64(&node, min, max, out, err) : WM_OK;
-}
-
 static wm_status check_lateness(const wm_yaml_node *node, double lateness_ms, double horizon_ms, wm_error *err) {
   if (lateness_ms <= horizon_ms) return WM_OK;
   return wm_yaml_fail(
@@ -61,41 +57,38 @@ static wm_status read_ready_after(const wm_yaml_node *item, wm_source_config *ou
   if (!wm_yaml_there(&node)) return WM_OK;
   snprintf(base, sizeof base, "%.*s", (int)strcspn(out->name, ":"), out->name);
   if (!config_detector_find(base)) return wm_yaml_fail(&node, err, "only a detector's observations take time");
-  return wm_yaml_f64(&node, 0, 60000, &out->ready_after_ms, err);
+  return config_number(item, kConfigSourceKeys, "ready_after_ms", &out->ready_after_ms, err);
 }
 
 // A file's convention for the stamps of its rows; other sources stamp their measurements.
 static wm_status read_sample_at(const wm_yaml_node *item, wm_source_config *out, wm_error *err) {
-  static const char *const kChoices[] = {"stamp", "next_stamp", NULL};
   wm_yaml_node node = wm_yaml_get(item, "sample_at");
   if (!wm_yaml_there(&node)) return WM_OK;
   if (strcmp(out->name, "motion") != 0 && strcmp(out->name, "motion6") != 0)
     return wm_yaml_fail(&node, err, "only `motion` and `motion6` have rows whose values can get the next row's stamp");
-  return wm_yaml_choice(&node, kChoices, &out->sample_at_next, err);
+  return config_choice(item, kConfigSourceKeys, "sample_at", &out->sample_at_next, err);
 }
 
 static wm_status read_source(const wm_yaml_node *item, const wm_config *config, wm_source_config *out, wm_error *err) {
-  static const char *const kKeys[] = {"name",      "use",    "lateness_max_ms", "period_ms", "ready_after_ms",
-                                      "sample_at", "from_s", "until_s",         NULL};
   *out = defaults(config);
   out->line = wm_yaml_line(item);
   if (!wm_yaml_is_map(item)) return wm_yaml_fail(item, err, "a map {name: NAME, ...} is needed");
-  wm_status status = wm_yaml_check_keys(item, kKeys, WM_YAML_STRICT, NULL, err);
+  wm_status status = config_check_keys(item, kConfigSourceKeys, err);
   if (status == WM_OK) status = read_name(item, config, out, err);
   wm_yaml_node use = wm_yaml_get(item, "use"), lateness = wm_yaml_get(item, "lateness_max_ms"),
                until = wm_yaml_get(item, "until_s");
   int yes = 1;
   if (status == WM_OK && wm_yaml_there(&use)) status = wm_yaml_bool(&use, &yes, err);
   out->use = yes;
-  if (status == WM_OK) status = number(item, "lateness_max_ms", 0, 60000, &out->lateness_max_ms, err);
+  if (status == WM_OK) status = config_number(item, kConfigSourceKeys, "lateness_max_ms", &out->lateness_max_ms, err);
   if (wm_yaml_there(&lateness)) out->lateness_is_stated = 1;
   if (status == WM_OK && wm_yaml_there(&lateness))
     status = check_lateness(&lateness, out->lateness_max_ms, config->runtime.merge_horizon_ms, err);
-  if (status == WM_OK) status = number(item, "period_ms", 0, 60000, &out->period_ms, err);
+  if (status == WM_OK) status = config_number(item, kConfigSourceKeys, "period_ms", &out->period_ms, err);
   if (status == WM_OK) status = read_ready_after(item, out, err);
   if (status == WM_OK) status = read_sample_at(item, out, err);
-  if (status == WM_OK) status = number(item, "from_s", -HUGE_VAL, 1e9, &out->from_s, err);
-  if (status == WM_OK) status = number(item, "until_s", -1e9, HUGE_VAL, &out->until_s, err);
+  if (status == WM_OK) status = config_number(item, kConfigSourceKeys, "from_s", &out->from_s, err);
+  if (status == WM_OK) status = config_number(item, kConfigSourceKeys, "until_s", &out->until_s, err);
   if (status == WM_OK && out->until_s <= out->from_s)
     return wm_yaml_fail(&until, err, "%.10g is not after from_s (%.10g): nothing would be taken", out->until_s,
                         out->from_s);

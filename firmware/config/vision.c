@@ -28,8 +28,7 @@ static wm_status read_cameras(const wm_yaml_node *section, wm_vision_config *out
 
 static wm_status read_class(const wm_yaml_node *item, int must_be_there, const wm_config *config, wm_vision_config *out,
                             wm_error *err) {
-  static const char *const kKeys[] = {"file", "height_m", NULL};
-  wm_status status = wm_yaml_check_keys(item, kKeys, WM_YAML_STRICT, NULL, err);
+  wm_status status = config_check_keys(item, kConfigClassKeys, err);
   if (status != WM_OK) return status;
   wm_yaml_node file = wm_yaml_get(item, "file"), height = wm_yaml_get(item, "height_m");
   if (!wm_yaml_there(&file)) return wm_yaml_fail(item, err, "file: is missing; a cascade in OpenCV's format (XML)");
@@ -38,7 +37,7 @@ static wm_status read_class(const wm_yaml_node *item, int must_be_there, const w
   char path[WM_PATH_MAX];
   double height_m = 0;
   status = config_path(&file, config->path, path, err);
-  if (status == WM_OK) status = wm_yaml_f64(&height, 0.01, 100, &height_m, err);
+  if (status == WM_OK) status = config_number(item, kConfigClassKeys, "height_m", &height_m, err);
   if (status != WM_OK || !must_be_there) return status;
   wm_error said = {0};
   if (wm_cascade_load(path, &out->cascades[out->cascade_count], &said) != WM_OK)

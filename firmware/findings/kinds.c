@@ -125,7 +125,7 @@ const wm_finding_kind kFindingKinds[WM_FOUND_COUNT] = {
     [WM_FOUND_CAMERA_DEVICE] = {"camera-device", "the camera is absent or may not be opened",
                                 "`v4l2-ctl --list-devices` lists cameras"},
     [WM_FOUND_IMU_DEVICE] = {"imu-device", "the IMU is absent, has no buffer, or may not be set up",
-                             "docs/motion-sources.md sets one up"},
+                             "docs/imu-gnss.md sets one up"},
     [WM_FOUND_GNSS_RECEIVER] = {"gnss-receiver", "gpsd does not run, or its receiver has no fix",
                                 "`gpspipe -w` shows its reports"},
     [WM_FOUND_LCM_ROUTE] = {"lcm-route", "no interface has a route for multicast", "ip route add 224.0.0.0/4 dev lo"},

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A robot of robots.py, drawn: its scenario (docs/simulate.md), the configuration that its user writes, and what it is, in words.
+"""A robot of robots.py, drawn: its scenario (docs/scenario.md), the configuration that its user writes, and what it is, in words.
 
 Ranges are of robots that people build: indoors, in a yard, a car; wheels with and without a gyro, measured twists, an IMU,
 holonomic and skid-steer bases; one or two sensors of landmarks, markers, or a receiver. Errors are of a tape measure and a data

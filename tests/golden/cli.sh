@@ -37,7 +37,7 @@ expect 0 "  eval      measure a run against truth" help
 expect 2 "did you mean 'replay'" repaly
 expect 2 "did you mean 'detect'" detct
 expect 2 "'dance' is not a command" dance
-for command in run replay check doctor record watch stamps; do expect 0 "example" "$command" --help; done
+for command in run replay check doctor record watch stamps config; do expect 0 "example" "$command" --help; done
 
 expect 2 "--record: records devices" run --config "$work/good.yaml" --recording "$work/rec" --record "$work/new"
 expect 2 "exists already; a recording is never overwritten" run --config "$work/good.yaml" --record "$work/rec"

@@ -21,11 +21,11 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 CONFIG_HEAD = """# Configuration
 
 A configuration names an estimator and its parameters, or leaves the choice to sources and maps. What belongs to a robot or a place (calibration, landmarks, DBC,
-start pose) comes from the recording's folder unless the configuration says otherwise, so that one configuration serves
-every recording of its kind. It is YAML, read once at start; a mistake stops with file, line, key, what is there and what
-is allowed ([errors.md](errors.md) shows them). A key that isn't given has its default; an unknown key is an error.
+start pose) comes from the recording's folder unless the configuration says otherwise. It is YAML, read once at start. A mistake stops with file, line, key,
+what is there and what is allowed ([errors.md](errors.md)). A key that isn't given has its default; an unknown key is an error.
 
 ```yaml
+# yaml-language-server: $schema=waymark.schema.json
 format: waymark-config/1
 estimator: landmark_ekf
 sources:                        # the order that holds at equal stamps; what isn't listed follows
@@ -38,7 +38,11 @@ sightings:
 landmark_ekf: {recover.sigma_xy_m: 3}
 ```
 
-Dots in the tables below are nested maps: `publish.rate_hz` is `publish: {rate_hz: 50}`. Units stand in the names.
+The first line is for editors (VS Code with the YAML extension, and others with yaml-language-server). `waymark config --schema > waymark.schema.json` writes the
+schema beside the configuration, from the tables below. The editor then completes keys, shows their meaning, and marks what the program would refuse. Former keys
+are marked, too.
+
+Dots in the tables are nested maps: `publish.rate_hz` is `publish: {rate_hz: 50}`. Units stand in the names.
 
 <!-- Made by tests/golden/docs.py from the tables that read the configuration: change them there. -->
 

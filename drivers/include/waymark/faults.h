@@ -137,8 +137,6 @@ int wm_fault_hits(uint32_t number, double share);
 
 // The file as one JSON object, with all defaults, for programs that judge: an absent number is null.
 void wm_faults_json(const wm_faults *self, FILE *to);
-// `text` as a JSON string with its quotes.
-void wm_json_text(const char *text, FILE *to);
 // The kinds as a table in markdown.
 void wm_fault_kinds_reference(FILE *to);
 

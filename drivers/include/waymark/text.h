@@ -6,6 +6,7 @@
 
 #include <stddef.h>
 #include <stdint.h>
+#include <stdio.h>
 
 #include "waymark/status.h"
 
@@ -35,6 +36,9 @@ const char *wm_word_nearest(const char *word, const char *const *known);
 // '?', cut with "..." where it is longer. Returns `out`.
 const char *wm_show_text(const char *text, size_t length, char *out, size_t capacity);
 #define WM_SHOW_TEXT_MAX 64  // bytes of a quoted value in a message
+
+// `text` as a JSON string with its quotes.
+void wm_json_text(const char *text, FILE *to);
 
 // Reads a file of at most `max_bytes` whole; *out is terminated, and the caller frees it. WM_NOT_FOUND, WM_IO, WM_FULL
 // with the path and the system's reason.

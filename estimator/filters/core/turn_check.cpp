@@ -11,8 +11,8 @@ namespace {
 constexpr double kFactor[] = {-1.0, 0.0};
 constexpr double kNisMost = 9.0;     // an outlier has no more weight
 constexpr double kLinear_rad = 0.5;  // a larger shift of the heading is beyond the derivatives
-// Nats. On 30 good drives (docs/reports/archive-motion.md, turn rates) the sum stays below 12, where commands are obeyed
-// by half; mistakes reach the most, which other evidence takes back within as many observations.
+// Nats. On 30 good drives (docs/reports/archive-motion.md, turn rates) the sum stays below 12, where commands are
+// obeyed by half; mistakes reach the most, which other evidence takes back within as many observations.
 constexpr double kAlarm = 20.0, kMost = 40.0;
 
 double clipped(double z) {

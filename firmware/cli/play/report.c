@@ -7,6 +7,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "waymark/text.h"
+
 static double us(const player_counts *counts, double quantile) {
   return (double)wm_histogram_quantile(&counts->late, quantile) * 1e-3;
 }

@@ -4,7 +4,7 @@ _waymark() {
   local word=${COMP_WORDS[COMP_CWORD]} command=${COMP_WORDS[1]:-} words= more=
   COMPREPLY=()
   if [ "$COMP_CWORD" -eq 1 ]; then
-    mapfile -t COMPREPLY < <(compgen -W 'run replay record watch check doctor stamps causes suggest batch calibrate compare detect diff eval hil import init map mine play reference report simulate web --help --version' -- "$word")
+    mapfile -t COMPREPLY < <(compgen -W 'run replay record watch check doctor stamps config causes suggest batch calibrate compare detect diff eval hil import init map mine play reference report simulate web --help --version' -- "$word")
     return
   fi
   case $command in
@@ -31,6 +31,7 @@ _waymark() {
     "check") words='--landmarks --calibration --map --json --quick --apply' ;;
     "doctor") words='--json --seconds' ;;
     "stamps") words='' ;;
+    "config") words='--schema' ;;
     "causes") words='--help --landmarks --calibration --map --apply --json' ;;
     "suggest") words='--help --out --against --only --from --to --minutes --json' ;;
     "batch") words='--help --out --jobs --part --list' ;;

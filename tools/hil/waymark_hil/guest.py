@@ -18,7 +18,7 @@ _BUS = ["-object", "can-bus,id=cb{0}", "-device", "kvaser_pci,canbus=cb{0}", "-d
 # wakes in time whatever else the host does; 1000 million, which is qemu's largest and less than any board's, idle time is the host's, as
 # a disk is waited for; as that, but idle time is skipped.
 SLOW, FAST, SYSTEM, BOARD = "shift=2,sleep=on", "shift=1,sleep=off", "shift=0,sleep=on", "shift=0,sleep=off"
-# Million instructions a second of a guest's processor for `waymark hil`: of those that one core of a board does, 1400 to 4000 (docs/boards.md).
+# Million instructions a second of a guest's processor for `waymark hil`: of those that one core of a board does, 1400 to 4000 (docs/cross.md).
 MIPS, MIPS_LEAST, MIPS_MOST = 2000, 1000, 4000
 GUEST_S = 3600  # of a processor's time: a busy desk gives a guest a tenth of one
 BUSY_DESK = 10
