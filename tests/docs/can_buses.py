@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""The buses of docs/can.md, recorded: its DBC files and bindings are taken from the page, and a drive of 15 s (10 m straight, then 1 m/s
+"""The buses of docs/can-buses.md, recorded: its DBC files and bindings are taken from the page, and a drive of 15 s (10 m straight, then 1 m/s
 and 0.3 rad/s) is written as a log of each; `waymark replay` has to end where the drive does. can_buses.py BIN"""
 import csv
 import math
@@ -11,7 +11,7 @@ import subprocess
 import sys
 import tempfile
 
-PAGE = pathlib.Path(__file__).resolve().parents[2] / "docs/can.md"
+PAGE = pathlib.Path(__file__).resolve().parents[2] / "docs/can-buses.md"
 TRACK_M, RADIUS_M, TICKS = 0.5, 0.1, 4096
 END = 10 + math.sin(1.5) / 0.3, (1 - math.cos(1.5)) / 0.3, 1.5
 NEAR_M = 0.05  # a row's stamp is that of its frame, and the turn begins between two

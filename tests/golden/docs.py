@@ -4,8 +4,8 @@
 docs.py check|write BUILD. `check` prints what differs and fails; `write` brings the files up to date. Both check, and
 docs.py references checks alone, that
 - each reference cited as [Author2015] stands once in docs/references.md;
-- what docs/glossary.md, docs/design.md and docs/runtime.md name in code is there;
-- docs/runtime.md names all files of the robot's rooms that have atomics, locks or shared memory;
+- what docs/glossary.md and the walks of design.md, runtime.md, edge_mcl.md and slam.md name in code is there;
+- docs/threads.md names all files of the robot's rooms that have atomics, locks or shared memory;
 - docs/failures.md's table of faults names tests that there are;
 - docs/troubleshooting.md has a section for each finding, and no other;
 - docs/images/threads.svg is what its script draws."""
@@ -124,7 +124,7 @@ def glossary():
     return faults
 
 
-WALKS = {"design.md": ROOT / "estimator", "runtime.md": ROOT}
+WALKS = {"design.md": ROOT / "estimator", "estimators/edge_mcl.md": ROOT / "estimator", "estimators/slam.md": ROOT / "estimator", "runtime.md": ROOT}
 
 
 def walks():
@@ -176,15 +176,15 @@ SHARED = re.compile(r"_Atomic|MAP_SHARED|\batomic_u?int (?!\*)|pthread_(mutex|co
 
 
 def shared():
-    """Prints sources of the robot's rooms with atomics or locks that docs/runtime.md does not name; returns how many."""
-    text, faults = (ROOT / "docs/runtime.md").read_text(), 0
+    """Prints sources of the robot's rooms with atomics or locks that docs/threads.md does not name; returns how many."""
+    text, faults = (ROOT / "docs/threads.md").read_text(), 0
     for room in ("estimator", "drivers", "firmware"):
         for path in sorted((ROOT / room).rglob("*")):
             if path.suffix not in (".c", ".h", ".cpp", ".hpp") or not SHARED.search(path.read_text()):
                 continue
             if not any(f"`{path.relative_to(ROOT).with_suffix(suffix)}`" in text for suffix in (".c", ".h", ".cpp")):
                 faults += 1
-                print(f"{path.relative_to(ROOT)}: shared between threads, and not named in docs/runtime.md")
+                print(f"{path.relative_to(ROOT)}: shared between threads, and not named in docs/threads.md")
     return faults
 
 
