@@ -145,15 +145,19 @@ def walks():
 NAMED = re.compile(r"`((?:firmware|drivers|estimator|msgs|tests|tools|sim)/[\w/.-]+\.(?:c|h|cpp|hpp|py))`")
 
 
+# Files and folders that a contributor is sent to.
+PLACES = re.compile(r"`((?:firmware|drivers|estimator|msgs|tests|tools|sim|config|docs)/(?!NAME)(?:[\w.-]+/)*(?!NAME)[\w.-]*)`")
+
+
 def named_files():
-    """Prints files that docs/*.md name and that are not there; returns how many."""
+    """Prints files that CONTRIBUTING.md and docs/*.md name and that are not there; returns how many."""
     faults = 0
-    for page in sorted((ROOT / "docs").glob("*.md")):
+    for page in [ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]:
         for number, line in enumerate(page.read_text().splitlines(), 1):
-            for path in NAMED.findall(line):
+            for path in (PLACES if page.parent == ROOT else NAMED).findall(line):
                 if not (ROOT / path).exists():
                     faults += 1
-                    print(f"docs/{page.name}:{number}: {path} is not there")
+                    print(f"{page.relative_to(ROOT)}:{number}: {path} is not there")
     return faults
 
 
