@@ -112,9 +112,9 @@ def check_rules():
     glossary = (ROOT / "docs/glossary.md").read_text().lower()
     for term in RULES["terms"].values():
         assert term.lower() in glossary, f"prose.yaml: '{term}' is not in the glossary"
-    planted = "One two three four five six seven eight nine ten " * 3 + ". The filter believes it.\n\nA time shift.\n\nVery unique."
+    planted = "One two three four five six seven eight nine ten " * 3 + ". The filter believes it.\n\nA time shift.\n\nVery unique.\n\nOne that drove no more than so many metres of way."
     seen = " ".join(message for _, message in faults(planted))
-    for what in ("words without a stop", "believes", "time offset", "uncomparables"):
+    for what in ("words without a stop", "believes", "time offset", "uncomparables", "One that", "no more than", "so many", "of way"):
         assert what in seen, f"prose.py does not find a planted fault: {what}"
     assert len(list(long_changes("- " + "a " * CHANGE_LENGTH + "\n  more\n"))) == 2
 
