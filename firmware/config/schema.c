@@ -92,7 +92,9 @@ static void print_param(FILE *to, const wm_param *p) {
       limits(to, p->min, p->max);
       if (isfinite(p->initial)) fprintf(to, ", \"default\": %.10g", p->initial);
       break;
-    case WM_PARAM_BOOL: fprintf(to, "\"type\": \"boolean\", \"default\": %s", p->initial != 0 ? "true" : "false"); break;
+    case WM_PARAM_BOOL:
+      fprintf(to, "\"type\": \"boolean\", \"default\": %s", p->initial != 0 ? "true" : "false");
+      break;
     case WM_PARAM_ENUM:
       list_of_names(to, p->names);
       fprintf(to, ", \"default\": ");
@@ -117,7 +119,8 @@ static void print_source(FILE *to) {
   fprintf(to, "\"anyOf\": [{");
   list_of_names(to, wm_source_names);
   fprintf(to, "}, {\"pattern\": \"^(sightings|markers|can):.\"}");
-  for (size_t i = 0; (seen = config_detector(i)) != NULL; i++) fprintf(to, ", {\"pattern\": \"^%s(:.+)?$\"}", seen->name);
+  for (size_t i = 0; (seen = config_detector(i)) != NULL; i++)
+    fprintf(to, ", {\"pattern\": \"^%s(:.+)?$\"}", seen->name);
   fprintf(to, "]");
 }
 
@@ -259,8 +262,9 @@ void wm_config_schema(FILE *to) {
   schema self = {.to = to, .at = calloc(ENTRIES_MAX, sizeof(entry))};
   if (!self.at) return;
   collect(&self);
-  fprintf(to, "{\"$schema\": \"http://json-schema.org/draft-07/schema#\", \"title\": \"Waymark's configuration\", "
-              "\"type\": \"object\", ");
+  fprintf(to,
+          "{\"$schema\": \"http://json-schema.org/draft-07/schema#\", \"title\": \"Waymark's configuration\", "
+          "\"type\": \"object\", ");
   print_members(&self, "");
   fprintf(to, "}\n");
   free(self.at);
