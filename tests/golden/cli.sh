@@ -41,6 +41,8 @@ for command in run replay check doctor record watch stamps config; do expect 0 "
 
 expect 2 "--record: records devices" run --config "$work/good.yaml" --recording "$work/rec" --record "$work/new"
 expect 2 "exists already; a recording is never overwritten" run --config "$work/good.yaml" --record "$work/rec"
+expect 2 "config needs --schema" config
+expect 0 "json-schema.org" config --schema
 expect 2 "replay needs a recording" replay
 expect 2 "replay needs --out" replay "$work/rec"
 expect 2 "needs --config" replay "$work/rec" --out "$work/out"
