@@ -9,10 +9,12 @@
 
 int wm_can_survey_take(wm_can_survey *self, const wm_can_frame *frame) {
   if (self->frames >= WM_CAN_SURVEY_FRAMES) return 0;
-  if (self->frames++ == 0)
+  if (self->frames++ == 0) {
     self->first_ns = frame->t_ns;
-  else
+  } else {
     self->not_later += frame->t_ns <= self->last_ns;
+    if (frame->t_ns - self->last_ns > self->rise_ns) self->rise_ns = frame->t_ns - self->last_ns;
+  }
   self->last_ns = frame->t_ns;
   if (frame->is_error || frame->is_remote) return 1;
   size_t i = 0;
@@ -32,14 +34,16 @@ int wm_can_survey_take(wm_can_survey *self, const wm_can_frame *frame) {
 
 // Differences begin with 0, or with the time since candump was started, and half of them are no larger than the one
 // before. Stamps of a clock go back or repeat now and then: where two adapters are read, or one stamps to the
-// millisecond.
+// millisecond. But they grow: the last one is many steps behind the first.
 #define DIFFERENCES_SHARE 4  // at least one of so many
 #define DIFFERENCES_FRAMES 8
+#define DIFFERENCE_STEPS 2  // a difference is within so many of the largest rise
 #define FIRST_DIFFERENCE_NS (60 * WM_NS_PER_S)
 
 int wm_can_survey_has_differences(const wm_can_survey *self) {
   if (self->frames < DIFFERENCES_FRAMES || self->first_ns < 0 || self->first_ns > FIRST_DIFFERENCE_NS) return 0;
   return self->last_ns >= 0 && self->last_ns < FIRST_DIFFERENCE_NS &&
+         self->last_ns - self->first_ns <= DIFFERENCE_STEPS * self->rise_ns &&
          DIFFERENCES_SHARE * self->not_later >= self->frames;
 }
 

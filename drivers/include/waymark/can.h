@@ -50,6 +50,7 @@ typedef struct wm_can_survey {
   size_t count;
   uint64_t frames, not_later;  // of all kinds; those whose stamp isn't later than that of the frame before
   wm_time_ns first_ns, last_ns;
+  wm_time_ns rise_ns;  // the largest from a stamp to the next one
 } wm_can_survey;
 // All zeros begin one. 0: it has seen enough. Cost: a search among the ids.
 int wm_can_survey_take(wm_can_survey *self, const wm_can_frame *frame);

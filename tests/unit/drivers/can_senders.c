@@ -225,12 +225,16 @@ TEST(times_that_are_differences) {
   static const double kFromStart[] = {3.2, .01, .01, .02, .01, .01, .01, .02, .01};  // after candump was started
   static const double kZeroBased[] = {0, .01, .02, .03, .04, .05, .06, .07, .08};
   static const double kBursts[] = {0, .010, .010, .020, .021, .022, .030, .031, .032};  // of an adapter
+  static const double kTogether[] = {0, 0, .01, .02, .02, .02, .03, .03, .04};  // several messages at once, from 0
+  static const double kSteady[] = {3.2, .010, .011, .010, .009, .010, .011, .010, .010};
   static const double kWall[] = {1.7e9, 1.7e9, 1.7e9, 1.7e9, 1.7e9, 1.7e9, 1.7e9, 1.7e9, 1.7e9};
   TEST_ASSERT_TRUE(differences_in(kEven, 9));
   TEST_ASSERT_TRUE(differences_in(kUneven, 9));
   TEST_ASSERT_TRUE(differences_in(kFromStart, 9));
   TEST_ASSERT_FALSE(differences_in(kZeroBased, 9));
+  TEST_ASSERT_TRUE(differences_in(kSteady, 9));
   TEST_ASSERT_FALSE(differences_in(kBursts, 9));
+  TEST_ASSERT_FALSE(differences_in(kTogether, 9));
   TEST_ASSERT_FALSE(differences_in(kWall, 9));
   TEST_ASSERT_FALSE(differences_in(kEven, 4));  // too few to tell
 }
