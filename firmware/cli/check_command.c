@@ -217,6 +217,7 @@ static void ended(void *context, const wm_assembly *assembly, const wm_run_repor
     keep_facts(&facts);
   if (tells_facts) comparisons_print(&self->sources.channels, assembly, stdout);
   evidence_judge(&self->evidence, assembly, &report->health, due, self->found);
+  check_observable(&self->evidence, assembly, &report->health, self->found);
   wm_health_map_findings(&report->health, self->found);
   clock_data_judge_unused(&self->sources.clocks, &report->health, self->found);
   check_unused(&self->evidence, &self->sources, &report->health, wm_recording_quantities(self->recording), self->found);

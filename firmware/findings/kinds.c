@@ -100,6 +100,8 @@ const wm_finding_kind kFindingKinds[WM_FOUND_COUNT] = {
                                        "`waymark map survey RUN --poses RUN` lists them; give each an id of its own"},
     [WM_FOUND_CALIBRATION_OFF] = {"calibration-off", "a value of the calibration differs from what the drive shows",
                                   "correct the value in calibration.yaml"},
+    [WM_FOUND_NOT_OBSERVABLE] = {"not-observable", "the drive does not excite it: one speed, no turn, or no standard",
+                                 "state what is measured, or drive so that it shows"},
     [WM_FOUND_CAPACITY_REACHED] = {"capacity-reached", "more landmarks, sources or findings than there is room for",
                                    "raise slam.landmarks.capacity"},
     [WM_FOUND_SOURCE_SILENT] = {"source-silent", "unplugged, switched off, or its program has ended",

@@ -36,6 +36,7 @@
 #define RANGE_RATIO_NOTE 0.02
 #define RANGE_MIN_M 0.5       // of a ratio: below, a range is mostly noise and mounting
 #define RANGE_RATIO_MAX 0.25  // of a ratio: beyond, it is an outlier
+#define DRIVES_MPS 0.1        // slower, it stands
 #define START_S 15.0          // a new pose this soon after the start contradicts the start
 // Of a start: what a tape measure and a look along the robot's side give.
 #define START_JUMP_M 0.5
@@ -103,6 +104,11 @@ static void take_published(drive_evidence *self, const wm_published *p) {
   const int is_lost = p->now.state == WM_STATE_LOST;
   if ((p->now.state == WM_STATE_DEGRADED || is_lost) && p->now.cause < WM_CAUSE_COUNT)
     self->causes[is_lost][has_source ? p->now.cause_source : WM_SOURCES_MAX][p->now.cause]++;
+  const double speed_mps = hypot(p->now.v_mps[0], p->now.v_mps[1]);
+  if (speed_mps > DRIVES_MPS) {
+    self->speed_squares += speed_mps * speed_mps;
+    self->driven++;
+  }
   if (self->published++ == 0) self->begun = *p;
   const double after_s = wm_seconds_between(self->begun.now.t_ns, p->now.t_ns);
   if (self->start_moved_s > 0 || after_s > START_S || p->now.resets == self->begun.now.resets) return;

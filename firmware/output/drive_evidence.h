@@ -38,7 +38,9 @@ typedef struct drive_evidence {
   wm_time_ns first_ns, last_ns;  // stamps of the events
   double silent_s;               // of this time, in silences longer than a replay plays (WM_LONGEST_SILENCE_NS)
   int has_events;
-  wm_published begun;  // the first message
+  wm_published begun;    // the first message
+  double speed_squares;  // of the messages of a robot that drives, (m/s)2
+  uint64_t driven;       // their number
   // The first new pose soon after the start: how far from the one before; 0 s: there was none.
   double start_moved_s, start_moved_m, start_turned_rad;
 } drive_evidence;

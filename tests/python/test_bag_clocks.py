@@ -145,6 +145,35 @@ class OwnClocks(BagTest):
                 self.assertLess(recording.meta["duration_s"], 15.1)
         self.assert_end(recording, said, 0.02)
 
+    def test_turns_tell_a_clock_from_a_delay(self):
+        """Stamps behind the log are late, or of a clock that is off: the turns of both topics say which."""
+        kinds = {"2 % slow": lambda t: ns(0.98 * t), "2 % fast": lambda t: ns(1.02 * t), "0.4 s behind": lambda t: ns(t) - 4 * S // 10,
+                 "3 s behind": lambda t: ns(t) - 3 * S, "microseconds for nanoseconds": lambda t: int((100 + t) * 1e6),
+                 "since its boot, 2 % slow": lambda t: int((100 + 0.98 * t) * S)}
+        for name, stamp in kinds.items():
+            with self.subTest(name):
+                recording, said = self.take(self.with_imu(stamp))
+                self.assertRegex(said, "(finding|note): /imu/data: its (clock is|stamps)")
+                self.assertLess(np.abs(recording.table("imu.csv")["t_ns"] - [ns(t) for t in times(50)]).max(), 20_000_000, said)
+                self.assert_end(recording, said, 0.02)
+        bag = self.bag()  # the odometry's own
+        for t in times():
+            bag.odometry(ns(0.98 * t), ns(t) + 1_000_000, place(t), (SPEED, 0, 0), (0, 0, turn_rate(t)))
+        for t in times(50):
+            bag.imu(ns(t), ns(t) + 1_000_000, (0, 0, turn_rate(t)))
+        recording, said = self.take(bag)
+        self.assertIn("finding: /odom: its clock is 2 % too slow", said)
+        self.assert_end(recording, said, 0.02)
+
+    def test_a_drift_that_nothing_else_shows_is_named(self):
+        for share, words in ((0.98, "a clock that runs 2 % slow"), (1.02, "its clock runs 2 % fast; its stamps are mended")):
+            bag = self.bag()
+            for t in times():
+                bag.odometry(ns(share * t), ns(t) + 1_000_000, place(t), (SPEED, 0, 0), (0, 0, turn_rate(t)))
+            recording, said = self.take(bag)
+            self.assertIn(words, said)
+        self.assert_end(recording, said, 0.02)
+
     def test_drift_is_taken_out(self):
         """Two minutes with a clock that is 500 ppm fast: 60 ms at the end."""
         bag = self.bag()

@@ -11,6 +11,7 @@ import re
 import shutil
 import sqlite3
 import subprocess
+import tarfile
 import unittest
 
 import lz4.frame
@@ -76,6 +77,8 @@ class Whole(BagTest):
                              (".lz4", lz4.frame.compress)):
             ways[ending] = f / f"packed.mcap{ending}"
             ways[ending].write_bytes(pack(whole))
+        ways["pzstd"] = f / "parallel.mcap.zst"  # begins with a frame that holds nothing
+        ways["pzstd"].write_bytes(b"\x50\x2a\x4d\x18\x04\0\0\0" + bytes(4) + zstd(whole[:5000]) + zstd(whole[5000:]))
         ways["database packed"] = f / "drive.db3.zstd"
         ways["database packed"].write_bytes(zstd(database.read_bytes()))
         for name, path in ways.items():
@@ -246,6 +249,8 @@ class Refused(BagTest):
         (f / "pointer.bag").write_bytes(b"version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 1\n")
         (f / "page.mcap").write_bytes(b"<!DOCTYPE html><html></html>")
         (f / "bag.zip").write_bytes(b"PK\3\4" + bytes(60))
+        with tarfile.open(f / "bag.tar.gz", "w:gz") as archive:
+            archive.add(f / "text.bag", "drive.bag")
         (f / "nothing").mkdir()
         two = f / "two"
         for name in "ab":
@@ -257,7 +262,7 @@ class Refused(BagTest):
         database.close()
         for name, word in (("empty.mcap", "is empty"), ("text.bag", "is no bag"), ("zeros.db3", "is no bag"), ("magic.mcap", "without its end"),
                            ("short.db3", "rosbag2"), ("ros1.bag", "nothing"), ("old.bag", "format 2.0"), ("junk.zst", "is no bag"), ("cut.zst", "nothing of what it holds"),
-                           ("pointer.bag", "git lfs pull"), ("page.mcap", "a web page"), ("bag.zip", "a zip archive"),
+                           ("pointer.bag", "git lfs pull"), ("page.mcap", "a web page"), ("bag.zip", "a zip archive"), ("bag.tar.gz", "a tar archive"),
                            ("nothing", "no file in this folder"), ("two", "2 bags"), ("missing.mcap", "no such file"), ("other.db3", "rosbag2")):
             with self.subTest(name):
                 text, out = self.take(f / name, code=1, out=f"out-{name}")

@@ -57,6 +57,29 @@ class Fixes(BagTest):
                 np.testing.assert_allclose(recording.calibration["gnss"]["origin"], ORIGIN, atol=1e-6)
                 self.assert_end(recording, said, 0.1, config=CONFIG)
 
+    def test_how_drivers_fill_latitude_and_longitude(self):
+        minutes = lambda v: 100 * np.trunc(v) + 60 * (v - np.trunc(v))  # noqa: E731
+        kinds = {"exchanged": lambda w: w[::-1], "in radians": lambda w: tuple(np.radians(w)), "ten-millionths": lambda w: tuple(1e7 * np.array(w)),
+                 "degrees and minutes": lambda w: tuple(map(minutes, w)), "exchanged and in radians": lambda w: tuple(np.radians(w))[::-1]}
+        for name, filled in kinds.items():
+            with self.subTest(name):
+                recording, said = self.take(self.drive(lambda i, w, a, f=filled: (f(w), a, 0)))
+                self.assertIn("finding: /fix: its latitude and longitude are", said)
+                self.assertIn(name, said)
+                np.testing.assert_allclose(recording.calibration["gnss"]["origin"], ORIGIN, atol=1e-6)
+                self.assert_end(recording, said, 0.1, config=CONFIG)
+        for slip in (1.0, 1.2):  # right ones stay, whatever the wheels say
+            bag = self.drive()
+            for _, _, _, _, message in bag._rows:
+                if hasattr(message, "twist"):
+                    message.twist.twist.linear.x *= slip
+            _, said = self.take(bag, "--motion-by", "twists")
+            self.assertNotIn("latitude and longitude are", said)
+
+    def test_a_status_that_nobody_set_is_no_missing_fix(self):
+        recording, said = self.take(self.drive(lambda i, w, a: (w, a, -2)))
+        self.assertEqual(len(recording.table("gnss.csv")["t_ns"]), 16, said)
+
     def test_an_outlier_on_the_way_stays(self):
         for at in (2, 7):
             recording, said = self.take(self.drive(lambda i, w, a, k=at: (place_of(ORIGIN, 5000, 40)[:2] if i == k else w, a, 0)))
@@ -75,7 +98,8 @@ class Fixes(BagTest):
         for name, change, empty in (("of the first three", lambda i, w, a: (w, nan if i < 3 else a, 0), 3), ("of some", lambda i, w, a: (
                 w, nan if i % 4 == 2 else a, 0), 4), ("of all", lambda i, w, a: (w, nan, 0), 16), ("0 of the first", lambda i, w, a: (
                     w, 0.0 if i < 2 else a, 0), 2), ("infinite", lambda i, w, a: (w, np.inf if i == 5 else a, 0), 1), ("far off", lambda i, w, a: (
-                        w, 1e9 if i < 9 else a, 0), 9)):
+                        w, 1e9 if i < 9 else a, 0), 9), ("-1000 of the first", lambda i, w, a: (w, -1000.0 if i < 3 else a, 0), 3),
+                                    ("-9999 of all", lambda i, w, a: (w, -9999.0, 0), 16)):
             with self.subTest(name):
                 recording, said = self.take(self.drive(change))
                 gnss = recording.table("gnss.csv")

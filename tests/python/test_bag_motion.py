@@ -72,12 +72,22 @@ class EmptyParts(BagTest):
         self.assertIn("linear.y", said)
         self.assert_end(recording, said, end=(DRIVE_S, 0.5 * DRIVE_S, 0))
 
-    def test_some_rows_of_nan_cost_those_rows(self):
+    def test_rows_of_no_number_are_the_poses_differences(self):
+        for is_none, count in ((lambda i: i % 50 == 7, 6), (lambda i: i < 20, 20)):
+            for none in (np.nan, np.inf):
+                bag = self.bag()
+                for i, t in enumerate(times()):
+                    bag.odometry(ns(t), ns(t), place(t), (none if is_none(i) else SPEED, 0, 0), (0, 0, turn_rate(t)))
+                recording, said = self.take(bag)
+                self.assertIn(f"{count} of its 301 messages have no number", said)
+                self.assert_end(recording, said)
+
+    def test_a_twist_of_infinity_is_none(self):
         bag = self.bag()
-        for i, t in enumerate(times()):
-            bag.odometry(ns(t), ns(t), place(t), (np.nan if i % 50 == 7 else SPEED, 0, 0), (0, 0, turn_rate(t)))
+        for t in times():
+            bag.odometry(ns(t), ns(t), place(t), (np.inf,) * 3, (-np.inf,) * 3)
         recording, said = self.take(bag)
-        self.assertIn("6 of its 301 messages", said)
+        self.assertIn("its twist is not a number", said)
         self.assert_end(recording, said)
 
     def test_poses_alone_are_increments_and_beside_a_gyro_twists(self):
@@ -284,6 +294,19 @@ class WhichTopic(BagTest):
                 recording, said = self.take(bag)
                 self.assertIn(f"not taken: {topic}: commands", said)
                 self.assert_end(recording, said)
+
+    def test_a_twist_with_a_covariance_is_measured(self):
+        bag = self.bag()
+        for t in times(50):
+            bag.put("/a/vel", "TwistStamped", ns(t), bag.m.make("TwistStamped", header=bag.m.header(ns(t), "base_link"), twist=bag.twist(
+                (1.2, 0, 0), (0, 0, 1.2 * turn_rate(t)))))
+        for t in times():
+            bag.put("/vehicle/twist", "TwistWithCovarianceStamped", ns(t), bag.m.make(
+                "TwistWithCovarianceStamped", header=bag.m.header(ns(t), "base_link"), twist=bag.m.make("TwistWithCovariance", twist=bag.twist(
+                    (SPEED, 0, 0), (0, 0, turn_rate(t))))))
+        recording, said = self.take(bag)
+        self.assertIn("not taken: /a/vel: motion comes from /vehicle/twist (its speed is 1.2 times that one's, its turn rate is 1.2 times that one's)", said)
+        self.assert_end(recording, said)
 
     def test_commands_alone_are_taken_and_said_to_be_commands(self):
         bag = self.bag()

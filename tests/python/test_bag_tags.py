@@ -12,7 +12,7 @@ import subprocess
 import unittest
 
 import numpy as np
-from bag_files import BIN, M, START_NS, BagTest, Events, camera_info
+from bag_files import BIN, M, START_NS, BagTest, Events, camera_info, register
 from PIL import Image
 
 import waymark
@@ -241,6 +241,14 @@ class Corners(BagTest):
                 "Detection3D", header=h, results=[M.make("ObjectHypothesisWithPose", hypothesis=M.make("ObjectHypothesis", class_id="aruco_0"),
                                                          pose=M.make("PoseWithCovariance", pose=p))])])),
         }
+        register({"ar_track_alvar_msgs/msg/AlvarMarker": "std_msgs/Header header\nuint32 id\nuint32 confidence\ngeometry_msgs/PoseStamped pose\n",
+                  "ar_track_alvar_msgs/msg/AlvarMarkers": "std_msgs/Header header\nar_track_alvar_msgs/AlvarMarker[] markers\n",
+                  "ros2_aruco_interfaces/msg/ArucoMarkers": "std_msgs/Header header\nint64[] marker_ids\ngeometry_msgs/Pose[] poses\n"})
+        cases |= {
+            "ar_track_alvar_msgs/AlvarMarkers": (aruco, opencv, lambda h, p: M.make("ar_track_alvar_msgs/AlvarMarkers", header=M.header(START_NS, ""), markers=[M.make(
+                "ar_track_alvar_msgs/AlvarMarker", header=h, id=0, pose=M.make("PoseStamped", header=h, pose=p))])),
+            "ros2_aruco_interfaces/ArucoMarkers": (aruco, opencv, lambda h, p: M.make("ros2_aruco_interfaces/ArucoMarkers", header=h, marker_ids=np.array([0]), poses=[p])),
+        }
         for name, (own, axes, make) in cases.items():
             with self.subTest(name):
                 events = Events()
@@ -257,21 +265,26 @@ class Corners(BagTest):
 
     def april_ros_1(self, own, ros_pose):
         """apriltag_ros for ROS 1: the library's way up of tag36h11; x to the right, y up, z out of the picture that it draws."""
-        from bag_files import register
-        register({"apriltag_ros/msg/AprilTagDetection": "int32[] id\nfloat64[] size\ngeometry_msgs/PoseWithCovarianceStamped pose\n",
-                  "apriltag_ros/msg/AprilTagDetectionArray": "std_msgs/Header header\napriltag_ros/AprilTagDetection[] detections\n"})
-        events = Events()
-        for i, p in enumerate(POSES):
-            t_ns = START_NS + i * STEP_NS
-            tag = M.make("apriltag_ros/AprilTagDetection", id=np.array([7], dtype=np.int32), size=np.array([TAG_M]), pose=M.make(
-                "PoseWithCovarianceStamped", header=M.header(t_ns, "cam_optical"), pose=M.make("PoseWithCovariance", pose=ros_pose(*p))))
-            events.put("/tag_detections", "apriltag_ros/AprilTagDetectionArray", t_ns,
-                       M.make("apriltag_ros/AprilTagDetectionArray", header=M.header(t_ns, "cam_optical"), detections=[tag]))
-        text, folder = self.take(events.mcap(self.folder / "a.mcap"), out="out-ros1")
-        self.assertIn("tag36h11", text)
-        table = waymark.Recording(folder).table("markers.csv")
-        for i, row in enumerate(own):
-            self.agree(row, np.array([table[key][i] for key in ("x_m", "y_m", "z_m")]), table["yaw_rad"][i], None, f"apriltag_ros {i}")
+        many = {"id": np.array([7], dtype=np.int32), "size": np.array([TAG_M])}
+        for package, fields, values, stamped in (
+                ("apriltag_ros", "int32[] id\nfloat64[] size\ngeometry_msgs/PoseWithCovarianceStamped pose\n", many, "PoseWithCovarianceStamped"),
+                ("apriltags2_ros", "int32[] id\nfloat64[] size\ngeometry_msgs/PoseWithCovarianceStamped pose\n", many, "PoseWithCovarianceStamped"),
+                ("apriltags_ros", "int32 id\nfloat64 size\ngeometry_msgs/PoseStamped pose\n", {"id": 7, "size": TAG_M}, "PoseStamped")):
+            register({f"{package}/msg/AprilTagDetection": fields,
+                      f"{package}/msg/AprilTagDetectionArray": f"std_msgs/Header header\n{package}/AprilTagDetection[] detections\n"})
+            events = Events()
+            for i, p in enumerate(POSES):
+                t_ns = START_NS + i * STEP_NS
+                header, inner = M.header(t_ns, "cam_optical"), ros_pose(*p)
+                pose = M.make(stamped, header=header, pose=inner if stamped == "PoseStamped" else M.make("PoseWithCovariance", pose=inner))
+                tag = M.make(f"{package}/AprilTagDetection", pose=pose, **values)
+                events.put("/tag_detections", f"{package}/AprilTagDetectionArray", t_ns,
+                           M.make(f"{package}/AprilTagDetectionArray", header=header, detections=[tag]))
+            text, folder = self.take(events.mcap(self.folder / "a.mcap"), out=f"out-{package}")
+            self.assertIn("tag36h11", text)
+            table = waymark.Recording(folder).table("markers.csv")
+            for i, row in enumerate(own):
+                self.agree(row, np.array([table[key][i] for key in ("x_m", "y_m", "z_m")]), table["yaw_rad"][i], None, f"{package} {i}")
 
 
 def april_events(points, family="tag36h11", frame="cam_optical", info=None, topic="/cam/detections"):
@@ -335,7 +348,6 @@ class Bad(BagTest):
 
         nan = np.array([(np.nan, 1.0)] * 4)
         isaac = Events()
-        from bag_files import register
         register({"isaac_ros_apriltag_interfaces/msg/AprilTagDetectionArray": "std_msgs/Header header\n"})
         isaac.put("/tags", "isaac_ros_apriltag_interfaces/AprilTagDetectionArray", START_NS,
                   M.make("isaac_ros_apriltag_interfaces/AprilTagDetectionArray", header=M.header(START_NS, "c")))

@@ -64,6 +64,8 @@ class Columns(Folder):
                               (np.array([1e18, 1e30]), "row 1 has 1e.30"),
                               (np.zeros((2, 2)), "has the shape .2, 2."),
                               (["2023-11-14T00:00:00", "2023-11-14T00:00:01"], "t_ns holds text .'2023-11-14T00:00:00'.; whole nanoseconds"),
+                              (np.array([2**63, 2**63 + 1], dtype=np.uint64), "has 9223372036854775808 in row 0; whole numbers up to"),
+                              (np.ma.array([1, 2], mask=[0, 1]), "has no value .masked. in row 1"),
                               (np.array([1j, 2j]), "holds complex128")):
             with self.assertRaisesRegex(ValueError, words):
                 self.written(stamps)

@@ -98,6 +98,12 @@ static void take_amount(channels *all, channel_kind kind, uint16_t source, wm_ti
   spread(all, self, from_ns, to_ns, amount);
 }
 
+// Of a base that moves sideways, too: its length, below 0 where it is mostly backwards.
+static double way_of(double ahead, double left) {
+  const double length = hypot(ahead, left);
+  return ahead < 0 && -ahead > fabs(left) ? -length : length;
+}
+
 // ── wheels ──────────────────────────────────────────────────────────────────────────────────────────────────────────
 
 static void take_ticks(channels *all, const wm_event *event) {
@@ -189,18 +195,18 @@ void channels_take(channels *self, const wm_event *event) {
       wm_rows_note(&self->twists[event->source], event->as.twist2.v_mps, event->as.twist2.w_radps,
                    event->as.twist2.v_mps != 0 || event->as.twist2.w_radps != 0);
       take_rate(self, CHANNEL_TWIST_TURN, event, event->as.twist2.w_radps, 1);
-      take_rate(self, CHANNEL_TWIST_WAY, event, fabs(event->as.twist2.v_mps), 1);
+      take_rate(self, CHANNEL_TWIST_WAY, event, event->as.twist2.v_mps, 1);
       break;
     case WM_EVENT_TWIST6:
       wm_rows_note(&self->twists[event->source], event->as.twist6.v_mps[0], event->as.twist6.w_radps[2],
                    event->as.twist6.v_mps[0] != 0 || event->as.twist6.w_radps[2] != 0);
       take_rate(self, CHANNEL_TWIST_TURN, event, event->as.twist6.w_radps[2], 1);
-      take_rate(self, CHANNEL_TWIST_WAY, event, hypot(event->as.twist6.v_mps[0], event->as.twist6.v_mps[1]), 1);
+      take_rate(self, CHANNEL_TWIST_WAY, event, way_of(event->as.twist6.v_mps[0], event->as.twist6.v_mps[1]), 1);
       break;
     case WM_EVENT_INCREMENT: {
       const wm_increment *i = &event->as.increment;
       take_amount(self, CHANNEL_INCREMENT_TURN, event->source, i->from_ns, event->t_ns, i->dheading_rad, 1);
-      take_amount(self, CHANNEL_INCREMENT_WAY, event->source, i->from_ns, event->t_ns, hypot(i->dx_m, i->dy_m), 1);
+      take_amount(self, CHANNEL_INCREMENT_WAY, event->source, i->from_ns, event->t_ns, way_of(i->dx_m, i->dy_m), 1);
       break;
     }
     case WM_EVENT_HEADING: take_heading(self, event); break;

@@ -104,6 +104,10 @@ void source_data_take(source_data *self, const wm_event *event);
 void source_data_judge(source_data *self, uint32_t bound, const wm_health *health, wm_findings *out);
 void source_data_free(source_data *self);
 
+// What the drive cannot show of the calibration, by the sigmas with which it ended.
+void check_observable(const drive_evidence *drive, const wm_assembly *assembly, const wm_health *health,
+                      wm_findings *out);
+
 // What the recording has and the run does not use, after a drive.
 void check_unused(const drive_evidence *evidence, const source_data *data, const wm_health *health, uint32_t bound,
                   wm_findings *out);

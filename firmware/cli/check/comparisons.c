@@ -40,14 +40,21 @@ static int has_window(const channel *c, size_t i) {
   return i < c->windows && (double)c->cover[i] >= COVER_MIN * WINDOW_S;
 }
 
+// Speeds of vehicles and of wheels may be without a sign; others are positive forwards.
+static int has_sign(const channel *c) {
+  return c->least < 0 || (c->kind != CHANNEL_VEHICLE_WAY && c->kind != CHANNEL_WHEELS_WAY);
+}
+
 static fit fit_at(const channel *a, const channel *b, int lag) {
+  const int are_sizes = channel_is_way(a->kind) && !(has_sign(a) && has_sign(b));
   fit out = {.lag_s = lag * WINDOW_S};
   double block[2] = {0, 0};
   size_t in_block = 0, blocks = 0;
   for (size_t i = LAG_WINDOWS; i < a->windows; i++) {
     const size_t k = (size_t)((long)i + lag);
     if (!has_window(a, i) || !has_window(b, k)) continue;
-    const double x = (double)a->sum[i], y = (double)b->sum[k];
+    const double x = are_sizes ? fabs((double)a->sum[i]) : (double)a->sum[i];
+    const double y = are_sizes ? fabs((double)b->sum[k]) : (double)b->sum[k];
     out.aa += x * x;
     out.bb += y * y;
     out.ab += x * y;
@@ -240,7 +247,9 @@ static void sign_line(const scene *s, const channel *c, char *fix, size_t capaci
   char line[96];
   if (is_can(c, s->assembly))
     (void)snprintf(fix, capacity,
-                   "`scale: -1` at the one that is not positive to the left; or left and right are swapped");
+                   channel_is_way(c->kind)
+                       ? "`scale: -1` at the one that is not positive forwards"
+                       : "`scale: -1` at the one that is not positive to the left; or left and right are swapped");
   else if (c->kind == CHANNEL_YAW_RATE && is_upside_down(s->all, c->source))
     (void)snprintf(fix, capacity, "it hangs upside down. calibration.yaml: %s",
                    mounting_line(s, 180, 0, line, sizeof line));
@@ -250,7 +259,8 @@ static void sign_line(const scene *s, const channel *c, char *fix, size_t capaci
         "calibration.yaml: %s where it hangs upside down; else %s.csv: wz_radps times -1: positive is to the left",
         mounting_line(s, 180, 0, line, sizeof line), source);
   else
-    (void)snprintf(fix, capacity, "%s.csv: %s times -1: positive is to the left", source, word_of(c, s->assembly));
+    (void)snprintf(fix, capacity, "%s.csv: %s times -1: positive is %s", source, word_of(c, s->assembly),
+                   channel_is_way(c->kind) ? "forwards" : "to the left");
 }
 
 // A factor that is nearly one with a usual cause is that one.
@@ -370,8 +380,9 @@ static void disagrees(const scene *s, const channel *c, const channel *other, co
   if (how == OTHER_SIGN) {
     sign_line(s, c, fix, sizeof fix);
     wm_find(s->out, WM_FOUND_SENSORS_DISAGREE, WM_SEVERITY_BAD, source_of(c, s->assembly), fix,
-            "%s turns left where %s turns right: %.2f times its turn (r %.2f, %.1f rad in all)", name, of, sign * size,
-            f->r, f->total[1])
+            is_way ? "%s goes forwards where %s goes backwards: %.2f times its way (r %.2f, %.1f m in all)"
+                   : "%s turns left where %s turns right: %.2f times its turn (r %.2f, %.1f rad in all)",
+            name, of, sign * size, f->r, f->total[1])
         ->size = sign * size;
     return;
   }
@@ -437,6 +448,31 @@ static void judge_quantity(const scene *s, int of_way) {
   }
 }
 
+// Sensors of the turn that a straight drive doesn't compare: a sign or a unit of them would not show.
+static void judge_straight(const scene *s) {
+  const channel *seen[2] = {NULL, NULL};
+  double turned = 0;
+  fit f;
+  for (size_t i = 0; i < s->all->count; i++)
+    for (size_t k = i + 1; k < s->all->count; k++) {
+      const channel *a = &s->all->at[i], *b = &s->all->at[k];
+      if (channel_is_way(a->kind) || channel_is_way(b->kind) || channel_is_tilt(a->kind) || channel_is_tilt(b->kind))
+        continue;
+      f = best_fit(a, b);
+      if (f.count < PAIRS_MIN) continue;
+      if (is_excited(&f, 0)) return;
+      seen[0] = a;
+      seen[1] = b;
+      turned = fmax(f.total[0], f.total[1]);
+    }
+  if (!seen[0]) return;
+  char name[96], of[96];
+  wm_find(s->out, WM_FOUND_NOT_OBSERVABLE, WM_SEVERITY_NOTE, "motion", "record a drive with turns to both sides",
+          "it turns by %.2g rad in all: sign and scale of %s against %s are not observable in this drive", turned,
+          name_of(seen[0], s->assembly, name, sizeof name), name_of(seen[1], s->assembly, of, sizeof of))
+      ->size = turned;
+}
+
 // An accelerometer at rest, or on the average of a drive, measures 9.8 m/s2 upwards.
 static void judge_gravity(const scene *s, uint16_t source) {
   static const struct {
@@ -486,6 +522,7 @@ void comparisons_judge(const channels *self, const wm_assembly *assembly, wm_fin
   const scene s = {self, assembly, out};
   judge_quantity(&s, 0);
   judge_quantity(&s, 1);
+  judge_straight(&s);
   for (uint16_t source = 0; source < assembly->source_count && source < WM_SOURCES_MAX; source++)
     judge_gravity(&s, source);
 }

@@ -113,6 +113,10 @@ def _needed(name: str) -> str:
 
 def as_column(name: str, values: Any, where: str) -> Array:
     """Values as a column of a table of that name: int64, float64 or str. ValueError in words where they can't be one."""
+    if isinstance(values, np.ma.MaskedArray) and np.ma.is_masked(values):
+        if is_integer(name):
+            raise ValueError(f"{where}: {name} has no value (masked) in row {int(np.argmax(np.ma.getmaskarray(values)))}")
+        values = values.astype(np.float64).filled(np.nan)
     column = np.asarray(values)
     if column.ndim != 1:
         raise ValueError(f"{where}: {name} has the shape {column.shape}; a column is one-dimensional")
@@ -130,6 +134,10 @@ def as_column(name: str, values: Any, where: str) -> Array:
     if column.dtype.kind not in "biuf":
         kind = type(column.flat[0]).__name__ if column.dtype.kind == "O" and column.size else str(column.dtype)
         raise ValueError(f"{where}: {name} holds {kind}; {_needed(name)} are needed")
+    if is_integer(name) and column.dtype.kind in "iu" and column.size:
+        far = np.flatnonzero((column > _NS_MOST) | (column < -_NS_MOST))
+        if len(far):
+            raise ValueError(f"{where}: {name} has {int(column[far[0]])} in row {int(far[0])}; whole numbers up to {_NS_MOST} are read")
     return _whole(name, column, where) if is_integer(name) and column.dtype.kind == "f" else column
 
 

@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
+from ..recording import Frame
 from . import lenses, names
 from .decoding import Topic
 from .lenses import Lens
@@ -23,6 +24,7 @@ class Camera:
     topic: Name
     frame: str = ""
     size: tuple[int, int] | None = None
+    waiting: list[Frame] = field(default_factory=list)  # the first pictures, while the size is not known
 
 
 @dataclass
@@ -97,13 +99,6 @@ class Cameras:
         if camera := self.by_topic.pop(topic, None):
             self._others.append(camera.topic)
 
-    def pictures(self, topic: str, frame: str, size: tuple[int, int]) -> str:
-        """The name of the camera whose picture came."""
-        camera = self.by_topic[topic]
-        if camera.size is None:
-            camera.frame, camera.size = frame.lstrip("/"), size
-        return camera.name
-
     def camera_info(self, topic: str, message: Any, t_ns: int) -> None:
         """Keeps the first camera_info that has a lens."""
         info = self.infos.get(topic)
@@ -147,13 +142,13 @@ class Cameras:
     @staticmethod
     def _with(found: Found, info: Info, is_rectified: bool, size: tuple[int, int] | None) -> Found:
         if info.message is None:
-            found.lens = Lens(None, [f"all {info.empty} messages of {info.topic.topic} are of a camera that is not calibrated (K is 0); calibrate it "
+            found.lens = Lens(None, [f"all {info.empty} messages of {info.topic.topic} are of a camera that is not calibrated (K is 0 or 1); calibrate it "
                                      "(`waymark calibrate camera`), or write its lens into calibration.yaml"])
             return found
         found.lens = lenses.of(info.message, is_rectified, size)
         found.info, found.is_rectified = info.message, is_rectified
         if info.empty:
-            found.lens.notes.append(f"the first {info.empty} messages of {info.topic.topic} are of a camera that is not calibrated (K is 0): the next is taken")
+            found.lens.notes.append(f"the first {info.empty} messages of {info.topic.topic} are of a camera that is not calibrated (K is 0 or 1): the next is taken")
         if info.changed_ns is not None:
             found.lens.notes.append(f"its camera_info changes at {info.changed_ns / 1e9:.3f} s: the first one is taken")
         return found

@@ -24,7 +24,9 @@ _WINDOW = 10  # messages on each side of a step whose smallest delays are compar
 _DRIFT_MIN_NS = 10_000_000  # drift over the drive that is taken out of a sensor's own clock; less is below its delays
 _COARSE_NS = 2_000_000  # a step of a clock that is finer matters to no sensor of a robot
 _BURST = 0.1  # messages nearer to each other than this share of their usual distance have one stamp
-_LAG_NS = 500_000_000  # a delay that grows by more is named
+_LAG_NS, _LAG_SHARE = 100_000_000, 1e-3  # a delay that grows by more is named: crystals differ by 1e-4 at most
+_QUEUE_MAX = 0.5  # growth of a delay, ns a ns, that a queue has: of a stream that is read at half its rate
+_RATE_MAX = 0.05  # no oscillator is off by more: stamps in another unit, or of no clock
 
 Say = Callable[[str, str], None]
 
@@ -145,7 +147,7 @@ def _drift(topic: _Topic) -> tuple[float, int, int]:
     least of ten parts."""
     log, delay = topic.log[topic.known], (topic.log - topic.stamp)[topic.known]
     span = int(log[-1] - log[0]) if len(log) > 50 else 0
-    if span < 20 * 10**9 or topic.ends:
+    if span < 5 * 10**9 or topic.ends:
         return 0.0, 0, topic.delay
     parts = np.array_split(np.arange(len(log)), 10)
     at = np.array([part[np.argmin(delay[part])] for part in parts])
@@ -212,9 +214,13 @@ def _one(topic: _Topic, reference: list[_Topic], reference_ns: int, say: Say) ->
     said: list[tuple[str, str]] = []
     clock = _by_stamps(topic, reference, reference_ns, lambda name, text: said.append((name, text)))
     t_ns, _ = clock(topic.stamp, topic.log)
-    if np.ptp(topic.log - t_ns) > np.ptp(topic.log) + _LOST_NS:
+    slope, _, _ = _drift(topic)
+    lost = np.ptp(topic.log - t_ns) > np.ptp(topic.log) + _LOST_NS
+    queues = any(topic is other for other in reference)  # of the others' clock: a delay that grows may be a queue's
+    if lost or slope < -_RATE_MAX or slope > (_QUEUE_MAX if queues else _RATE_MAX):
         clock = Clock(by_log=True, delay_ns=0 if abs(reference_ns) <= OTHER_LOG_NS else reference_ns)
-        said = [(topic.name, "its stamps follow no clock: the times of the log are used")]
+        how = "follow no clock" if lost else f"run at {1 - slope:.3g} times the pace of the log, as no clock does (another unit?)"
+        said = [(topic.name, f"its stamps {how}: the times of the log are used")]
     for name, text in said:
         say(name, text)
     return clock
@@ -230,10 +236,14 @@ def _by_stamps(topic: _Topic, reference: list[_Topic], reference_ns: int, say: S
         clock = _own_clock(topic, reference_ns, say)
     else:
         clock = Clock(topic.ends, [delay - topic.delay for delay in topic.delays], delay_ns=topic.delay)
-        _, grown, _ = _drift(topic)
-        if abs(grown) > _LAG_NS:
-            cause = "a queue that is read too slowly, or a clock that runs slow" if grown > 0 else "a clock that runs fast"
-            say(topic.name, f"from its stamps to its log it takes {seconds(grown)} {'more' if grown > 0 else 'less'} at the end than at the start: {cause}")
+        slope, grown, _ = _drift(topic)
+        if abs(grown) > _LAG_NS and abs(slope) > _LAG_SHARE:
+            text = f"from its stamps to its log it takes {seconds(grown)} {'more' if grown > 0 else 'less'} at the end than at the start: "
+            if grown > 0:
+                say(topic.name, f"{text}a queue that is read too slowly, or a clock that runs {100 * slope:.2g} % slow")
+            else:  # no message comes sooner and sooner
+                clock.drift, clock.start_ns = slope, int(topic.log[topic.known][0])
+                say(topic.name, f"{text}its clock runs {-100 * slope:.2g} % fast; its stamps are mended")
     for k, end in enumerate(topic.ends):
         step = topic.delays[k] - topic.delays[k + 1]
         at = (end - int(topic.log[0])) / 1e9
@@ -241,6 +251,27 @@ def _by_stamps(topic: _Topic, reference: list[_Topic], reference_ns: int, say: S
                         "the clock was set; the stamps are mended")
     _name_coarse(topic, clock, say)
     return clock
+
+
+def growth(times: Array) -> int:
+    """How unlike a prompt sensor's the delays from stamp to log are: the smallest one, and its growth over the drive (ns)."""
+    topic = _look("", times)
+    return abs(topic.delay) + abs(_drift(topic)[1]) if topic.known.any() else 0
+
+
+def onto(times: Array, reference: Array) -> tuple[Clock, str] | None:
+    """The clock of (stamp, log) pairs moved onto that of others by both logs, offset and drift, and how far in words; None where both agree."""
+    topic, other = _look("", times), _look("", reference)
+    if topic.ends or other.ends or not topic.known.any() or not other.known.any():
+        return None
+    slope, grown, begin = _drift(topic)
+    offset = begin - other.delay
+    if abs(offset) < STEP_NS and abs(grown) < STEP_NS:
+        return None
+    clock = Clock([], [offset], drift=slope, start_ns=int(topic.log[topic.known][0]), delay_ns=other.delay)
+    parts = [f"{seconds(offset)} {'behind' if offset > 0 else 'ahead'}"] if abs(offset) >= STEP_NS else []
+    parts += [f"{abs(100 * slope):.2g} % too {'slow' if slope > 0 else 'fast'}"] if abs(grown) >= STEP_NS else []
+    return clock, " and ".join(parts)
 
 
 def once(times: Array, values: Array) -> Array:

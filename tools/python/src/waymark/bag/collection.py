@@ -49,6 +49,7 @@ class Collection:
         self.sight = Sight()
         self.frames = Frames()
         self.can = CanLog(writer)
+        self.with_covariance: set[str] = set()  # topics of twists that state one: measurements, since no command has it
         self.notes: dict[str, list[str]] = {}
         self.refused: dict[str, str] = {}
         self.bad: dict[str, Bad] = {}
@@ -111,10 +112,11 @@ class Collection:
         keep = self._once[topic]
         times = samples.times[keep]
         t_ns, arrival_ns = self.clocks[topic](times[:, 0], times[:, 1])
+        values = np.where(np.isfinite(samples.values), samples.values, np.nan)  # the infinite is no measurement, either
         t_ns, first = np.unique(t_ns, return_index=True)
         if len(first) < len(times):
             self.note(topic, f"{len(times) - len(first)} of its messages have the stamp of another one: the first is taken")
-        return t_ns, arrival_ns[first], samples.values[keep][first]
+        return t_ns, arrival_ns[first], values[keep][first]
 
     def on_clock(self, topic: str, table: dict[str, Array]) -> dict[str, Array]:
         """A table whose t_ns are stamps and whose arrival_ns are the log's, on the recording's clock."""

@@ -13,7 +13,7 @@ import numpy as np
 from ..mcapio import streams
 from ..numbers import finite
 from ..recording import RecordingWriter
-from . import gnss, imu, motion, sight, tables
+from . import gnss, imu, motion, sight, tables, turns
 from .attachments import write_attachments
 from .collection import Collection, NoSuchTopic
 from .containers import Bag, Unreadable
@@ -45,6 +45,7 @@ def _write_moving(into: Collection, given: argparse.Namespace) -> str:
     if not into.samples and not into.sight.topics and not into.sight.tags:
         for topic in into.frames.topics:
             into.refuse(topic, "transforms place sensors, and the bag has none that is taken")
+    turns.settle(into)
     drive = motion.choose(into, given, base)
     sensor = imu.choose(into, given, base, drive)
     if drive:

@@ -21,6 +21,8 @@ from .decoding import Topic
 _KINDS: tuple[tuple[bytes, Callable[[Path], "BagFile"]], ...] = (
     (mcap_file.MAGIC, mcap_file.McapFile), (sqlite_file.MAGIC, sqlite_file.SqliteFile), (ros1_file.MAGIC, ros1_file.Ros1File))
 _PACKED: dict[bytes, str] = {b"\x28\xb5\x2f\xfd": "zstd", b"\x1f\x8b": "gzip", b"BZh": "bzip2", b"\xfd7zXZ\0": "xz", b"\x04\x22\x4d\x18": "lz4"}
+_SKIPPABLE = b"\x2a\x4d\x18"  # behind one byte: a frame of zstd that holds nothing, with which pzstd begins (RFC 8878, 3.1.2)
+_TAR = (257, b"ustar")
 _OTHERS = {b"version https://": "a pointer of Git LFS: `git lfs pull` fetches the file that it stands for", b"<": "a web page: the download went wrong",
            b"PK\3\4": "a zip archive: unpack it and give the bag in it", b"#ROSBAG V1": "a ROS 1 bag of format 1: `rosbag fix` makes format 2.0 of it"}
 _BAG_NAME = re.compile(r"\.(mcap|db3|bag|active)(\.(zstd|zst|gz|bz2|xz|lz4))?$")
@@ -81,7 +83,7 @@ class Bag:
             raise Unreadable(f"{path.name} is empty: 0 bytes; was the disk full, or the recorder killed at its start?")
         head = _head(path)
         for magic, how in _PACKED.items():
-            if head.startswith(magic):
+            if head.startswith(magic) or (how == "zstd" and head[1:4] == _SKIPPABLE):
                 packed, path = path, self._unpacked(path, how)
                 head = _head(path)
                 if not head:
@@ -93,6 +95,10 @@ class Bag:
         for magic, what in _OTHERS.items():
             if head.startswith(magic):
                 raise Unreadable(f"{path.name} is no bag, but {what}")
+        with path.open("rb") as file:
+            file.seek(_TAR[0])
+            if file.read(len(_TAR[1])) == _TAR[1]:
+                raise Unreadable(f"{path.name} is no bag, but a tar archive: unpack it and give the bag in it")
         raise Unreadable(f"{path.name} is no bag: it begins neither as MCAP, nor as rosbag2's SQLite, nor as a ROS 1 bag of format 2.0"
                          f" ({_said(head)}); give the recorder's file as it is")
 

@@ -3,6 +3,7 @@
 
 import argparse
 import re
+from collections.abc import Callable
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from .motion import Motion
 from .tables import without_arrival
 from .samples import Samples
 
+_NO_FIX = -1  # of NavSatStatus; -2 is "not set", as of drivers that fill none
 _STATUS_SIGMA_M = {-1: 5.0, 0: 5.0, 1: 2.0, 2: 0.5}
 """Sigma without a stated covariance, by NavSatStatus: a plain fix, one with satellite corrections, one with a ground station's
 (RTK float or fixed); usual figures of data sheets."""
@@ -21,7 +23,8 @@ _VARIANCE_MAX_M2 = 1e6  # a larger one means "not known"
 _UP_SIGMAS = 2.0  # the altitude's sigma in horizontal ones, by the satellites' geometry
 _SPREAD_SIGMAS = 3.0  # the way under the fixes in sigmas of a fix, from which on they show its direction
 _SPEED_MAX_MPS = 100.0  # of a robot whose motion is not known
-_ALTITUDE_MAX_M = 10_000.0  # of a robot's place; of more, and of no number, nothing is known
+_ALTITUDE_M = (-5_000.0, 10_000.0)  # of a robot's place, the deepest mines included; of others, and of no number, nothing is known
+_CLIMB_MAX_M = 1_000.0  # from the median of a drive; farther off is a receiver's word for "none" (-1000, -9999)
 _LEAP_SIGMAS, _LEAPS_MAX = 10.0, 0.1  # of a leap; share of leaps among the steps of a drive
 _FUSED = re.compile(r"filtered|fused|ekf|ukf", re.I)
 
@@ -30,7 +33,7 @@ def _real(topic: str, into: Collection, values: Array) -> Array:
     """Which messages are fixes; the others are counted."""
     latitude, longitude, status = values[:, 0], values[:, 1], values[:, 7]
     finite = np.isfinite(latitude) & np.isfinite(longitude)
-    none = status < 0
+    none = status == _NO_FIX
     zero = ~none & finite & (latitude == 0) & (longitude == 0)
     inside = finite & (np.abs(latitude) <= 90) & (np.abs(longitude) <= 360)
     for mask, text in ((none, "say that there is no fix"), (zero, "are of latitude 0 and longitude 0, which is no fix"),
@@ -64,7 +67,7 @@ def _choose(into: Collection, given: argparse.Namespace) -> str | None:
 
     def rank(topic: str) -> tuple[float, ...]:
         values = topics[topic].values
-        ok = (values[:, 7] >= 0) & np.isfinite(values[:, 0]) & (values[:, :2] != 0).any(axis=1)
+        ok = (values[:, 7] != _NO_FIX) & np.isfinite(values[:, 0]) & (values[:, :2] != 0).any(axis=1)
         if not ok.any():
             return 1.0, 0.0, 0.0
         return 0.0, float(bool(_FUSED.search(topic))), float(np.median(_sigmas(values[ok], ok[ok])[0]))
@@ -73,11 +76,12 @@ def _choose(into: Collection, given: argparse.Namespace) -> str | None:
 
 
 def _altitude(into: Collection, topic: str, altitude: Array) -> Array:
-    """The altitudes; NaN where a fix has none (2-D: not a number, or exactly 0 between others that are far from it)."""
-    out = np.where(np.abs(altitude) <= _ALTITUDE_MAX_M, altitude, np.nan)
+    """The altitudes; NaN where a fix has none (2-D: not a number, a place where no robot is, or exactly 0 between others that are far from it)."""
+    out = np.where((altitude >= _ALTITUDE_M[0]) & (altitude <= _ALTITUDE_M[1]), altitude, np.nan)
     known = out[np.isfinite(out) & (out != 0)]
-    if len(known) and abs(np.median(known)) > 5:
-        out[out == 0] = np.nan
+    if len(known):
+        middle = float(np.median(known))
+        out[(np.abs(out - middle) > _CLIMB_MAX_M) | ((out == 0) & (abs(middle) > 5))] = np.nan
     missing = int(np.isnan(out).sum())
     if missing:
         into.note(topic, f"{missing} of its {len(out)} fixes have no altitude: their z is empty, their x and y are taken")
@@ -108,12 +112,8 @@ def _stale(into: Collection, topic: str, motion: Motion | None, t_ns: Array, val
     return count
 
 
-def _start(motion: Motion | None, t_ns: Array, places: Array, sigma_m: Array, antenna: Array) -> Array | None:
-    """Where the drive starts (east, north; m) if that is not the first fix: the dead-reckoned way of the antenna is laid over the fixes
-    (Umeyama 1991, without a scale). None: it starts at the first fix, or the fixes don't show it.
-    """
-    if motion is None or motion.is_command or len(t_ns) < 5:
-        return None
+def _way(motion: Motion, t_ns: Array, antenna: Array) -> Array:
+    """Places (n, 2; m) of the antenna at the fixes' times by dead reckoning from the drive's start on."""
     twist, dt = np.nan_to_num(motion.twist), np.append(np.diff(motion.t_ns) / 1e9, 0.0)
     heading = np.concatenate([[0.0], np.cumsum(twist[:, 5] * dt)])[:-1]
     middle = heading + 0.5 * twist[:, 5] * dt
@@ -122,18 +122,85 @@ def _start(motion: Motion | None, t_ns: Array, places: Array, sigma_m: Array, an
     way = np.vstack([np.zeros(2), np.cumsum(step, axis=0)[:-1]])
     at = np.column_stack([np.interp(t_ns, motion.t_ns, column) for column in way.T])
     turned = np.interp(t_ns, motion.t_ns, heading)
-    at += np.column_stack([np.cos(turned) * antenna[0] - np.sin(turned) * antenna[1], np.sin(turned) * antenna[0] + np.cos(turned) * antenna[1]])
-    before = np.linalg.norm(at[0])
-    a, b = at - at.mean(axis=0), places - places.mean(axis=0)
-    if before < float(np.median(sigma_m)) or np.linalg.norm(a, axis=1).max() < max(_SPREAD_SIGMAS * float(np.median(sigma_m)), 1.0):
-        return None
+    return np.asarray(at + np.column_stack([np.cos(turned) * antenna[0] - np.sin(turned) * antenna[1],
+                                            np.sin(turned) * antenna[0] + np.cos(turned) * antenna[1]]))
+
+
+def _laid(way: Array, places: Array) -> tuple[Array, float]:
+    """Where the way's start lies among the places, the way being turned and moved onto them (Umeyama 1991, without a scale), and what is left (rms)."""
+    a, b = way - way.mean(axis=0), places - places.mean(axis=0)
     turn = np.arctan2(np.sum(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]), np.sum(a * b))
     c, s = np.cos(turn), np.sin(turn)
     rotation = np.array([[c, -s], [s, c]])
-    rest = b - a @ rotation.T
-    if np.sqrt(np.mean(rest**2)) > 3 * float(np.median(sigma_m)) + 0.02 * float(np.linalg.norm(a, axis=1).max()):
+    return np.asarray(places.mean(axis=0) - rotation @ way.mean(axis=0)), float(np.sqrt(np.mean((b - a @ rotation.T) ** 2)))
+
+
+def _fits_within(way: Array, sigma_m: float) -> float:
+    """What may be left where the way and the places are of one drive (rms, m): the fixes' noise and 2 % of the way."""
+    return 3 * sigma_m + 0.02 * float(np.linalg.norm(way - way.mean(axis=0), axis=1).max())
+
+
+def _shows(way: Array, sigma_m: float) -> bool:
+    """Whether a way is long enough to compare places with it."""
+    return len(way) >= 5 and float(np.linalg.norm(way - way.mean(axis=0), axis=1).max()) >= max(_SPREAD_SIGMAS * sigma_m, 1.0)
+
+
+def _start(motion: Motion | None, t_ns: Array, places: Array, sigma_m: float, antenna: Array) -> Array | None:
+    """Where the drive starts (east, north; m) if that is not the first fix: the dead-reckoned way of the antenna is laid over the fixes.
+    None: it starts at the first fix, or the fixes don't show it.
+    """
+    if motion is None or motion.is_command:
         return None
-    return np.asarray(places.mean(axis=0) - rotation @ at.mean(axis=0))
+    way = _way(motion, t_ns, antenna)
+    if not _shows(way, sigma_m) or np.linalg.norm(way[0]) < sigma_m:
+        return None
+    start, rest = _laid(way, places)
+    return start if rest <= _fits_within(way, sigma_m) else None
+
+
+def _minutes(value: Array) -> Array:
+    """Degrees by degrees and minutes in one number, as NMEA 0183 has them (dddmm.mmmm)."""
+    whole = np.trunc(value / 100)
+    return np.asarray(whole + (value - 100 * whole) / 60)
+
+
+# How drivers fill latitude and longitude, in words, and the degrees that are meant.
+_READINGS: tuple[tuple[str, Callable[[Array], Array]], ...] = (
+    ("", lambda v: v), ("in radians", np.degrees), ("degrees and minutes in one number, as NMEA has them", _minutes),
+    ("in ten-millionths of a degree", lambda v: v * 1e-7))
+
+
+def _read(into: Collection, topic: str, motion: Motion | None, t_ns: Array, values: Array, antenna: Array) -> Array:
+    """The messages with latitude and longitude in degrees: as they are, unless these can't be, or the motion fits another reading alone."""
+    seen = (values[:, 7] != _NO_FIX) & np.isfinite(values[:, :2]).all(axis=1) & (values[:, :2] != 0).all(axis=1)
+    if not seen.any():
+        return values
+    choices: list[tuple[str, Array]] = []
+    for words, degrees in _READINGS:
+        for is_exchanged in (False, True):
+            read = degrees(values[:, [1, 0]] if is_exchanged else values[:, :2])
+            if ((np.abs(read[seen]) <= (90, 360)).all(axis=1)).mean() > 0.5:
+                choices.append((" and ".join(filter(None, ("exchanged" if is_exchanged else "", words))), read))
+    if not choices:
+        return values
+    said, best = choices[0]  # of those that can be
+    sigma = float(np.median(_sigmas(values[seen], np.isfinite(values[seen, 2]))[0]))
+    if motion is not None and not motion.is_command:
+        way = _way(motion, t_ns[seen], antenna)
+        if _shows(way, sigma):
+            rests = [_laid(way, _plane(read[seen])[:, :2])[1] for _, read in choices]
+            k, limit = int(np.argmin(rests)), _fits_within(way, sigma)
+            if rests[k] <= limit and rests[0] > max(limit, 3 * rests[k]):
+                said, best = choices[k]
+                said += f", as {motion.topic} shows: its way is {rests[k]:.2g} m off them then, and {rests[0]:.3g} m as they are"
+    if said:
+        into.find(topic, f"its latitude and longitude are {said}: mended")
+    return np.hstack([best, values[:, 2:]])
+
+
+def _plane(read: Array) -> Array:
+    """Metres east, north and up of the first of some places."""
+    return np.asarray(tangent_plane([read[0, 0], read[0, 1], 0.0], read[:, 0], read[:, 1], np.zeros(len(read))))
 
 
 def _origin(into: Collection, topic: str, motion: Motion | None, t_ns: Array, values: Array, known: Array, antenna: Array) -> list[float]:
@@ -142,7 +209,7 @@ def _origin(into: Collection, topic: str, motion: Motion | None, t_ns: Array, va
     if not len(known):
         into.note(topic, "no fix has an altitude: that of the origin is written as 0")
     places = tangent_plane(first, values[:, 0], values[:, 1], np.full(len(values), first[2]))[:, :2]
-    start = _start(motion, t_ns, places, _sigmas(values, np.isfinite(values[:, 2]))[0], antenna)
+    start = _start(motion, t_ns, places, float(np.median(_sigmas(values, np.isfinite(values[:, 2]))[0])), antenna)
     if start is None or motion is None:
         return first
     into.note(topic, f"its first fix comes {max(int(t_ns[0]) - int(motion.t_ns[0]), 0) / 1e9:.1f} s after the drive's start: the map's origin is the robot's start, "
@@ -160,6 +227,9 @@ def write(into: Collection, given: argparse.Namespace, base: str, motion: Motion
             into.refuse(other, f"positions come from {topic}; --gnss {other} takes this one")
     samples = into.samples["fixes"][topic]
     t, arrival, values = into.timed(topic, samples)
+    place = _antenna(into, topic, samples.frame, base)
+    antenna = np.array(place["mounting"]["xyz_m"][:2] if place else [0.0, 0.0])
+    values = _read(into, topic, motion, t, values, antenna)
     ok = _real(topic, into, values)
     if not ok.any():
         into.refuse(topic, "it never has a fix")
@@ -169,8 +239,6 @@ def write(into: Collection, given: argparse.Namespace, base: str, motion: Motion
     t, arrival, values = t[stale:], arrival[stale:], values[stale:]
     altitude = _altitude(into, topic, values[:, 2])
     known = altitude[np.isfinite(altitude)]
-    place = _antenna(into, topic, samples.frame, base)
-    antenna = np.array(place["mounting"]["xyz_m"][:2] if place else [0.0, 0.0])
     origin = list(given.origin or _origin(into, topic, motion, t, values, known, antenna))
     # Without an altitude the place on the ground follows from one like it: 10 m change it by 1.6 parts in a million.
     height = np.where(np.isfinite(altitude), altitude, np.median(known) if len(known) else origin[2])

@@ -10,10 +10,11 @@ from ..tables import Array
 from .lens_fit import fitted, rational
 
 # Names of models in sensor_msgs/distortion_models.hpp and of drivers.
-_RADTAN = {"plumb_bob", "", "radtan", "brown_conrady", "brown", "pinhole"}
+_RADTAN = {"plumb_bob", "", "radtan", "radial_tangential", "brown_conrady", "brown", "pinhole", "perspective", "opencv"}
 _NONE = {"none", "no_distortion"}
 _RATIONAL = {"rational_polynomial", "thin_prism"}
-_EQUIDISTANT = {"equidistant", "fisheye", "kannala_brandt", "kannala_brandt4"}
+_EQUIDISTANT = {"equidistant", "fisheye", "opencv_fisheye", "kannala_brandt", "kannala_brandt4", "kb4"}
+_FOCAL_MAX_PX = 1e6
 _SAME_SHAPE = 0.01  # largest relative difference of two scales that are one
 
 
@@ -33,15 +34,20 @@ def values(message: Any, name: str) -> Array:
 
 
 def is_calibrated(message: Any) -> bool:
-    """Whether a camera_info has a lens at all: drivers send zeros before a camera is calibrated."""
+    """Whether a camera_info has a lens at all: drivers send zeros, or ones, before a camera is calibrated."""
+    return has_raw(message) or has_rectified(message)
+
+
+def has_raw(message: Any) -> bool:
+    """Whether a camera_info has the lens of raw pictures (K). A focal length of a pixel is none."""
     k = values(message, "k")
-    return len(k) == 9 and bool(np.isfinite(k).all()) and k[0] > 0 and k[4] > 0
+    return len(k) == 9 and bool(np.isfinite(k).all()) and k[0] > 1 and k[4] > 1
 
 
 def has_rectified(message: Any) -> bool:
     """Whether a camera_info has the lens of rectified pictures (P)."""
     p = values(message, "p")
-    return len(p) == 12 and bool(np.isfinite(p).all()) and p[0] > 0 and p[5] > 0
+    return len(p) == 12 and bool(np.isfinite(p).all()) and p[0] > 1 and p[5] > 1
 
 
 def _part(message: Any) -> tuple[float, float, float, float, float, float]:
@@ -79,7 +85,9 @@ def of(message: Any, is_rectified: bool, size: tuple[int, int] | None) -> Lens:
     """The lens of pictures of `size` (None: not known), raw or rectified."""
     notes: list[str] = []
     if not is_calibrated(message):
-        return Lens(None, ["its camera_info is of a camera that is not calibrated (K is 0)"])
+        return Lens(None, ["its camera_info is of a camera that is not calibrated (K is 0 or 1)"])
+    if not is_rectified and not has_raw(message):
+        return Lens(None, ["its camera_info has P, the lens of rectified pictures, alone, and its pictures are raw by their name: the lens is left out"])
     k, p, d = values(message, "k"), values(message, "p"), values(message, "d")
     raw = np.array([k[0], k[4], k[2], k[5]])
     has_p = has_rectified(message)
@@ -89,6 +97,8 @@ def of(message: Any, is_rectified: bool, size: tuple[int, int] | None) -> Lens:
         return Lens(None, [*notes, f"its camera_info is of {message.width} x {message.height}, its pictures have "
                            + (f"{size[0]} x {size[1]}" if size else "no known size") + ": the lens is left out"])
     intrinsics, shown = placed
+    if wrong := _cannot_be(intrinsics, shown):
+        return Lens(None, [*notes, f"its camera_info has {wrong}: the lens is left out, calibrate it (`waymark calibrate camera`)"])
     entry: dict[str, Any] = {"model": "pinhole-radtan", "size": shown, "intrinsics": [float(v) for v in intrinsics], "distortion": [0.0] * 4}
     if not is_rectified:
         bent = _distortion(str(message.distortion_model), d, entry, notes)
@@ -97,6 +107,14 @@ def of(message: Any, is_rectified: bool, size: tuple[int, int] | None) -> Lens:
     elif not has_p:
         notes.append("its pictures are rectified and P of its camera_info is 0: K is taken")
     return Lens(entry, notes)
+
+
+def _cannot_be(intrinsics: list[float], size: list[int]) -> str:
+    """What of [fx, fy, cx, cy] no lens has, as calibration.yaml judges it; "" where all is in order."""
+    if max(intrinsics[:2]) > _FOCAL_MAX_PX:
+        return f"a focal length of {max(intrinsics[:2]):.6g} px"
+    far = [f"{value:.6g} px" for value, side in zip(intrinsics[2:], size) if not -side <= value <= 2 * side]
+    return f"a centre at {far[0]} of a picture of {size[0]} x {size[1]}" if far else ""
 
 
 def _distortion(name: str, d: Array, entry: dict[str, Any], notes: list[str]) -> bool:

@@ -240,6 +240,11 @@ def _odometry(into: Collection, topic: str, samples: Samples, given: argparse.Na
     twist = odometry.twist if given.motion_by == "twists" else odometry.body()
     if given.motion_by == "poses":
         twist, odometry.by_poses = pose_rates(t, odometry.places, odometry.turns), True
+    if not odometry.by_poses and odometry.has_orientation and np.isfinite(twist).any():
+        missing: Array = np.asarray(~np.isfinite(twist[:, [0, 5]]).all(axis=1))
+        if missing.any() and np.isfinite(rates := pose_rates(t, odometry.places, odometry.turns)).any():
+            odometry.say(f"{int(missing.sum())} of its {len(t)} messages have no number as speed or turn rate: the differences of its poses are used for them")
+            twist = np.where(missing[:, None], rates, twist)
     matrix, text = _place(into, topic, samples.child, base)
     if text:
         odometry.say(text, finding=text.startswith(("tf", "the")))
@@ -290,12 +295,28 @@ def _rank(into: Collection, motion: Motion, base: str, span_s: float) -> tuple[f
     samples = into.samples.get("odometry", {}).get(motion.topic)
     is_twist = motion.topic in into.samples.get("twists", {})
     unstamped = is_twist and not into.samples["twists"][motion.topic].times[:, 0].any()
+    # Of two twists the one that states a covariance, or has new values in each message, is measured.
+    may_be_command = is_twist and motion.topic not in into.with_covariance
+    repeats = is_twist and _repeats(motion.twist) > _REPEATS
     covered = (int(motion.t_ns[-1]) - int(motion.t_ns[0])) / 1e9 / max(span_s, 1e-9) if len(motion.t_ns) else 0.0
     findings = sum(finding for finding, _ in motion.said)
     moves = bool(np.abs(np.nan_to_num(motion.twist)).max(initial=0) > 1e-6)
     return (float(not moves), float(motion.is_command), float(bool(_TRUTH.search(motion.topic))), float(unstamped),
-            float(bool(_FUSED.search(motion.topic))), float(covered < 0.8), float(findings),
+            float(bool(_FUSED.search(motion.topic))), float(covered < 0.8), float(findings), float(may_be_command), float(repeats),
             float(samples is None or not into.frames.is_base(samples.child, base)), float(motion.by_poses))
+
+
+def _against(other: Motion, best: Motion) -> str:
+    """How another topic's motion differs from the one that is taken, as a part of a sentence; "" where it doesn't."""
+    borders = compare.grid(other.t_ns, best.t_ns)
+    a, b = (compare.held(each.t_ns, each.twist[:, [0, 5]], borders) for each in (other, best))
+    shows = (compare.moves(b[:, :1]), compare.turns(b[:, 1]))
+    parts = []
+    for k, what in enumerate(("speed", "turn rate")):
+        alike = compare.likeness(a[:, k], b[:, k])
+        if shows[k] and alike.r > _FITS and alike.differs(_AGREES):
+            parts.append(f"its {what} is {alike.factor:.3g} times that one's")
+    return f" ({', '.join(parts)})" if parts else ""
 
 
 def choose(into: Collection, given: argparse.Namespace, base: str) -> Motion | None:
@@ -315,7 +336,7 @@ def choose(into: Collection, given: argparse.Namespace, base: str) -> Motion | N
     for other in found:
         if other is not best:
             kind = "commands, not measured motion; " if other.is_command and not best.is_command else ""
-            into.refuse(other.topic, f"{kind}motion comes from {best.topic}; --motion {other.topic} takes this one")
+            into.refuse(other.topic, f"{kind}motion comes from {best.topic}{_against(other, best)}; --motion {other.topic} takes this one")
     _name_lever(best)
     for finding, text in best.said:
         (into.find if finding else into.note)(best.topic, text)

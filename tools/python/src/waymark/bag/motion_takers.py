@@ -41,7 +41,10 @@ def twist(into: Collection, topic: str, message: Any, log_ns: int) -> None:
 
 def twist_stamped(into: Collection, topic: str, message: Any, log_ns: int) -> None:
     """TwistStamped and TwistWithCovarianceStamped."""
-    inner = message.twist.twist if hasattr(message.twist, "twist") else message.twist
+    inner = message.twist
+    if hasattr(inner, "twist"):
+        into.with_covariance.add(topic)
+        inner = inner.twist
     frame = message.header.frame_id
     into.sample("twists", topic, (_stamp_ns(message), log_ns), (frame, frame), _twist(inner.linear, inner.angular))
 

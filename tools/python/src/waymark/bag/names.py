@@ -38,8 +38,8 @@ class Name:
             if _words(parts[-1])[-1:] in (["color"], ["gray"], ["grey"], ["mono"]):
                 parts.pop()
         if parts:
-            words = _words(parts[-1])
-            while len(words) > 1 and words[-1] in {"raw"} | _RECTIFIED:
+            words = [word for word in parts[-1].split("_") if word]
+            while len(words) > 1 and words[-1].lower() in {"raw"} | _RECTIFIED:
                 words.pop()
             parts[-1] = "_".join(words)
         return (*parts, self.rest)
@@ -65,6 +65,14 @@ def picture(topic: str) -> Name:
     rest = "_".join(word for word in words if word not in _PICTURE_WORDS and word != "camera")
     near = words + [word for part in parts[-1:] for word in _words(part)]
     return Name(topic, tuple(parts), rest, transport, bool(_RECTIFIED & set(near)))
+
+
+def is_distance(topic: str) -> bool | None:
+    """Whether a topic's name says that its pictures hold distances, or infrared light (False); None: it says neither."""
+    words = [re.sub(r"\d+$", "", word) for part in topic.split("/") for word in _words(part)]
+    if {"ir", "infra", "infrared"} & set(words):
+        return False
+    return True if {"depth", "disparity", "range"} & set(words) else None
 
 
 @dataclass(frozen=True)

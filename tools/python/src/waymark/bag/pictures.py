@@ -16,15 +16,24 @@ from .decoding import BadMessage
 _SIDE_MAX = 65535  # pixels; of JPEG
 # Bits that sensors give; a picture of 16 bits is scaled by the smallest of these that holds all that came so far.
 _DEPTHS = (8, 10, 12, 14, 16)
-# Encodings as sensor_msgs/image_encodings.hpp and OpenCV name them: Pillow's raw mode, bytes of a pixel.
-_PACKED = {"mono8": ("L", "L", 1), "8uc1": ("L", "L", 1), "rgb8": ("RGB", "RGB", 3), "bgr8": ("RGB", "BGR", 3), "8uc3": ("RGB", "BGR", 3),
-           "rgba8": ("RGB", "RGBX", 4), "bgra8": ("RGB", "BGRX", 4), "8uc4": ("RGB", "BGRX", 4)}
-# YUV 4:2:2 has a grey level in every other byte: the second of UYVY (ROS's yuv422), the first of YUYV.
-_EVERY_OTHER = {"yuv422": 1, "uyvy": 1, "yuv422_uyvy": 1, "yuv422_yuy2": 0, "yuyv": 0, "yuy2": 0, "yuv422_yuyv": 0}
-# Planar YUV begins with the grey levels of the whole picture.
-_LUMA_FIRST = {"nv12", "nv21", "nv24", "nv16", "nv61", "yuv420", "yuv420p", "i420", "yv12", "yuv444p"}
-_BAYER = re.compile(r"bayer_(rggb|bggr|gbrg|grbg)(8|10|12|14|16)$")
-_COLOURS16 = {"rgb16": (3, 1), "bgr16": (3, -1), "rgba16": (4, 1), "bgra16": (4, -1)}  # channels, order of the first three
+# Encodings by the names of sensor_msgs/image_encodings.hpp, OpenCV, V4L2's four letters, FFmpeg and GenICam. Colours: Pillow's raw mode, bytes of
+# a pixel. XRGB of DRM and of libcamera is a word of 32 bits, whose lowest byte, blue, comes first.
+_COLOURS = {("rgb8", "rgb", "rgb24", "rgb3"): ("RGB", 3), ("bgr8", "8uc3", "8sc3", "bgr", "bgr24", "bgr3"): ("BGR", 3),
+            ("rgba8", "rgba", "rgbx8", "rgbx"): ("RGBX", 4), ("bgra8", "8uc4", "bgra", "bgrx8", "bgrx", "xrgb8888", "argb8888"): ("BGRX", 4),
+            ("argb8", "argb", "xrgb8"): ("XRGB", 4), ("abgr8", "abgr"): ("XBGR", 4), ("rgb565", "rgbp"): ("BGR;16", 2)}
+# Where the grey level is: bytes of a pixel in its row, the first of them that is one, and rows of all planes to those of the picture.
+_GREY = {("mono8", "8uc1", "8sc1", "mono", "grey", "gray", "gray8", "y8", "y800", "l8"): (1, 0, 1.0),
+         ("yuyv", "yuy2", "yuv422_yuy2", "yuv422_yuyv", "yuyv422", "yvyu", "yvyu422"): (2, 0, 1.0),
+         ("uyvy", "yuv422", "yuv422_uyvy", "uyvy422", "vyuy"): (2, 1, 1.0), ("yuv444", "yuv3"): (3, 0, 1.0),
+         ("nv12", "nv21", "yuv420", "yuv420p", "yuv420sp", "i420", "iyuv", "yu12", "yv12"): (1, 0, 1.5),
+         ("nv16", "nv61", "yuv422p", "422p"): (1, 0, 2.0), ("nv24", "nv42", "yuv444p"): (1, 0, 3.0)}
+_GREY16 = {"mono10", "mono12", "mono14", "mono16", "y10", "y12", "y14", "y16", "gray16", "gray16le", "grey16"}
+_BAYER = re.compile(r"(bayer_?)?(rggb|bggr|gbrg|grbg|rg|bg|gb|gr|ba)_?(8|10|12|14|16)?$")
+# Channels, order of the first three.
+_COLOURS16 = {"rgb16": (3, 1), "rgb48": (3, 1), "bgr16": (3, -1), "16uc3": (3, -1), "rgba16": (4, 1), "bgra16": (4, -1), "16uc4": (4, -1)}
+_BY_NAME = {name: value for names, value in _COLOURS.items() for name in names}
+_GREY_BY_NAME = {name: value for names, value in _GREY.items() for name in names}
+_TWO_BYTES = "8uc2"  # of OpenCV: YUYV or UYVY
 _DEPTH_PICTURES = {"16uc1", "32fc1", "64fc1", "16sc1"}  # REP 118: distances in mm or m
 _VIDEO = re.compile(r"h\.?26[45]|hevc|avc|av1|vp[89]|theora|mpeg", re.I)
 
@@ -34,11 +43,24 @@ class NotTaken(Exception):
 
 
 class Depths:
-    """Bits that a camera's pictures of 16 bits use, over all pictures so far."""
+    """What a camera's pictures so far show of their encoding: bits that those of 16 bits use, and which byte of two is grey."""
 
-    def __init__(self, note: Callable[[str], None]):
+    def __init__(self, note: Callable[[str], None], is_distance: bool | None = None):
+        """`is_distance`: whether values of 16 bits are distances, where the topic's name says so; None: the encoding says it."""
+        self.is_distance = is_distance
         self._note = note
         self._bits = 0
+        self._grey_byte: int | None = None
+
+    def grey_byte(self, rows: Array) -> int:
+        """Which byte of two is the grey level: the chroma is nearer to 128, or varies less. Of the first picture that shows it."""
+        if self._grey_byte is None:
+            spread = [float(np.square(rows[:, k::2].astype(np.float32) - 128).mean()) for k in range(2)]
+            if spread[0] == spread[1]:
+                return 0
+            self._grey_byte = int(spread[1] > spread[0])
+            self._note(f"its encoding states two bytes a pixel: the {('first', 'second')[self._grey_byte]} is the grey level, as of {('YUYV', 'UYVY')[self._grey_byte]}")
+        return self._grey_byte
 
     def grey(self, values: Array) -> Array:
         """Grey levels, uint8, of a picture of uint16."""
@@ -79,25 +101,32 @@ def _demosaiced(mosaic: Array) -> Array:
 
 def jpeg_of_image(message: Any, depths: Depths) -> bytes:
     """The JPEG of a sensor_msgs/Image."""
-    width, height, encoding = int(message.width), int(message.height), message.encoding.strip().lower()
-    if encoding in _DEPTH_PICTURES:
+    width, height, encoding = int(message.width), int(message.height), message.encoding.strip().lower().split(";")[0]
+    is_distance = encoding in _DEPTH_PICTURES
+    if encoding in ("16uc1", "mono16") and depths.is_distance is not None:
+        is_distance = depths.is_distance
+    if is_distance:
         raise NotTaken(f"depth or raw distances ({message.encoding}), no picture that a detector reads")
+    if bytes(message.data[:3]) == b"\xff\xd8\xff" and "jp" in encoding:  # "jpeg", "mjpeg", "mjpg"
+        return _whole_jpeg(bytes(message.data))
     if not 0 < width <= _SIDE_MAX or not 0 < height <= _SIDE_MAX:
         raise BadMessage(f"a picture of {width} x {height} pixels")
-    if encoding in _PACKED:
-        return _packed(message, *_PACKED[encoding])
-    if encoding in _EVERY_OTHER:
-        return jpeg_of(_rows(message, height, 2 * width)[:, _EVERY_OTHER[encoding] :: 2])
-    if encoding in _LUMA_FIRST:
-        return jpeg_of(_rows(message, height, width))
-    if encoding in ("mono10", "mono12", "mono14", "mono16"):
+    if encoding in _BY_NAME:
+        return _packed(message, *_BY_NAME[encoding])
+    if encoding == _TWO_BYTES:
+        rows = _rows(message, height, 2 * width)
+        return jpeg_of(rows[:, depths.grey_byte(rows) :: 2])
+    if encoding in _GREY_BY_NAME:
+        size, first, planes = _GREY_BY_NAME[encoding]
+        return jpeg_of(_rows(message, _height(message, size, planes), size * width)[:, first::size])
+    if encoding in _GREY16 or encoding == "16uc1":
         return jpeg_of(depths.grey(_words(message)))
     if bayer := _BAYER.match(encoding):
         if min(width, height) < 2:
             raise BadMessage(f"a Bayer picture of {width} x {height} pixels")
-        mosaic = np.ascontiguousarray(_rows(message, height, width)) if bayer[2] == "8" else _words(message)
-        grey = _demosaiced(mosaic)
-        return jpeg_of(grey if bayer[2] == "8" else depths.grey(grey))
+        is_byte = bayer[3] in (None, "8")
+        grey = _demosaiced(np.ascontiguousarray(_rows(message, height, width)) if is_byte else _words(message))
+        return jpeg_of(grey if is_byte else depths.grey(grey))
     if encoding in _COLOURS16:
         channels, order = _COLOURS16[encoding]
         rows = np.ascontiguousarray(_rows(message, height, 2 * channels * width)).view(">u2" if message.is_bigendian else "<u2")
@@ -107,7 +136,14 @@ def jpeg_of_image(message: Any, depths: Depths) -> bytes:
     raise NotTaken(f"pictures in '{message.encoding}' are not read; mono, rgb, bgr, Bayer, YUV 4:2:2 and NV12 are")
 
 
-def _packed(message: Any, mode: str, raw: str, size: int) -> bytes:
+def _height(message: Any, size: int, planes: float) -> int:
+    """Rows of the picture: drivers that count the rows of all planes leave no bytes for further ones."""
+    height, step = int(message.height), int(message.step) or size * int(message.width)
+    counts_all = planes > 1 and len(message.data) < planes * (height - 1) * step and height * step <= len(message.data)
+    return round(height / planes) if counts_all else height
+
+
+def _packed(message: Any, raw: str, size: int) -> bytes:
     """By Pillow's own unpacking, which knows the order of the channels and the length of the rows."""
     width, height = int(message.width), int(message.height)
     rows = _rows(message, height, size * width)
@@ -115,7 +151,7 @@ def _packed(message: Any, mode: str, raw: str, size: int) -> bytes:
     if len(data) < height * rows.strides[0]:
         data = np.ascontiguousarray(rows).ravel()  # the last row ends with its last pixel
     step = rows.strides[0] if len(data) >= height * rows.strides[0] else size * width
-    picture = Image.frombuffer(mode, (width, height), data, "raw", raw, step, 1)
+    picture = Image.frombuffer("RGB", (width, height), data, "raw", raw, step, 1)
     return jpeg_of(np.asarray(picture.convert("L")))
 
 
@@ -146,7 +182,7 @@ def _whole_jpeg(data: bytes) -> bytes:
         jpeg_size(data)
     except ValueError:
         raise BadMessage(f"its {len(data)} bytes begin as a JPEG and have no size of a picture") from None
-    if b"\xff\xd9" not in data.rstrip(b"\0")[-4096:]:
+    if data.rfind(b"\xff\xd9") <= data.rfind(b"\xff\xda"):  # no end after the last scan's begin
         raise BadMessage(f"the JPEG of {len(data)} bytes is cut: it has no end")
     try:
         with Image.open(io.BytesIO(data)) as picture:

@@ -64,6 +64,8 @@ def read(bag: Bag, into: Collection, progress: Progress | None) -> dict[str, lis
             _own(into, own, topic, log_ns, raw)
         else:
             _take(into, topic, log_ns, raw)
+    for name, camera in into.sight.cameras.by_topic.items():
+        sight.begin(into, name, camera)
     for name, bad in into.bad.items():
         into.say_bad(name, bad, counts.get(name, 0))
     return own

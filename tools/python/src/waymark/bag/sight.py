@@ -8,27 +8,55 @@ import numpy as np
 
 from ..recording import Frame, jpeg_size
 from ..tables import Array, Table
-from . import cameras, pictures, tables, tags
+from . import cameras, names, pictures, tables, tags
 from .collection import Collection, stamp_ns
 from .decoding import BadMessage, Topic
 from .pictures import Depths
 from .views import TagRows
 
 
+_FIRST = 5  # pictures; the size of most of them is the camera's
+
+
 def _picture(into: Collection, topic: str, message: Any, log_ns: int, make: Callable[[Any, Depths], bytes]) -> None:
-    if topic not in into.sight.cameras.by_topic:
+    camera = into.sight.cameras.by_topic.get(topic)
+    if camera is None:
         return
-    depths = into.sight.depths.setdefault(topic, Depths(lambda text: into.note(topic, text)))
+    depths = into.sight.depths.setdefault(topic, Depths(lambda text: into.note(topic, text), names.is_distance(topic)))
     jpeg = make(message, depths)
-    size = jpeg_size(jpeg)
-    camera = into.sight.cameras.by_topic[topic]
-    if camera.size and size != camera.size:
-        raise BadMessage(f"a picture of {size[0]} x {size[1]} follows one of {camera.size[0]} x {camera.size[1]}")
-    name = into.sight.cameras.pictures(topic, message.header.frame_id, size)
-    into.sight.topics.setdefault(name, topic)
     t_ns = stamp_ns(message, log_ns)
+    frame = Frame(t_ns, into.arrival_ns(topic, t_ns, log_ns), jpeg)
+    camera.frame = camera.frame or message.header.frame_id.lstrip("/")
+    if camera.size is None:
+        camera.waiting.append(frame)
+        if len(camera.waiting) == _FIRST:
+            begin(into, topic, camera)
+    else:
+        _write_picture(into, topic, camera, frame)
+
+
+def begin(into: Collection, topic: str, camera: cameras.Camera) -> None:
+    """Decides the size of a camera's pictures, and writes the first ones."""
+    sizes = [jpeg_size(frame.jpeg) for frame in camera.waiting]
+    if not sizes:
+        return
+    camera.size = max(sizes, key=sizes.count)
+    into.sight.topics.setdefault(camera.name, topic)
+    for frame in camera.waiting:
+        try:
+            _write_picture(into, topic, camera, frame)
+        except BadMessage as problem:
+            into.spoilt(topic, frame.t_ns, str(problem))
+    camera.waiting.clear()
+
+
+def _write_picture(into: Collection, topic: str, camera: cameras.Camera, frame: Frame) -> None:
+    size = jpeg_size(frame.jpeg)
+    if size != camera.size:
+        assert camera.size
+        raise BadMessage(f"a picture of {size[0]} x {size[1]} among those of {camera.size[0]} x {camera.size[1]}")
     try:
-        into.writer.frame(name, Frame(t_ns, into.arrival_ns(topic, t_ns, log_ns), jpeg))
+        into.writer.frame(camera.name, frame)
     except ValueError:  # AVI's lengths have 32 bits
         raise BadMessage("the video has 4 GB, the most that an AVI file holds") from None
 
@@ -65,7 +93,7 @@ def detections(kind: str) -> Callable[[Collection, str, Any, int], None]:
             except BadMessage as problem:
                 bad = problem
                 break
-            rows = into.sight.tags.setdefault(topic, TagRows(kind, message.header.frame_id.lstrip("/"), seen.corners is not None))
+            rows = into.sight.tags.setdefault(topic, TagRows(kind, tags.frame_of(message), seen.corners is not None))
             rows.whole.extend((t_ns, arrival_ns, seen.id))
             rows.values.extend(seen.corners or seen.place or [])
         if bad:
@@ -81,7 +109,7 @@ def problem_of(topic: Topic, raw: Any) -> str | None:
     try:
         message = topic.decode(raw)
         make = pictures.jpeg_of_image if topic.kind == cameras.PICTURE_KINDS[0] else pictures.jpeg_of_compressed
-        make(message, Depths(lambda text: None))
+        make(message, Depths(lambda text: None, names.is_distance(topic.name)))
     except pictures.NotTaken as problem:
         return str(problem)
     except Exception:  # one bad message says nothing of the topic; reading names it
@@ -145,7 +173,7 @@ def _write_tags(into: Collection, found: list[cameras.Found], rectified: bool | 
         elif not _is_optical(rows.frame, camera):
             into.refuse(topic, f"its poses are in '{rows.frame}', which is no camera's optical frame")
         else:
-            if rows.kind == "apriltag_ros/msg/AprilTagDetectionArray":
+            if tags.READERS[rows.kind].is_half_turned:
                 into.note(topic, "its messages name no family: the poses are taken as of tag36h11, which is read half a turn from the library's way up")
             place = tables.mounting(into, rows.frame, base, optical=True)
             written["markers.csv"].append(tags.pose_table(columns, name, place["rpy_deg"] if place else [0.0, 0.0, 0.0]))

@@ -7,7 +7,7 @@ Ours: the middle of a pixel is whole; corners from the upper left one on, clockw
                                        (apriltag.c: homography_project of (-1,1), (1,1), (1,-1), (-1,-1)). Its four oldest families are drawn
                                        the other way up than OpenCV's and ours (cv::aruco::DICT_APRILTAG_*): half a turn
   OpenCV's aruco (fiducial_msgs)       as ours
-  poses (aruco_msgs, aruco_opencv_msgs, apriltag_ros of ROS 1, fiducial_msgs, vision_msgs)
+  poses (aruco_msgs, aruco_opencv_msgs, ros2_aruco_interfaces, ar_track_alvar_msgs, apriltag_ros of ROS 1, fiducial_msgs, vision_msgs)
                                        in the camera's optical frame (REP 103). OpenCV: x to the right, y up, z out of the print.
                                        AprilTag: z into it, y down. aruco_ros: y out of it, z up. The axis that points towards the camera,
                                        or away from it, tells which
@@ -80,13 +80,6 @@ def apriltag(message: Any) -> Iterator[Seen]:
         yield Seen(int(tag.id), _corners([(c.x, c.y) for c in tag.corners], order, _HALF_PX))
 
 
-def apriltag_pose(message: Any) -> Iterator[Seen]:
-    """AprilTagDetectionArray of apriltag_ros for ROS 1: a pose; of a bundle of tags none of them has one."""
-    for tag in message.detections:
-        if len(tag.id) == 1:
-            yield _pose(int(tag.id[0]), tag.pose.pose.pose.position, tag.pose.pose.pose.orientation, half_turned=True)
-
-
 def fiducials(message: Any) -> Iterator[Seen]:
     """fiducial_msgs/FiducialArray."""
     for tag in message.fiducials:
@@ -99,11 +92,31 @@ def fiducial_poses(message: Any) -> Iterator[Seen]:
         yield _pose(int(tag.fiducial_id), tag.transform.translation, tag.transform.rotation)
 
 
-def aruco_poses(message: Any) -> Iterator[Seen]:
-    """aruco_msgs/MarkerArray (id) and aruco_opencv_msgs/ArucoDetection (marker_id)."""
-    for tag in message.markers:
-        pose = tag.pose.pose if hasattr(tag.pose, "pose") else tag.pose
-        yield _pose(int(tag.marker_id if hasattr(tag, "marker_id") else tag.id), pose.position, pose.orientation)
+def poses(message: Any, half_turned: bool = False) -> Iterator[Seen]:
+    """Lists of tags with a pose, or lists of identities and of poses. Of a bundle of tags (several identities) none has a pose."""
+    if hasattr(message, "marker_ids"):
+        pairs = list(zip(message.marker_ids, message.poses))
+    else:
+        tags = message.markers if hasattr(message, "markers") else message.detections
+        pairs = [(tag.marker_id if hasattr(tag, "marker_id") else tag.id, tag) for tag in tags]
+    for identity, pose in pairs:
+        while hasattr(pose, "pose"):
+            pose = pose.pose
+        if np.size(identity) == 1:
+            yield _pose(int(np.ravel(identity)[0]), pose.position, pose.orientation, half_turned)
+
+
+def apriltag_poses(message: Any) -> Iterator[Seen]:
+    """apriltag_ros for ROS 1, and its predecessors: half a turn from the library's way up."""
+    return poses(message, half_turned=True)
+
+
+def frame_of(message: Any) -> str:
+    """The frame of a message's tags: its own, or, where that is empty, that of its first tag (ar_track_alvar)."""
+    tags = getattr(message, "markers", getattr(message, "detections", []))
+    parts: list[Any] = [message, *(part for tag in tags[:1] for part in (tag, getattr(tag, "pose", None)))]
+    headers = [part.header for part in parts if hasattr(part, "header")]
+    return next((name for header in headers if (name := header.frame_id.lstrip("/"))), "")
 
 
 def vision_poses(message: Any) -> Iterator[Seen]:
@@ -126,23 +139,25 @@ def vision_poses(message: Any) -> Iterator[Seen]:
 
 @dataclass(frozen=True)
 class Reader:
-    """How a type is read. `is_of_rectified`: its node reads rectified pictures; `families`: whether its tags name theirs."""
+    """How a type is read. `is_of_rectified`: its node reads rectified pictures; `families`: whether its tags name theirs; `is_half_turned`: its poses
+    are taken as of a family that is drawn the other way up."""
 
     read: Callable[[Any], Iterator[Seen]]
     is_of_rectified: bool = False
     families: bool = False
+    is_half_turned: bool = False
 
 
 READERS = {
     "apriltag_msgs/msg/AprilTagDetectionArray": Reader(apriltag, is_of_rectified=True, families=True),
-    "apriltag_ros/msg/AprilTagDetectionArray": Reader(apriltag_pose),
     "fiducial_msgs/msg/FiducialArray": Reader(fiducials),
     "fiducial_msgs/msg/FiducialTransformArray": Reader(fiducial_poses),
-    "aruco_msgs/msg/MarkerArray": Reader(aruco_poses),
-    "aruco_opencv_msgs/msg/ArucoDetection": Reader(aruco_poses),
     "vision_msgs/msg/Detection2DArray": Reader(vision_poses),
     "vision_msgs/msg/Detection3DArray": Reader(vision_poses),
-}
+} | {f"{package}/msg/AprilTagDetectionArray": Reader(apriltag_poses, is_half_turned=True) for package in ("apriltag_ros", "apriltags2_ros", "apriltags_ros")} | {
+    kind: Reader(poses) for kind in ("aruco_msgs/msg/MarkerArray", "aruco_markers_msgs/msg/MarkerArray", "aruco_opencv_msgs/msg/ArucoDetection",
+                                     "ros2_aruco_interfaces/msg/ArucoMarkers", "aruco_interfaces/msg/ArucoMarkers",
+                                     "ar_track_alvar_msgs/msg/AlvarMarkers")}
 
 
 def to_raw(camera: Found, pixels: Array) -> Array | None:
