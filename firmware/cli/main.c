@@ -48,6 +48,7 @@ static const struct {
     {"import", "make a video of any kind part of a recording", "waymark-tools"},
     {"init", "make the configuration of a new robot from what it has", "waymark-tools"},
     {"map", "make, check and survey maps; print markers", "waymark-tools"},
+    {"mavlink", "give a run's poses to PX4 or ArduPilot, and a localizer's poses to the run", "waymark, of Python (pip)"},
     {"mine", "what black boxes hold, by place and by cause", "waymark-fleet"},
     {"play", "play a recording into CAN, cameras and LCM, with faults", "waymark"},
     {"reference", "smooth a run into a reference trajectory", "waymark-tools"},

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A live run's messages: `for message in waymark.Live(): ...`"""
 
+import math
 import os
 import re
 import struct
@@ -59,14 +60,20 @@ class Live:
             self.malformed[channel] += 1
 
     def next(self, timeout_s: float) -> Message | None:
-        """The next message; None where none came in time."""
-        end = time.monotonic() + timeout_s
-        while not self._waiting:
+        """The next message; None where none came in time. 0: only one that has come already."""
+        end, left_s = time.monotonic() + timeout_s, timeout_s
+        while not self._waiting and left_s >= 0:
+            self._lcm.handle_timeout(math.ceil(1000 * left_s))
             left_s = end - time.monotonic()
-            if left_s < 0:
-                return None
-            self._lcm.handle_timeout(max(round(1000 * left_s), 1))
-        return self._waiting.popleft()
+        return self._waiting.popleft() if self._waiting else None
+
+    def fileno(self) -> int:
+        """Of what becomes readable when messages come, for select()."""
+        return int(self._lcm.fileno())
+
+    def publish(self, kind: str, message: Any) -> None:
+        """Sends a message to the run, on the channel of this kind behind the prefix."""
+        self._lcm.publish(self._prefix + kind, message.encode())
 
     def __iter__(self) -> Iterator[Message]:
         """Messages without an end."""
