@@ -25,7 +25,7 @@ import waymark_fleet.mine
 from waymark_fleet import comparison, html, plan, statistics
 from waymark_hil import HilError, compare, fault_judge, lcm_log, page, poses, verdict
 
-from waymark import geometry, ros
+from waymark import geometry, mavlink, ros
 from waymark.bag import clocks, frames, lens_fit, motion, tags
 from waymark.bag import samples as bag_samples
 from waymark.causes import changes, fault
@@ -114,6 +114,16 @@ CASES = {
     # the package
     "suggest.command: --from": (option(suggest_command._parser(), "run", "--from"), [1.5]),
     "suggest.command: --minutes": (option(suggest_command._parser(), "run", "--minutes"), [1.5]),
+    "mavlink.Frame.__init__": (lambda north, x, y: mavlink.Frame(north, (x, y)).local(POSE[:3, 3], [0.0, 0.0, 0.0, 1.0], np.eye(6)).position, [25.0, 1.0, 2.0]),
+    "mavlink.Frame.local": (lambda *pose: list(mavlink.Frame(25.0).local(*pose)), [[1.0, 2.0, 3.0], [0.0, 0.0, 0.6, 0.8], np.eye(6)]),
+    "mavlink.Frame.planar": (lambda *pose: list(mavlink.Frame(25.0).planar(mavlink.Local(*pose))), [np.ones(3), ROTATION, np.eye(6)]),
+    "mavlink.Frame.east_north": (lambda x, y: mavlink.Frame(25.0).east_north([x, y, 0.0]), [1.0, 2.0]),
+    "mavlink.upper": (lambda value: mavlink.upper(np.full((6, 6), value)), [1.0]),
+    "mavlink.full": (mavlink.full, [mavlink.upper(np.eye(6))]),
+    "mavlink: --north": (option(mavlink._parser(), "--link=udpout:a:1", "--north"), [25.0]),
+    "mavlink: --rate": (option(mavlink._parser(), "--link=udpout:a:1", "--rate"), [25.0]),
+    "mavlink: --duration": (option(mavlink._parser(), "--link=udpout:a:1", "--duration"), [25.0]),
+    "mavlink: --zero": (lambda x: option(mavlink._parser(), "--link=udpout:a:1", "--zero")(f"{x},1"), [25.0]),
     "bag.clocks.seconds": (clocks.seconds, [2e9]),
     "bag.frames.mounting": (frames.mounting, [POSE[:3]]),
     "bag.frames.camera_pose": (lambda matrix: frames.camera_pose("eye", matrix), [POSE]),
@@ -200,7 +210,7 @@ WITHOUT = {
         "of calibrations and transforms, which are refused where one is NaN": "bag.frames.is_optical bag.tags.to_raw",
         "written by the table of mistakes": "causes.fault.discrete",
         "limits of time, whose options are read by numbers.finite": "avi.AviWriter.__init__ causes.search.Search.__init__ causes.search.Search.part_s causes.trial.Blocks.part "
-                                 "causes.trial.Trials.run foxglove_server.serve live.Live.next pool.Pool.run suggest.search.Search.__init__",
+                                 "causes.trial.Trials.run foxglove_server.serve live.Live.next mavlink.Bridge.run pool.Pool.run suggest.search.Search.__init__",
         "values of the table of parameters, whose reader refuses NaN": "suggest.drive.Run.drive suggest.drive.Scores.of suggest.drive.Scores.with_states",
         "in test_nan.py": "replaying.replay recording.RecordingWriter.landmarks recording.RecordingWriter.frame",
     },

@@ -366,13 +366,13 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--as", dest="kind", choices=("odometry", "vision", "global"), default="odometry",
                         help="message: ODOMETRY, VISION_POSITION_ESTIMATE or GLOBAL_POSITION_SENSOR (default odometry)")
     parser.add_argument("--frame", choices=("frd", "ned"), default="frd",
-                        help="of ODOMETRY: MAV_FRAME_LOCAL_FRD, whose heading may be any, or MAV_FRAME_LOCAL_NED (default frd; ArduPilot takes it alone)")
+                        help="of ODOMETRY: MAV_FRAME_LOCAL_FRD, whose heading may be any, or MAV_FRAME_LOCAL_NED (default frd; ArduPilot takes no other)")
     parser.add_argument("--north", metavar="DEGREES", type=finite,
                         help="direction of the frame's x axis (of ned: of north) in the map, from the map's x axis anticlockwise (default 0; 90 where y is north)")
     parser.add_argument("--zero", metavar="X,Y", type=_numbers(2, 2), default=(0.0, 0.0), help="place of the frame's zero in the map, m (default 0,0)")
     parser.add_argument("--origin", metavar="LATITUDE,LONGITUDE,HEIGHT", type=_numbers(3, 3),
                         help="of the frame's zero, degrees and m above the ellipsoid, for --as global")
-    parser.add_argument("--rate", metavar="HZ", type=_range(1, 50, float), default=30.0, help="poses a second at most, 1 to 50 (default 30; PX4 wants 30 to 50)")
+    parser.add_argument("--rate", metavar="HZ", type=_range(1, 50, float), default=30.0, help="poses a second at most, 1 to 50 (default 30; PX4 needs 30 to 50)")
     parser.add_argument("--take", metavar="COMPONENT", type=_range(1, 255, int),
                         help="component whose ODOMETRY or VISION_POSITION_ESTIMATE is sent to the run as localizer (default none)")
     parser.add_argument("--system", metavar="N", type=_range(1, 255, int), default=1, help="MAVLink's number of the vehicle (default 1)")
