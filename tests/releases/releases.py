@@ -25,6 +25,7 @@ USES = [
     ("arrays", "recordings and runs as arrays", ("numpy", "pyyaml"), "python_arrays python_nan python_inputs"),
     ("native", "`libwaymark.so` in Python", ("cffi", "numpy"), "python_native python_estimators"),
     ("types", "types of the Python package", ("mypy", "types-cffi", "types-pyyaml"), "python_types"),
+    ("mavlink", "`waymark mavlink`", ("pymavlink", "pyserial", "lcm"), "python_mavlink"),
     ("ros2", "a listener of `waymark ros2`", ("cyclonedds", "rosbags"), "run_ros2"),
     ("can", "judges of DBC files and logs", ("cantools", "python-can"), "can_judge"),
     ("wheel", "the wheel of the Python package", ("hatchling",), "python_wheel_installed"),
