@@ -201,7 +201,7 @@ CASES = {
 # Modules and functions whose numbers can't be NaN, or are absent as NaN by what they state; "*": all of a module.
 WITHOUT = {
     "waymark": {
-        "whole numbers or text": "bag.can.CanLog.finish bag.clocks.once bag.clocks.settle bag.clocks.Clock.mended bag.clocks.silences bag.clocks.excess bag.collection.Collection.on_clock "
+        "whole numbers or text": "bag.can.CanLog.finish bag.clocks.once bag.clocks.settle bag.clocks.Clock.mended bag.clocks.silences bag.clocks.excess bag.clocks.growth bag.clocks.onto bag.pictures.Depths.grey_byte bag.turns.settle bag.collection.Collection.on_clock "
                                  "bag.pictures.Depths.grey bag.tables.without_arrival bag.tags.corner_table causes.trial.Blocks.of causes.trial.Undo.original "
                                  "recording.jpeg_of recording.RecordingWriter.restamp",
         "NaN is absent: windows, updates and samples without a number are left out": "bag.clocks.goes_on bag.compare.held bag.compare.Likeness.differs bag.compare.likeness "

@@ -26,11 +26,12 @@ static void delay_and_antenna(const drive_evidence *drive, const wm_health *heal
   const double v = sqrt(drive->speed_squares / (double)drive->driven);
   const double delay_m = v * delay->sigma, antenna_m = antenna->sigma;
   if (fmin(delay_m, antenna_m) < OPEN_M || fabs(delay_m - antenna_m) > SUM_SHARE * fmax(delay_m, antenna_m)) return;
-  wm_find(out, WM_FOUND_NOT_OBSERVABLE, WM_SEVERITY_NOTE, "gnss",
-          "measure the antenna's place (gnss: {mounting: {xyz_m}} in calibration.yaml), or drive with several speeds",
-          "the receiver's delay (%.2g +- %.2g s) and its antenna's place ahead (%.2g +- %.2g m) are not observable apart "
-          "in this drive, at %.2g m/s: only their sum is",
-          delay->value, delay->sigma, antenna->value, antenna->sigma, v)
+  wm_find(
+      out, WM_FOUND_NOT_OBSERVABLE, WM_SEVERITY_NOTE, "gnss",
+      "measure the antenna's place (gnss: {mounting: {xyz_m}} in calibration.yaml), or drive with several speeds",
+      "the receiver's delay (%.2g +- %.2g s) and its antenna's place ahead (%.2g +- %.2g m) are not observable apart "
+      "in this drive, at %.2g m/s: only their sum is",
+      delay->value, delay->sigma, antenna->value, antenna->sigma, v)
       ->size = delay_m;
 }
 

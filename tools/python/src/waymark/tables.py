@@ -113,10 +113,11 @@ def _needed(name: str) -> str:
 
 def as_column(name: str, values: Any, where: str) -> Array:
     """Values as a column of a table of that name: int64, float64 or str. ValueError in words where they can't be one."""
-    if isinstance(values, np.ma.MaskedArray) and np.ma.is_masked(values):
+    if isinstance(values, np.ma.MaskedArray) and np.any(values.mask):
+        mask = np.broadcast_to(values.mask, values.shape)
         if is_integer(name):
-            raise ValueError(f"{where}: {name} has no value (masked) in row {int(np.argmax(np.ma.getmaskarray(values)))}")
-        values = values.astype(np.float64).filled(np.nan)
+            raise ValueError(f"{where}: {name} has no value (masked) in row {int(np.argmax(mask))}")
+        values = np.where(mask, np.nan, np.asarray(values.data, dtype=np.float64))
     column = np.asarray(values)
     if column.ndim != 1:
         raise ValueError(f"{where}: {name} has the shape {column.shape}; a column is one-dimensional")
