@@ -189,7 +189,7 @@ static const wm_fault_kind_row kKinds[] = {
                              NULL,
                              NULL,
                              {{"share", DBL_MIN, 1, 1}, {"cpus", 0, 1024, 0}},
-                             "Other programs take this share of so many processors (0: of all)."},
+                             "Other programs take this share of this number of processors (0: of all)."},
     [WM_FAULT_FREQUENCY_CAP] = {"frequency_cap",
                                 RUNNER,
                                 NULL,
