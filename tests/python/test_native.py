@@ -78,7 +78,7 @@ class Replays(unittest.TestCase):
         found = waymark.parameters("format: waymark-config/1\nestimator: landmark_ekf\nmotion: {noise: {speed_mps: 0.5}}\n")
         speed = found["motion.noise.speed_mps"]
         self.assertEqual((speed["value"], speed["initial"], speed["min"]), (0.5, 0.02, 0.0))
-        self.assertFalse([key for key in found if key.split(".")[0] not in ("motion", "sightings", "positions", "markers", "landmark_ekf")])
+        self.assertFalse([key for key in found if key.split(".")[0] not in ("motion", "sightings", "positions", "markers", "localizer", "landmark_ekf")])
         with self.assertRaisesRegex(waymark.WaymarkError, "estimator: is missing"):
             waymark.parameters("format: waymark-config/1\n")
         with self.assertRaisesRegex(waymark.WaymarkError, "sped_mps"):
