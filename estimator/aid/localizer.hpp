@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Poses of another localizer (a lidar's, a visual odometry, a second robot program) as observations of a planar filter.
 // In the map's frame they are observations of the pose with a time-correlated error: a localizer is a filter itself. In
-// a frame of their own its place in the map is unknown: three states hold base_link's pose in map as the localizer has
-// it, which goes on with the way between two of its poses and drifts with it. So only their differences tell something.
+// a frame of their own its place in the map is unknown: three states hold base_link's pose in map by the localizer.
+// They follow the motion between two of its poses, and drift with the distance. So only this motion is observed.
 // Whether the localizer is wrong is a hypothesis with a probability of its own: it is not followed while it is likely,
 // and is again when its poses fit.
 #ifndef WAYMARK_ESTIMATOR_AID_LOCALIZER_HPP

@@ -16,7 +16,7 @@ namespace wm::tools {
 std::vector<Pose> load_truth(const std::filesystem::path &recording);
 // truth_offset_m of recording.yaml: truth's point in base_link; 0 where it says nothing.
 Eigen::Vector3d load_truth_offset(const std::filesystem::path &recording);
-// The antenna's place in base_link, by calibration.yaml; 0 where it says nothing.
+// The antenna's place in base_link, by calibration.yaml; 0 where it is not stated.
 Eigen::Vector3d load_antenna(const std::filesystem::path &recording);
 // gnss.csv as positions without orientation, in the order of their stamps; z 0 where absent.
 std::vector<Pose> load_gnss(const std::filesystem::path &recording);

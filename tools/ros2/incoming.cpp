@@ -93,7 +93,7 @@ Fault localized_of(const RosPoseCovariance &pose, wm_stream_row *out) {
   out->number[1] = at.translation().y();
   out->number[2] = std::atan2(r(1, 0), r(0, 0));
   for (int i = 0; i < 6; i++) out->number[3 + i] = is_one ? covariance[i] : kAbsent;
-  out->number[9] = kAbsent;  // it says nothing of a reset
+  out->number[9] = kAbsent;  // ROS has no counter of resets
   return std::nullopt;
 }
 

@@ -16,7 +16,7 @@
 
 namespace wm {
 
-// Keys of sources that are no landmark; kNoKey: tells nothing of the pose.
+// Keys of sources that are no landmark; kNoKey: no evidence of the pose.
 inline constexpr int kPositionKey = -2, kHeadingKey = -3, kLocalizerKey = -4, kNoKey = -5;
 
 // What this drive has shown of a landmark; kept by the filter, one a landmark of the map.

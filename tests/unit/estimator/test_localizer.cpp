@@ -115,7 +115,7 @@ TEST(test_its_poses_alone_find_and_hold_the_pose) {
   }
 }
 
-// A localizer that is confidently 10 m off: it is not followed, and the alarm says so within 3 s; it is taken again.
+// A localizer that is confidently 10 m off is not followed. The alarm comes within 3 s. Right again, it is followed.
 TEST(test_a_wrong_localizer_is_not_followed) {
   robot r("landmark_ekf");
   r.drive(20);
@@ -178,7 +178,7 @@ TEST(test_a_small_lie_is_not_followed) {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.1, r.off_m());
 }
 
-// In a frame of its own it says how the robot moves: wheels that are 5 % off lose 5 m on a way of 100 m.
+// In a frame of its own it observes the motion: wheels that are 5 % off lose 5 m on 100 m.
 TEST(test_an_own_frame_keeps_the_way) {
   double off_m[2];
   for (const bool has_poses : {false, true}) {
@@ -194,7 +194,7 @@ TEST(test_an_own_frame_keeps_the_way) {
     TEST_ASSERT_LESS_THAN_DOUBLE(3.5 * std::sqrt(e.covariance[0] + e.covariance[wm_cov_index(1, 1)]), r.off_m());
     if (!has_poses) continue;
     for (const bool is_told : {true, false}) {
-      r.frame = {is_told ? -3.0 : 7.0, 0, 0};  // it began anew, and says so or not
+      r.frame = {is_told ? -3.0 : 7.0, 0, 0};  // it began anew, with another `reset` or without
       if (is_told) r.reset = 1;
       r.drive(1);
       TEST_ASSERT_EQUAL_DOUBLE(is_told ? 0 : 1, r.value("localizer.jumps"));
@@ -204,7 +204,7 @@ TEST(test_an_own_frame_keeps_the_way) {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.5 * off_m[false], off_m[true]);
 }
 
-// Of its ellipse the long axis tells little: here it lies across the axes.
+// The long axis of its ellipse gives little information; here it lies across the map's axes.
 TEST(test_the_ellipse_counts) {
   robot r("landmark_ekf");
   r.sees = false;
