@@ -66,6 +66,10 @@ class localizer_aid {
   bool is_for_search(const view &at, bool tracking) const {
     return is_in_map() && at.is_new && !(tracking && is_wrong_);
   }
+  // Of one pose in map, in m^2 (k 0 and 1, the longer axis of its ellipse) or rad^2 (2).
+  double variance(int k, const view &at) const {
+    return at.variance[k < 2 ? 0 : 2] + (first_ >= 0 ? lasting_variance_[k] : 0.0);
+  }
   observation observe(const view &at, const planar_motion &filter) const;
   observation observe_heading(const view &at, const planar_motion &filter) const;
 

@@ -94,6 +94,11 @@ position_aid::view position_aid::look(const wm_position &p, planar_motion *filte
   return out;
 }
 
+void position_aid::heading_corrected(double by_rad, planar_motion *filter) const {
+  filter->turn_errors(kX, by_rad);
+  filter->turn_errors(error_, by_rad);
+}
+
 // Derivatives of the antenna's x (axis 0) or y; returns what is expected there.
 double position_aid::put_row(int axis, const view &at, const planar_motion &filter, planar_row *row) const {
   const bool is_x = axis == 0;

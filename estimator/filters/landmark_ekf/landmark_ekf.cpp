@@ -131,6 +131,14 @@ void landmark_ekf::begin_at(const wm_pose2 &pose, double variance_m2) {
   start_.close();  // another heading is no other start
 }
 
+// Another localizer's pose is a whole one.
+void landmark_ekf::begin_at(const localizer_aid::view &at) {
+  const double xy = localizer_.variance(0, at);
+  const double covariance[3][3] = {{xy, 0, 0}, {0, xy, 0}, {0, 0, localizer_.variance(2, at)}};
+  filter_.set_pose(at.there, covariance);
+  begin_life(true);
+}
+
 wm_status landmark_ekf::predict(const wm_event &motion) {
   const wm_status status = filter_.check_motion(motion);
   if (status != WM_OK) return status;

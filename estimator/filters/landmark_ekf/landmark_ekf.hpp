@@ -45,6 +45,7 @@ class landmark_ekf {
   static_assert(kMaxCalibration + 3 + noise_adaption::kFactors + 2 <= 2 * WM_HEALTH_CALIBRATION_MAX);
 
   wm_status fuse_landmark(const wm_event &event, record_list records);
+  double fuse_given(residual *rows, int count, double clutter_volume, record_list records);
   wm_status fuse_position(const wm_event &event, record_list records);
   wm_status fuse_heading(const wm_event &event, record_list records);
   wm_status fuse_localized(const wm_event &event, record_list records);
@@ -82,6 +83,7 @@ class landmark_ekf {
     return false;
   }
   void begin_at(const wm_pose2 &pose, double variance_m2);
+  void begin_at(const localizer_aid::view &at);
   void begin_start_test();
   void test_start(wm_time_ns t_ns);
   double lost_probability() const;

@@ -174,6 +174,23 @@ void planar_motion::inflate_pose(double xy_m2, double heading_rad2) {
   for (int i = 0; i < kPoseStates; i++) state_.add_variance(i, i == kHeading ? heading_rad2 : xy_m2);
 }
 
+// A rotation as three shears, since each state is assigned from the others as they are.
+void planar_motion::turn_errors(int first, double by_rad) {
+  if (first < 0 || by_rad == 0.0) return;
+  const sin_cos half = sincos(0.5 * by_rad);
+  const double along = half.sin / half.cos, across = 2.0 * half.sin * half.cos, noise = 0.0;
+  const auto shear = [&](int state, int other, double by) {
+    planar_row row;
+    row.add(state, 1.0);
+    row.add(other, by);
+    const double unchanged = value(state);
+    assign(state, 1, &row, &noise, 1, &unchanged);
+  };
+  shear(first, first + 1, -along);
+  shear(first + 1, first, across);
+  shear(first, first + 1, -along);
+}
+
 void planar_motion::put_pose(const wm_pose2 &pose, const double covariance[3][3]) {
   const double value[3] = {pose.x_m, pose.y_m, wrap(pose.heading_rad)};
   for (int i = 0; i < 3; i++) forget(i, value[i], 0.0);

@@ -111,6 +111,8 @@ class planar_motion {
   }
   // Adds variances of x and y, and of the heading, as noise of the motion does.
   void inflate_pose(double xy_m2, double heading_rad2);
+  // Turns the errors of a vector in map's axes (two states from `first` on; below 0: none), not their values.
+  void turn_errors(int first, double by_rad);
   // A value of the calibration that the configuration states is wrong, and not known as well yet as it was stated.
   bool is_stated_wrongly(int state) const { return stated_.is_wrong(state, variance(state)); }
   // Fills time, mean, covariance and twist.

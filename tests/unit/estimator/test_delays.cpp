@@ -8,6 +8,7 @@
 
 #include "common/suite.h"
 #include "events.hpp"
+#include "math/arc.hpp"
 #include "math/elementary.hpp"
 #include "waymark/random.h"
 
@@ -105,6 +106,41 @@ TEST(test_a_lag_and_a_time_offset_are_observed_as_a_sum) {
       TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(0.015, 0.089, offset.sigma, estimator);
       TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(3.5 * offset.sigma, offset_s, offset.value, estimator);
     }
+}
+
+// A receiver's positions at 100 Hz from a start that is not given. Each moves the vague heading, and this jitter must
+// not make anything known: squared errors by their variances, which have the mean 1, over 12 drives of 20 s.
+TEST(test_the_jitter_of_a_vague_heading_makes_nothing_known) {
+  const double white_m = 0.01;
+  wm_rig rig = {};
+  rig.antenna_m[0] = 0.8, rig.antenna_m[1] = -0.5;
+  setup.rig = &rig;
+  setup.start = {WM_TIME_NONE, {NAN, NAN, 0}, {0, 0, 0, 1}, NAN, NAN, NAN};
+  double of_heading = 0, of_place = 0;
+  for (uint64_t drive = 0; drive < 12; drive++) {
+    begin();
+    const double base = 0.3 + 0.03 * static_cast<double>(drive), phase = static_cast<double>(drive);
+    wm_pose2 p = {1, -2, wm::wrap(0.7 * phase)}, before = p;
+    for (uint64_t k = 0; k < 2000; k++) {
+      const double t = 0.01 * static_cast<double>(k), v = base + 0.1 * std::sin(0.8 * t),
+                   w = 0.5 * std::sin(0.4 * t + phase);
+      const double c = std::cos(p.heading_rad), s = std::sin(p.heading_rad);
+      feed(make::twist(t, v, w));
+      feed(make::position(
+          t, p.x_m + c * rig.antenna_m[0] - s * rig.antenna_m[1] + white_m * wm_random_normal(drive, 1, k),
+          p.y_m + s * rig.antenna_m[0] + c * rig.antenna_m[1] + white_m * wm_random_normal(drive, 2, k), 0.02));
+      const wm::arc a = wm::make_arc(0.01 * v, 0.01 * w);
+      before = p;
+      p = wm::compose(p, {a.x_m, a.y_m, a.turn_rad});
+    }
+    wm_estimate out;
+    ekf->estimate(state.get(), &out);
+    of_heading += wm::square(wm::wrap(out.heading_rad - before.heading_rad)) / out.covariance[35] / 12;
+    of_place += wm::square(out.pose_map_base.p_m[0] - before.x_m) / out.covariance[0] / 24;
+    of_place += wm::square(out.pose_map_base.p_m[1] - before.y_m) / out.covariance[7] / 24;
+  }
+  TEST_ASSERT_LESS_THAN_DOUBLE(2.0, of_heading);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.3, of_place);
 }
 
 // No lag is below 0: what the sum has below it is the offset's.

@@ -108,6 +108,8 @@ TEST(test_its_poses_alone_find_and_hold_the_pose) {
     robot r(name, false);
     r.sees = false;
     r.truth = {5, -3, 1};
+    r.drive(0.5);  // landmark_ekf begins with the first one, which is a whole pose
+    if (std::strcmp(name, "landmark_ekf") == 0) TEST_ASSERT_LESS_THAN_DOUBLE(0.15, r.off_m());
     const wm_estimate e = r.drive(30);
     TEST_ASSERT_EQUAL_MESSAGE(WM_STATE_TRACKING, e.state, name);
     TEST_ASSERT_LESS_THAN_DOUBLE(0.06, r.off_m());
