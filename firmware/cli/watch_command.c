@@ -59,6 +59,11 @@ static void on_health(const lcm_recv_buf_t *message, const char *channel, void *
   watch_health(context, message->data, message->data_size, wm_monotonic_ns());
 }
 
+static void on_bound(const lcm_recv_buf_t *message, const char *channel, void *context) {
+  (void)channel;
+  watch_bound(context, message->data, message->data_size);
+}
+
 static void on_refused(const lcm_recv_buf_t *message, const char *channel, void *context) {
   (void)channel;
   watch_refused(context, message->data, message->data_size);
@@ -207,6 +212,8 @@ int command_watch(int argc, char *const *argv) {
   }
   (void)snprintf(channel, sizeof channel, "%.80sPOSE", prefix);
   (void)lcm_subscribe(lcm, channel, on_pose, &seen);
+  (void)snprintf(channel, sizeof channel, "%.80sPOSE_BOUND", prefix);
+  (void)lcm_subscribe(lcm, channel, on_bound, &seen);
   (void)snprintf(channel, sizeof channel, "%.80sHEALTH", prefix);
   (void)lcm_subscribe(lcm, channel, on_health, &seen);
   (void)snprintf(channel, sizeof channel, "%.80sREFUSED", prefix);

@@ -154,7 +154,8 @@ static wm_status read_sections(const wm_yaml_node *root, wm_config *out, wm_erro
 
 // All keys at the top: sections of estimators and those that they share are read by read_sections.
 static wm_status check_top(const wm_yaml_node *root, wm_config *out, wm_error *err) {
-  static const char *const kGroups[] = {"merge", "publish", "commands", "realtime", "start", "black_box", NULL};
+  static const char *const kGroups[] = {"merge",    "publish", "integrity", "commands",
+                                        "realtime", "start",   "black_box", NULL};
   for (size_t i = 0; i < wm_yaml_count(root); i++) {
     const char *key;
     int line, known = 0;

@@ -17,6 +17,7 @@
 //   initial_pose: {x_m: 0, y_m: 0, heading_rad: 0, sigma_xy_m: 0.05, sigma_heading_rad: 0.05}
 //   merge: {horizon_ms: 300, ...}  # wm_runtime_params
 //   publish: {rate_hz: 50, ...}
+//   integrity: {alert_limit_m: 0.3, ...}
 //   realtime: {priority: 80, ...}
 //   start: {saved_pose: FILE, ...}
 //   black_box: {folder: FOLDER, ...}
@@ -55,7 +56,7 @@ typedef struct wm_source_config {
   int line;
 } wm_source_config;
 
-// `merge:`, `publish:` and `realtime:`. Meanings and limits are in wm_runtime_params_table.
+// `merge:`, `publish:`, `integrity:`, `realtime:` and the like. Meanings and limits are in wm_runtime_params_table.
 typedef struct wm_runtime_params {
   double merge_horizon_ms;       // largest lateness_max that is allowed
   int32_t merge_queue_events;    // events that may wait in the merge
@@ -63,10 +64,12 @@ typedef struct wm_runtime_params {
   double publish_rate_hz;
   double publish_jump_m, publish_jump_deg;  // map against odom: larger moves are announced as jumps
   double publish_motion_stale_ms;
-  int32_t publish_lcm;                    // 0: no LCM
-  int32_t commands_lcm;                   // 0: SET_POSE and RESET are not taken
-  double publish_useless_m;               // sigma of position above which a pose is useless
-  double start_max_age_s;                 // of the saved pose
+  int32_t publish_lcm;       // 0: no LCM
+  int32_t commands_lcm;      // 0: SET_POSE and RESET are not taken
+  double publish_useless_m;  // sigma of position above which a pose is useless
+  double integrity_risk_per_pose;
+  double integrity_alert_limit_m, integrity_alert_limit_heading_deg;  // 0: none
+  double start_max_age_s;                                             // of the saved pose
   double start_moved_m, start_moved_deg;  // sigmas of a motion of the robot while it was off
   double start_save_every_s, start_save_map_every_s;
   double black_box_keep_s, black_box_pictures_hz;

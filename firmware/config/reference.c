@@ -126,7 +126,7 @@ void wm_config_reference(FILE *to) {
   config_section sections[CONFIG_SECTIONS_MAX];
   size_t count = config_sections(sections);
   print_keys(to, "## At the top", kConfigKeys);
-  fprintf(to, "## `merge`, `publish`, `commands`, `realtime`, `start`, `black_box`\n\n");
+  fprintf(to, "## `merge`, `publish`, `integrity`, `commands`, `realtime`, `start`, `black_box`\n\n");
   print_table(to, &sections[0], 0);
   for (size_t i = 1; i < count; i++) {
     int is_vision = strncmp(sections[i].prefix, "vision.", 7) == 0;

@@ -35,6 +35,13 @@ static const wm_param kParams[] = {
     F64("publish.useless_m", publish_useless_m, 1.0, 1e-3, 1000,
         "m. Sigma of the position above which a pose is useless: health has the metres and seconds of dead reckoning "
         "until then."),
+    F64("integrity.risk_per_pose", integrity_risk_per_pose, 1e-4, 1e-7, 0.1,
+        "Probability that a pose is off by more than its bound: 1e-4 is the smallest that drives could test "
+        "(docs/usable.md)."),
+    F64("integrity.alert_limit_m", integrity_alert_limit_m, 0, 0, 1e6,
+        "m. A pose whose horizontal bound is larger is not usable; 0: each bound is."),
+    F64("integrity.alert_limit_heading_deg", integrity_alert_limit_heading_deg, 0, 0, 180,
+        "degrees. As alert_limit_m, for the heading."),
     F64("start.max_age_s", start_max_age_s, 86400, 0, 1e9,
         "s. A saved pose that is older than this is not used: the robot may have been moved since."),
     F64("start.moved_m", start_moved_m, 0.2, 0, 1000,

@@ -6,6 +6,7 @@
 
 #include <stddef.h>
 
+#include "waymark/bound.h"
 #include "waymark/estimator.h"
 #include "waymark/event.h"
 #include "waymark/health.h"
@@ -18,7 +19,8 @@ typedef enum wm_output_kind {
   WM_OUTPUT_PUBLISHED,   // wm_published
   WM_OUTPUT_HEALTH,      // wm_health
   WM_OUTPUT_PARTICLES,   // wm_particle_set, once a second
-  WM_OUTPUT_HYPOTHESES   // with the particles, as many as fit
+  WM_OUTPUT_HYPOTHESES,  // with the particles, as many as fit
+  WM_OUTPUT_BOUND        // wm_bound: of the pose that is published next
 } wm_output_kind;
 
 // A cloud of particles, truncated to the size of a record of points.

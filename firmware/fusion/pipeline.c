@@ -53,6 +53,9 @@ wm_status wm_pipeline_start(wm_pipeline *self, wm_output output, wm_error *err) 
                                 .fusion_stale_ns = ns_from_ms(config->runtime.merge_horizon_ms)};
   wm_predictor_init(&self->predictor, &params, self->odometry_memory);
   wm_budget_init(&self->budget, config->runtime.publish_useless_m);
+  self->integrity = (wm_integrity){.risk = config->runtime.integrity_risk_per_pose,
+                                   .limit_m = config->runtime.integrity_alert_limit_m,
+                                   .limit_rad = config->runtime.integrity_alert_limit_heading_deg * M_PI / 180};
   return WM_OK;
 }
 
@@ -101,6 +104,10 @@ int wm_pipeline_publish(wm_pipeline *self, wm_time_ns now_ns, wm_published *out)
   wm_histogram_add(&self->publish_ns, wm_monotonic_ns() - begin_ns);
   self->published += (uint64_t)there_is_one;
   return there_is_one;
+}
+
+void wm_pipeline_bound(wm_pipeline *self, const wm_published *published, wm_bound *out) {
+  wm_fuser_bound(&self->fuser, &self->integrity, &self->predictor.fused, &published->now, out);
 }
 
 int wm_pipeline_expect(const wm_pipeline *self, wm_time_ns now_ns, wm_estimate *out) {

@@ -12,6 +12,7 @@
 #define WAYMARK_FUSION_PIPELINE_H
 
 #include "fusion/assembly.h"
+#include "fusion/bound.h"
 #include "fusion/budget.h"
 #include "fusion/fuser.h"
 #include "fusion/merge.h"
@@ -31,6 +32,7 @@ typedef struct wm_pipeline {
   wm_fuser fuser;
   wm_predictor predictor;
   wm_budget budget;
+  wm_integrity integrity;
   uint64_t published;
   wm_histogram arrive_ns, publish_ns;
   void *merge_memory, *state_memory, *odometry_memory;
@@ -50,6 +52,8 @@ WM_REALTIME wm_merge_verdict wm_pipeline_arrive(wm_pipeline *self, const wm_even
 WM_REALTIME void wm_pipeline_advance(wm_pipeline *self, wm_time_ns now_ns);
 // The pose of `now_ns` into *out, without sending it. 0 where there is none.
 WM_REALTIME int wm_pipeline_publish(wm_pipeline *self, wm_time_ns now_ns, wm_published *out);
+// The bound of that pose.
+WM_REALTIME void wm_pipeline_bound(wm_pipeline *self, const wm_published *published, wm_bound *out);
 // The pose by which guided detectors search at `now_ns` (wm_predictor_expect). 0 where there is none.
 WM_REALTIME int wm_pipeline_expect(const wm_pipeline *self, wm_time_ns now_ns, wm_estimate *out);
 WM_REALTIME void wm_pipeline_finish(wm_pipeline *self);

@@ -126,6 +126,16 @@ wm_status waymark_pose(waymark_session *handle, wm_time_ns now_ns, wm_published 
   return status;
 }
 
+wm_status waymark_bound(waymark_session *handle, wm_bound *out, size_t bytes, wm_error *err) {
+  session *self;
+  wm_status status = ENTER(GIVEN(ENTRY_GIVEN(out)));
+  if (status != WM_OK) return status;
+  status = library_check_size(__func__, out, bytes, sizeof *out, err);
+  if (status == WM_OK) status = session_bound(self, out, err);
+  entry_leave(handle);
+  return status;
+}
+
 wm_status waymark_health(waymark_session *handle, wm_health *out, size_t bytes, wm_error *err) {
   session *self;
   wm_health health;
@@ -237,6 +247,12 @@ wm_status waymark_read_pose(const void *message, size_t length, wm_published *ou
   return status == WM_OK ? judge(wm_lcm_read_pose(message, length, out), err) : status;
 }
 
+wm_status waymark_read_bound(const void *message, size_t length, wm_bound *out, size_t bytes, wm_error *err) {
+  wm_status status = entry_check(__func__, GIVEN(ENTRY_GIVEN(message), ENTRY_GIVEN(out)), err);
+  if (status == WM_OK) status = library_check_size(__func__, out, bytes, sizeof *out, err);
+  return status == WM_OK ? judge(wm_lcm_read_bound(message, length, out), err) : status;
+}
+
 wm_status waymark_read_health(const void *message, size_t length, wm_health *out, size_t bytes, wm_error *err) {
   wm_health health;
   wm_status status = entry_check(__func__, GIVEN(ENTRY_GIVEN(message), ENTRY_GIVEN(out)), err);
@@ -258,6 +274,7 @@ const char *waymark_name(waymark_names of, uint32_t number) {
     case WAYMARK_NAMES_VERDICT: return wm_verdict_name(number);
     case WAYMARK_NAMES_EVENT: return wm_event_kind_name(number);
     case WAYMARK_NAMES_QUANTITY: return wm_quantity_name(number);
+    case WAYMARK_NAMES_UNUSABLE: return wm_unusable_name(number);
     case WAYMARK_NAMES_STATUS: return wm_status_text((wm_status)number);
   }
   return "?";

@@ -245,11 +245,20 @@ wm_status session_pose(session *self, wm_time_ns now_ns, wm_published *out, wm_e
   const int there_is_one = wm_pipeline_publish(&self->pipeline, now_ns, out);
   if (there_is_one) {
     out->made_ns = now_ns;
+    wm_pipeline_bound(&self->pipeline, out, &self->bound);
+    self->pipeline.output.put(self->pipeline.output.context, WM_OUTPUT_BOUND, &self->bound, sizeof self->bound);
     self->pipeline.output.put(self->pipeline.output.context, WM_OUTPUT_PUBLISHED, out, sizeof *out);
   }
   if (wm_pipeline_expect(&self->pipeline, now_ns, &expected))
     wm_vision_set_prediction(self->assembly.vision, &expected);
   return there_is_one ? WM_OK : WM_AGAIN;
+}
+
+wm_status session_bound(session *self, wm_bound *out, wm_error *err) {
+  wm_status status = session_check_started(self, "waymark_bound", err);
+  if (status != WM_OK) return status;
+  *out = self->bound;
+  return self->bound.risk > 0 ? WM_OK : WM_AGAIN;
 }
 
 wm_status session_health(session *self, wm_health *out, wm_error *err) {

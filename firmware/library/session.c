@@ -56,6 +56,7 @@ waymark_record library_record(wm_output_kind kind) {
     case WM_OUTPUT_POSE: return WAYMARK_RECORD_FUSED;
     case WM_OUTPUT_INNOVATION: return WAYMARK_RECORD_INNOVATION;
     case WM_OUTPUT_PUBLISHED: return WAYMARK_RECORD_PUBLISHED;
+    case WM_OUTPUT_BOUND: return WAYMARK_RECORD_BOUND;
     default: return 0;
   }
 }

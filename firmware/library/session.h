@@ -27,6 +27,7 @@ typedef struct session {
   wm_output file;
   char site[WM_PATH_MAX], out[WM_PATH_MAX];  // "": none
   int has_started, has_data;                 // has_data: the readers are open
+  wm_bound bound;                            // of the last pose
   wm_time_ns now_ns;                         // newest time on the clock of the arrivals
   // First and last of the times that were refused, one behind the other, because they are far ahead; WM_TIME_NONE:
   // none.
@@ -61,6 +62,7 @@ wm_status session_push_can(session *self, const char *interface, const wm_can_fr
 wm_status session_push_picture(session *self, const char *camera, const wm_frame *frame, wm_error *err);
 wm_status session_advance(session *self, const char *function, wm_time_ns now_ns, wm_error *err);
 wm_status session_pose(session *self, wm_time_ns now_ns, wm_published *out, wm_error *err);
+wm_status session_bound(session *self, wm_bound *out, wm_error *err);
 wm_status session_health(session *self, wm_health *out, wm_error *err);
 wm_status session_close(session *self, wm_error *err);
 wm_status event_log_open(const char *path, event_log **out, wm_error *err);

@@ -40,7 +40,7 @@ static void put(void *context, wm_output_kind kind, const void *record, size_t b
     return;
   }
   // Records without room are counted by the ring.
-  if (kind == WM_OUTPUT_PUBLISHED || kind == WM_OUTPUT_INNOVATION)
+  if (kind == WM_OUTPUT_PUBLISHED || kind == WM_OUTPUT_BOUND || kind == WM_OUTPUT_INNOVATION)
     (void)push(&self->to_publish, (uint64_t)kind, record, bytes);
   views_put(&self->views, kind, record, bytes);
   (void)push(&self->to_disk, (uint64_t)kind, record, bytes);
@@ -74,6 +74,9 @@ static void publish(live *run, wm_time_ns now_ns) {
   published.deadlines_missed = (uint32_t)self->deadlines_missed;
   published.made_ns = run_now(&run->clock);
   wm_histogram_add(&self->age_ns, published.made_ns - published.now.t_ns);
+  wm_bound bound;
+  wm_pipeline_bound(&self->pipeline, &published, &bound);
+  put(self, WM_OUTPUT_BOUND, &bound, sizeof bound);
   put(self, WM_OUTPUT_PUBLISHED, &published, sizeof published);
 }
 

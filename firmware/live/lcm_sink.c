@@ -74,6 +74,10 @@ void lcm_sink_pose(lcm_sink *self, const wm_published *published, wm_time_ns sen
   publish(self, "POSE", wm_lcm_pose(published, sent_ns, self->bytes, sizeof self->bytes));
 }
 
+void lcm_sink_bound(lcm_sink *self, const wm_bound *bound) {
+  publish(self, "POSE_BOUND", wm_lcm_bound(bound, self->bytes, sizeof self->bytes));
+}
+
 void lcm_sink_innovation(lcm_sink *self, const wm_innovation *innovation) {
   publish(self, "INNOVATION", wm_lcm_innovation(innovation, self->bytes, sizeof self->bytes));
 }

@@ -33,6 +33,7 @@ typedef struct lcm_sink {
 void lcm_sink_open(lcm_sink *self, int is_on, const char *url, const char *prefix, const wm_assembly *assembly,
                    wm_line_fn say, void *say_context, lcm_t *lent);
 void lcm_sink_pose(lcm_sink *self, const wm_published *published, wm_time_ns sent_ns);
+void lcm_sink_bound(lcm_sink *self, const wm_bound *bound);
 void lcm_sink_innovation(lcm_sink *self, const wm_innovation *innovation);
 void lcm_sink_health(lcm_sink *self, const wm_health *health);
 // One message a source whose data were refused.

@@ -139,6 +139,7 @@ typedef struct output_record {
     wm_estimate pose;
     wm_innovation innovation;
     wm_published published;
+    wm_bound bound;
     wm_particle_set particles;
     wm_hypothesis_set hypotheses;
     uint64_t gap;

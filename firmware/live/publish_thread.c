@@ -62,6 +62,7 @@ static void take_output(live *run, const output_record *record) {
   switch (record->kind) {
     case WM_OUTPUT_EVENT: lcm_sink_event(&run->publish.lcm, &record->as.event); break;
     case WM_OUTPUT_INNOVATION: lcm_sink_innovation(&run->publish.lcm, &record->as.innovation); break;
+    case WM_OUTPUT_BOUND: lcm_sink_bound(&run->publish.lcm, &record->as.bound); break;
     case WM_OUTPUT_PUBLISHED: send_pose(run, &record->as.published); break;
     default: break;
   }

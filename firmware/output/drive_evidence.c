@@ -120,6 +120,7 @@ static void take_published(drive_evidence *self, const wm_published *p) {
 void evidence_put(drive_evidence *self, wm_output_kind kind, const void *record) {
   if (kind == WM_OUTPUT_INNOVATION) take(self, record);
   if (kind == WM_OUTPUT_PUBLISHED) take_published(self, record);
+  if (kind == WM_OUTPUT_BOUND) self->unusable[((const wm_bound *)record)->why]++;
   if (kind == WM_OUTPUT_EVENT) take_event(self, record);
   self->poses += kind == WM_OUTPUT_POSE;
 }

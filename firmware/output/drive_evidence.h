@@ -34,9 +34,10 @@ typedef struct drive_evidence {
   uint64_t updates, fused;
   // Of the degraded and of the lost messages; the last row: without a source.
   uint64_t causes[2][WM_SOURCES_MAX + 1][WM_CAUSE_COUNT];
-  uint64_t poses;                // fused
-  wm_time_ns first_ns, last_ns;  // stamps of the events
-  double silent_s;               // of this time, in silences longer than a replay plays (WM_LONGEST_SILENCE_NS)
+  uint64_t unusable[WM_UNUSABLE_COUNT];  // messages by wm_unusable
+  uint64_t poses;                        // fused
+  wm_time_ns first_ns, last_ns;          // stamps of the events
+  double silent_s;                       // of this time, in silences longer than a replay plays (WM_LONGEST_SILENCE_NS)
   int has_events;
   wm_published begun;    // the first message
   double speed_squares;  // of the messages of a robot that drives, (m/s)2

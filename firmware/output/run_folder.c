@@ -39,6 +39,7 @@ struct wm_run_folder {
   uint64_t bytes_max;     // 0: no limit
   wm_assembly continued;  // of the run, with the start of a log that begins later
   wm_estimate newest;     // published; WM_TIME_NONE: none
+  wm_bound bound;         // of the pose that is published next
   drive_evidence evidence;
 };
 
@@ -115,6 +116,7 @@ static void published_head(wm_run_folder *self, int dof) {
   wm_row_text(head, "t_ns,made_ns,fused_until_ns,");
   pose_head(head, dof);
   wm_row_text(head, ",odom_x_m,odom_y_m,odom_heading_rad,resets,lost_probability,cause");
+  wm_row_text(head, ",bound_m,bound_heading_rad,usable,unusable");
   end(self, PUBLISHED);
   self->published_has_head = 1;
 }
@@ -140,6 +142,17 @@ static void fused_pose(wm_run_folder *self, const wm_estimate *e) {
   end(self, TRAJECTORY_TUM);
 }
 
+static void bound_columns(wm_row *line, const wm_bound *bound) {
+  wm_row_char(line, ',');
+  wm_row_short(line, bound->horizontal_m);
+  wm_row_char(line, ',');
+  wm_row_short(line, bound->heading_rad);
+  wm_row_char(line, ',');
+  wm_row_int(line, bound->usable);
+  wm_row_char(line, ',');
+  wm_row_int(line, bound->why);
+}
+
 static void published(wm_run_folder *self, const wm_published *p) {
   published_head(self, p->now.dof);
   wm_row *line = begin(self);
@@ -161,6 +174,7 @@ static void published(wm_run_folder *self, const wm_published *p) {
   wm_row_short(line, p->now.lost_probability);
   wm_row_char(line, ',');
   wm_row_text(line, wm_cause_name(p->now.cause));
+  bound_columns(line, &self->bound);
   end(self, PUBLISHED);
 }
 
@@ -234,6 +248,7 @@ static void put(void *context, wm_output_kind kind, const void *record, size_t b
       self->newest = ((const wm_published *)record)->now;
       published(self, record);
       break;
+    case WM_OUTPUT_BOUND: self->bound = *(const wm_bound *)record; break;
     case WM_OUTPUT_PARTICLES: particles(self, record); break;
     case WM_OUTPUT_HYPOTHESES: hypotheses(self, record); break;
     case WM_OUTPUT_HEALTH: break;  // written once, at the end

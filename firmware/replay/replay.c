@@ -100,7 +100,10 @@ static void publish_until(replay *self, wm_time_ns now_ns) {
     wm_estimate expected;
     wm_pipeline_advance(&self->pipeline, self->next_tick_ns);
     if (wm_pipeline_publish(&self->pipeline, self->next_tick_ns, &published)) {
+      wm_bound bound;
       published.made_ns = self->next_tick_ns;
+      wm_pipeline_bound(&self->pipeline, &published, &bound);
+      self->output.put(self->output.context, WM_OUTPUT_BOUND, &bound, sizeof bound);
       self->output.put(self->output.context, WM_OUTPUT_PUBLISHED, &published, sizeof published);
     }
     if (wm_pipeline_expect(&self->pipeline, self->next_tick_ns, &expected))

@@ -5,6 +5,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "waymark_bound_t.h"
 #include "waymark_health_t.h"
 #include "waymark_innovation_t.h"
 #include "waymark_landmarks_t.h"
@@ -24,8 +25,24 @@ _Static_assert(sizeof(((waymark_health_t *)0)->counters) / sizeof(waymark_counte
                "a place each");
 _Static_assert(WAYMARK_POSE_T_STATUS_JUMPED == WM_PUB_JUMPED &&
                    WAYMARK_POSE_T_STATUS_CAUSE_SHIFT == WM_PUB_CAUSE_SHIFT &&
-                   WAYMARK_POSE_T_STATE_DEGRADED == WM_STATE_DEGRADED && WAYMARK_POSE_T_CAUSE_TURN == WM_CAUSE_TURN,
+                   WAYMARK_POSE_T_STATE_DEGRADED == WM_STATE_DEGRADED && WAYMARK_POSE_T_CAUSE_TURN == WM_CAUSE_TURN &&
+                   WAYMARK_BOUND_T_UNUSABLE_HEADING == WM_UNUSABLE_HEADING,
                "the messages' numbers are the structs' numbers");
+
+size_t wm_lcm_bound(const wm_bound *b, void *out, size_t capacity) {
+  waymark_bound_t m = {.t_ns = b->t_ns,
+                       .risk = b->risk,
+                       .horizontal_m = b->horizontal_m,
+                       .heading_rad = b->heading_rad,
+                       .limit_m = b->limit_m,
+                       .limit_rad = b->limit_rad,
+                       .heading_after_m = b->heading_after_m,
+                       .usable = (int8_t)b->usable,
+                       .unusable = (int8_t)b->why,
+                       .cause = (int8_t)b->cause,
+                       .cause_source = b->cause_source};
+  return written(waymark_bound_t_encode(out, 0, room(capacity), &m));
+}
 
 size_t wm_lcm_pose(const wm_published *p, wm_time_ns sent_ns, void *out, size_t capacity) {
   const wm_estimate *e = &p->now;

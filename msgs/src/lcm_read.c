@@ -4,6 +4,7 @@
 
 #include "lcm_bytes.h"
 #include "waymark/lcm_messages.h"
+#include "waymark_bound_t.h"
 #include "waymark_health_t.h"
 #include "waymark_innovation_t.h"
 #include "waymark_pose_t.h"
@@ -35,6 +36,23 @@ const char *wm_lcm_read_pose(const void *message, size_t length, wm_published *o
   e->cause = (uint8_t)WM_PUB_CAUSE(out->status_flags);
   e->cause_source = -1;
   e->lost_probability = m.lost_probability;
+  return NULL;
+}
+
+const char *wm_lcm_read_bound(const void *message, size_t length, wm_bound *out) {
+  waymark_bound_t m;
+  if (waymark_bound_t_decode(message, 0, given(message, length), &m) < 0) return "is not a bound_t of this version";
+  *out = (wm_bound){.t_ns = m.t_ns,
+                    .risk = m.risk,
+                    .horizontal_m = m.horizontal_m,
+                    .heading_rad = m.heading_rad,
+                    .limit_m = m.limit_m,
+                    .limit_rad = m.limit_rad,
+                    .heading_after_m = m.heading_after_m,
+                    .usable = (uint8_t)(m.usable == 1),
+                    .why = (uint8_t)m.unusable,
+                    .cause = (uint8_t)m.cause,
+                    .cause_source = m.cause_source};
   return NULL;
 }
 

@@ -3,6 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "waymark/bound.h"
 #include "waymark/event.h"
 #include "waymark/health.h"
 #include "waymark/look.h"
@@ -28,6 +29,7 @@ static const char *const kQuantities[] = {"wheel_ticks_left",
 static const char *const kStates[] = {"searching", "tracking", "dead_reckoning", "lost", "degraded"};
 static const char *const kCauses[] = {"",           "contradicted",       "refused", "inconsistent", "biased",
                                       "lost_again", "unknown_identities", "silent",  "off_map",      "turn"};
+static const char *const kUnusable[] = {"", "no_pose", "unmonitored", "doubt", "untested", "position", "heading"};
 static const char *const kResiduals[] = {"bearing", "range",      "x",     "y",        "z",
                                          "heading", "standstill", "pixel", "elevation"};
 static const char *const kVerdicts[] = {"fused",      "gate",     "unknown_id", "no_association", "out_of_range",
@@ -47,6 +49,7 @@ static const char *const kLooks[] = {"found",        "not_in_view", "faces_away"
 _Static_assert(COUNT(kQuantities) == WM_Q_COUNT, "a name for each quantity");
 _Static_assert(COUNT(kStates) == WM_STATE_COUNT, "a name for each state");
 _Static_assert(COUNT(kCauses) == WM_CAUSE_COUNT, "a name for each cause");
+_Static_assert(COUNT(kUnusable) == WM_UNUSABLE_COUNT, "a name for each reason");
 _Static_assert(COUNT(kResiduals) == WM_RESIDUAL_COUNT, "a name for each residual");
 _Static_assert(COUNT(kVerdicts) == WM_VERDICT_COUNT, "a name for each verdict");
 _Static_assert(COUNT(kCounters) == WM_COUNTER_KIND_COUNT, "a name for each counter");
@@ -56,6 +59,7 @@ _Static_assert(COUNT(kLooks) == WM_LOOK_COUNT, "a name for each look");
 const char *wm_quantity_name(unsigned q) { return q < COUNT(kQuantities) ? kQuantities[q] : "?"; }
 const char *wm_state_name(unsigned state) { return state < COUNT(kStates) ? kStates[state] : "?"; }
 const char *wm_cause_name(unsigned cause) { return cause < COUNT(kCauses) ? kCauses[cause] : "?"; }
+const char *wm_unusable_name(unsigned why) { return why < COUNT(kUnusable) ? kUnusable[why] : "?"; }
 const char *wm_residual_name(unsigned r) { return r < COUNT(kResiduals) ? kResiduals[r] : "?"; }
 const char *wm_verdict_name(unsigned v) { return v < COUNT(kVerdicts) ? kVerdicts[v] : "?"; }
 const char *wm_alarm_name(unsigned kind) { return kind < COUNT(kAlarms) ? kAlarms[kind] : "?"; }

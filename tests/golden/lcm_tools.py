@@ -117,7 +117,7 @@ def check_logger(work):
 
     decoders = {"WAYMARK_POSE": waymark.pose_t, "WAYMARK_HEALTH": waymark.health_t,
                 "WAYMARK_INNOVATION": waymark.innovation_t, "WAYMARK_OBSERVATIONS": waymark.observations_t,
-                "WAYMARK_LANDMARKS": waymark.landmarks_t}
+                "WAYMARK_LANDMARKS": waymark.landmarks_t, "WAYMARK_POSE_BOUND": waymark.bound_t}
     heard = {channel: [] for channel in decoders}
     for event in lcm.EventLog(str(log), "r"):
         if event.channel == "LCM_SELF_TEST":  # liblcm's own, from who begins to listen
@@ -136,6 +136,12 @@ def check_logger(work):
         assert pose.position_m[0] == float(row["x_m"]) and pose.position_m[1] == float(row["y_m"])
         assert pose.covariance[0][0] == float(row["cov_xx"]) and pose.covariance[5][5] == float(row["cov_tt"])
         assert pose.made_ns == int(row["made_ns"]) <= pose.sent_ns and pose.jumps == int(row["resets"])
+    bounds = heard["WAYMARK_POSE_BOUND"]
+    assert [bound.t_ns for bound in bounds] == [pose.t_ns for pose in poses], "a bound for each pose"
+    for bound in bounds:
+        row = rows[bound.t_ns]
+        assert bound.usable == int(row["usable"]) and bound.unusable == int(row["unusable"])
+        assert math.isclose(bound.horizontal_m, float(row["bound_m"]), rel_tol=1e-8), row["bound_m"]
     utc_ns = poses[-1].t_ns + poses[-1].utc_offset_ns
     assert abs(utc_ns - time.time_ns()) < 60e9 and 0 < poses[-1].utc_uncertainty_ns < 1e8, "the offset of UTC"
     assert counts["WAYMARK_HEALTH"] >= 2 and counts["WAYMARK_LANDMARKS"] >= 1

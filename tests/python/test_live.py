@@ -54,7 +54,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore  # noqa: E
 SECONDS = 6
 PORT = 8765
 CONFIG = "format: waymark-config/1\nestimator: landmark_ekf\npublish: {rate_hz: 50}\n"
-STEADY = {"/tf", "/waymark/pose", "/waymark/odom", "/waymark/status", "/waymark/innovations/sightings_eye/bearing",
+STEADY = {"/tf", "/waymark/pose", "/waymark/odom", "/waymark/status", "/waymark/bound", "/waymark/innovations/sightings_eye/bearing",
           "/waymark/innovations/sightings_eye/range", "/recording/sightings", "/diagnostics", "/waymark/path", "/waymark/path/points",
           "/landmarks", "/landmarks/points"}
 
@@ -146,7 +146,7 @@ class LiveRun(unittest.TestCase):
         for pose in poses:
             i = published[pose.t_ns]
             self.assertEqual(pose.position_m[0], self.localized.published["x_m"][i])
-        self.assertEqual({"POSE", "HEALTH", "INNOVATION", "OBSERVATIONS", "LANDMARKS"}, {message.kind for message in self.live})
+        self.assertEqual({"POSE", "POSE_BOUND", "HEALTH", "INNOVATION", "OBSERVATIONS", "LANDMARKS"}, {message.kind for message in self.live})
         self.assertEqual({}, dict(self.malformed))
 
     def test_types_have_lcm_s_names(self):

@@ -146,7 +146,7 @@ class Export(unittest.TestCase):
             topics = {connection.topic for connection in bag.connections}
         self.assertEqual(first, second)
         self.assertGreater(first, 1000)
-        self.assertLessEqual({"/tf", "/tf_static", "/waymark/pose", "/waymark/odom", "/waymark/fused_pose", "/waymark/status",
+        self.assertLessEqual({"/tf", "/tf_static", "/waymark/pose", "/waymark/odom", "/waymark/fused_pose", "/waymark/status", "/waymark/bound",
                               "/diagnostics", "/landmarks", "/truth/pose", "/can0/frames", "/recording/sightings"}, topics)
 
     def test_poses_and_covariances_are_the_run_s(self):

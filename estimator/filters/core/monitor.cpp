@@ -505,6 +505,16 @@ void wm_monitor_step(wm_monitor *self, const wm_estimate *e, const wm_alarm *ala
   self->is_outside = wm::is_outside(*self, *e);
 }
 
+double wm_monitor_untested(const wm_monitor *self) { return self->fitted_s < wm::kProven_s ? wm::kFoundWrong : 0.0; }
+
+int wm_monitor_image(const wm_monitor *self, wm_hypothesis *out) {
+  const double chance = wm::course_mirrored(self->course);
+  if (!(chance > 0.0)) return 0;
+  const wm_pose2 image = wm::course_mirror_image(self->course);
+  *out = {image.x_m, image.y_m, image.heading_rad, {}, chance};
+  return 1;
+}
+
 int wm_monitor_doubts(const wm_monitor *self) {
   return self->doubt_s > 0.0 || self->is_unsupported || self->is_outside;
 }

@@ -119,6 +119,10 @@ int wm_monitor_take(wm_monitor *self, const wm_event *event, const wm_innovation
 void wm_monitor_step(wm_monitor *self, const wm_estimate *estimate, const wm_alarm *alarms, size_t count);
 // State, cause, covariance and probability of being lost, as the monitor finds them. Without doubt nothing changes.
 void wm_monitor_judge(const wm_monitor *self, wm_estimate *estimate);
+// Probability that something is wrong which no test could see yet: until observations have fitted for 5 s.
+double wm_monitor_untested(const wm_monitor *self);
+// The pose that is right if turn or positions are mirrored, with that probability; 0: it is none of weight.
+int wm_monitor_image(const wm_monitor *self, wm_hypothesis *out);
 // Whether the pose is in doubt.
 int wm_monitor_doubts(const wm_monitor *self);
 

@@ -30,6 +30,27 @@ static double percent(const drive_facts *self, wm_state state) {
   return 100 * evidence_share(self->evidence, state, self->due);
 }
 
+static double unusable(const drive_facts *self, wm_unusable why) {
+  return self->due > 0 ? (double)self->evidence->unusable[why] / (double)self->due : 0;
+}
+
+// How much of the drive a machine may act on, and what takes the rest.
+static void print_usable(const drive_facts *self, FILE *to) {
+  const wm_runtime_params *limits = &self->assembly->config->runtime;
+  (void)fprintf(to, "usable       %.1f %% of the drive, at a risk of %g", 100 * unusable(self, WM_UNUSABLE_NOT),
+                limits->integrity_risk_per_pose);
+  if (limits->integrity_alert_limit_m > 0) (void)fprintf(to, ", within %g m", limits->integrity_alert_limit_m);
+  if (limits->integrity_alert_limit_heading_deg > 0)
+    (void)fprintf(to, ", within %g deg", limits->integrity_alert_limit_heading_deg);
+  const char *before = "; not, by ";
+  for (unsigned why = WM_UNUSABLE_NOT + 1; why < WM_UNUSABLE_COUNT; why++) {
+    if (self->evidence->unusable[why] == 0) continue;
+    (void)fprintf(to, "%s%s %.1f %%", before, wm_unusable_name(why), 100 * unusable(self, why));
+    before = ", ";
+  }
+  (void)fputc('\n', to);
+}
+
 void facts_print(const drive_facts *self, FILE *to) {
   for (size_t i = 0; i < self->assembly->source_count; i++)
     facts_print_source(&self->assembly->sources[i], &self->sources[i], to);
@@ -39,6 +60,7 @@ void facts_print(const drive_facts *self, FILE *to) {
                 self->recorded_s, percent(self, WM_STATE_TRACKING), percent(self, WM_STATE_DEGRADED),
                 percent(self, WM_STATE_DEAD_RECKONING), percent(self, WM_STATE_LOST),
                 percent(self, WM_STATE_SEARCHING));
+  print_usable(self, to);
   for (size_t i = 0; i < self->assembly->source_count; i++)
     for (unsigned k = 0; k < WM_RESIDUAL_COUNT; k++) {
       const residual_evidence *r = &self->evidence->residuals[i][k];
@@ -73,6 +95,13 @@ static void json_states(const drive_facts *self, FILE *to) {
   (void)fputc('}', to);
 }
 
+static void json_usable(const drive_facts *self, FILE *to) {
+  (void)fprintf(to, ",\n    \"usable\": {\"share\": %.6g", unusable(self, WM_UNUSABLE_NOT));
+  for (unsigned why = WM_UNUSABLE_NOT + 1; why < WM_UNUSABLE_COUNT; why++)
+    (void)fprintf(to, ", \"%s\": %.6g", wm_unusable_name(why), unusable(self, why));
+  (void)fputc('}', to);
+}
+
 static void json_fit(const drive_facts *self, FILE *to) {
   int count = 0;
   (void)fputs(",\n    \"fit\": [", to);
@@ -102,6 +131,7 @@ void facts_json(const drive_facts *self, FILE *to) {
   (void)fprintf(to, ", \"duration_s\": %.6g", self->recorded_s);
   json_sources(self, to);
   json_states(self, to);
+  json_usable(self, to);
   json_fit(self, to);
   (void)fputs("\n  }", to);
 }

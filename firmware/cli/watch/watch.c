@@ -24,6 +24,13 @@ void watch_pose(watch *self, const void *message, size_t length, wm_time_ns now_
   self->pose_at_ns = now_ns;
 }
 
+void watch_bound(watch *self, const void *message, size_t length) {
+  if (wm_lcm_read_bound(message, length, &self->bound))
+    self->not_understood++;
+  else
+    self->has_bound = 1;
+}
+
 void watch_refused(watch *self, const void *message, size_t length) {
   char source[WM_HEALTH_NAME_MAX], reason[WM_HEALTH_REASON_MAX];
   if (wm_lcm_read_refused(message, length, source, reason)) {
@@ -144,6 +151,28 @@ static void print_pose(const wm_published *p, double rate_hz, FILE *to) {
                 p->jumps);
 }
 
+static void print_number(double value, double unit, const char *name, FILE *to) {
+  (void)(isfinite(value) ? fprintf(to, "%.2f %s", value / unit, name) : fprintf(to, "no bound"));
+}
+
+static void print_bound(const wm_bound *b, FILE *to) {
+  static const char *const kWhy[WM_UNUSABLE_COUNT] = {
+      [WM_UNUSABLE_NOT] = "usable",
+      [WM_UNUSABLE_NO_POSE] = "not usable: there is no pose yet",
+      [WM_UNUSABLE_UNMONITORED] = "not usable: this estimator does not watch its pose",
+      [WM_UNUSABLE_DOUBT] = "not usable: the pose may be wrong",
+      [WM_UNUSABLE_UNTESTED] = "not usable yet: observations have to fit for 5 s",
+      [WM_UNUSABLE_POSITION] = "not usable: the position is not known well enough",
+      [WM_UNUSABLE_HEADING] = "not usable: the heading is not known well enough"};
+  (void)fputs("bound      position ", to);
+  print_number(b->horizontal_m, 1, "m", to);
+  (void)fputs(", heading ", to);
+  print_number(b->heading_rad, M_PI / 180, "deg", to);
+  (void)fprintf(to, " at a risk of %g: %s\n", b->risk, b->why < WM_UNUSABLE_COUNT ? kWhy[b->why] : "not usable");
+  if (b->heading_after_m > 0)
+    (void)fprintf(to, "heading    not known well enough: drive %.1f m straight on\n", b->heading_after_m);
+}
+
 static void print_source(const wm_source_health *s, FILE *to) {
   uint64_t rejected = 0;
   for (int i = 1; i < WM_VERDICT_COUNT; i++) rejected += s->rejected[i];
@@ -182,6 +211,7 @@ void watch_print(const watch *self, wm_time_ns now_ns, FILE *to) {
     (void)fprintf(to, "   (lost with probability %.3g)", self->health.lost_probability);
   (void)fputc('\n', to);
   if (self->has_pose) print_pose(&self->pose, self->rate_hz, to);
+  if (self->has_bound) print_bound(&self->bound, to);
   if (self->innovations > 0)
     (void)fprintf(to, "consistency %s (mean squared innovation %.2f of its variance)\n", watch_consistency(self),
                   self->nis);

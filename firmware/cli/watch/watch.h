@@ -6,6 +6,7 @@
 #include <stdio.h>
 
 #include "findings/findings.h"
+#include "waymark/bound.h"
 #include "waymark/health.h"
 #include "waymark/pose.h"
 
@@ -16,9 +17,10 @@ typedef struct watch_reason {
 
 typedef struct watch {
   wm_published pose;
+  wm_bound bound;
   wm_health health;
   wm_findings found;  // of that health
-  int has_pose, has_health;
+  int has_pose, has_health, has_bound;
   wm_time_ns pose_at_ns, health_at_ns;  // arrival, on this computer's clock
   double rate_hz;                       // of poses, smoothed
   double nis;  // mean squared innovation by its own variance, of about the last hundred; 1 is expected
@@ -28,6 +30,7 @@ typedef struct watch {
 } watch;
 
 void watch_pose(watch *self, const void *message, size_t length, wm_time_ns now_ns);
+void watch_bound(watch *self, const void *message, size_t length);
 void watch_health(watch *self, const void *message, size_t length, wm_time_ns now_ns);
 void watch_refused(watch *self, const void *message, size_t length);
 void watch_innovation(watch *self, const void *message, size_t length);

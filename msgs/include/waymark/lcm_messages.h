@@ -8,6 +8,7 @@
 
 #include <stddef.h>
 
+#include "waymark/bound.h"
 #include "waymark/event.h"
 #include "waymark/health.h"
 #include "waymark/pose.h"
@@ -24,6 +25,7 @@ extern "C" {
 
 // `sent_ns`: now, on the clock of published->made_ns, which is when the pose was made.
 size_t wm_lcm_pose(const wm_published *published, wm_time_ns sent_ns, void *out, size_t capacity);
+size_t wm_lcm_bound(const wm_bound *bound, void *out, size_t capacity);
 // Name of the last calibration value of a message that has no room for all: how many are left out.
 #define WM_LCM_CALIBRATION_LEFT "calibration.left_out"
 size_t wm_lcm_health(const wm_health *health, void *out, size_t capacity);
@@ -39,6 +41,7 @@ const char *wm_lcm_read_sightings(const void *message, size_t length, char *sens
                                   size_t *count);
 // Messages of a run, for viewers: NULL, or a text with the fault.
 const char *wm_lcm_read_pose(const void *message, size_t length, wm_published *out);
+const char *wm_lcm_read_bound(const void *message, size_t length, wm_bound *out);
 const char *wm_lcm_read_health(const void *message, size_t length, wm_health *out);
 // A refused_t: the source's name and the reason, each terminated.
 const char *wm_lcm_read_refused(const void *message, size_t length, char source[WM_HEALTH_NAME_MAX],

@@ -297,7 +297,7 @@ TEST(misspelt) {
   refused(
       HEAD "something: 1\n",
       "dir/x.yaml:3: something: unknown key; known here: format, estimator, sources, calibration, landmarks, dbc, "
-      "can_signals, devices, map, initial_pose, vision, start, black_box, publish, commands, merge, realtime, motion, "
+      "can_signals, devices, map, initial_pose, vision, start, black_box, publish, commands, merge, integrity, realtime, motion, "
       "sightings, pole_filter, cloud_filter");
   refused(HEAD "pole_filter: {states: {other: 1}}\n",
           "dir/x.yaml:3: pole_filter.states.other: unknown key; known here: yaw_sigma_rad, slots, deep");

@@ -2,6 +2,7 @@
 #include <stdio.h>
 
 #include "common/suite.h"
+#include "fusion/bound.h"
 #include "fusion/fuser.h"
 #include "tiny_estimator.h"
 
@@ -186,6 +187,69 @@ TEST(a_pose_whose_observations_are_refused_is_lost) {
   TEST_ASSERT_EQUAL(WM_STATE_LOST, health->state);
   TEST_ASSERT_EQUAL(WM_CAUSE_REFUSED, health->cause);
   TEST_ASSERT_EQUAL(1, health->cause_source);
+}
+
+static double lost, image_x_m, image_weight;
+
+static void sure(const void *s, wm_estimate *out) {
+  kTiny.estimate(s, out);
+  out->covariance[wm_cov_index(0, 0)] = out->covariance[wm_cov_index(1, 1)] = 0.01;
+  out->covariance[wm_cov_index(5, 5)] = 1e-4;
+  out->lost_probability = lost;
+}
+
+static wm_status fits(void *s, const wm_event *e, wm_innovation *out, size_t capacity, size_t *count) {
+  const wm_status status = kTiny.correct(s, e, out, capacity, count);
+  if (*count > 0) out[0].variance = 1;
+  return status;
+}
+
+// Twelve poses at the same place, of which eight count one by one.
+static size_t other_places(const void *s, wm_hypothesis *out, size_t capacity) {
+  (void)s;
+  for (size_t i = 0; i < capacity && i < 12; i++)
+    out[i] = (wm_hypothesis){.x_m = image_x_m, .covariance = {1e-4, 0, 1e-4, 0, 0, 1e-4}, .weight = image_weight};
+  return 12;
+}
+
+static wm_bound bound_after(wm_time_ns until_ms) {
+  static wm_estimator watched;
+  const wm_integrity integrity = {.risk = 1e-4};
+  wm_estimate fused;
+  wm_bound bound;
+  watched = kTiny;
+  watched.estimate = sure;
+  watched.correct = fits;
+  watched.hypotheses = other_places;
+  setUp();
+  wm_fuser_init(&fuser, &watched, &state, wm_driving_choose(WM_EVENT_BIT(WM_EVENT_TWIST2), 0), (wm_output){put, NULL});
+  wm_fuser_watch(&fuser, &(wm_setup){0}, 1u << 1);
+  for (wm_time_ns ms = 0; ms < until_ms; ms += 100) {
+    twist(ms, 0);
+    sighting(ms, 0.0);
+  }
+  wm_fuser_estimate(&fuser, &fused);
+  wm_fuser_bound(&fuser, &integrity, &fused, &fused, &bound);
+  return bound;
+}
+
+TEST(a_pose_is_usable_once_observations_have_fitted_for_5_s) {
+  lost = image_weight = 0;
+  TEST_ASSERT_EQUAL(WM_UNUSABLE_UNTESTED, bound_after(4000).why);
+  const wm_bound bound = bound_after(8000);
+  TEST_ASSERT_EQUAL(WM_UNUSABLE_NOT, bound.why);
+  TEST_ASSERT_TRUE(bound.usable && bound.horizontal_m > 0.7 && bound.horizontal_m < 0.8);
+}
+
+TEST(a_bound_reaches_the_other_poses_that_are_known) {
+  image_x_m = 3;
+  image_weight = 4e-5;
+  lost = 12 * image_weight;
+  // Eight are known, four count as a pose anywhere: 1.6e-4, of which the evidence's floor is 1.2e-4.
+  const wm_bound bound = bound_after(8000);
+  TEST_ASSERT_TRUE(bound.usable && bound.horizontal_m > 3.0 && bound.horizontal_m < 3.2);
+  lost += 1e-4;
+  TEST_ASSERT_EQUAL(WM_UNUSABLE_DOUBT, bound_after(8000).why);
 }
 
 static wm_status take_points(void *self, const wm_event *e, wm_innovation *out, size_t capacity, size_t *count) {

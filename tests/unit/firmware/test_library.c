@@ -21,7 +21,7 @@ static uint32_t source;
 
 // Hash and count of the records by kind.
 typedef struct taken {
-  uint64_t hash[WAYMARK_RECORD_PUBLISHED + 1], count[WAYMARK_RECORD_PUBLISHED + 1];
+  uint64_t hash[WAYMARK_RECORD_BOUND + 1], count[WAYMARK_RECORD_BOUND + 1];
   wm_estimate last;
 } taken;
 
@@ -174,9 +174,16 @@ TEST(test_rows_and_events_give_the_replay_s_bits) {
   TEST_ASSERT_EQUAL_STRING("sightings:eye", waymark_source_name(session, 1));
   TEST_ASSERT_EQUAL_UINT64(STEPS / 5, health.sources[1].received);
   TEST_ASSERT_EQUAL_STRING("tracking", waymark_name(WAYMARK_NAMES_STATE, health.state));
+  wm_bound bound;
+  ok(waymark_bound(session, &bound, sizeof bound, &err));
+  TEST_ASSERT_EQUAL_INT64((STEPS + 3) * STEP_NS + 15 * WM_NS_PER_MS, bound.t_ns);
+  TEST_ASSERT_EQUAL_DOUBLE(1e-4, bound.risk);
+  TEST_ASSERT_EQUAL(1, bound.usable);
+  TEST_ASSERT_EQUAL_STRING("", waymark_name(WAYMARK_NAMES_UNUSABLE, bound.why));
   ok(waymark_close(session, &err));
   replay(&replayed, dir, NULL, NULL);
   same(&pushed, &replayed);
+  TEST_ASSERT_EQUAL_UINT64(pushed.count[WAYMARK_RECORD_PUBLISHED], pushed.count[WAYMARK_RECORD_BOUND]);
   TEST_ASSERT_DOUBLE_WITHIN(0.05, 0.5 * (STEPS - 1) * 0.02, pushed.last.pose_map_base.p_m[0]);
   TEST_ASSERT_GREATER_THAN_UINT64(STEPS - FIRST_POSE, pushed.count[WAYMARK_RECORD_PUBLISHED]);
 }
@@ -372,6 +379,24 @@ TEST(test_pictures_give_the_replay_s_bits) {
 }
 
 // ── what is refused ─────────────────────────────────────────────────────────────────────────────────────────────────
+
+TEST(test_a_bound_asked_for_wrongly_is_refused) {
+  taken into;
+  wm_bound bound;
+  waymark_session *session = open_session(&into, NULL, NULL);
+  TEST_ASSERT_EQUAL(WM_BAD_USAGE, waymark_bound(NULL, &bound, sizeof bound, &err));
+  TEST_ASSERT_EQUAL(WM_BAD_USAGE, waymark_bound(session, &bound, sizeof bound, &err));  // not started
+  ok(waymark_add_source(session, "sightings:eye", &source, &err));
+  ok(waymark_add_source(session, "motion", &source, &err));
+  ok(waymark_start(session, &err));
+  TEST_ASSERT_EQUAL(WM_BAD_USAGE, waymark_bound(session, NULL, sizeof bound, &err));
+  TEST_ASSERT_EQUAL(WM_BAD_USAGE, waymark_bound(session, &bound, sizeof bound + 8, &err));
+  TEST_ASSERT_NOT_NULL(strstr(err.text, "waymark_bound"));
+  TEST_ASSERT_EQUAL(WM_AGAIN, waymark_bound(session, &bound, sizeof bound, &err));  // without a pose
+  ok(waymark_close(session, &err));
+  TEST_ASSERT_EQUAL(WM_BAD_DATA, waymark_read_bound("", 0, &bound, sizeof bound, &err));
+  TEST_ASSERT_EQUAL(WM_BAD_USAGE, waymark_read_bound(NULL, 10, &bound, sizeof bound, &err));
+}
 
 TEST(test_sizes_are_checked) {
   taken into;

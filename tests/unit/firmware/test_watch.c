@@ -193,6 +193,35 @@ TEST(refused_data_have_their_reason) {
   }
 }
 
+static const char *shown_of(const wm_bound *bound) {
+  memset(&seen, 0, sizeof seen);
+  watch_bound(&seen, bytes, wm_lcm_bound(bound, bytes, sizeof bytes));
+  FILE *f = fmemopen(shown, sizeof shown, "w");
+  watch_print(&seen, 10 * WM_NS_PER_S, f);
+  (void)fclose(f);
+  return shown;
+}
+
+TEST(a_bound_says_whether_the_pose_is_usable) {
+  wm_bound bound = {.risk = 1e-4, .horizontal_m = 0.25, .heading_rad = 0.1, .usable = 1};
+  TEST_ASSERT_NOT_NULL_MESSAGE(
+      strstr(shown_of(&bound), "bound      position 0.25 m, heading 5.73 deg at a risk of 0.0001: usable\n"), shown);
+  TEST_ASSERT_NULL_MESSAGE(strstr(shown, "straight on"), shown);
+  bound.heading_rad = (double)INFINITY;
+  bound.usable = 0;
+  bound.why = WM_UNUSABLE_HEADING;
+  bound.heading_after_m = 2.04;
+  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(shown_of(&bound),
+                                      "heading no bound at a risk of 0.0001: not usable: the heading "
+                                      "is not known well enough\n"),
+                               shown);
+  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(shown, "heading    not known well enough: drive 2.0 m straight on\n"), shown);
+  bound.why = WM_UNUSABLE_COUNT;  // of a newer version
+  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(shown_of(&bound), ": not usable\n"), shown);
+  watch_bound(&seen, "rubbish", 7);
+  TEST_ASSERT_EQUAL_UINT64(1, seen.not_understood);
+}
+
 static const char *metrics_at(wm_time_ns now_ns) {
   FILE *f = fmemopen(shown, sizeof shown, "w");
   watch_metrics(&seen, now_ns, f);

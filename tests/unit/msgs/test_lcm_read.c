@@ -280,7 +280,31 @@ TEST(identities_of_sightings) {
   }
 }
 
+TEST(bound) {
+  const wm_bound b = {.t_ns = 99,
+                      .risk = 1e-4,
+                      .horizontal_m = (double)INFINITY,
+                      .heading_rad = 0.25,
+                      .limit_m = 0.5,
+                      .limit_rad = 0.75,
+                      .heading_after_m = 2,
+                      .why = WM_UNUSABLE_DOUBT,
+                      .cause = WM_CAUSE_REFUSED,
+                      .cause_source = -1};
+  const size_t length = wm_lcm_bound(&b, bytes, sizeof bytes);
+  wm_bound read;
+  memset(&read, 0x55, sizeof read);
+  TEST_ASSERT_NULL(wm_lcm_read_bound(bytes, length, &read));
+  TEST_ASSERT_EQUAL_MEMORY(&b, &read, sizeof b);
+  wm_bound usable = b;
+  usable.usable = 1;
+  TEST_ASSERT_NULL(wm_lcm_read_bound(bytes, wm_lcm_bound(&usable, bytes, sizeof bytes), &read));
+  TEST_ASSERT_EQUAL(1, read.usable);
+  for (size_t cut = 0; cut < length; cut++) TEST_ASSERT_NOT_NULL(wm_lcm_read_bound(bytes, cut, &read));
+}
+
 TEST(no_message_is_not_read) {
+  static wm_bound bound;
   static wm_published p;
   static wm_health h;
   static wm_innovation in;
@@ -292,6 +316,7 @@ TEST(no_message_is_not_read) {
   wm_time_ns t_ns;
   for (size_t length = 0; length < 100; length += 8) {
     TEST_ASSERT_NOT_NULL(wm_lcm_read_pose(NULL, length, &p));
+    TEST_ASSERT_NOT_NULL(wm_lcm_read_bound(NULL, length, &bound));
     TEST_ASSERT_NOT_NULL(wm_lcm_read_health(NULL, length, &h));
     TEST_ASSERT_NOT_NULL(wm_lcm_read_innovation(NULL, length, &in));
     TEST_ASSERT_NOT_NULL(wm_lcm_read_refused(NULL, length, name, reason));

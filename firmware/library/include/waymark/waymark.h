@@ -34,6 +34,7 @@
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wpedantic"
 #endif
+#include <waymark/bound.h>
 #include <waymark/event.h>
 #include <waymark/frame.h>
 #include <waymark/health.h>
@@ -59,7 +60,8 @@ typedef enum waymark_record {
   WAYMARK_RECORD_EVENT = 1,   // wm_event: handed to the estimator, in the order of the stamps
   WAYMARK_RECORD_FUSED,       // wm_estimate: pose after all observations up to its stamp, one a row of motion
   WAYMARK_RECORD_INNOVATION,  // wm_innovation: one a scalar update, fused or refused
-  WAYMARK_RECORD_PUBLISHED    // wm_published: pose of now, as the robot has it
+  WAYMARK_RECORD_PUBLISHED,   // wm_published: pose of now, as the robot has it
+  WAYMARK_RECORD_BOUND        // wm_bound: of the published pose that follows
 } waymark_record;
 
 // A record; it belongs to the library and is valid during the call. `bytes` is what of it is in use.
@@ -131,6 +133,9 @@ wm_status waymark_advance(waymark_session *session, wm_time_ns now_ns, wm_error 
 
 // The pose of `now_ns`, by the odometry since the fused one. WM_AGAIN: there is none yet, or it was asked for already.
 wm_status waymark_pose(waymark_session *session, wm_time_ns now_ns, wm_published *out, size_t bytes, wm_error *err);
+// How far the robot may be from the last pose that waymark_pose gave, for integrity.risk_per_pose, and whether it is
+// usable (docs/usable.md). WM_AGAIN: there was none.
+wm_status waymark_bound(waymark_session *session, wm_bound *out, size_t bytes, wm_error *err);
 // Counts of the sources, calibration states, state of the pose. Tens of microseconds.
 wm_status waymark_health(waymark_session *session, wm_health *out, size_t bytes, wm_error *err);
 // Name of a source of a wm_innovation or wm_health, "" beyond.
@@ -204,8 +209,10 @@ void waymark_log_close(waymark_log *log);  // NULL is fine
 
 // ── messages of a live run, names ───────────────────────────────────────────────────────────────────────────────────
 
-// Messages as they come over LCM (docs/lcm.md): POSE, HEALTH and INNOVATION. One thread at a time in all of a program.
+// Messages as they come over LCM (docs/lcm.md): POSE, POSE_BOUND, HEALTH and INNOVATION. One thread at a time in all of
+// a program.
 wm_status waymark_read_pose(const void *message, size_t length, wm_published *out, size_t bytes, wm_error *err);
+wm_status waymark_read_bound(const void *message, size_t length, wm_bound *out, size_t bytes, wm_error *err);
 wm_status waymark_read_health(const void *message, size_t length, wm_health *out, size_t bytes, wm_error *err);
 wm_status waymark_read_innovation(const void *message, size_t length, wm_innovation *out, size_t bytes, wm_error *err);
 
@@ -216,7 +223,8 @@ typedef enum waymark_names {
   WAYMARK_NAMES_VERDICT,
   WAYMARK_NAMES_EVENT,
   WAYMARK_NAMES_QUANTITY,
-  WAYMARK_NAMES_STATUS
+  WAYMARK_NAMES_STATUS,
+  WAYMARK_NAMES_UNUSABLE
 } waymark_names;
 // Word of a number in the structs: "tracking", "fused" ...; "?" beyond.
 const char *waymark_name(waymark_names of, uint32_t number);

@@ -153,6 +153,7 @@ struct callbacks {
   std::function<void(const wm_published &)> published;    // pose of now
   std::function<void(std::string_view)> note;             // for people: one line
   std::function<void(double)> progress;                   // of a replay: 0 to 1
+  std::function<void(const wm_bound &)> bound;            // of the published pose that follows
 };
 
 struct options {
@@ -193,6 +194,7 @@ struct outlet {
         case WAYMARK_RECORD_FUSED: return hand(self.on.fused, record);
         case WAYMARK_RECORD_INNOVATION: return hand(self.on.innovation, record);
         case WAYMARK_RECORD_PUBLISHED: return hand(self.on.published, record);
+        case WAYMARK_RECORD_BOUND: return hand(self.on.bound, record);
       }
     });
   }
@@ -301,6 +303,14 @@ class session {
     const auto given = detail::call(out_.get(), waymark_pose, handle_, now.ns(), &pose, sizeof pose);
     if (given) return std::optional<wm_published>(pose);
     if (given.error().status == WM_AGAIN) return std::optional<wm_published>();
+    return given.error();
+  }
+  // Of the last pose; empty: there was none.
+  result<std::optional<wm_bound>> bound() {
+    wm_bound bound = {};
+    const auto given = detail::call(out_.get(), waymark_bound, handle_, &bound, sizeof bound);
+    if (given) return std::optional<wm_bound>(bound);
+    if (given.error().status == WM_AGAIN) return std::optional<wm_bound>();
     return given.error();
   }
   result<wm_health> health() {

@@ -18,7 +18,8 @@ const error_case kErrorCases[] = {
      "config/robot.yaml:3: horizon_ms: unknown key; did you mean 'merge.horizon_ms'?"},
     {CONFIG, "Unknown key", FILE_, "colour: red\n",
      "config/robot.yaml:3: colour: unknown key; known here: format, estimator, sources, calibration, landmarks, dbc, "
-     "can_signals, devices, map, initial_pose, vision, start, black_box, publish, commands, merge, realtime, motion, "
+     "can_signals, devices, map, initial_pose, vision, start, black_box, publish, commands, merge, integrity, "
+     "realtime, motion, "
      "sightings, positions, markers, localizer, landmark_ekf, edge_mcl, pf_edges, slam, "
      "stereo_ekf"},
     {CONFIG, "CAN interface without its name", FILE_, "devices: {can: [{dbc: car.dbc, can_signals: s.yaml}]}\n",

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from .lcm_types import load
 
 THIS_COMPUTER = "udpm://239.255.76.67:7667?ttl=0"
-KINDS = {"POSE": "pose_t", "HEALTH": "health_t", "INNOVATION": "innovation_t", "OBSERVATIONS": "observations_t",
+KINDS = {"POSE": "pose_t", "POSE_BOUND": "bound_t", "HEALTH": "health_t", "INNOVATION": "innovation_t", "OBSERVATIONS": "observations_t",
          "LANDMARKS": "landmarks_t", "MAP": "map_t", "PARTICLES": "places_t", "HYPOTHESES": "places_t", "REFUSED": "refused_t"}
 """Channels of a run behind the prefix, and their types (docs/lcm.md)."""
 

@@ -59,7 +59,7 @@ def text(characters: Any) -> str:
 
 
 def names(kind: str) -> Array:
-    """Words of the numbers of an enum: "STATE", "CAUSE", "RESIDUAL", "VERDICT" or "EVENT"."""
+    """Words of the numbers of an enum: "STATE", "CAUSE", "RESIDUAL", "VERDICT", "UNUSABLE" or "EVENT"."""
     count = getattr(library(), f"WM_{kind}_KIND_COUNT" if kind == "EVENT" else f"WM_{kind}_COUNT")
     which = getattr(library(), f"WAYMARK_NAMES_{kind}")
     return np.array([text(library().waymark_name(which, number)) for number in range(count)])

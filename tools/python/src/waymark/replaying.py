@@ -36,12 +36,14 @@ def _poses(estimates: Array) -> Table:
     return out | {"state": names("STATE")[estimates["state"]]}
 
 
-def _published(rows: Array) -> Table:
+def _published(rows: Array, bounds: Array) -> Table:
     poses = _poses(rows["now"])
     odom = rows["pose_odom_base"]
     return {"t_ns": poses.pop("t_ns"), "made_ns": rows["made_ns"], "fused_until_ns": rows["fused_until_ns"], **poses,
             "odom_x_m": odom["x_m"], "odom_y_m": odom["y_m"], "odom_heading_rad": odom["heading_rad"], "resets": rows["jumps"],
-            "lost_probability": rows["now"]["lost_probability"], "cause": names("CAUSE")[rows["now"]["cause"]]}
+            "lost_probability": rows["now"]["lost_probability"], "cause": names("CAUSE")[rows["now"]["cause"]],
+            "bound_m": bounds["horizontal_m"], "bound_heading_rad": bounds["heading_rad"], "usable": bounds["usable"].astype(np.int64),
+            "unusable": bounds["why"].astype(np.int64)}
 
 
 def _innovations(rows: Array) -> Table:
@@ -51,7 +53,7 @@ def _innovations(rows: Array) -> Table:
             "verdict": names("VERDICT")[rows["verdict"]]}
 
 
-_KINDS = {2: "wm_estimate", 3: "wm_innovation", 4: "wm_published"}
+_KINDS = {2: "wm_estimate", 3: "wm_innovation", 4: "wm_published", 5: "wm_bound"}
 
 
 def replay(input: str | Path, config: str | Path | None = None, *, changes: Mapping[str, object] | None = None,
@@ -103,7 +105,7 @@ def replay(input: str | Path, config: str | Path | None = None, *, changes: Mapp
     if failed:
         raise failed[0]
     arrays = {kind: np.frombuffer(bytes(data), dtype(_KINDS[kind])) for kind, data in records.items()}
-    return Estimate(_poses(arrays[2]), _published(arrays[4]), _innovations(arrays[3]),
+    return Estimate(_poses(arrays[2]), _published(arrays[4], arrays[5]), _innovations(arrays[3]),
                     {name: getattr(report, name) for name in ("poses", "events", "recorded_s", "events_missing", "log_was_cut")})
 
 

@@ -17,6 +17,7 @@ _OTHERS = {
     "float64 innovation\nfloat64 sigma\nfloat64 normalised\nfloat64 nis\nfloat64 gate\nbool fused\nstring verdict\n",
     "waymark_msgs/msg/Status": "std_msgs/Header header\nstring state\nbool tracking\nfloat64 lost_probability\n"
     "float64 sigma_xy_m\nfloat64 sigma_heading_rad\nfloat64 age_of_fusion_s\nint32 resets\n",
+    "waymark_msgs/msg/Bound": "std_msgs/Header header\nfloat64 horizontal_m\nfloat64 heading_rad\nbool usable\nstring unusable\n",
     "foxglove_msgs/msg/Point2": "float64 x\nfloat64 y\n",
     "foxglove_msgs/msg/Color": "float64 r\nfloat64 g\nfloat64 b\nfloat64 a\n",
     "foxglove_msgs/msg/CircleAnnotation": "builtin_interfaces/Time timestamp\nfoxglove_msgs/Point2 position\nfloat64 diameter\n"

@@ -16,7 +16,7 @@ Table: TypeAlias = dict[str, Array]
 """Columns by name, all of one length: int64 (stamps, identities), float64 (NaN: empty) or str."""
 
 _WORDS = {"sensor", "source", "state", "verdict", "residual", "picture", "cause"}
-_COUNTS = {"id", "landmark", "frame", "polyline", "resets"}
+_COUNTS = {"id", "landmark", "frame", "polyline", "resets", "usable", "unusable"}
 _MEASURES = re.compile(r"_(m|mps|mps2|rad|radps|px|deg|hz|s)$")  # units of numbers
 _BLOCK_ROWS = 4096  # written at once
 ABSENT = -1

@@ -104,6 +104,20 @@ def _odometry(messages: Messages, table: Table, log_ns: Array) -> Iterator[Item]
         yield odometry(messages, log_ns[i], t_ns, (x[i], y[i], heading[i]), linear, angular)
 
 
+UNUSABLE = ("", "no_pose", "unmonitored", "doubt", "untested", "position", "heading")
+"""Why a pose is not usable, by its number."""
+
+
+def bounds(messages: Messages, table: Table, log_ns: Array) -> Iterator[Item]:
+    """How far the robot may be from each pose (docs/usable.md)."""
+    for i, t_ns in enumerate(table["t_ns"]):
+        why = int(table["unusable"][i])
+        yield Item(log_ns[i], "/waymark/bound", "waymark_msgs/msg/Bound", messages.make(
+            "Bound", header=messages.header(t_ns, "map"), horizontal_m=float(table["bound_m"][i]),
+            heading_rad=float(table["bound_heading_rad"][i]), usable=bool(table["usable"][i]),
+            unusable=UNUSABLE[why] if 0 <= why < len(UNUSABLE) else "?"))
+
+
 def status(messages: Messages, table: Table, log_ns: Array) -> Iterator[Item]:
     errors = covariance(table)
     for i, t_ns in enumerate(table["t_ns"]):
@@ -192,6 +206,8 @@ def estimate_streams(messages: Messages, run: Run) -> list[Iterator[Item]]:
         streams += [poses(messages, "/waymark/pose", table, made), _paths(messages, table, made)]
         if "state" in table:
             streams.append(status(messages, table, made))
+        if "bound_m" in table:
+            streams.append(bounds(messages, table, made))
         if "odom_x_m" in table:
             streams += [frames(messages, table, made), _odometry(messages, table, made)]
     for name, make in (("innovations.csv", innovations), ("particles.csv", particles), ("hypotheses.csv", hypotheses)):

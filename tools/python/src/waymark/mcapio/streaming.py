@@ -19,6 +19,7 @@ _CLOCK_STEP_NS = 1_000_000
 TOPICS = {"/tf": "tf2_msgs/msg/TFMessage", "/tf_static": "tf2_msgs/msg/TFMessage", "/map": "nav_msgs/msg/OccupancyGrid",
           "/waymark/pose": "geometry_msgs/msg/PoseWithCovarianceStamped", "/waymark/odom": "nav_msgs/msg/Odometry",
           "/waymark/path": "nav_msgs/msg/Path", "/waymark/status": "waymark_msgs/msg/Status",
+          "/waymark/bound": "waymark_msgs/msg/Bound",
           "/waymark/particles": "geometry_msgs/msg/PoseArray", "/waymark/hypotheses": "visualization_msgs/msg/MarkerArray",
           "/waymark/landmarks": "visualization_msgs/msg/MarkerArray", "/landmarks": "visualization_msgs/msg/MarkerArray",
           **{f"{topic}/points": "sensor_msgs/msg/PointCloud2"
@@ -124,6 +125,12 @@ class LiveItems:
         yield from estimates.poses(messages, "/waymark/pose", table, log_ns)
         yield from estimates.frames(messages, table, log_ns)
         yield from self._path(columns["t_ns"], message)
+
+    def _pose_bound(self, message: Any) -> Iterator[Item]:
+        columns = {"t_ns": self._utc(message.t_ns), "bound_m": message.horizontal_m, "bound_heading_rad": message.heading_rad,
+                   "usable": message.usable, "unusable": message.unusable}
+        table: Table = {name: np.array([value]) for name, value in columns.items()}
+        yield from estimates.bounds(self._messages, table, np.array([self._utc(message.t_ns)]))
 
     def _path(self, t_ns: int, message: Any) -> Iterator[Item]:
         self._way.append((t_ns, tuple(message.position_m), tuple(message.orientation_xyzw)))
