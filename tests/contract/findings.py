@@ -74,6 +74,7 @@ def check(bin_dir, config, recording, options):
         report = json.loads(done.stdout)
         assert report["facts"]["duration_s"] > 0.9 * small_robot.DURATION_S and report["facts"]["sources"], report["facts"]
         assert abs(sum(report["facts"]["states"].values()) - 1) < 0.02, report["facts"]["states"]
+        assert abs(sum(report["facts"]["usable"].values()) + report["facts"]["states"]["searching"] - 1) < 0.02, report["facts"]["usable"]
         return report["findings"]
     except json.JSONDecodeError:
         sys.exit(f"check {config} {recording}: exit code {done.returncode}\n{done.stdout}{done.stderr}")

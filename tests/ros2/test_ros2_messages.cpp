@@ -162,6 +162,23 @@ TEST(test_silence_is_a_stale_diagnostic) {
   TEST_ASSERT_EQUAL_STRING("no poses for 3 s", out.status._buffer[0].message);
 }
 
+TEST(test_a_diagnostic_has_whether_the_pose_is_usable) {
+  Diagnostics texts;
+  static wm_health health{};
+  const uint32_t before = texts.message(health, "", 5).status._buffer[0].values._length;
+  wm_bound bound{};
+  bound.horizontal_m = 0.25;
+  bound.why = WM_UNUSABLE_DOUBT;
+  texts.take(bound);
+  const DiagnosticArray out = texts.message(health, "", 5);
+  const auto &values = out.status._buffer[0].values;
+  TEST_ASSERT_EQUAL_UINT32(before + 4, values._length);
+  TEST_ASSERT_EQUAL_STRING("usable", values._buffer[before].key);
+  TEST_ASSERT_EQUAL_STRING("no: doubt", values._buffer[before].value);
+  TEST_ASSERT_EQUAL_STRING("bound_m", values._buffer[before + 1].key);
+  TEST_ASSERT_EQUAL_STRING("0.25", values._buffer[before + 1].value);
+}
+
 TEST(test_bridges_that_are_in_each_other_s_way) {
   const Peer self{2, 10, "here", "", "WAYMARK_@udpm"};
   TEST_ASSERT_FALSE(conflict(self, {1, 11, "there", "", "WAYMARK_@udpm"}).empty());       // the same topics

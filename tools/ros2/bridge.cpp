@@ -73,9 +73,10 @@ Bridge::Bridge(const Wishes &wishes, Participant *participant, lcm_t *lcm)
   const auto on_message = [](const lcm_recv_buf_t *message, const char *channel, void *context) {
     auto *self = static_cast<Bridge *>(context);
     if (self->wishes_.prefix + "POSE" == channel) self->on_pose(message->data, message->data_size);
+    if (self->wishes_.prefix + "POSE_BOUND" == channel) self->on_bound(message->data, message->data_size);
     if (self->wishes_.prefix + "HEALTH" == channel) self->on_health(message->data, message->data_size);
   };
-  for (const char *channel : {"POSE", "HEALTH"}) {
+  for (const char *channel : {"POSE", "POSE_BOUND", "HEALTH"}) {
     lcm_subscription_t *taken = lcm_subscribe(lcm_, pattern_of(wishes.prefix + channel).c_str(), on_message, this);
     if (taken != nullptr) (void)lcm_subscription_set_queue_capacity(taken, kQueued);
   }
@@ -144,6 +145,16 @@ void Bridge::send_transforms(const wm_published &published, int64_t utc_ns) {
   if (count == 0) return;
   const TransformMessage message{{count, count, transforms.data(), false}};
   send(tf_, &message);
+}
+
+void Bridge::on_bound(const void *bytes, size_t length) {
+  wm_bound bound;
+  if (const char *why = wm_lcm_read_bound(bytes, length, &bound)) {
+    counts_.not_understood++;
+    report(wishes_.prefix + "POSE_BOUND: " + why);
+    return;
+  }
+  texts_.take(bound);
 }
 
 void Bridge::on_health(const void *bytes, size_t length) {

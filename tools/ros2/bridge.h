@@ -52,6 +52,7 @@ class Bridge {
   };
 
   void on_pose(const void *bytes, size_t length);
+  void on_bound(const void *bytes, size_t length);
   void on_health(const void *bytes, size_t length);
   void send_transforms(const wm_published &published, int64_t utc_ns);
   void send(dds_entity_t writer, const void *message);

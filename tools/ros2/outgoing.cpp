@@ -81,7 +81,7 @@ TransformStamped transform_message(const std::string &parent, const std::string 
   return {header(parent, utc_ns), text(child), {{at.position.x, at.position.y, at.position.z}, at.orientation}};
 }
 
-Diagnostics::Status Diagnostics::pose(const wm_health &health) {
+Diagnostics::Status Diagnostics::pose(const wm_health &health) const {
   const char *cause = wm_cause_name(health.cause);
   Status out{kError, "waymark: pose", wm_state_name(health.state), {}};
   if (health.state == WM_STATE_TRACKING) out.level = kOk;
@@ -105,6 +105,13 @@ Diagnostics::Status Diagnostics::pose(const wm_health &health) {
                 {"other_runs", std::to_string(health.other_runs)},
                 {"host", health.host},
                 {"pid", std::to_string(health.pid)}};
+  if (bound_) {
+    out.values.emplace_back("usable",
+                            bound_->usable != 0 ? "yes" : std::string("no: ") + wm_unusable_name(bound_->why));
+    out.values.emplace_back("bound_m", number(bound_->horizontal_m));
+    out.values.emplace_back("bound_heading_rad", number(bound_->heading_rad));
+    out.values.emplace_back("heading_after_m", number(bound_->heading_after_m));
+  }
   for (uint32_t i = 0; i < health.calibration_count; i++) {
     const wm_calibration_value &value = health.calibration[i];
     out.values.emplace_back(value.name, number(value.value) + " +- " + number(value.sigma));

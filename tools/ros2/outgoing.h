@@ -5,10 +5,12 @@
 #include <Eigen/Geometry>
 #include <array>
 #include <deque>
+#include <optional>
 #include <string>
 #include <vector>
 
 extern "C" {
+#include "waymark/bound.h"
 #include "waymark/health.h"
 }
 
@@ -44,6 +46,8 @@ class Diagnostics {
  public:
   // `silence` is not empty where messages of the run fail to come: the reason.
   DiagnosticArray message(const wm_health &health, const std::string &silence, int64_t utc_ns);
+  // Of the newest pose; it is a part of the messages from here on.
+  void take(const wm_bound &bound) { bound_ = bound; }
 
  private:
   struct Status {
@@ -51,9 +55,10 @@ class Diagnostics {
     std::string name, message;
     std::vector<std::pair<std::string, std::string>> values;
   };
-  [[nodiscard]] static Status pose(const wm_health &health);
+  [[nodiscard]] Status pose(const wm_health &health) const;
   [[nodiscard]] static Status source(const wm_source_health &source);
 
+  std::optional<wm_bound> bound_;
   std::vector<Status> statuses_;
   std::deque<std::vector<KeyValue>> values_;
   std::vector<DiagnosticStatus> messages_;

@@ -14,6 +14,7 @@
 #include "live/notify.h"
 #include "log_fixture.h"
 #include "rt/clock.h"
+#include "waymark_bound_t.h"
 #include "waymark_health_t.h"
 #include "waymark_innovation_t.h"
 #include "waymark_landmarks_t.h"
@@ -29,7 +30,7 @@ static lcm_sink sink;
 static waymark_pose_t pose;
 static waymark_observations_t observations;
 static waymark_landmarks_t landmarks;
-static int poses, innovations, healths, observed, maps;
+static int poses, bounds, innovations, healths, observed, maps;
 
 static void received(const lcm_recv_buf_t *b, const char *channel, void *user) {
   (void)user;
@@ -37,6 +38,8 @@ static void received(const lcm_recv_buf_t *b, const char *channel, void *user) {
   static waymark_innovation_t innovation;
   static waymark_health_t health;
   if (strcmp(channel, "TEST_POSE") == 0) poses += waymark_pose_t_decode(b->data, 0, n, &pose) == n;
+  static waymark_bound_t bound;
+  if (strcmp(channel, "TEST_POSE_BOUND") == 0) bounds += waymark_bound_t_decode(b->data, 0, n, &bound) == n;
   if (strcmp(channel, "TEST_INNOVATION") == 0)
     innovations += waymark_innovation_t_decode(b->data, 0, n, &innovation) == n;
   if (strcmp(channel, "TEST_HEALTH") == 0) healths += waymark_health_t_decode(b->data, 0, n, &health) == n;
@@ -62,6 +65,7 @@ TEST(messages_arrive_over_memq) {
 
   wm_published p = {.made_ns = 12};
   p.now.t_ns = 11;
+  lcm_sink_bound(&sink, &(wm_bound){.t_ns = 11});
   lcm_sink_pose(&sink, &p, 13);
   wm_innovation i = {.t_ns = 3};
   lcm_sink_innovation(&sink, &i);
@@ -78,6 +82,7 @@ TEST(messages_arrive_over_memq) {
   while (lcm_handle_timeout(lcm, 10) > 0) {
   }
   TEST_ASSERT_EQUAL(1, poses);
+  TEST_ASSERT_EQUAL(1, bounds);
   TEST_ASSERT_EQUAL_INT64(11, pose.t_ns);
   TEST_ASSERT_EQUAL(1, innovations);
   TEST_ASSERT_EQUAL(1, healths);
@@ -86,7 +91,7 @@ TEST(messages_arrive_over_memq) {
   TEST_ASSERT_EQUAL(2, observed);  // three at 100, one at 200
   TEST_ASSERT_EQUAL(1, observations.count);
   TEST_ASSERT_EQUAL_STRING("left", (const char *)observations.sensor);
-  TEST_ASSERT_EQUAL_UINT64(6, sink.sent);
+  TEST_ASSERT_EQUAL_UINT64(7, sink.sent);
   lcm_sink_close(&sink);
   lcm_destroy(lcm);
 }
