@@ -51,7 +51,7 @@ void wm_fuser_init(wm_fuser *self, const wm_estimator *estimator, void *state, w
   self->row_ns = WM_TIME_NONE;
   self->last_row_ns = WM_TIME_NONE;
   self->until_ns = WM_TIME_NONE;
-  self->particles_ns = WM_TIME_NONE;
+  self->particles_ns = self->others.made_ns = WM_TIME_NONE;
   wm_fuser_watch(self, &(wm_setup){0}, 0);
 }
 

@@ -11,6 +11,7 @@
 #include "fusion/output.h"
 #include "rt/histogram.h"
 #include "rt/realtime.h"
+#include "waymark/bounds.h"
 #include "waymark/estimator.h"
 #include "waymark/event.h"
 #include "waymark/health.h"
@@ -33,6 +34,16 @@ typedef struct wm_fuser_counts {
   uint64_t refused[WM_STATUS_COUNT];
 } wm_fuser_counts;
 
+// Other poses that may be the right one, for the bound: the most probable ones; the rest counts as a pose anywhere.
+#define WM_OTHERS_MAX 8
+typedef struct wm_others {
+  wm_other_pose poses[WM_OTHERS_MAX];  // by falling probability
+  size_t count;
+  double image;        // probability of a mirror image, which the estimator does not know of
+  wm_time_ns made_ns;  // WM_TIME_NONE: never
+  uint32_t resets;     // of that estimate
+} wm_others;
+
 typedef struct wm_fuser {
   const wm_estimator *estimator;
   void *state;
@@ -46,6 +57,7 @@ typedef struct wm_fuser {
   wm_fuser_counts counts[WM_SOURCES_MAX];
   wm_histogram predict_ns, correct_ns;
   wm_time_ns particles_ns;  // when they were written last
+  wm_others others;
   wm_particle_set particles;
   wm_hypothesis listed[2 * WM_HYPOTHESES_MAX];
   wm_hypothesis_set hypotheses;

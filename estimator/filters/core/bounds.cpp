@@ -18,13 +18,8 @@ constexpr double kDof = 10.0;
 // A heading with a larger bound is not known, where the configuration has no limit; a longer drive is no advice.
 constexpr double kVague_rad = 20.0 * kPi / 180.0, kLongestDrive_m = 100.0;
 
-// Probability that an error on two axes with this sigma is larger; on one axis it is so less often.
-double share_beyond(double error, double sigma) {
-  return error <= 0.0 ? 1.0 : sigma <= 0.0 ? 0.0 : exp(-0.5 * kDof * log(1.0 + square(error / sigma) / kDof));
-}
-double bound_of_own(double share, double sigma) {
-  return sigma * std::sqrt(kDof * (exp(-2.0 / kDof * log(share)) - 1.0));
-}
+// The sigmas that an error on two axes exceeds with this probability; on one axis it does so less often.
+double ratio_of(double share) { return share < 1.0 ? std::sqrt(kDof * (exp(-2.0 / kDof * log(share)) - 1.0)) : 0.0; }
 
 // Along one axis of the pose: how far off other poses are, and their sigmas.
 using member = double wm_other_pose::*;
@@ -33,33 +28,23 @@ struct mixture {
   size_t count;
   double sigma, anywhere;  // of the estimate; probability of a pose that is not known
   member distance, own_sigma;
-
-  double share(double error) const {
-    const double own = share_beyond(error, sigma);
-    double sum = anywhere + (1.0 - anywhere) * own;
-    for (size_t i = 0; i < count; i++) {
-      const double theirs = share_beyond(error - others[i].*distance, others[i].*own_sigma);
-      if (theirs > own) sum += others[i].probability * (theirs - own);
-    }
-    return sum;
-  }
 };
 
+// Where the others together have more than half of the risk that is left, the estimate's own error gets one half, and
+// each of them an equal share of the other: at most the risk in all, and at most half of it is given away.
 double bound_of(const mixture &of, double risk) {
   if (!(of.anywhere < risk)) return kUnbounded;
-  double low = bound_of_own((risk - of.anywhere) / (1.0 - of.anywhere), of.sigma), high = low;
-  if (of.count == 0 || !(of.share(low) > risk)) return low;
+  const double left = (risk - of.anywhere) / (1.0 - of.anywhere);
+  double known = 0.0;
+  for (size_t i = 0; i < of.count; i++) known += of.others[i].probability;
+  if (!(known > 0.5 * left)) return of.sigma * ratio_of(left - known);
+  double bound = of.sigma * ratio_of(0.5 * left);
   for (size_t i = 0; i < of.count; i++) {
     const wm_other_pose &o = of.others[i];
-    // Beyond this even an alternative that is certain leaves half of what is left of the risk.
-    const double far = o.*of.distance + bound_of_own(0.5 * (risk - of.anywhere), larger(o.*of.own_sigma, of.sigma));
-    high = larger(high, far);
+    const double share = 0.5 * left / (static_cast<double>(of.count) * o.probability);
+    if (share < 1.0) bound = larger(bound, o.*of.distance + o.*of.own_sigma * ratio_of(share));
   }
-  for (int i = 0; i < 48; i++) {  // halvings: to less than 1e-9 of the bound
-    const double middle = 0.5 * (low + high);
-    (of.share(middle) > risk ? low : high) = middle;
-  }
-  return high;
+  return bound;
 }
 
 double sigma_of_position(const wm_estimate &e) {
@@ -137,5 +122,5 @@ void wm_bound_of(const wm_estimate *estimate, double untested, const wm_integrit
   out->usable = out->why == WM_UNUSABLE_NOT;
   const double wanted_rad = std::isfinite(out->limit_rad) ? out->limit_rad : kVague_rad;
   if (out->heading_rad > wanted_rad && std::isfinite(out->horizontal_m))
-    out->heading_after_m = drive_for(e, wanted_rad / bound_of_own(out->risk, 1.0));
+    out->heading_after_m = drive_for(e, wanted_rad / ratio_of(out->risk));
 }
