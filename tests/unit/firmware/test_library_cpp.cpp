@@ -55,7 +55,9 @@ TEST(test_a_session_moves_and_its_sources_stay) {
   motion.push(1000ms, row, 1001ms).value();
   motion.push(std::chrono::steady_clock::time_point(1020ms), array).value();
   TEST_ASSERT_EQUAL_STRING("motion", second.source_name(motion.number()).c_str());
+  TEST_ASSERT_FALSE(second.bound().value().has_value());  // there was no pose
   const auto pose = second.pose(1300ms).value();
+  TEST_ASSERT_EQUAL_INT64(pose->now.t_ns, second.bound().value()->t_ns);
   TEST_ASSERT_TRUE(pose.has_value());
   TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.65, pose->now.pose_map_base.p_m[0]);
   TEST_ASSERT_FALSE(second.pose(1300ms).value().has_value());  // asked for already
