@@ -199,7 +199,7 @@ static int may_have_a_cause(const wm_findings *found, size_t from) {
   for (size_t i = from; i < found->count; i++) {
     const wm_finding_id id = found->at[i].id;
     const int says_it = id == WM_FOUND_DATA_UNUSED || id == WM_FOUND_ROWS_UNUSED || id == WM_FOUND_CLOCK_JUMPED ||
-                        id == WM_FOUND_CLOCK_COARSE;
+                        id == WM_FOUND_CLOCK_COARSE || id == WM_FOUND_CLOCK_DRIFTS;
     if (found->at[i].severity == WM_SEVERITY_BAD && !says_it) return 1;
   }
   return 0;

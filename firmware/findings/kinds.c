@@ -55,6 +55,8 @@ const wm_finding_kind kFindingKinds[WM_FOUND_COUNT] = {
     [WM_FOUND_CLOCK_COARSE] = {"clock-coarse",
                                "a clock of whole seconds or of some milliseconds, or differences of times",
                                "stamp with a finer clock, in nanoseconds"},
+    [WM_FOUND_CLOCK_DRIFTS] = {"clock-drifts", "a clock of its own, or a rate of samples that is stated wrong",
+                               "stamp all sources by one clock"},
     [WM_FOUND_BARE_RANGES] = {"bare-ranges", "ranges without a bearing leave two places for a landmark",
                               "drive curves within reach of each landmark"},
     [WM_FOUND_IDENTITIES_UNKNOWN] = {"identities-unknown", "ids of another place, another family, or with an offset",

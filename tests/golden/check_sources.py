@@ -25,7 +25,8 @@ SIGNALS = "- {quantity: vehicle_speed, message: DRIVE, signal: SPEED}\n- {quanti
 
 
 def turn(t):
-    """rad/s: straight, a bend to the left, one to the right."""
+    """rad/s: straight, a bend to the left, one to the right; again each 20 s."""
+    t %= 20
     return 0.3 if 6 < t < 11 else -0.25 if 14 < t < 18 else 0.0
 
 
@@ -54,10 +55,10 @@ def table(head, rows):
     return head + "\n" + "".join(",".join(str(c) for c in row) + "\n" for row in rows)
 
 
-def motion(rate_hz=50, v=1.0, w=1.0, sigma=0.01, stamp=ns, repeat=1, arrival=None, exact=False, steady=False):
+def motion(rate_hz=50, v=1.0, w=1.0, sigma=0.01, stamp=ns, repeat=1, arrival=None, exact=False, steady=False, seconds=SECONDS):
     """motion.csv: speed and turn rate times a factor each; each value `repeat` times."""
     n, rows, held = noise(1), [], None
-    for k, t in enumerate(times(rate_hz)):
+    for k, t in enumerate(times(rate_hz, seconds)):
         if k % repeat == 0:
             s = 0 if exact else sigma
             held = (f"{v * (1.5 if steady else speed(t)) + n(s):.5f}", f"{w * turn(t) + n(s):.5f}") if not exact else (v, w * turn(t))
@@ -76,10 +77,10 @@ def commands():
     return table("t_ns,v_mps,w_radps", rows)
 
 
-def imu(rate_hz=100, axes=(0, 0, 1), factor=1.0, up=(0, 0, 1), gravity=9.81, sigma=0.003, stamp=ns, zero=None, lag_s=0.0, bias=0.0, every=1):
+def imu(rate_hz=100, axes=(0, 0, 1), factor=1.0, up=(0, 0, 1), gravity=9.81, sigma=0.003, stamp=ns, zero=None, lag_s=0.0, bias=0.0, every=1, seconds=SECONDS):
     """imu.csv: the turn about an axis, gravity along another; `zero`: which samples are 0."""
     n, rows = noise(2), []
-    for k, t in enumerate(times(rate_hz)):
+    for k, t in enumerate(times(rate_hz, seconds)):
         w = factor * turn(t - lag_s)
         rates = [a * w + n(sigma) + bias for a in axes]
         if zero and zero(k):
@@ -138,8 +139,8 @@ def increments(scale_turn=1.0, scale_way=1.0):
     return table("t_ns,from_ns,dx_m,dy_m,dheading_rad", rows)
 
 
-def ticks(track_m=0.5, radius_m=0.1, per_turn=2000, swap=False, raw_bits=None, wraps_at=None, rate_hz=50):
-    left = right = 0.0
+def ticks(track_m=0.5, radius_m=0.1, per_turn=2000, swap=False, raw_bits=None, wraps_at=None, rate_hz=50, begin=0):
+    left = right = begin
     rows = []
     for t in times(rate_hz):
         per_m = per_turn / (2 * math.pi * radius_m)
@@ -161,6 +162,24 @@ def jump(at_s, by_s):
 
 def grid(step_s):
     return lambda t: START_NS + int(t // step_s * step_s * 1e9)
+
+
+def drifts(share, later_s=0.0):
+    return lambda t: ns(t * (1 + share) + later_s)
+
+
+def apart(stamp, seconds=80, sigma=0.003, of_motion=ns):
+    """Twist and gyro of a longer drive, of a gyro with another clock."""
+    return {"motion.csv": motion(seconds=seconds, stamp=of_motion), "imu.csv": imu(seconds=seconds, stamp=stamp, sigma=sigma)}
+
+
+def counters(bits, stated, rate_hz=200):
+    """Ticks on CAN by counters of `bits`, whose DBC states another length, beside a gyro."""
+    rows = [[int(c) for c in line.split(",")[1:]] for line in ticks(rate_hz=rate_hz, begin=50000).splitlines()[1:]]
+    lines = [f"({START_NS / 1e9 + t:.6f}) can0 101#{(left % 2**bits | right % 2**bits << stated).to_bytes(8, 'little').hex().upper()}" for t, (left, right) in zip(times(rate_hz), rows)]
+    return {"can.log": "\n".join(lines) + "\n", "imu.csv": imu(), "calibration.yaml": WHEELS,
+            "vehicle.dbc": DBC.split("BO_ ")[0] + f'BO_ 257 WHEELS: 8 ECU\n SG_ LEFT : 0|{stated}@1+ (1,0) [0|0] "" ECU\n SG_ RIGHT : {stated}|{stated}@1+ (1,0) [0|0] "" ECU\n',
+            "can-signals.yaml": "- {quantity: wheel_ticks_left, message: WHEELS, signal: LEFT}\n- {quantity: wheel_ticks_right, message: WHEELS, signal: RIGHT}\n"}
 
 
 def both(**files):
@@ -207,6 +226,13 @@ FAULTS = [
     ("ticks of swapped wheels", {"ticks.csv": ticks(swap=True), "imu.csv": imu(), "calibration.yaml": WHEELS}, ("bad", DISAGREE, "*"), "turns left where", ""),
     ("track of half the length", {"ticks.csv": ticks(track_m=1.0), "imu.csv": imu(), "calibration.yaml": WHEELS}, ("bad", DISAGREE, "*"), "times", ""),
     ("counter that starts anew at 3000", {"ticks.csv": ticks(wraps_at=3000), "imu.csv": imu(), "calibration.yaml": WHEELS}, ("bad", "value-implausible", "ticks"), "anew at about 30", "ticks.csv"),
+    *[(f"counter of {bits} bits in a table", {"ticks.csv": ticks(wraps_at=2**bits, rate_hz=200, begin=50000), "imu.csv": imu(), "calibration.yaml": WHEELS}, ("bad", "value-implausible", "ticks"), f"anew after {2**bits} counts", f"plus {2**bits} from") for bits in (8, 12, 16)],
+    ("counter of 12 bits in a signal of 16", counters(12, 16), ("bad", "value-implausible", "can"), "a counter of 12 bits", "|12@1+"),
+    ("counter of 8 bits in a signal of 16", counters(8, 16), ("bad", "value-implausible", "can"), "a counter of 8 bits", "|8@1+"),
+    ("gyro whose clock is 2 % fast", apart(drifts(0.02)), ("bad", "clock-drifts", "imu"), "runs 2 % fast", "less 0.02"),
+    ("gyro whose clock is 1.2 % slow, noise", apart(drifts(-0.012), sigma=0.05), ("bad", "clock-drifts", "imu"), "1.2 % slow", "less -0.01"),
+    ("gyro that is stamped 1.5 s late", apart(drifts(0, 1.5)), ("bad", "clock-drifts", "imu"), "s late against that of motion", "t_ns of imu less 1."),
+    ("gyro whose clock is 5 % fast beside CAN and increments", {**can(), "increments.csv": increments(), "imu.csv": imu(stamp=drifts(0.05))}, ("bad", "clock-drifts", "imu"), "% fast", "t_ns of imu"),
     ("clock set back by 8 s", both(motion_csv=motion(stamp=jump(9, -8))), ("bad", STAMPS, "motion"), "back by 7.98 s, 8.980 s after", "add 7.98 s"),
     ("clock set back by 2 s, arrivals go on", both(motion_csv=motion(stamp=jump(9, -2), arrival=lambda t: ns(t) + 2_000_000)), ("bad", STAMPS, "motion"), "back by 1.98 s", "add 1.98 s"),
     ("gyro's clock set back by 3 s", both(imu_csv=imu(stamp=jump(12, -3))), ("bad", STAMPS, "imu"), "back by 2.99 s", "add 2.99 s"),
@@ -247,6 +273,9 @@ RIGHT = [
     ("a gyro on CAN", can()),
     ("CAN, unsigned turn to the left alone", can(w=0.5)),
     ("ticks and a gyro", {"ticks.csv": ticks(), "imu.csv": imu(), "calibration.yaml": WHEELS}),
+    *[(f"counters of {bits} bits on CAN", counters(bits, bits)) for bits in (8, 12, 16)],
+    ("a long drive, a gyro of much noise", apart(ns, sigma=0.08)),
+    ("a clock that is 0.1 % fast", apart(drifts(0.001))),
     ("straight on, a gyro of noise", {"motion.csv": motion(w=0), "imu.csv": imu(axes=(0, 0, 0))}, "not-observable"),
     ("an accelerometer without gravity", both(imu_csv=imu(gravity=0))),
     ("exact values", {"motion.csv": motion(exact=True), "imu.csv": imu()}),

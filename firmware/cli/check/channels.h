@@ -64,6 +64,12 @@ typedef struct channels {
   uint64_t accelerations[WM_SOURCES_MAX];
 } channels;
 
+// Of a command only a sign, a unit, and a sensor that never moves are sure: a robot obeys late and in part.
+static inline int channels_are_commands(const channels *all, const channel *c) {
+  return (c->kind == CHANNEL_TWIST_TURN || c->kind == CHANNEL_TWIST_WAY) &&
+         all->twists[c->source].kind == WM_ROWS_COMMANDS;
+}
+
 void channels_init(channels *self, const wm_wheels *wheels);
 void channels_take(channels *self, const wm_event *event);
 void channels_free(channels *self);

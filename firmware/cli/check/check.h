@@ -39,10 +39,12 @@ typedef struct quantity_seen {
   uint64_t zeros, as_float;  // as_float: values whose bits, taken for a float, are a usual number
 } quantity_seen;
 // A counter of wheel ticks that starts anew before the end of its bits.
+#define WRAP_BITS 6  // usual numbers of bits
 typedef struct ticks_wrap {
   double last, step, step_before;
-  uint64_t counts, jumps, alike;      // alike: jumps of the size of the first one
-  double since, between, first_jump;  // counts: since the last jump, between the jumps
+  uint64_t counts, jumps, alike;                  // alike: jumps of the size of the first one
+  double since, between, first_jump;              // counts: since the last jump, between the jumps
+  uint64_t folds[WRAP_BITS], misfits[WRAP_BITS];  // large steps that are a small one less a cycle, and others
 } ticks_wrap;
 typedef struct motion_data {
   const wm_wheels *wheels;

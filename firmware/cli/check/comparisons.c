@@ -130,12 +130,6 @@ static contradiction compare(const channel *a, const channel *b, fit *f) {
   return f->r > FIT_MIN ? AGREE : UNKNOWN;
 }
 
-// Of a command only a sign, a unit, and a sensor that never moves are sure: a robot obeys late and in part.
-static int are_commands(const channels *all, const channel *c) {
-  return (c->kind == CHANNEL_TWIST_TURN || c->kind == CHANNEL_TWIST_WAY) &&
-         all->twists[c->source].kind == WM_ROWS_COMMANDS;
-}
-
 // Which of two is believed, where no third one decides: what counts wheels or integrates over what measures a rate.
 static int rank(const channel *c) {
   static const int kRanks[CHANNEL_KINDS] = {
@@ -342,7 +336,8 @@ static void shows_nothing(const scene *s, const channel *quiet, const channel *o
   // A speed beside a gyro, as of a DVL, has no turn rate of its own: the column is filled with zeros, and not read.
   if (quiet->kind == CHANNEL_TWIST_TURN && quiet->zeros == quiet->values && other->kind == CHANNEL_YAW_RATE) return;
   const int is_constant = quiet->least == quiet->most;
-  const wm_severity severity = are_commands(s->all, other) && !is_constant ? WM_SEVERITY_NOTE : WM_SEVERITY_BAD;
+  const wm_severity severity =
+      channels_are_commands(s->all, other) && !is_constant ? WM_SEVERITY_NOTE : WM_SEVERITY_BAD;
   const channel *axis = quiet->kind == CHANNEL_YAW_RATE ? other_axis(s->all, quiet, other, &r) : NULL;
   if (axis) {
     char line[96];
@@ -376,7 +371,8 @@ static void disagrees(const scene *s, const channel *c, const channel *other, co
   (void)name_of(c, s->assembly, name, sizeof name);
   (void)name_of(other, s->assembly, of, sizeof of);
   const int is_unit = unit_of(factor, is_way) != NULL || unit_of(1 / factor, is_way) != NULL;
-  const int is_weak = (are_commands(s->all, c) || are_commands(s->all, other)) && !is_unit && f->r < OBEYED;
+  const int is_weak =
+      (channels_are_commands(s->all, c) || channels_are_commands(s->all, other)) && !is_unit && f->r < OBEYED;
   if (how == OTHER_SIGN) {
     sign_line(s, c, fix, sizeof fix);
     wm_find(s->out, WM_FOUND_SENSORS_DISAGREE, WM_SEVERITY_BAD, source_of(c, s->assembly), fix,
@@ -399,7 +395,7 @@ static void disagrees(const scene *s, const channel *c, const channel *other, co
 
 // Whether a gyro shows a turn where another sensor shows none, in the mean of the drive. Makes the finding.
 static int has_bias(const scene *s, const channel *c, const channel *other) {
-  if (c->kind != CHANNEL_YAW_RATE || !other->has_scale || are_commands(s->all, other)) return 0;
+  if (c->kind != CHANNEL_YAW_RATE || !other->has_scale || channels_are_commands(s->all, other)) return 0;
   const fit f = best_fit(c, other);
   const double bias = bias_of(&f);
   if (!(fabs(bias) > BIAS_MAX_RADPS)) return 0;

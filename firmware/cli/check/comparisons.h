@@ -13,5 +13,7 @@
 void comparisons_judge(const channels *self, const wm_assembly *assembly, wm_findings *out);
 // A line for each pair: "compared  A with B: 0.99 times, r 0.98", or that the drive does not show it.
 void comparisons_print(const channels *self, const wm_assembly *assembly, FILE *to);
+// Findings about clocks that run apart, by the turns of two sources.
+void drifts_judge(const channels *self, const wm_assembly *assembly, wm_findings *out);
 
 #endif

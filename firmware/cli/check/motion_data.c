@@ -20,6 +20,7 @@
 #define WRAP_STEPS 10.0
 #define WRAP_COUNTS 100.0
 #define WRAP_ALIKE 0.05
+#define FOLD_COUNTS 2.0  // of a wheel that stands, where its counter trembles about its end
 
 void motion_data_init(motion_data *self, const wm_wheels *wheels) {
   memset(self, 0, sizeof *self);
@@ -39,11 +40,28 @@ static void take_jump(ticks_wrap *self, double jump) {
   self->since = 0;
 }
 
+static const int kBits[WRAP_BITS] = {8, 10, 12, 16, 24, 32};
+
+// A step of more than half a cycle, against the way of the steps beside it, that is one of them less a cycle.
+static void take_fold(ticks_wrap *self, double after) {
+  const double size = fmax(fabs(self->step_before), fabs(after)), by = (self->step_before + after) / 2;
+  for (int k = 0; k < WRAP_BITS; k++) {
+    const double cycle = ldexp(1, kBits[k]);
+    if (fabs(self->step) <= cycle / 2) continue;
+    const double left = fabs(self->step - copysign(cycle, self->step) - by);
+    if (size < cycle / 4 && self->step * by <= 0 && left <= size + FOLD_COUNTS)
+      self->folds[k]++;
+    else
+      self->misfits[k]++;
+  }
+}
+
 // A step that is far larger than the one before and the one behind it is a jump.
 static void take_count(ticks_wrap *self, double value, int is_doubtful) {
   const double step = value - self->last;
   self->last = value;
   if (self->counts++ == 0 || is_doubtful) return;
+  if (self->counts > 3) take_fold(self, step);
   if (fabs(self->step) > WRAP_STEPS * (fabs(self->step_before) + fabs(step)) + WRAP_COUNTS)
     take_jump(self, self->step - (self->step_before + step) / 2);
   else
@@ -52,8 +70,20 @@ static void take_count(ticks_wrap *self, double value, int is_doubtful) {
   self->step = step;
 }
 
+// Bits after which it starts anew, and how often it did; 0: none of the usual numbers.
+static int bits_of(const ticks_wrap *self, uint64_t *folds) {
+  for (int k = 0; k < WRAP_BITS; k++) {
+    *folds = self->folds[k];
+    if (self->folds[k] > 0 && self->misfits[k] == 0) return kBits[k];
+  }
+  return 0;
+}
+
 // 0: it does not wrap. A counter of M that starts anew at m jumps by M - m where it is taken for one of M.
 static double wraps_at(const ticks_wrap *self) {
+  uint64_t folds = 0;
+  const int bits = bits_of(self, &folds);
+  if (bits > 0) return ldexp(1, bits);
   if (self->jumps < 2 || (double)self->alike < 0.8 * (double)self->jumps) return 0;
   const double between = self->between / (double)(self->jumps - 1);
   if (fabs(between - self->first_jump) < WRAP_ALIKE * between) return rint(self->first_jump);
@@ -63,14 +93,33 @@ static double wraps_at(const ticks_wrap *self) {
 
 static void judge_wrap(const motion_data *self, int side, const char *about, wm_findings *out) {
   const double at = wraps_at(&self->wraps[side]);
+  uint64_t folds = 0;
+  const int bits = bits_of(&self->wraps[side], &folds);
+  const char *name = wm_quantity_name(side ? WM_Q_WHEEL_TICKS_RIGHT : WM_Q_WHEEL_TICKS_LEFT);
   if (at == 0) return;
+  if (bits > 0) {
+    char fix[WM_FINDING_FIX_MAX];
+    if (strncmp(about, ABOUT, strlen(ABOUT)) == 0)
+      (void)snprintf(fix, sizeof fix, "vehicle.dbc: the signal has %d bits, the lower ones: `SG_ NAME : FIRST|%d@1+`",
+                     bits, bits);
+    else
+      (void)snprintf(fix, sizeof fix,
+                     "%s.csv: counts that go on: %s plus %.0f from each row on at which it falls by more than %.0f, "
+                     "less where it rises so",
+                     about, side ? "right" : "left", at, at / 2);
+    wm_find(out, WM_FOUND_VALUE_IMPLAUSIBLE, WM_SEVERITY_BAD, about, fix,
+            "%s starts anew after %.0f counts, %" PRIu64 " times: a counter of %d bits, read as a longer one", name, at,
+            folds, bits)
+        ->size = at;
+    return;
+  }
   wm_find(out, WM_FOUND_VALUE_IMPLAUSIBLE, WM_SEVERITY_BAD, about,
           "let the sender count on to the last of the signal's bits, or write the unwrapped counts to ticks.csv",
           "%s jumps by about %.0f counts, %" PRIu64
           " times, %.0f counts apart: the counter starts anew at about %.0f, not "
           "at the end of its bits",
-          wm_quantity_name(side ? WM_Q_WHEEL_TICKS_RIGHT : WM_Q_WHEEL_TICKS_LEFT), self->wraps[side].first_jump,
-          self->wraps[side].jumps, self->wraps[side].between / (double)(self->wraps[side].jumps - 1), at)
+          name, self->wraps[side].first_jump, self->wraps[side].jumps,
+          self->wraps[side].between / (double)(self->wraps[side].jumps - 1), at)
       ->size = at;
 }
 

@@ -275,4 +275,5 @@ void source_data_judge(source_data *self, uint32_t bound, const wm_health *healt
   course_data_judge(&self->course, out);
   if (kinds & WM_EVENT_BIT(WM_EVENT_QUANTITIES)) motion_data_judge(&self->motion, self->assembly, bound, out);
   comparisons_judge(&self->channels, self->assembly, out);
+  drifts_judge(&self->channels, self->assembly, out);
 }
