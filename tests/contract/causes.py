@@ -18,6 +18,8 @@ import sys
 import tempfile
 import time
 
+import mistakes
+import plan_robots
 import replays
 import small_robot
 from cause_robots import fork_robot, landmarks_robot, satellites_robot, tags_robot
@@ -178,6 +180,85 @@ def setting(rng):
     return {"config": lambda w: w.replace("sightings:\n", f"sightings:\n  noise: {{range_factor: {f}}}\n")}, "setting sightings.noise.range_factor", [1.0]
 
 
+# ── a floor plan ─────────────────────────────────────────────────────────────────────────────────────────────────────
+
+def numbers(text):
+    return [float(n) for n in text.split(",")]
+
+
+def plan_scale(rng):
+    """Of the plan by its resolution, and its origin where it was measured from: the plan's own, the map's, the robot's start."""
+    f, kind = 1 + signed(rng, 0.04, 0.12), rng.randrange(3)
+
+    def change(whole):
+        x, y, yaw = numbers(re.search(r"origin: \[([^\]]*)\]", whole)[1])
+        about = [(x, y), (0, 0), plan_robots.START][kind]
+        whole = re.sub(r"origin: \[[^\]]*\]", f"origin: [{about[0] + f * (x - about[0]):.6f}, {about[1] + f * (y - about[1]):.6f}, {yaw}]", whole)
+        return re.sub(r"resolution: ([0-9.]+)", lambda m: f"resolution: {f * float(m[1]):.9f}", whole)
+    return {"map/map.yaml": change}, "scale of the plan" + ["", " and its origin", " about the start"][kind], [1 / f]
+
+
+def plan_turned(rng):
+    turn, name = rng.choice(((lambda rows: [row[::-1] for row in rows], "mirror (left and right)"), (lambda rows: rows[::-1], "mirror (top and bottom)"),
+                             (lambda rows: [row[::-1] for row in rows[::-1]], "turn by 180 degrees"),
+                             (lambda rows: [bytes(column)[::-1] for column in zip(*rows)], "turn by 90 degrees to the left")))
+
+    def change(data):
+        rows = turn(mistakes.png_rows(data))
+        return b"P5 %d %d 255\n" % (len(rows[0]), len(rows)) + b"".join(rows)
+    return {"map/edges.png": change, "map/drivable.png": change}, f"plan: {name}", [1.0]
+
+
+def remounted(by_m=(0, 0, 0), by_deg=(0, 0, 0)):
+    """A camera whose mounting is stated wrong: the points that it sees are placed by that."""
+    def calibration(whole):
+        for key, by in (("xyz_m", by_m), ("rpy_deg", by_deg)):
+            old = numbers(re.search(rf"{key}: \[([^\]]*)\]", whole)[1])
+            whole = re.sub(rf"{key}: \[[^\]]*\]", f"{key}: {[round(a + b, 4) for a, b in zip(old, by)]}", whole, count=1)
+        return whole
+    (x0, y0, z0), (_, tilt, _) = plan_robots.CAMERA
+
+    def place(row):
+        a, b, h = math.radians(tilt), math.radians(tilt + by_deg[1]), math.radians(by_deg[2])
+        dx, dy, dz = float(row["x_m"]) - x0, float(row["y_m"]) - y0, -z0
+        ahead, down = dx * math.cos(a) - dz * math.sin(a), -dx * math.sin(a) - dz * math.cos(a)  # in the camera's own axes
+        fx, fz = ahead * math.cos(b) - down * math.sin(b), -ahead * math.sin(b) - down * math.cos(b)
+        k = (z0 + by_m[2]) / -fz if fz < -1e-3 else 1e3
+        row["x_m"] = f"{x0 + by_m[0] + k * (fx * math.cos(h) - dy * math.sin(h)):.4f}"
+        row["y_m"] = f"{y0 + by_m[1] + k * (fx * math.sin(h) + dy * math.cos(h)):.4f}"
+    return {"calibration.yaml": calibration, "points.csv": replays.each_row(place)}
+
+
+def camera_tilt(rng):
+    a = signed(rng, 2, 8)
+    return remounted(by_deg=(0, a, 0)), "pitch of points", [-math.radians(a)]
+
+
+def camera_height(rng):
+    z = signed(rng, 0.04, 0.15)
+    return remounted(by_m=(0, 0, z)), "height of points", [-z]
+
+
+def camera_yaw(rng):
+    a = signed(rng, 4, 15)
+    return remounted(by_deg=(0, 0, a)), "yaw of points", [-math.radians(a)]
+
+
+def camera_place(rng):
+    x, y = signed(rng, 0.2, 0.6), signed(rng, 0.2, 0.6)
+    return remounted(by_m=(x, y, 0)), "place of points", [-x, -y]
+
+
+def plan_radius(rng):
+    f = rng.uniform(1.15, 1.6)
+    return {"calibration.yaml": value(r"radius_m: 0.1\b", f"radius_m: {0.1 * f:.5f}")}, "way of a tick", [1 / f]
+
+
+def plan_track(rng):
+    f = rng.choice((rng.uniform(1.3, 2), rng.uniform(0.5, 0.75)))
+    return {"calibration.yaml": value(r"track_m: 0.45", f"track_m: {0.45 * f:.4f}")}, "wheels.track_m", [1 / f]
+
+
 def none(rng):
     return {}, None, []
 
@@ -187,6 +268,8 @@ PLANTED += [(satellites_robot, m) for m in (none, antenna, small_antenna, receiv
 PLANTED += [(landmarks_robot, m) for m in (wheels_swapped, byte_order, setting)]
 PLANTED += [(tags_robot, m) for m in (none, tag_size, tilt, tag_yaw, tags_exchanged, tags_scaled, camera_late)]
 PLANTED += [(fork_robot, m) for m in (none, steering_ratio)]
+PLANTED += [(plan_robots.corridor, m) for m in (none, plan_scale, plan_turned, camera_tilt, camera_height, camera_yaw, camera_place)]
+PLANTED += [(plan_robots.flat, m) for m in (none, plan_scale, plan_turned, camera_tilt, camera_height, plan_radius, plan_track)]
 
 
 # ── judgement ────────────────────────────────────────────────────────────────────────────────────────────────────────
@@ -211,13 +294,16 @@ def error_m(options, config, recording, truth):
 
 def judge(options, robot, mistake, seed, folder):
     recording, made, fixed = folder / "right", folder / "made", folder / "fixed"
-    robot(recording, seed)
+    robot(recording, seed, options) if robot.__module__ == "plan_robots" else robot(recording, seed)
     changes, name, size = mistake(random.Random(f"{mistake.__name__} {seed}"))
     edit_of_config = changes.pop("config", None)
     if changes:
         replays.copy_changed(recording, made, changes)
     made = made if changes else recording
     right = config = options.source_dir / "config/robot.yaml"
+    if robot.__module__ == "plan_robots":
+        right = config = folder / "plan.yaml"
+        right.write_text("format: waymark-config/1\nestimator: edge_mcl\n")
     if edit_of_config:
         config = folder / "robot.yaml"
         config.write_text(edit_of_config(right.read_text()))

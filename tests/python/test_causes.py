@@ -5,13 +5,18 @@
     test_causes.py BIN_DIR       Skipped (77) where the build has no libwaymark.so (sanitizers)."""
 
 import dataclasses
+import io
 import math
 import os
+import shutil
 import sys
+import tempfile
 import unittest
+from pathlib import Path
 
 import numpy as np
 from common import BIN
+from PIL import Image
 
 LIBRARY = BIN.resolve().parent / "lib/libwaymark.so"
 if not LIBRARY.exists():
@@ -19,9 +24,10 @@ if not LIBRARY.exists():
     sys.exit(77)
 os.environ["WAYMARK_LIBRARY"] = str(LIBRARY)
 
-from waymark.causes import changes, search  # noqa: E402
+from waymark.causes import changes, plan, search  # noqa: E402
 from waymark.causes.fault import Clock, Fault, discrete, factor_words  # noqa: E402
 from waymark.causes.trial import Drive, Undo, likelihoods  # noqa: E402
+from waymark.maps import FloorPlan, write_floor_plan  # noqa: E402
 
 YAML = b"# a robot\nsensors:\n  front:   # screwed on by eye\n    mounting: {xyz_m: [0.1, 0, 0.2]}\nwheels: {radius_m: 0.05}\n"
 DBC = b"BO_ 256 ODOMETRY: 8 R\n SG_ TICKS : 0|32@1- (1,0) [0|1] \"\" W\n\nBO_ 257 OTHER: 8 R\n SG_ TICKS : 8|16@1+ (2,0) [0|1] \"\" W\n"
@@ -144,6 +150,63 @@ class Judgement(unittest.TestCase):
 
     def test_words_of_a_factor(self):
         self.assertEqual([factor_words(f) for f in (0.001, 1 / 1.05, 2.0)], ["in mm", "5 % too large", "0.5 times the true one"])
+
+
+class FloorPlans(unittest.TestCase):
+    """A room of 4 x 3 m, a robot that drives along it, and points of its walls."""
+
+    def setUp(self):
+        self.folder = Path(tempfile.mkdtemp())
+        self.addCleanup(shutil.rmtree, self.folder)
+        edges = np.zeros((360, 460), bool)
+        edges[30:330, [30, 429]] = edges[[30, 329], 30:430] = edges[80, 30:430] = True
+        write_floor_plan(self.folder, FloorPlan(0.01, (-0.3, -0.3, 0.0), edges=edges))
+        t_ns = 10**9 + np.arange(20) * 10**8
+        self.trajectory = {"t_ns": t_ns, "x_m": np.linspace(1, 2, 20), "y_m": np.full(20, 1.5), "qz": np.zeros(20), "qw": np.ones(20)}
+        walls = [(x, y) for x in np.arange(0.05, 4, 0.2) for y in (0.505, 0.505, 2.995)] + [(x, y) for x in (0.005, 3.995) for y in np.arange(0.05, 3, 0.2)]
+        self.walls = np.array(walls)
+
+    def judged(self, scale=1.0, turned=False, at=0.0):
+        lines = ["t_ns,x_m,y_m"]
+        for t, x, y in zip(self.trajectory["t_ns"], self.trajectory["x_m"], self.trajectory["y_m"]):
+            lines += [f"{t},{scale * (px - x):.4f},{scale * (py - y) * (-1 if turned else 1) + at:.4f}" for px, py in self.walls]
+        (self.folder / "points.csv").write_text("\n".join(lines) + "\n")
+        return plan.judged(self.trajectory, self.folder / "points.csv", self.folder / "map/map.yaml", None)
+
+    def test_points_on_the_walls_fit_and_others_do_not(self):
+        right, off = self.judged(), self.judged(at=0.25)
+        self.assertEqual(len(right.t_ns), 20)
+        self.assertTrue(right.fits.all())
+        self.assertGreater(right.near.mean(), 3.0)
+        self.assertFalse(off.fits.any())
+        self.assertLess(off.near.mean(), right.near.mean() - 1)
+
+    def test_the_nearer_scale_is_the_likelier_one(self):
+        means = [self.judged(scale).far.mean() for scale in (0.8, 0.9, 0.95, 1.0, 1.05, 1.1, 1.2)]
+        self.assertEqual(means, [*sorted(means[:4]), *sorted(means[4:], reverse=True)])
+        self.assertGreater(means[3], max(means[2], means[4]) + 0.3)
+
+    def test_a_picture_is_turned(self):
+        picture = (self.folder / "map/edges.png").read_bytes()
+        for way, size in ((Image.Transpose.ROTATE_90, (360, 460)), (Image.Transpose.ROTATE_180, (460, 360)), (Image.Transpose.FLIP_LEFT_RIGHT, (460, 360))):
+            turned = changes.Turned("map/edges.png", way)
+            with Image.open(io.BytesIO(turned.apply(picture))) as image:
+                self.assertEqual(image.size, size)
+        self.assertEqual(turned.words(), "mirror (left and right) the picture")
+
+    def test_points_are_seen_anew_by_another_mounting(self):
+        # 0.5 m above the floor; 2 m ahead is 14.04 degrees below the horizon, or 4.04 where it looks up by 10 degrees less.
+        table = b"t_ns,x_m,y_m,arrival_ns\n5,2.1000,0.0000,7\n6,2.1000,1.0000,8\n"
+        down = math.atan2(0.5, 2.0)
+        for tilt in (-0.1, 0.2):
+            seen = changes.Seen("f", ((0.1, 0, 0.5), (0, 0.3, 0)), ((0.1, 0, 0.5), (0, 0.3 + tilt, 0))).apply(table).decode().splitlines()
+            self.assertAlmostEqual(float(seen[1].split(",")[1]), 0.1 + 0.5 / math.tan(down + tilt), places=3)
+        higher = changes.Seen("f", ((0.1, 0, 0.5), (0, 0.3, 0)), ((0.1, 0, 0.75), (0, 0.3, 0))).apply(table).decode().splitlines()
+        self.assertEqual(higher, ["t_ns,x_m,y_m,arrival_ns", "5,3.1000,0.0000,7", "6,3.1000,1.5000,8"])
+        turned = changes.Seen("f", ((0.1, 0, 0.5), (0, 0.3, 0)), ((0.1, 0, 0.5), (0, 0.3, math.pi / 2))).apply(table).decode().splitlines()
+        self.assertEqual(turned[1], "5,0.1000,2.0000,7")
+        up = changes.Seen("f", ((0.1, 0, 0.5), (0, 0.3, 0)), ((0.1, 0, 0.5), (0, -0.3, 0))).apply(table)
+        self.assertEqual(len(up.splitlines()), 1)  # what doesn't meet the floor is not seen
 
 
 if __name__ == "__main__":

@@ -9,9 +9,16 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+import numpy as np
 import yaml
 from PIL import Image
 
+from ..geometry import from_rpy
+
+TURNS = {Image.Transpose.FLIP_LEFT_RIGHT: "mirror (left and right)", Image.Transpose.FLIP_TOP_BOTTOM: "mirror (top and bottom)",
+         Image.Transpose.ROTATE_90: "turn by 90 degrees to the left", Image.Transpose.ROTATE_180: "turn by 180 degrees",
+         Image.Transpose.ROTATE_270: "turn by 90 degrees to the right"}
+"""Ways to turn or mirror a picture, and their words."""
 CONFIG = ""
 """In place of a file's name: the configuration."""
 
@@ -80,12 +87,17 @@ class Rows(Edit):
                 return before
             raise Impossible(f"{self.file} has no {', '.join(self.columns)}")
         at = [names.index(name) for name in self.columns]
+        last = max(at)
         sensor = names.index("sensor") if self.only and "sensor" in names else -1
         out = [head]
+        known: dict[tuple[str, ...], Sequence[str]] = {}  # all points of a scan have one stamp
         for line in lines:
             row = line.split(",")
-            if len(row) > max(at) and (sensor < 0 or row[sensor] == self.only):
-                for i, value in zip(at, self.change(*(row[i] for i in at))):
+            if len(row) > last and (sensor < 0 or row[sensor] == self.only):
+                values = tuple([row[i] for i in at])
+                if values not in known:
+                    known[values] = self.change(*values)
+                for i, value in zip(at, known[values]):
                     row[i] = value
                 line = ",".join(row)
             out.append(line)
@@ -129,6 +141,35 @@ def identities(file: str, table: dict[int, int], only: str = "") -> Rows:
     said += "id " + ", ".join(f"{a} -> {b}" for a, b in sorted(table.items()))
     return Rows(file, ("id",), lambda text: [str(table.get(int(text), int(text))) if re.fullmatch(r"-?\d+", text) else text],
                 said, only)
+
+
+Mounting = tuple[tuple[float, float, float], tuple[float, float, float]]
+"""Place, m, and roll, pitch, yaw, rad, in base_link."""
+
+
+@dataclass(frozen=True)
+class Seen(Edit):
+    """Points on the floor as a camera with another mounting would have placed them."""
+
+    before: Mounting
+    after: Mounting
+
+    def words(self) -> str:
+        return "see the points anew with that mounting"
+
+    def apply(self, before: bytes) -> bytes:
+        head, _, body = before.decode().rstrip().partition("\n")
+        names = head.strip().split(",")
+        fields = body.replace("\n", ",").split(",")
+        x, y = (names.index(name) for name in ("x_m", "y_m"))
+        points = np.column_stack([*(np.array(fields[k::len(names)], float) for k in (x, y)), np.zeros(len(fields) // len(names))])
+        (old, old_turn), (new, new_turn) = ((np.array(place), from_rpy(*turn)) for place, turn in (self.before, self.after))
+        rays = (points - old) @ old_turn @ new_turn.T
+        down = rays[:, 2] < -1e-3 * np.linalg.norm(rays, axis=1)  # others don't meet the floor
+        floor = new + rays * np.where(down, -new[2] / np.where(down, rays[:, 2], 1), 0)[:, None]
+        columns = [fields[k::len(names)] for k in range(len(names))]
+        columns[x], columns[y] = ([f"{value:.4f}" for value in floor[:, axis].tolist()] for axis in (0, 1))
+        return "\n".join([head, *(",".join(row) for row, is_seen in zip(zip(*columns), down.tolist()) if is_seen), ""]).encode()
 
 
 @dataclass(frozen=True)
@@ -243,19 +284,18 @@ class Signal(Edit):
 # ── pictures ─────────────────────────────────────────────────────────────────────────────────────────────────────────
 
 @dataclass(frozen=True)
-class Mirrored(Edit):
-    """A floor plan's picture with left and right, or top and bottom, exchanged."""
+class Turned(Edit):
+    """A floor plan's picture turned or mirrored."""
 
-    upside_down: bool
+    way: Image.Transpose
 
     def words(self) -> str:
-        return f"mirror the picture ({'top and bottom' if self.upside_down else 'left and right'})"
+        return f"{TURNS[self.way]} the picture"
 
     def apply(self, before: bytes) -> bytes:
         out = io.BytesIO()
-        way = Image.Transpose.FLIP_TOP_BOTTOM if self.upside_down else Image.Transpose.FLIP_LEFT_RIGHT
         with Image.open(io.BytesIO(before)) as picture:
-            picture.transpose(way).save(out, "PNG")
+            picture.transpose(self.way).save(out, "PNG")
         return out.getvalue()
 
     def place(self, before: bytes, after: bytes) -> Place:

@@ -12,7 +12,7 @@ import numpy as np
 from ..native import WaymarkError
 from ..replaying import parameters
 from . import motion_faults
-from .changes import CONFIG, Edit, Mirrored, Sorted, Value, column, degrees, identities, numbers, stretched, swapped
+from .changes import CONFIG, TURNS, Edit, Seen, Sorted, Turned, Value, column, degrees, identities, numbers, stretched, swapped
 from .fault import DEG, LENGTHS, NEAR, Clock, Fault, Size, discrete, factor_words
 from .robot import Robot, Source
 
@@ -23,6 +23,7 @@ AROUND = tuple((round(away * math.cos(k * math.pi / 4), 3), round(away * math.si
 CLOCK_MOST_S = 60.0
 CLOCKS_S = tuple(sign * s for s in (0.15, 0.4, 0.8, 1.2, 1.6, 2.0, 2.5, 3.0, 3.5, 4.0, 5.0, 10.0, 18.0, 37.0) for sign in (-1, 1))
 """The last ones: leap seconds of GPS, of TAI."""
+CLOCKS_OF_SCANS_S = (-4.0, -1.6, -0.8, -0.3, 0.3, 0.8, 1.6, 4.0)  # fewer: a drive on a floor plan is slow to begin
 DRIFTS = (-0.01, 0.01, 0.02, 0.03, 0.04, 0.05)  # of a clock that is too fast, or of a lag that grows, s/s
 CRUMB = 0.03  # of a map's breadth
 SETTING_FAR = 4.0  # times a default, or a part of it: nearer ones are a matter of tuning, which `waymark suggest` does
@@ -37,7 +38,7 @@ def all_faults(robot: Robot) -> list[Fault]:
         found += [*_clocks(robot, one), *_values(robot, one)]
     for source in robot.sources:
         found += [*_clocks(robot, source), *_values(robot, source), *_ids(robot, source)]
-        if source.kind not in ("heading", "points", "stereo"):
+        if source.kind not in ("heading", "stereo") and (source.kind != "points" or robot.floor_camera):
             found += _mountings(robot, source)
     return found
 
@@ -86,7 +87,7 @@ def _clocks(robot: Robot, source: Source) -> Iterator[Fault]:
         yield Fault(f"clock of {name}", ((gap,), (float(round(gap)),)), shift, late)
         return
     begin, only, offset = int(stamps.min()), source.sensor if source.kind != "pictures" else "", f"{source.sensor or source.kind}.time_offset_s"
-    yield Fault(f"clock of {name}", tuple((s,) for s in CLOCKS_S), shift, late, step=(0.25,), smallest=(0.01,),
+    yield Fault(f"clock of {name}", tuple((s,) for s in (CLOCKS_OF_SCANS_S if source.kind == "points" else CLOCKS_S)), shift, late, step=(0.25,), smallest=(0.01,),
                 is_possible=lambda size: abs(size[0]) <= CLOCK_MOST_S, clock=Clock(name, begin), group=f"along the way of {name}",
                 settled=lambda size, states: (size[0] - states.get(offset, 0.0),))
     yield Fault(f"drift of {name}", tuple((rate,) for rate in DRIFTS),
@@ -167,10 +168,16 @@ def exchanged(robot: Robot, source: Source, table: dict[int, int]) -> Fault:
 
 def _mountings(robot: Robot, source: Source) -> Iterator[Fault]:
     path, place, angles = robot.mounting(source)
-    who = source.sensor or "the antenna"
+    who, is_floor = source.sensor or (path[1] if source.kind == "points" else "the antenna"), source.kind == "points"
+
+    def remounted(by_m: Sequence[float] = (0, 0, 0), by_rad: Sequence[float] = (0, 0, 0)) -> list[Edit]:
+        new, turned = np.round(place + by_m, 3), np.round([degrees(a) for a in angles + by_rad], 2)
+        edits: list[Edit] = [Value("calibration.yaml", (*path, key), numbers(value)) for key, value, by in (("xyz_m", new, by_m), ("rpy_deg", turned, by_rad))
+                             if any(by)]
+        return edits + [Seen(source.file, (tuple(place), tuple(angles)), (tuple(new), tuple(np.radians(turned))))] * is_floor
 
     def placed(size: Sequence[float]) -> list[Edit]:
-        return [Value("calibration.yaml", (*path, "xyz_m"), numbers(np.round(place + [size[0], size[1], 0], 3)))]
+        return remounted((size[0], size[1], 0))
 
     def place_words(size: Sequence[float]) -> str:
         sides = [f"{abs(size[k]):.2f} m further to the {words[size[k] < 0]}" for k, words in ((0, ("front", "rear")), (1, ("left", "right")))
@@ -182,7 +189,7 @@ def _mountings(robot: Robot, source: Source) -> Iterator[Fault]:
         here = [states.get(f"gnss.antenna_{axis}_m") if source.kind == "gnss" else None for axis in "xy"]
         return tuple(s if state is None else state - float(place[k]) for k, (s, state) in enumerate(zip(size, here)))
 
-    yield Fault(f"place of {source.name}", (*AROUND, *mirrored), placed, place_words,
+    yield Fault(f"place of {source.name}", (*AROUND[:8 if is_floor else None], *mirrored), placed, place_words,
                 step=(0.3, 0.3), smallest=(0.02, 0.02), settled=settled, group=f"along the way of {source.name}",
                 is_possible=lambda s: math.hypot(place[0] + s[0], place[1] + s[1]) <= PLACE_MOST_M and math.hypot(s[0], s[1]) >= 0.05)
     for f, unit in ((0.01, "cm"), (0.001, "mm")):
@@ -193,26 +200,27 @@ def _mountings(robot: Robot, source: Source) -> Iterator[Fault]:
         return
 
     def turned(axis: int) -> Callable[[Sequence[float]], list[Edit]]:
-        def edits(size: Sequence[float]) -> list[Edit]:
-            new = [degrees(a + (size[0] if k == axis else 0)) for k, a in enumerate(angles)]
-            return [Value("calibration.yaml", (*path, "rpy_deg"), numbers(np.round(new, 2)))]
-        return edits
+        return lambda size: remounted(by_rad=[size[0] * (k == axis) for k in range(3)])
 
     def say(words: str) -> Callable[[Sequence[float]], str]:
         return lambda size: f"the mounting of {who} is turned by {degrees(size[0]):.3g} degrees ({words})"
 
-    yaws = [math.pi, math.pi / 2, -math.pi / 2, math.pi / 4, -math.pi / 4, 0.35, -0.35] + [-2 * float(angles[2])] * (abs(angles[2]) > 0.02)
+    yaws = ([0.1, -0.1] if is_floor else [math.pi, math.pi / 2, -math.pi / 2, math.pi / 4, -math.pi / 4]) + [0.35, -0.35] + [-2 * float(angles[2])] * (abs(angles[2]) > 0.02)
     yield Fault(f"yaw of {source.name}", tuple((y,) for y in yaws), turned(2), say("yaw"), step=(0.15,), smallest=(0.01,),
-                settled=lambda size, states: (size[0] + states.get(f"{source.sensor}.yaw_rad", 0.0),),
+                settled=lambda size, states: (size[0] + states.get(f"{who}.yaw_rad", 0.0),),
                 is_possible=lambda s: abs(math.remainder(s[0], 2 * math.pi)) > 0.03)
-    if source.kind in ("pictures", "corners", "markers") or abs(angles[1]) > 0.02:
-        pitches = [-2 * float(angles[1])] * (abs(angles[1]) > 0.02) + [-0.15, 0.15]
+    if source.kind in ("pictures", "corners", "markers", "points") or abs(angles[1]) > 0.02:
+        pitches = [-2 * float(angles[1])] * (abs(angles[1]) > 0.02) + [-0.15, 0.15] + [-0.05, 0.05] * is_floor
         yield Fault(f"pitch of {source.name}", tuple((p,) for p in pitches), turned(1), say("pitch: positive looks down"), step=(0.05,), smallest=(0.005,),
-                    is_possible=lambda s: abs(s[0]) > 0.01)
-    if source.kind == "pictures" or abs(angles[0]) > 0.02:
+                    settled=lambda size, states: (size[0] + states.get(f"{who}.pitch_rad", 0.0),), is_possible=lambda s: abs(s[0]) > 0.01)
+    if is_floor:
+        yield Fault(f"height of {source.name}", tuple((float(place[2]) * (f - 1),) for f in (0.8, 0.9, 1.1, 1.25)), lambda size: remounted((0, 0, size[0])),
+                    lambda size: f"{who} is {abs(size[0]):.3f} m {'higher' if size[0] > 0 else 'lower'} than its mounting says", step=(0.05,), smallest=(0.004,),
+                    settled=lambda size, states: (size[0] + states.get(f"{who}.height_m", 0.0),), is_possible=lambda s: abs(s[0]) > 0.01 and place[2] + s[0] > 0.05)
+    if source.kind == "pictures" or abs(angles[0]) > 0.02 and not is_floor:
         yield discrete(f"roll of {source.name}", turned(0), say("roll"), size=math.pi)
     largest = float(np.degrees(np.abs(angles).max()))
-    if 0.02 < largest < 2 * math.pi:
+    if 0.02 < largest < 2 * math.pi and not is_floor:
         yield discrete(f"angles of {source.name}", lambda _: [Value("calibration.yaml", (*path, "rpy_deg"), numbers(np.degrees(np.degrees(angles))))],
                        lambda _: f"the mounting's angles of {who} are in radians")
 
@@ -243,21 +251,25 @@ def _maps(robot: Robot) -> Iterator[Fault]:
     if not isinstance(resolution, int | float):
         return
 
-    def plan(size: Sequence[float], moves: bool) -> list[Edit]:
+    def plan(size: Sequence[float], about: Sequence[float]) -> list[Edit]:
         edits: list[Edit] = [Value("map/map.yaml", ("resolution",), f"{resolution * size[0]:.6g}")]
-        if moves and isinstance(origin, list):
-            edits.append(Value("map/map.yaml", ("origin",), numbers([origin[0] * size[0], origin[1] * size[0], *origin[2:]])))
+        if about and isinstance(origin, list):
+            edits.append(Value("map/map.yaml", ("origin",), numbers([*(a + (o - a) * size[0] for a, o in zip(about, origin)), *origin[2:]])))
         return edits
 
-    for moves in (False, True):
-        yield Fault(f"scale of the plan{' and its origin' * moves}", tuple((f,) for f in (*NEAR, 0.5, 2, 0.1, 10, 0.0254)), lambda s, m=moves: plan(s, m),
+    start = robot.vehicle.get("initial_pose") or {}
+    fixed = {"": (), " and its origin": (0.0, 0.0)} | ({" about the start": (start["x_m"], start["y_m"])} if {"x_m", "y_m"} <= set(start) else {})
+    for words, about in fixed.items():
+        yield Fault(f"scale of the plan{words}", tuple((f,) for f in (*NEAR, *(() if about else (0.5, 2, 0.1, 10, 0.0254)))), lambda s, a=about: plan(s, a),
                     lambda s: f"the floor plan is {factor_words(s[0])}", step=(0.02,), smallest=(0.003,), is_log=True,
-                    is_possible=lambda s: 0.001 <= resolution * s[0] <= 1 and abs(math.log(s[0])) > 0.006, group="scale of the plan")
+                    is_possible=lambda s: 0.001 <= resolution * s[0] <= 1 and abs(math.log(s[0])) > 0.006, group="scale of the plan",
+                    settled=lambda s, states: (s[0] / states.get("motion.speed_scale", 1.0),))
     pictures = [robot.plan.get("image"), *((robot.plan.get("layers") or {}).get(name) for name in ("edges", "drivable"))]
     names = sorted({f"map/{p}" for p in pictures if isinstance(p, str) and "/" not in p})
-    for upside_down in (False, True):
-        yield discrete(f"plan mirrored {upside_down}", lambda _, u=upside_down: [Mirrored(name, u) for name in names],
-                       lambda _, u=upside_down: f"the floor plan is mirrored: {'top and bottom' if u else 'left and right'} are swapped")
+    for way in TURNS if names else ():
+        said = TURNS[way]
+        yield discrete(f"plan: {said}", lambda _, w=way: [Turned(name, w) for name in names],
+                       lambda _, s=said: f"the floor plan is {'mirrored' if 'mirror' in s else 'turned'}: {s} is right", group="picture of the plan")
 
 
 # ── markers, lenses, satellites ──────────────────────────────────────────────────────────────────────────────────────

@@ -18,6 +18,10 @@ OBSERVED = {"sightings.csv": "sightings", "markers.csv": "markers", "marker-corn
 """Tables of observations, and their sources' names."""
 
 
+Place = tuple[float, float, float]
+"""In base_link, m."""
+
+
 @dataclass(frozen=True)
 class Source:
     """Observations of one kind by one sensor. `file` has their stamps."""
@@ -119,8 +123,10 @@ class Robot:
     def mounting(self, source: Source) -> tuple[tuple[str, ...], Array, Array]:
         """Path in calibration.yaml of a sensor's mounting, its place (m) and its angles (rad: roll, pitch, yaw)."""
         path: tuple[str, ...] = ("gnss",)
-        if source.sensor:
-            path = ("cameras" if source.sensor in (self.calibration.get("cameras") or {}) else "sensors", source.sensor)
+        cameras = self.calibration.get("cameras") or {}
+        sensor = next(iter(cameras), "") if source.kind == "points" else source.sensor
+        if sensor:
+            path = ("cameras" if sensor in cameras else "sensors", sensor)
         node: Any = self.calibration
         for step in (*path, "mounting"):
             node = node.get(step) if isinstance(node, dict) else None
@@ -130,6 +136,15 @@ class Robot:
         except (TypeError, ValueError):
             place, angles = np.zeros(3), np.zeros(3)
         return (*path, "mounting"), np.resize(place, 3), np.radians(np.resize(angles, 3))
+
+    @cached_property
+    def floor_camera(self) -> Place | None:
+        """Where the only camera stands, by which points.csv was placed on the floor; None without one."""
+        cameras = self.calibration.get("cameras") or {}
+        if len(cameras) != 1 or not len(self.table("points.csv").get("t_ns", ())) or "edges" not in (self.plan.get("layers") or {}):
+            return None
+        _, place, _ = self.mounting(Source("points", "points.csv"))
+        return (float(place[0]), float(place[1]), float(place[2])) if place[2] > 0 else None
 
     @cached_property
     def motion_span(self) -> tuple[int, int] | None:

@@ -16,7 +16,7 @@ from .faults import all_faults, exchanged
 from .robot import Robot, Source
 from .trial import Blocks, Change, Drive, Trials, outliers
 
-BUDGET_S = 14.0  # of processor time a processor; after it no further round is begun
+BUDGET_S, PLAN_BUDGET_S = 14.0, 45.0  # of processor time a processor; after it no further round is begun. With a floor plan, whose start alone is 0.2 s
 SCREEN_SHARE, SCREEN_MIN_S, SCREEN_MAX_S = 0.3, 10.0, 20.0
 FIT_MAX_S = 40.0  # of the drive, for sizes
 ROWS_KEPT, ROWS_FITTED, ROWS_JUDGED = 10, 4, 6
@@ -90,7 +90,11 @@ class Search:
 
     def left_s(self) -> float:
         """Of the budget."""
-        return BUDGET_S * self.trials.pool.at_once - self.trials.spent_s
+        return self.budget_s() - self.trials.spent_s
+
+    def budget_s(self) -> float:
+        """Processor time of all processors."""
+        return (PLAN_BUDGET_S if self.robot.floor_camera else BUDGET_S) * self.trials.pool.at_once
 
     def part_s(self, drives: int, share: float, most_s: float) -> float:
         """How much of the drive so many trials may take; 0: all of it."""
@@ -205,7 +209,7 @@ class Search:
 
     def _tried(self, changes: Sequence[Change], fixed: list[Change], until_s: float, has_states: bool = False) -> list[Candidate]:
         drives = self._drives(changes, fixed, until_s, has_states=has_states)
-        self.progress(min(0.99, self.trials.spent_s / (BUDGET_S * self.trials.pool.at_once)))
+        self.progress(min(0.99, self.trials.spent_s / self.budget_s()))
         return [Candidate(fault, size, drive) for (fault, size), drive in zip(changes, drives) if drive is not None]
 
     def _score(self, drive: Drive, until_s: float) -> float:
@@ -254,7 +258,10 @@ class Search:
         """Settings with which a filter that starts at a known pose does not look for it elsewhere: a copy that is wrong need not be
         driven well, and most of its time would go there."""
         estimator, vehicle = self.robot.config.get("estimator"), self.robot.vehicle
-        return {f"{estimator}.recover.on": "false"} if estimator in ("landmark_ekf", "slam") and "initial_pose" in vehicle else {}
+        if "initial_pose" not in vehicle:
+            return {}
+        return {"landmark_ekf": {"landmark_ekf.recover.on": "false"}, "slam": {"slam.recover.on": "false"},
+                "edge_mcl": {"edge_mcl.search.poses": "12000"}}.get(str(estimator), {})  # the least that is allowed
 
     # ── proposals that the data make ─────────────────────────────────────────────────────────────────────────────────
 
@@ -374,7 +381,7 @@ class Search:
     def _pairs(self, firsts: list[Candidate], before: Drive, verdict: Verdict) -> tuple[list[Change], Drive] | None:
         """Two mistakes of which neither explains the drive alone."""
         for first in firsts:
-            if self.left_s() < 0.2 * BUDGET_S * self.trials.pool.at_once:
+            if self.left_s() < 0.2 * self.budget_s():
                 break
             fixed: list[Change] = [(first.fault, first.size)]
             found = self._round(fixed, first.drive)

@@ -18,9 +18,11 @@ from ..native import WaymarkError
 from ..pool import Pool
 from ..replaying import Estimate, replay
 from ..tables import Array
+from . import plan
 from .changes import CONFIG, NAMED, Edit, Impossible, Value
 from .fault import Fault, Size
-from .robot import Robot
+from .plan import Scans
+from .robot import Place, Robot
 
 # Log density of an outlier, which has any value: over a turn, over 50 m, over a picture of 1000 px, over half a turn. That of ranges and
 # bearings is over the values that the recording has, where they are further: of ranges in mm.
@@ -133,11 +135,14 @@ class Undo:
         return out
 
 
-def judged(estimate: Estimate, blocks: Blocks, undo: Undo, cpu_s: float, keeps: bool) -> Drive:
-    """A drive's blocks and shares."""
+def judged(estimate: Estimate, blocks: Blocks, undo: Undo, cpu_s: float, keeps: bool, scans: Scans | None = None) -> Drive:
+    """A drive's blocks and shares. `scans` take the place of the filter's records of them."""
     rows = estimate.innovations
     counts = np.isin(rows["residual"], list(OUTLIER))
-    rows = {name: column[counts] for name, column in rows.items()}
+    is_scan = (rows["residual"] == "range") & (rows["landmark"] < 0) if scans else np.zeros(len(counts), bool)
+    taken = rows["t_ns"][is_scan & (rows["verdict"] == "fused")]
+    source = rows["source"][is_scan][:1]
+    rows = {name: column[counts & ~is_scan] for name, column in rows.items()}
     at, fused = blocks.of(undo.original(rows)), rows["verdict"] == "fused"
     away = rows["observed"] - rows["expected"]
     turn = np.isin(rows["residual"], _ANGLES)
@@ -148,10 +153,17 @@ def judged(estimate: Estimate, blocks: Blocks, undo: Undo, cpu_s: float, keeps: 
     when = blocks.of(estimate.published["t_ns"])
     costs = sum((states == name) * cost for name, cost in DOUBT.items())
     doubt = np.bincount(when, costs, blocks.count) / np.maximum(1, np.bincount(when, minlength=blocks.count))
+    values = [likelihoods(rows, blocks.outliers, undo.scaled, is_far) for is_far in (False, True)]
+    squares = float(np.mean(away[good] ** 2 / rows["variance"][good])) if good.any() else math.inf
+    if scans:
+        stamps = {"t_ns": scans.t_ns, "source": np.resize(source, len(scans.t_ns)) if len(source) else np.full(len(scans.t_ns), -1)}
+        at = np.concatenate([at, blocks.of(undo.original(stamps))])
+        values = [np.concatenate(both) for both in zip(values, (scans.near, scans.far))]
+        fused = np.concatenate([fused, scans.fits & np.isin(scans.t_ns, taken)])
+        squares = squares if good.any() else 1.0
     seen = np.bincount(at, minlength=blocks.count)
-    near, far = (np.bincount(at, likelihoods(rows, blocks.outliers, undo.scaled, is_far), blocks.count) - doubt * seen for is_far in (False, True))
-    return Drive(near, far, seen, float(fused.mean()) if len(fused) else 0.0,
-                 float(np.mean(away[good] ** 2 / rows["variance"][good])) if good.any() else math.inf, share["lost"], share["degraded"], cpu_s,
+    near, far = (np.bincount(at, value, blocks.count) - doubt * seen for value in values)
+    return Drive(near, far, seen, float(fused.mean()) if len(fused) else 0.0, squares, share["lost"], share["degraded"], cpu_s,
                  estimate if keeps else None)
 
 
@@ -160,18 +172,20 @@ def edits_of(changes: Sequence[Change]) -> list[Edit]:
     return [edit for fault, size in changes for edit in fault.edits(size)]
 
 
-Job = tuple[dict[str, Any], Blocks, Undo, bool]
-"""What a worker drives: arguments of a replay, its blocks, how observations were changed, whether its records are returned."""
+Job = tuple[dict[str, Any], Blocks, Undo, bool, Place | None]
+"""What a worker drives: arguments of a replay, its blocks, how observations were changed, whether its records are returned, and where the
+camera stands that sees edges of a floor plan."""
 
 
 def _driven(job: Job) -> Drive | None:
-    arguments, blocks, undo, keeps = job
+    arguments, blocks, undo, keeps, camera = job
     begun = time.process_time()
     try:
         estimate = replay(**arguments)
     except WaymarkError:
         return None  # such a copy can't be driven: it explains nothing
-    drive = judged(estimate, blocks, undo, time.process_time() - begun, keeps)
+    scans = plan.judged(estimate.trajectory, arguments["input"] / "points.csv", arguments["map"] or arguments["input"] / "map/map.yaml", camera) if camera else None
+    drive = judged(estimate, blocks, undo, time.process_time() - begun, keeps, scans)
     if not arguments.get("out"):
         return drive
     ended, sources = ended_states(arguments["out"])
@@ -239,7 +253,7 @@ class Trials:
                 remove(self.folder / str(number))
                 return None  # nothing to change: it explains nothing
             arguments["out"] = self.folder / f"run-{number}" if has_states else None
-            return arguments, blocks, Undo.of(jobs[number], self.sources), keeps
+            return arguments, blocks, Undo.of(jobs[number], self.sources), keeps, self.robot.floor_camera
 
         def ended(number: int, drive: Drive | None, is_there: bool) -> None:
             is_local = bool(jobs[number]) and jobs[number][-1][0].is_local
