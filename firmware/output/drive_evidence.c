@@ -29,6 +29,7 @@
 #define OUTLIERS_BAD 0.02
 #define BIASED_LOST_MAX 0.3  // share of the time lost beyond which a bias may come from wrong poses
 #define MAP_SCALE 0.03       // beyond this neither a tyre nor a sensor is off, where the two agree
+#define EXPLAINED_MIN 0.6    // of the edge points of the last metre; of good drives 0.85 and more
 #define FACTOR_BAD 3.0       // of a sensor's stated sigma
 // Mean of the innovations over their sigma. Errors that last are correlated, so a tenth of a sigma is usual.
 #define BIAS_NOTE 0.5
@@ -490,6 +491,44 @@ static void map_scale(const wm_assembly *assembly, const wm_health *health, wm_f
       ->size = factor;
 }
 
+// The height above the floor that is stated of a camera, m; 0: there is no such camera.
+static double height_of(const wm_assembly *assembly, const char *state) {
+  const wm_rig *rig = assembly->setup.rig;
+  for (uint32_t i = 0; rig && i < rig->camera_count; i++)
+    if (strncmp(rig->cameras[i].name, state, strcspn(state, ".")) == 0) return rig->cameras[i].mounting.xyz_m[2];
+  return 0;
+}
+
+// Wheels and the height of a camera that sees the floor agree that the plan has other lengths than theirs. And how much
+// of what was seen last is on the plan.
+static void plan_scale(const wm_assembly *assembly, const wm_health *health, wm_findings *out) {
+  const wm_raster *plan = assembly->setup.map;
+  const wm_counter *explained = wm_health_counter(health, WM_COUNTER_EXPLAINED_PERMILLE);
+  double way = 0, height = 0;
+  for (uint32_t i = 0; i < wm_health_calibration_count(health); i++) {
+    const wm_calibration_value *c = wm_health_calibration(health, i);
+    if (strcmp(c->name, "motion.speed_scale") == 0) way = log(c->value);
+    const double stated = strstr(c->name, ".height_m") ? height_of(assembly, c->name) : 0;
+    if (stated > 0 && c->sigma < MAP_SCALE / 2 * stated) height = log(fmax(0.1, 1 + c->value / stated));
+  }
+  if (plan && fmin(fabs(way), fabs(height)) >= MAP_SCALE && way / height > 0.5 && way / height < 2) {
+    char fix[WM_FINDING_FIX_MAX];
+    (void)snprintf(
+        fix, sizeof fix,
+        "map/map.yaml: `resolution: %.5g`, if wheels and camera are right, with origin and initial_pose by it",
+        plan->resolution_m / exp(way));
+    wm_find(out, WM_FOUND_MAP_IMPLAUSIBLE, WM_SEVERITY_BAD, "map", fix,
+            "by the wheels (%.1f %%) and by the height of the camera (%.1f %%) the floor plan is too %s",
+            100 * fabs(way), 100 * fabs(height), way > 0 ? "large" : "small")
+        ->size = exp(way);
+  }
+  if (plan && explained && (double)explained->count < 1e3 * EXPLAINED_MIN)
+    wm_find(out, WM_FOUND_MAP_IMPLAUSIBLE, WM_SEVERITY_BAD, "map",
+            "look at its scale, at the camera's mounting, and at what stands there that it doesn't have",
+            "at the end %" PRIu64 " of 100 edge points are on its edges", explained->count / 10)
+        ->size = (double)explained->count * 1e-3;
+}
+
 void evidence_judge(const drive_evidence *self, const wm_assembly *assembly, const wm_health *health, uint64_t total,
                     wm_findings *out) {
   for (size_t i = 0; i < assembly->source_count; i++) refused(self, assembly, i, out);
@@ -503,5 +542,6 @@ void evidence_judge(const drive_evidence *self, const wm_assembly *assembly, con
   unknown(self, out);
   calibration(assembly, health, out);
   map_scale(assembly, health, out);
+  plan_scale(assembly, health, out);
   map_unused(assembly, out);
 }

@@ -11,10 +11,13 @@ with their seeds, and the notes by their identifiers. Exit code 1 where more tha
 import collections
 import json
 import pathlib
+import random
 import subprocess
 import sys
 import tempfile
 
+import causes
+import plan_robots
 import replays
 
 # World, configuration. The faults that a world plants (a robot that is carried off) are true alarms: none of these has one.
@@ -67,6 +70,27 @@ def judge(options, case, _):
     return [{"world": world, "drives": options.drives, "degraded": degraded, "alarms": alarms, "notes": dict(notes)}]
 
 
+def judge_plans(options):
+    """Robots on a floor plan: nothing is wrong of a right one; of one whose scale is off by 4 to 12 % something is, in each drive."""
+    wrong = []
+    for seed in range(1, options.drives + 1):
+        for robot in (plan_robots.flat, plan_robots.corridor):
+            with tempfile.TemporaryDirectory() as folder:
+                folder = pathlib.Path(folder)
+                robot(folder / "right", seed, options)
+                config = folder / "plan.yaml"
+                config.write_text("format: waymark-config/1\nestimator: edge_mcl\n")
+                changes, _, size = causes.plan_scale(random.Random(f"plan_scale {seed}"))
+                replays.copy_changed(folder / "right", folder / "scaled", changes)
+                for kind in ("right", "scaled"):
+                    done = subprocess.run([options.bin_dir / "waymark", "check", config, folder / kind, "--quick", "--json"], capture_output=True, text=True)
+                    bad = [f["id"] for f in json.loads(done.stdout)["findings"] if f["severity"] == "bad"]
+                    if bool(bad) != (kind == "scaled"):
+                        wrong.append(f"{robot.__name__}, seed {seed}, {kind} {size if kind == 'scaled' else ''}: {', '.join(bad) or 'good'}")
+    print(f"floor plans: {4 * options.drives} checks, {len(wrong)} wrong" + "".join(f"\n  {w}" for w in wrong))
+    return wrong
+
+
 def line(row):
     return (f"{row['world']:18} {row['drives']:4} drives, degraded {100 * row['degraded']:.2f} % of all, {len(row['alarms']):3} alarms  "
             + "; ".join(f"seed {s}: {', '.join(a)}" for s, a in row["alarms"].items())
@@ -81,7 +105,8 @@ def main():
         print("no simulator here")
         return 77
     results = replays.table(options, "world, drives with alarms, notes", [w for w in WORLDS if replays.is_chosen(options, w[0])], judge, line)
-    return int(any(len(row["alarms"]) > 0.01 * row["drives"] for row in results))
+    wrong = judge_plans(options) if replays.is_chosen(options, "plans") else []
+    return int(bool(wrong) or any(len(row["alarms"]) > 0.01 * row["drives"] for row in results))
 
 
 if __name__ == "__main__":

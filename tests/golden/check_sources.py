@@ -128,6 +128,13 @@ def sighted(map_factor=1.0, most_m=""):
             "config.yaml": "format: waymark-config/1\nestimator: landmark_ekf\n"}
 
 
+def mapped():
+    """Bearings to posts that no map has."""
+    files = {name: text for name, text in sighted().items() if name != "landmarks.csv"}
+    files["sightings.csv"] = "\n".join(line.rpartition(",")[0] for line in files["sightings.csv"].splitlines()) + "\n"
+    return files | {"config.yaml": "format: waymark-config/1\nestimator: slam\nmotion: {states: {speed_scale_sigma: 0.03}}\n"}
+
+
 heading_at = [0.0]
 for _k in range(round(SECONDS * 100)):
     heading_at.append(heading_at[-1] + 0.01 * turn(_k / 100))
@@ -269,6 +276,8 @@ RIGHT = [
     ("values in threes beside a gyro", {"motion.csv": motion(100, repeat=3), "imu.csv": imu()}),
     ("sightings of posts on the map", sighted()),
     ("positions at one speed, the antenna's place unknown", {"motion.csv": motion(steady=True), "gnss.csv": gnss(sigma=0.03, steady=True), "heading.csv": headings(), "recording.yaml": RECORDING.format("motion.csv, gnss.csv, heading.csv").split("vehicle:")[0], "config.yaml": "format: waymark-config/1\nestimator: landmark_ekf\n"}, "not-observable"),
+    ("bearings alone in a map of its own", mapped(), "not-observable"),
+    ("bearings in a map that is given", mapped() | {"landmarks.csv": sighted()["landmarks.csv"]}),
     ("a gyro that lags by 0.3 s", both(imu_csv=imu(lag_s=0.3))),
     ("a gyro on CAN", can()),
     ("CAN, unsigned turn to the left alone", can(w=0.5)),

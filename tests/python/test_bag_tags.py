@@ -191,6 +191,37 @@ class Corners(BagTest):
                                  - pixels(*POSES[i], OURS * TAG_M / 2).mean(0) for i in range(3)], axis=0)
                 self.assertLess(np.abs(shift).max(), 0.12)  # no half pixel is left
 
+    def test_nvidia_s(self):
+        """The library's corners the other way round, and a pose whose z axis is in the print; corners that its pose contradicts are none."""
+        library, kind = AprilTag(), "isaac_ros_apriltag_interfaces"
+        register({f"{kind}/msg/AprilTagDetection": "string family\nint32 id\ngeometry_msgs/Point center\ngeometry_msgs/Point[4] corners\n"
+                                                   "geometry_msgs/PoseWithCovarianceStamped pose\n",
+                  f"{kind}/msg/AprilTagDetectionArray": f"std_msgs/Header header\n{kind}/AprilTagDetection[] detections\n"})
+        for family in ("tag36h11", "tagStandard41h12"):
+            modules = library.picture(family, 7)
+            pictures = [rendered(modules, FAMILIES[family], *p) for p in POSES]
+            own = self.detected(family, pictures, family)
+            for turn in (0, 1, 2, "the library's order"):
+                events = with_lens()
+                for i, (picture, (rotation, place)) in enumerate(zip(pictures, POSES)):
+                    (found,) = library.detect(family, picture)
+                    t_ns, points = START_NS + i * STEP_NS, np.reshape(found[1], (4, 2))
+                    points = points if isinstance(turn, str) else np.roll(points[::-1], turn, axis=0)
+                    x, y, z, w = map(float, quaternion(rotation @ np.diag([1.0, -1.0, -1.0])))
+                    seen = M.make("Pose", position=M.point(place), orientation=M.make("Quaternion", x=x, y=y, z=z, w=w))
+                    header = M.header(t_ns, "cam_optical")
+                    tag = M.make(f"{kind}/AprilTagDetection", family=family, id=found[0], center=M.point((0, 0, 0)), corners=[M.point((*map(float, p), 0)) for p in points],
+                                 pose=M.make("PoseWithCovarianceStamped", header=header, pose=M.make("PoseWithCovariance", pose=seen)))
+                    events.put("/tag_detections", f"{kind}/AprilTagDetectionArray", t_ns, M.make(f"{kind}/AprilTagDetectionArray", header=header, detections=[tag]))
+                text, folder = self.take(events.mcap(self.folder / f"isaac-{turn}.mcap"), out=f"isaac-{family}-{turn}")
+                if turn:
+                    self.assertIn("contradict each other", text)
+                    continue
+                tables = waymark.Recording(folder).table("marker-corners.csv")
+            for i, row in enumerate(own):
+                place, yaw = pose_of([tables[f"{axis}{k}_px"][i] for k in range(4) for axis in "uv"])
+                self.agree(row, place, yaw, pixels(*POSES[i], np.zeros((1, 2)))[0], f"{family} {i}")
+
     def test_opencv_s_aruco(self):
         pictures = [rendered(aruco_modules(), 6, *p) for p in POSES]
         own = self.detected("aruco", pictures, "aruco_4x4_50")
@@ -347,16 +378,12 @@ class Bad(BagTest):
             return events
 
         nan = np.array([(np.nan, 1.0)] * 4)
-        isaac = Events()
-        register({"isaac_ros_apriltag_interfaces/msg/AprilTagDetectionArray": "std_msgs/Header header\n"})
-        isaac.put("/tags", "isaac_ros_apriltag_interfaces/AprilTagDetectionArray", START_NS,
-                  M.make("isaac_ros_apriltag_interfaces/AprilTagDetectionArray", header=M.header(START_NS, "c")))
         poses = Events()
         poses.put("/markers", "aruco_msgs/MarkerArray", START_NS, M.make("aruco_msgs/MarkerArray", header=M.header(START_NS, "base_link"), markers=[
             M.make("aruco_msgs/Marker", id=4, pose=M.make("PoseWithCovariance", pose=M.pose((0.1, 0, 1), (1, 0, 0, 0))))]))
         for name, events, said in (("a box", vision("7", (0, 0, 0)), "a box alone gives no corners"), ("a word", vision("person", (0, 0, 1)), "'person'"),
                                    ("behind", vision("7", (0, 0, -1)), "before the camera"), ("no number", april_events(nan), "a corner is no number"),
-                                   ("isaac", isaac, "isn't documented"), ("another frame", poses, "no camera's optical frame")):
+                                   ("another frame", poses, "no camera's optical frame")):
             with self.subTest(name):
                 text, _ = self.take(events.mcap(self.folder / "a.mcap"), code=1, out=f"out-{name}")
                 self.assertIn(said, text)

@@ -6,6 +6,8 @@ Ours: the middle of a pixel is whole; corners from the upper left one on, clockw
   AprilTag's library (apriltag_msgs)   the middle of a pixel is at a half; corners against the clock from the lower left one on
                                        (apriltag.c: homography_project of (-1,1), (1,1), (1,-1), (-1,-1)). Its four oldest families are drawn
                                        the other way up than OpenCV's and ours (cv::aruco::DICT_APRILTAG_*): half a turn
+  NVIDIA's (isaac_ros_apriltag)        those of AprilTag's library the other way round: clockwise from the upper left one on (apriltag_node.cpp). Its
+                                       pose tells whether the order is that
   OpenCV's aruco (fiducial_msgs)       as ours
   poses (aruco_msgs, aruco_opencv_msgs, ros2_aruco_interfaces, ar_track_alvar_msgs, apriltag_ros of ROS 1, fiducial_msgs, vision_msgs)
                                        in the camera's optical frame (REP 103). OpenCV: x to the right, y up, z out of the print.
@@ -30,6 +32,7 @@ from .lens_fit import equidistant, radtan
 _HALF_TURNED = {"16h5", "25h9", "36h10", "36h11"}
 _UPRIGHT_ORDER, _HALF_TURNED_ORDER = (3, 2, 1, 0), (1, 0, 3, 2)
 _HALF_PX = 0.5
+_ALIKE = 0.7  # cosine of the upper edge by the corners and by the pose
 _NUMBER = re.compile(r"(\d+)\D*$")
 _FACING_MIN = 0.05  # cosine; a print seen more askew than that, 87 degrees, isn't read by any detector
 
@@ -78,6 +81,23 @@ def apriltag(message: Any) -> Iterator[Seen]:
     for tag in message.detections:
         order = _HALF_TURNED_ORDER if _is_half_turned(tag.family) else _UPRIGHT_ORDER
         yield Seen(int(tag.id), _corners([(c.x, c.y) for c in tag.corners], order, _HALF_PX))
+
+
+def isaac(message: Any) -> Iterator[Seen]:
+    """isaac_ros_apriltag_interfaces/AprilTagDetectionArray."""
+    for tag in message.detections:
+        turned = _is_half_turned(tag.family)
+        order = tuple(3 - k for k in (_HALF_TURNED_ORDER if turned else _UPRIGHT_ORDER))
+        corners = _corners([(c.x, c.y) for c in tag.corners], order, _HALF_PX)
+        pose = tag.pose.pose.pose
+        if pose.position.z > 0:
+            ahead, left, up, *right = _pose(int(tag.id), pose.position, pose.orientation, turned).place or [0.0] * 6
+            edge = np.array([left * right[0] - ahead * right[1], up * right[0] - ahead * right[2]])  # of the picture, by the derivative of -left/ahead, -up/ahead
+            by_corners, down = np.subtract(corners[2:4], corners[:2]), np.subtract(corners[4:6], corners[2:4])
+            is_clockwise = by_corners[0] * down[1] > by_corners[1] * down[0]
+            if not is_clockwise or edge @ by_corners < _ALIKE * np.linalg.norm(edge) * np.linalg.norm(by_corners):
+                raise BadMessage(f"the corners of tag {tag.id} and its pose contradict each other: they are of another version's order")
+        yield Seen(int(tag.id), corners)
 
 
 def fiducials(message: Any) -> Iterator[Seen]:
@@ -150,6 +170,7 @@ class Reader:
 
 READERS = {
     "apriltag_msgs/msg/AprilTagDetectionArray": Reader(apriltag, is_of_rectified=True, families=True),
+    "isaac_ros_apriltag_interfaces/msg/AprilTagDetectionArray": Reader(isaac, is_of_rectified=True, families=True),
     "fiducial_msgs/msg/FiducialArray": Reader(fiducials),
     "fiducial_msgs/msg/FiducialTransformArray": Reader(fiducial_poses),
     "vision_msgs/msg/Detection2DArray": Reader(vision_poses),

@@ -32,7 +32,6 @@ _ELSEWHERE = {
     "theora_image_transport/msg/Packet": "a video stream: `ros2 run image_transport republish theora raw` makes pictures of it",
     "ffmpeg_image_transport_msgs/msg/FFMPEGPacket": "a video stream: `ros2 run image_transport republish ffmpeg raw` makes pictures of it",
     "foxglove_msgs/msg/CompressedVideo": "a video stream: give the video itself to `waymark import VIDEO`, or record pictures",
-    "isaac_ros_apriltag_interfaces/msg/AprilTagDetectionArray": "the order of its corners isn't documented: let `waymark` read the pictures (vision.apriltag)",
 }
 
 
