@@ -9,6 +9,7 @@ import io
 import math
 import os
 import shutil
+import subprocess
 import sys
 import tempfile
 import unittest
@@ -25,10 +26,28 @@ if not LIBRARY.exists():
 os.environ["WAYMARK_LIBRARY"] = str(LIBRARY)
 
 from waymark.causes import changes, plan, search  # noqa: E402
+from waymark.causes.features import with_points  # noqa: E402
 from waymark.causes.fault import Clock, Fault, discrete, factor_words  # noqa: E402
+from waymark.causes.robot import Robot  # noqa: E402
 from waymark.causes.trial import Drive, Undo, likelihoods  # noqa: E402
 from waymark.maps import FloorPlan, write_floor_plan  # noqa: E402
+from waymark.replaying import replay  # noqa: E402
 
+SCENARIO = """format: waymark-scenario/1
+name: floor
+clock_start_s: 5000
+world: {kind: corridor, variant: easy}
+robot:
+  wheel_radius_m: 0.11
+  ticks_per_turn: 2048
+  track_m: 0.6
+  wheelbase_m: 1.0
+  wheels_send: speeds
+  steering_table: {actuator_mm: [8, 18, 30, 42, 52, 60, 71, 84, 98], road_wheel_deg: [-41, -29, -17, -7, 0, 5.5, 13, 25, 39]}
+bus: {wheels_hz: 100, yaw_rate_hz: 100, steering_hz: 50, gear_hz: 10}
+pictures: {samples: 1}
+cameras: [{name: front, size: [320, 180], xyz_m: [0.33, 0, 0.5], rpy_deg: [0, 20, 0], rate_hz: 5}]
+"""
 YAML = b"# a robot\nsensors:\n  front:   # screwed on by eye\n    mounting: {xyz_m: [0.1, 0, 0.2]}\nwheels: {radius_m: 0.05}\n"
 DBC = b"BO_ 256 ODOMETRY: 8 R\n SG_ TICKS : 0|32@1- (1,0) [0|1] \"\" W\n\nBO_ 257 OTHER: 8 R\n SG_ TICKS : 8|16@1+ (2,0) [0|1] \"\" W\n"
 
@@ -193,6 +212,26 @@ class FloorPlans(unittest.TestCase):
             with Image.open(io.BytesIO(turned.apply(picture))) as image:
                 self.assertEqual(image.size, size)
         self.assertEqual(turned.words(), "mirror (left and right) the picture")
+
+    @unittest.skipUnless((BIN / "waymark-simulate").exists(), "no simulator here")
+    def test_pictures_are_looked_at_once(self):
+        (self.folder / "scenario.yaml").write_text(SCENARIO)
+        drive, config = self.folder / "drive", self.folder / "robot.yaml"
+        subprocess.run([BIN / "waymark-simulate", self.folder / "scenario.yaml", "--duration", "8", "--out", drive], check=True, capture_output=True)
+        config.write_text("format: waymark-config/1\nestimator: edge_mcl\nsources:\n  - {name: edges, lateness_max_ms: 250}\nvision: {edges: {}}\n")
+        robot = Robot.read(drive, config, {})
+        seen = with_points(robot, self.folder)
+        self.assertEqual(seen.floor_camera, (0.33, 0.0, 0.5))
+        ends = [replay(r.files.recording, r.files.config) for r in (robot, seen)]
+        self.assertEqual(*(len(e.innovations["t_ns"]) for e in ends))
+        for axis in ("x_m", "y_m"):
+            self.assertLess(abs(ends[0].trajectory[axis][-1] - ends[1].trajectory[axis][-1]), 0.01)
+        self.assertFalse((seen.files.recording / "video").exists())
+        # The fix is of the robot's own files: the detector finds the points anew.
+        edits = [changes.Value("calibration.yaml", ("cameras", "front", "mounting", "rpy_deg"), "[0, 24, 0]"),
+                 changes.Seen("points.csv", ((0.33, 0, 0.5), (0, 0.35, 0)), ((0.33, 0, 0.5), (0, 0.42, 0)))]
+        self.assertEqual([place.file for place in robot.files.places(edits)], ["calibration.yaml"])
+        self.assertEqual([place.file for place in seen.files.places(edits)], ["calibration.yaml", "points.csv"])
 
     def test_points_are_seen_anew_by_another_mounting(self):
         # 0.5 m above the floor; 2 m ahead is 14.04 degrees below the horizon, or 4.04 where it looks up by 10 degrees less.

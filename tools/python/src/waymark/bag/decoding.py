@@ -46,6 +46,7 @@ def kind_of(name: str) -> str:
     return "/".join(parts)
 
 
+@lru_cache(maxsize=256)  # a bag has many topics of one type
 def _store_of(kind: str, definition: str, style: str) -> Typestore | None:
     """The types of a definition ("msg" or "idl"); None where it is none."""
     store = get_typestore(Stores.EMPTY)

@@ -330,16 +330,20 @@ class Files:
     def copy(self, edits: Sequence[Edit], out: Path) -> dict[str, Path]:
         """Makes the folder `out`: the recording with the edits. Returns the changed ones of the `named` files."""
         changed = {edit.file for edit in edits if edit.file != CONFIG}
-        _link(self.recording.resolve(), out, "", changed)
+        link(self.recording.resolve(), out, changed)
         for file in changed:
             (out / file).parent.mkdir(parents=True, exist_ok=True)
             (out / file).write_bytes(self.edited(edits, file))
         return {file: out / file for file in changed if file in self.named}
 
+    def _own(self, edits: Sequence[Edit]) -> list[Edit]:
+        """Without changes of points that a detector finds in pictures: it finds them anew."""
+        return [edit for edit in edits if not isinstance(edit, Seen) or (self.recording / edit.file).is_file()]
+
     def places(self, edits: Sequence[Edit]) -> list[Place]:
         """What to write, and where."""
         out = []
-        for edit in edits:
+        for edit in self._own(edits):
             before = self.read(edit.file)
             after = edit.apply(before)
             if after != before and not (isinstance(edit, Rows) and edit.optional):
@@ -350,6 +354,7 @@ class Files:
     def apply(self, edits: Sequence[Edit], out: Path) -> Path | None:
         """Writes the corrected copy that a person asked for: with a comment at what was changed. Returns the configuration in it
         where that is changed, or names a file that is."""
+        edits = self._own(edits)
         if out.exists():
             raise FileExistsError(f"{out}: is there already; name a new folder")
         moved = self.copy(edits, out)
@@ -374,12 +379,13 @@ NAMED = {"calibration.yaml": "calibration", "landmarks.csv": "landmarks", "vehic
 """Files of a recording that a configuration may name in their place, by its keys."""
 
 
-def _link(original: Path, out: Path, inner: str, changed: set[str]) -> None:
+def link(original: Path, out: Path, changed: set[str], inner: str = "") -> None:
+    """Makes the folder `out` of links to the files of a recording but for those that are changed."""
     out.mkdir(parents=True)
     for path in original.iterdir():
         name = f"{inner}{path.name}"
         if path.is_dir() and any(file.startswith(f"{name}/") for file in changed):
-            _link(path, out / path.name, f"{name}/", changed)
+            link(path, out / path.name, changed, f"{name}/")
         elif name not in changed:
             (out / path.name).symlink_to(path)
 

@@ -11,6 +11,7 @@ from typing import Any
 
 from ..native import WaymarkError
 from .changes import NAMED, Impossible
+from .features import with_points
 from .robot import Robot
 from .search import GAIN_MIN, Search, Verdict
 from .trial import Change, Drive, Trials, edits_of, scratch_folder
@@ -84,8 +85,10 @@ def main(arguments: list[str] | None = None) -> int:
     trials: Trials | None = None
     try:
         robot = Robot.read(options.recording, options.config, named)
-        trials = Trials(robot, scratch_folder())
-        verdict = Search(robot, trials, _progress if sys.stderr.isatty() else lambda share: None).run()
+        folder = scratch_folder()
+        driven = with_points(robot, folder)
+        trials = Trials(driven, folder)
+        verdict = Search(driven, trials, _progress if sys.stderr.isatty() else lambda share: None).run()
         found = report(robot, verdict)
         if options.apply and verdict.causes:
             config = robot.files.apply(edits_of(verdict.causes), options.apply)
