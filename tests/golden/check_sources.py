@@ -146,12 +146,12 @@ def increments(scale_turn=1.0, scale_way=1.0):
     return table("t_ns,from_ns,dx_m,dy_m,dheading_rad", rows)
 
 
-def ticks(track_m=0.5, radius_m=0.1, per_turn=2000, swap=False, raw_bits=None, wraps_at=None, rate_hz=50, begin=0):
+def ticks(track_m=0.5, radius_m=0.1, per_turn=2000, swap=False, raw_bits=None, wraps_at=None, rate_hz=50, begin=0, larger=1.0):
     left = right = begin
     rows = []
     for t in times(rate_hz):
         per_m = per_turn / (2 * math.pi * radius_m)
-        left += (speed(t) - turn(t) * track_m / 2) / rate_hz * per_m
+        left += (speed(t) - turn(t) * track_m / 2) / rate_hz * per_m / larger
         right += (speed(t) + turn(t) * track_m / 2) / rate_hz * per_m
         counts = [round(left), round(right)]
         if wraps_at:
@@ -218,6 +218,7 @@ FAULTS = [
     ("y up, straight on", {"motion.csv": motion(w=0), "imu.csv": imu(axes=(0, 0, 0), up=(0, 1, 0))}, ("bad", DISAGREE, "imu"), "gravity on y", "rpy_deg: [90, 0, 0]"),
     ("gyro whose zero is off", both(imu_csv=imu(bias=0.1)), ("bad", DISAGREE, "imu"), "shows 0.1", "wz_radps less 0.0"),
     ("gyro whose zero is off, straight on", {"motion.csv": motion(w=0), "imu.csv": imu(axes=(0, 0, 0), bias=-0.2)}, ("bad", DISAGREE, "imu"), "shows -0.2", "wz_radps less -0.2"),
+    ("gyro whose zero is off beside ticks", {"ticks.csv": ticks(), "imu.csv": imu(bias=0.1), "calibration.yaml": WHEELS}, ("bad", DISAGREE, "imu"), "shows 0.09", "wz_radps less 0.09"),
     ("gyro about y, a mounting of the other side", both(imu_csv=imu(axes=(0, 1, 0), up=(0, 1, 0)), calibration_yaml="imu: {mounting: {rpy_deg: [-90, 0, 0]}}\n"), ("bad", DISAGREE, "imu"), "-1.00 times", "rpy_deg: [90, 0, 0]"),
     ("gyro about x, a mounting about y", both(imu_csv=imu(axes=(1, 0, 0), up=(1, 0, 0)), calibration_yaml="imu: {mounting: {rpy_deg: [0, 0, 90]}}\n"), ("bad", DISAGREE, "imu"), "axis is up", "rpy_deg: [0, -90, 90]"),
     ("accelerations in thousandths of g", both(imu_csv=imu(gravity=1000)), ("bad", "value-implausible", "imu"), "1000.00 m/s2", "thousandths of g: times 0.00980665"),
@@ -285,6 +286,7 @@ RIGHT = [
     *[(f"counters of {bits} bits on CAN", counters(bits, bits)) for bits in (8, 12, 16)],
     ("a long drive, a gyro of much noise", apart(ns, sigma=0.08)),
     ("a clock that is 0.1 % fast", apart(drifts(0.001))),
+    ("a left wheel that is 4 % larger, and a gyro", {"ticks.csv": ticks(larger=1.04), "imu.csv": imu(), "calibration.yaml": WHEELS}),
     ("straight on, a gyro of noise", {"motion.csv": motion(w=0), "imu.csv": imu(axes=(0, 0, 0))}, "not-observable"),
     ("an accelerometer without gravity", both(imu_csv=imu(gravity=0))),
     ("exact values", {"motion.csv": motion(exact=True), "imu.csv": imu()}),

@@ -22,6 +22,7 @@
 #define LONE_ZEROS_MIN 0.2   // share of the values; a wheel that turns slowly has a few
 #define OBEYED 0.98          // a command that fits better is no command
 #define BIAS_MAX_RADPS 0.05  // of a gyro beside another sensor's turn; below, the estimators' states hold it
+#define APART_SHARE 0.005    // of the time's sum, that the way leaves: a speed that varies by 7 %, or stops
 #define DEGREES (180 / M_PI)
 #define KMH 3.6
 #define G_MPS2 9.80665
@@ -393,11 +394,42 @@ static void disagrees(const scene *s, const channel *c, const channel *other, co
       ->size = factor;
 }
 
+// The way of the wheels whose difference is this turn; NULL: it is none.
+static const channel *way_of_wheels(const channels *all, const channel *turn) {
+  const channel_kind kind = turn->kind == CHANNEL_TICKS_TURN    ? CHANNEL_TICKS_WAY
+                            : turn->kind == CHANNEL_WHEELS_TURN ? CHANNEL_WHEELS_WAY
+                                                                : CHANNEL_KINDS;
+  for (size_t i = 0; i < all->count; i++)
+    if (all->at[i].kind == kind && all->at[i].source == turn->source) return &all->at[i];
+  return NULL;
+}
+
+// Of a gyro beside the wheels' difference: what it shows at rest, rad/s, by least squares over turn, time and way. A
+// wheel that is larger than the other one turns with the way. 0 where the drive does not tell the two apart.
+static double bias_at_rest(const channel *gyro, const channel *turn, const channel *way) {
+  double m[3][4] = {{0}};
+  for (size_t i = 0; i < gyro->windows; i++) {
+    if (!has_window(gyro, i) || !has_window(turn, i) || !has_window(way, i)) continue;
+    const double row[4] = {(double)turn->sum[i], (double)way->sum[i], WINDOW_S, (double)gyro->sum[i]};
+    for (int j = 0; j < 3; j++)
+      for (int k = 0; k < 4; k++) m[j][k] += row[j] * row[k];
+  }
+  const double time_alone = m[2][2];
+  for (int j = 0; j < 3; j++) {
+    if (m[j][j] <= APART_SHARE * (j == 2 ? time_alone : 1e-12)) return 0;
+    for (int i = j + 1; i < 3; i++)
+      for (int k = 3; k >= j; k--) m[i][k] -= m[i][j] / m[j][j] * m[j][k];
+  }
+  return m[2][3] / m[2][2];
+}
+
 // Whether a gyro shows a turn where another sensor shows none, in the mean of the drive. Makes the finding.
 static int has_bias(const scene *s, const channel *c, const channel *other) {
   if (c->kind != CHANNEL_YAW_RATE || !other->has_scale || channels_are_commands(s->all, other)) return 0;
   const fit f = best_fit(c, other);
-  const double bias = bias_of(&f);
+  const channel *way = way_of_wheels(s->all, other);
+  double bias = bias_of(&f);
+  if (way && fabs(bias) > BIAS_MAX_RADPS) bias = bias_at_rest(c, other, way);
   if (!(fabs(bias) > BIAS_MAX_RADPS)) return 0;
   char name[96], of[96], fix[WM_FINDING_FIX_MAX];
   if (is_can(c, s->assembly))
