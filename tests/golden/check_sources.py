@@ -278,6 +278,8 @@ RIGHT = [
     ("sightings of posts on the map", sighted()),
     ("positions at one speed, the antenna's place unknown", {"motion.csv": motion(steady=True), "gnss.csv": gnss(sigma=0.03, steady=True), "heading.csv": headings(), "recording.yaml": RECORDING.format("motion.csv, gnss.csv, heading.csv").split("vehicle:")[0], "config.yaml": "format: waymark-config/1\nestimator: landmark_ekf\n"}, "not-observable"),
     ("bearings alone in a map of its own", mapped(), "not-observable"),
+    ("a compass as a landmark far in the north", sighted() | {"landmarks.csv": "id,x_m,y_m,z_m,sigma_m\n1000000,0,1e7,0,1\n", "sightings.csv": "t_ns,sensor,id,bearing_rad\n" + "".join(
+        f"{ns(k / 5)},eye,1000000,{math.pi / 2 - heading_at[20 * k]:.5f}\n" for k in range(99))}),
     ("bearings in a map that is given", mapped() | {"landmarks.csv": sighted()["landmarks.csv"]}),
     ("a gyro that lags by 0.3 s", both(imu_csv=imu(lag_s=0.3))),
     ("a gyro on CAN", can()),

@@ -5,13 +5,16 @@
 #include "cli/check/check.h"
 
 #define LANDMARKS_NEAR_M 0.002  // below the accuracy of any survey
+#define DIRECTION_M 1e7         // of a landmark that stands for a direction: a compass's (docs/scenario.md)
 
 static void start_among_landmarks(const wm_setup *setup, wm_findings *out) {
   double nearest_m = HUGE_VAL;
   const double *start = setup->start.p_m;
   if (isnan(start[0]) || isnan(start[1])) return;
-  for (size_t i = 0; i < setup->landmark_count; i++)
-    nearest_m = fmin(nearest_m, hypot(setup->landmarks[i].p_m[0] - start[0], setup->landmarks[i].p_m[1] - start[1]));
+  for (size_t i = 0; i < setup->landmark_count; i++) {
+    const double away_m = hypot(setup->landmarks[i].p_m[0] - start[0], setup->landmarks[i].p_m[1] - start[1]);
+    if (fabs(away_m / DIRECTION_M - 1) > 0.1) nearest_m = fmin(nearest_m, away_m);
+  }
   if (nearest_m > 500 && isfinite(nearest_m))
     wm_find(out, WM_FOUND_START_OFF_MAP, WM_SEVERITY_BAD, "landmarks",
             "both are metres in map; is one of them of another place, or in mm?",

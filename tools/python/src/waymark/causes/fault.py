@@ -60,7 +60,7 @@ class Fault:
     clock: Clock | None = None
     """What it does to stamps."""
     is_local: bool = False
-    """It touches few observations: those of two landmarks."""
+    """It touches few observations: those of two landmarks, or those until a pose is found."""
     scales: str = ""
     """The residual whose observations are multiplied by the size."""
     settled: Callable[[Size, dict[str, float]], Size] = lambda size, states: size
