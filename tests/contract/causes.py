@@ -320,8 +320,11 @@ def judge(options, robot, mistake, seed, folder):
     causes = found["causes"]
     row["named"] = "; ".join(f"{c['name']} {c['size']}" for c in causes) or ("either: " + " | ".join(c["name"] for c in found["undecided"]) if found["undecided"] else "-")
     row["drives"] = found["drives"]
-    row["is_wrong"] = bool(causes) and causes[0]["name"] != name
-    is_named = [c["name"] for c in causes] == [name] and is_size(name, causes[0]["size"], size)
+    # A short drive shows a plan's scale, and not about which place it is: the fix lists each.
+    names = ["scale of the plan" if c["name"].startswith("scale of the plan") else c["name"] for c in causes]
+    wanted = "scale of the plan" if str(name).startswith("scale of the plan") else name
+    row["is_wrong"] = bool(causes) and names[0] != wanted
+    is_named = names == [wanted] and is_size(name, causes[0]["size"], size)
     row["is_right"] = not causes if name is None else is_named or (row["is_harmless"] and not causes)
     if fixed.is_dir():
         corrected = fixed / config.name

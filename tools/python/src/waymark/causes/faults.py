@@ -259,11 +259,17 @@ def _maps(robot: Robot) -> Iterator[Fault]:
 
     start = robot.vehicle.get("initial_pose") or {}
     fixed = {"": (), " and its origin": (0.0, 0.0)} | ({" about the start": (start["x_m"], start["y_m"])} if {"x_m", "y_m"} <= set(start) else {})
+
+    def elsewhere(about: Sequence[float]) -> Callable[[Size], list[list[Edit]]]:
+        """A short drive shows the scale, not about which place it is."""
+        return lambda size: [plan(size, other) for other in fixed.values() if other != about]
+
     for words, about in fixed.items():
         yield Fault(f"scale of the plan{words}", tuple((f,) for f in (*NEAR, *(() if about else (0.5, 2, 0.1, 10, 0.0254)))), lambda s, a=about: plan(s, a),
                     lambda s: f"the floor plan is {factor_words(s[0])}", step=(0.02,), smallest=(0.003,), is_log=True,
                     is_possible=lambda s: 0.001 <= resolution * s[0] <= 1 and abs(math.log(s[0])) > 0.006, group="scale of the plan",
-                    settled=lambda s, states: (s[0] / states.get("motion.speed_scale", 1.0),))
+                    settled=lambda s, states: (s[0] / states.get("motion.speed_scale", 1.0),),
+                    other_places=elsewhere(about))
     pictures = [robot.plan.get("image"), *((robot.plan.get("layers") or {}).get(name) for name in ("edges", "drivable"))]
     names = sorted({f"map/{p}" for p in pictures if isinstance(p, str) and "/" not in p})
     for way in TURNS if names else ():
