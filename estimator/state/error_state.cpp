@@ -175,10 +175,11 @@ double error_state::assigned(const sparse_row &by, int first, int count, int k,
   return sum;
 }
 
+// Flattened: it is the covariance's part of each motion.
 // In place, one row after the other: a row of the block takes from the rows behind it as they were. T = F P; its part
 // beyond the block is P'. Of states before the block the covariance is a column.
-void error_state::assign(int first, int count, const sparse_row *rows, const double *noise, int stride,
-                         const double *values) {
+[[gnu::flatten]] void error_state::assign(int first, int count, const sparse_row *rows, const double *noise, int stride,
+                                          const double *values) {
   touch();
   half_covariance cov = p();
   const int begin = half_covariance::first(first), end = even(first + count);
