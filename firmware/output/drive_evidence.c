@@ -29,7 +29,7 @@
 #define OUTLIERS_BAD 0.02
 #define BIASED_LOST_MAX 0.3  // share of the time lost beyond which a bias may come from wrong poses
 #define MAP_SCALE 0.03       // beyond this neither a tyre nor a sensor is off, where the two agree
-#define EXPLAINED_MIN 0.6    // of the edge points of the last metre; of good drives 0.85 and more
+#define EXPLAINED_MIN 0.6    // of the edge points of the last metre; a crowded room has fewer as well
 #define FACTOR_BAD 3.0       // of a sensor's stated sigma
 // Mean of the innovations over their sigma. Errors that last are correlated, so a tenth of a sigma is usual.
 #define BIAS_NOTE 0.5
@@ -523,7 +523,7 @@ static void plan_scale(const wm_assembly *assembly, const wm_health *health, wm_
         ->size = exp(way);
   }
   if (plan && explained && (double)explained->count < 1e3 * EXPLAINED_MIN)
-    wm_find(out, WM_FOUND_MAP_IMPLAUSIBLE, WM_SEVERITY_BAD, "map",
+    wm_find(out, WM_FOUND_MAP_IMPLAUSIBLE, WM_SEVERITY_NOTE, "map",
             "look at its scale, at the camera's mounting, and at what stands there that it doesn't have",
             "at the end %" PRIu64 " of 100 edge points are on its edges", explained->count / 10)
         ->size = (double)explained->count * 1e-3;
