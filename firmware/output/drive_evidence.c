@@ -29,7 +29,8 @@
 #define OUTLIERS_BAD 0.02
 #define BIASED_LOST_MAX 0.3  // share of the time lost beyond which a bias may come from wrong poses
 #define MAP_SCALE 0.03       // beyond this neither a tyre nor a sensor is off, where the two agree
-#define EXPLAINED_MIN 0.6    // of the edge points of the last metre; a crowded room has fewer as well
+#define EXPLAINED_MIN 0.6    // of the edge points of the last metre; of good drives 0.85 and more
+#define EXPLAINED_SCANS 50   // with fewer scans one place that is crowded is all of the drive
 #define FACTOR_BAD 3.0       // of a sensor's stated sigma
 // Mean of the innovations over their sigma. Errors that last are correlated, so a tenth of a sigma is usual.
 #define BIAS_NOTE 0.5
@@ -501,7 +502,8 @@ static double height_of(const wm_assembly *assembly, const char *state) {
 
 // Wheels and the height of a camera that sees the floor agree that the plan has other lengths than theirs. And how much
 // of what was seen last is on the plan.
-static void plan_scale(const wm_assembly *assembly, const wm_health *health, wm_findings *out) {
+static void plan_scale(const drive_evidence *self, const wm_assembly *assembly, const wm_health *health,
+                       wm_findings *out) {
   const wm_raster *plan = assembly->setup.map;
   const wm_counter *explained = wm_health_counter(health, WM_COUNTER_EXPLAINED_PERMILLE);
   double way = 0, height = 0;
@@ -522,8 +524,12 @@ static void plan_scale(const wm_assembly *assembly, const wm_health *health, wm_
             100 * fabs(way), 100 * fabs(height), way > 0 ? "large" : "small")
         ->size = exp(way);
   }
-  if (plan && explained && (double)explained->count < 1e3 * EXPLAINED_MIN)
-    wm_find(out, WM_FOUND_MAP_IMPLAUSIBLE, WM_SEVERITY_NOTE, "map",
+  uint64_t scans = 0;
+  for (size_t i = 0; i < assembly->source_count; i++)
+    if (assembly->sources[i].kinds & WM_EVENT_BIT(WM_EVENT_POINTS))
+      scans += self->residuals[i][WM_RESIDUAL_RANGE].fused;
+  if (plan && explained && scans >= EXPLAINED_SCANS && (double)explained->count < 1e3 * EXPLAINED_MIN)
+    wm_find(out, WM_FOUND_MAP_IMPLAUSIBLE, WM_SEVERITY_BAD, "map",
             "look at its scale, at the camera's mounting, and at what stands there that it doesn't have",
             "at the end %" PRIu64 " of 100 edge points are on its edges", explained->count / 10)
         ->size = (double)explained->count * 1e-3;
@@ -542,6 +548,6 @@ void evidence_judge(const drive_evidence *self, const wm_assembly *assembly, con
   unknown(self, out);
   calibration(assembly, health, out);
   map_scale(assembly, health, out);
-  plan_scale(assembly, health, out);
+  plan_scale(self, assembly, health, out);
   map_unused(assembly, out);
 }

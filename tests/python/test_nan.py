@@ -106,8 +106,8 @@ CASES = {
 }
 # Functions of libwaymark.so through which numbers go, and where a NaN in each is tried. "out": they give them.
 C_FUNCTIONS = {"waymark_push_row": "tests/unit/firmware/test_library_nan.c", "waymark_push_event": "tests/unit/firmware/test_library_nan.c",
-               "waymark_replay": "here", "waymark_pose": "out", "waymark_health": "out", "waymark_log_next": "out", "waymark_read_pose": "out",
-               "waymark_read_health": "out", "waymark_read_innovation": "out", "waymark_parameters": "out"}
+               "waymark_replay": "here", "waymark_pose": "out", "waymark_bound": "out", "waymark_health": "out", "waymark_log_next": "out", "waymark_read_pose": "out",
+               "waymark_read_bound": "out", "waymark_read_health": "out", "waymark_read_innovation": "out", "waymark_parameters": "out"}
 
 
 def has_numbers(kind, seen=()):
