@@ -15,6 +15,7 @@ constexpr double kSteeringMost_rad = 200.0;  // of a steering wheel: 32 turns
 constexpr double kActuatorMost_m = 10.0;
 constexpr double kAccelerationMost_mps2 = 2000.0;  // 200 g: the largest range of accelerometers of vehicles
 constexpr double kTicksMost = 1e15;                // doubles still count singly there
+constexpr double kFlicker_ticks = 3.0;             // of the wheels' difference at rest: each encoder may sit on an edge
 constexpr double kRoadWheelMost_rad = 1.5;         // tan is finite; no wheel is turned across
 
 // Sensors without a sign give zero errors of either; the largest seen is 0.05 m/s. Not swept.
@@ -62,6 +63,7 @@ void motion_front_end::init(const wm_motion_params *params, const wm_wheels *whe
   hold_max_ns_ = wm_ns_from_seconds(params->hold_max_s);
   position_m2_ = std::numeric_limits<double>::infinity();
   now_ns_ = newest_ns_ = fed_ns_ = wrapped_ns_ = still_since_ns_ = WM_TIME_NONE;
+  still_apart_m_ = 0.0;
   refused_since_ns_ = last_refusal_ns_ = yaw_watch_.since_ns = yaw_watch_.moved_ns = WM_TIME_NONE;
   for (wm_time_ns &stamp : stamp_ns_) stamp = WM_TIME_NONE;
   for (wm_time_ns &stamp : message_ns_) stamp = WM_TIME_NONE;
@@ -181,11 +183,11 @@ bool motion_front_end::twist_gives_speed() const {
          now_ns_ - twist_sample_ns_ <= hold_max_ns_;
 }
 
-// The newest speed is below the threshold; of a twist also its turn rate, as it may turn on the spot. So may a robot
-// whose front wheels roll.
+// The newest speed is below the threshold, and that of each wheel; of a twist also its turn rate: a robot that turns on
+// the spot does not stand.
 bool motion_front_end::is_still(double speed_mps) const {
-  const double rolled_mps = speed_source_ == kFrontWheels ? front_mps_ : speed_mps;
-  if (speed_source_ != kOfTwist) return std::fabs(rolled_mps) < params_->standstill_speed_mps;
+  if (speed_source_ != kOfTwist)
+    return std::fabs(speed_mps) < params_->standstill_speed_mps && wheel_mps_ < params_->standstill_speed_mps;
   return speed_of(twist_) < params_->standstill_speed_mps && std::fabs(twist_.w) < params_->standstill_yaw_rate_radps;
 }
 
@@ -317,11 +319,14 @@ double motion_front_end::behind_front_wheels(double front_mps) const {
 // The rear wheels' mean is base_link's own speed; ticks come next (no rounding), then the dashboard's speed, then the
 // front wheels. A source that fell silent yields to the next.
 bool motion_front_end::read_speed(double *speed_mps) {
-  const auto mean_of = [this](int left, int right, double *out) {
-    const wm_time_ns now = now_ns_;
-    const bool l = seen(left) && !silent(left, now), r = seen(right) && !silent(right, now);
-    if (l || r) *out = l && r ? 0.5 * (value_[left] + value_[right]) : value_[l ? left : right];
-    return l || r;
+  double wheel_mps = 0.0;
+  const auto mean_of = [&](int left, int right, double *out) {
+    const bool l = seen(left) && !silent(left, now_ns_), r = seen(right) && !silent(right, now_ns_);
+    if (!l && !r) return false;
+    const double one = value_[l ? left : right], other = value_[r ? right : left];
+    *out = 0.5 * (one + other);
+    wheel_mps = larger(std::fabs(one), std::fabs(other));
+    return true;
   };
   double speed = 0.0;
   uint8_t source = kNone;
@@ -329,6 +334,7 @@ bool motion_front_end::read_speed(double *speed_mps) {
     source = kRearWheels;
   } else if (counts_ticks() && !(silent(WM_Q_WHEEL_TICKS_LEFT, now_ns_) && silent(WM_Q_WHEEL_TICKS_RIGHT, now_ns_))) {
     speed = mean_of_wheels(wheel_[0].speed_mps, wheel_[1].speed_mps);
+    wheel_mps = larger(std::fabs(wheel_[0].speed_mps), std::fabs(wheel_[1].speed_mps));
     source = kTicksMean;
   } else if (mean_of(WM_Q_VEHICLE_SPEED, WM_Q_VEHICLE_SPEED, &speed)) {
     source = kVehicleSpeed;
@@ -347,7 +353,8 @@ bool motion_front_end::read_speed(double *speed_mps) {
     speed_is_signed_ |= speed < kSignedBelow_mps;
     speed = by_gear(speed, speed_is_signed_);
   }
-  if (source == kFrontWheels) speed = behind_front_wheels(front_mps_ = speed);
+  wheel_mps_ = wheel_mps;
+  if (source == kFrontWheels) speed = behind_front_wheels(speed);
   *speed_mps = speed;
   return true;
 }
@@ -380,7 +387,14 @@ bool motion_front_end::watch_standstill(wm_time_ns t_ns, bool still) {
     still_since_ns_ = WM_TIME_NONE;
     return false;
   }
-  if (still_since_ns_ == WM_TIME_NONE) still_since_ns_ = t_ns;
+  const double apart_m = counts_ticks() ? wheel_[1].position_m - wheel_[0].position_m : 0.0;
+  const double tick_m = kTwoPi * wheels_.radius_m / wheels_.ticks_per_turn;
+  // A slow turn adds up.
+  const bool turned = counts_ticks() && std::fabs(apart_m - still_apart_m_) > kFlicker_ticks * tick_m;
+  if (still_since_ns_ == WM_TIME_NONE || turned) {
+    still_since_ns_ = t_ns;
+    still_apart_m_ = apart_m;
+  }
   return stands(t_ns);
 }
 

@@ -240,12 +240,13 @@ class motion_front_end {
   double change2_[3];           // of a holonomic twist: mean square of the changes less the samples' noise
   wm_time_ns sampled_ns_[2];    // newest sample of the speed and of the turn rate that the model uses
   wm_time_ns still_since_ns_;   // speed below the threshold since; WM_TIME_NONE while moving
+  double still_apart_m_;        // the wheels' difference then
   // While the gyro's value has the same bits.
   struct yaw_watch : repeated_value {
     wm_time_ns moved_ns;   // the newest sample at which the robot moved
     double explained_rad;  // of the turn by the other sensor less the gyro's, by that sensor's errors
   } yaw_watch_;
-  double front_mps_;         // newest speed of the front wheels, along them
+  double wheel_mps_;         // newest speed of the faster wheel, along it
   double missed_turn_rad2_;  // variance of the heading for the next input: what the gyro has missed
   double stand_in_rad_;      // error of the heading since the wheels' difference stands in for the gyro
   uint64_t outliers_;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Dead reckoning as the predictor uses it: exact arcs, a short memory, and a pose carried from then to now.
+#include <cmath>
 #include <cstdlib>
 #include <cstring>
 
@@ -53,6 +54,19 @@ TEST(test_extrapolates_with_the_held_twist_but_not_for_ever) {
   feed(make::twist(1, 1.0, 0.0));
   assert_pose(1.5, 0, 0, pose_at(1.5));
   assert_pose(1.0 + params.hold_max_s, 0, 0, pose_at(60));
+}
+
+// The mean of the two wheels stands. A slow turn is one of ticks that add up.
+TEST(test_a_robot_that_turns_on_the_spot_does_not_stand) {
+  for (const double rate : {0.05, 1.0}) {
+    start(make::two_wheels());
+    for (int k = 0; k <= 500; k++) {
+      const double t = 0.02 * k, ticks = std::floor(rate * t * 0.25 / (2 * M_PI * 0.1) * 1000);
+      feed(make::quantities(t,
+                            {{WM_Q_WHEEL_TICKS_LEFT, -ticks}, {WM_Q_WHEEL_TICKS_RIGHT, ticks}, {WM_Q_YAW_RATE, rate}}));
+    }
+    TEST_ASSERT_DOUBLE_WITHIN(0.01, 0, wm::wrap(pose_at(10).heading_rad - 10 * rate));
+  }
 }
 
 TEST(test_an_estimate_without_a_time_is_carried_nowhere) {
