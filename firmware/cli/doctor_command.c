@@ -41,6 +41,7 @@ static int look(const wm_config *config, double seconds, int as_json) {
   doctor_clocks("", &found);
   doctor_power("", &found);
   doctor_limits(&found);
+  doctor_group("", &found);
   doctor_lcm(lcm_connect_url(config ? config->lcm_url : ""), &found);
   doctor_can("", config, &found);
   int wanted, granted = wm_can_queue_bytes(&wanted);

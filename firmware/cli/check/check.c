@@ -21,7 +21,9 @@ static void messages(const wm_config *config, wm_findings *out) {
   if (p->commands_lcm || devices->sightings_by_lcm || devices->lcm_count > 0)
     wm_find(
         out, WM_FOUND_OPEN_NETWORK, WM_SEVERITY_NOTE, "commands",
-        "commands.socket, which programs of this computer reach alone, or a firewall rule for LCM's port",
+        p->commands_lcm
+            ? "commands.socket, which programs of this computer reach alone, or a firewall rule for LCM's port"
+            : "a firewall rule for LCM's port (docs/live.md has one)",
         "%s taken over LCM: any program that reaches its UDP port (7667 by default), on this computer or on a network "
         "that it is in, can move the pose",
         p->commands_lcm             ? "commands are"

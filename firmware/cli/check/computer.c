@@ -22,7 +22,10 @@ static size_t available_bytes(void) {
 }
 
 static void memory(const wm_config *config, size_t needed, wm_findings *out) {
+  double of_cpu, of_group;
+  doctor_group_limits("", &of_cpu, &of_group);
   size_t available = available_bytes();
+  if (of_group < (double)available) available = (size_t)of_group;
   if (available > 0 && needed > available / 10 * 9)
     wm_find(out, WM_FOUND_COMPUTER_MEMORY, WM_SEVERITY_BAD, "memory",
             "fewer particles or landmarks in the configuration, or a smaller map",

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Kernel, clocks, power, limits.
+// Kernel, clocks, power, limits, control group.
 #include <dirent.h>
 #include <errno.h>
+#include <math.h>
 #include <sched.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -139,4 +140,47 @@ void doctor_limits(wm_findings *out) {
             "LimitMEMLOCK=infinity in the systemd unit (config/waymark.service has it)",
             "only %llu kB may be locked: page faults may stop the estimator",
             (unsigned long long)(memory.rlim_cur >> 10));
+}
+
+// ── control group (v2) of a container or a service ──────────────────────────────────────────────────────────────────
+
+// Of this group's file, "max" or numbers; 0: none.
+static int limit_of(const char *root, const char *group, const char *file, double out[2]) {
+  char path[400], text[64], *end;
+  (void)snprintf(path, sizeof path, "/sys/fs/cgroup%s/%s", group, file);
+  if (!line_of(root, path, text, sizeof text)) return 0;
+  out[0] = strtod(text, &end);
+  if (end == text) return 0;
+  out[1] = strtod(end, NULL);
+  return 1;
+}
+
+void doctor_group_limits(const char *root, double *cpus, double *memory_bytes) {
+  char group[256], *path = group;
+  double limit[2];
+  *cpus = *memory_bytes = HUGE_VAL;
+  if (!line_of(root, "/proc/self/cgroup", group, sizeof group) || strncmp(group, "0::", 3) != 0) return;
+  path += 3;
+  for (;;) {  // each group's limit holds for those within it
+    if (limit_of(root, path, "cpu.max", limit) && limit[1] > 0) *cpus = fmin(*cpus, limit[0] / limit[1]);
+    if (limit_of(root, path, "memory.max", limit)) *memory_bytes = fmin(*memory_bytes, limit[0]);
+    char *last = strrchr(path, '/');
+    if (!last) return;
+    *last = '\0';
+  }
+}
+
+void doctor_group(const char *root, wm_findings *out) {
+  double cpus, bytes;
+  doctor_group_limits(root, &cpus, &bytes);
+  if (isfinite(cpus))
+    wm_find(out, WM_FOUND_COMPUTER_REALTIME, WM_SEVERITY_BAD, "processor quota",
+            "no quota: `docker run` without --cpus (--cpuset-cpus instead), the unit without CPUQuota=",
+            "this control group may take %.2g CPUs on average: when they are used up, all threads stop for the rest of "
+            "each period, 100 ms by default",
+            cpus);
+  if (isfinite(bytes))
+    wm_find(out, WM_FOUND_COMPUTER_MEMORY, WM_SEVERITY_NOTE, "memory limit",
+            "enough for what `waymark check CONFIG` names, and for files",
+            "this control group may have %.0f MB: a run that takes more is killed", bytes * 1e-6);
 }

@@ -12,7 +12,10 @@ void doctor_kernel(const char *root, wm_findings *out);  // preemption, real-tim
 void doctor_clocks(const char *root, wm_findings *out);  // clock source, synchronisation
 void doctor_power(const char *root, wm_findings *out);   // governors, temperatures
 void doctor_limits(wm_findings *out);                    // real-time priority, locked memory
-void doctor_lcm(const char *url, wm_findings *out);      // a route for messages, and their reach
+// Limits of this process's control group (v2) and of those around it; infinite where there is none.
+void doctor_group_limits(const char *root, double *cpus, double *memory_bytes);
+void doctor_group(const char *root, wm_findings *out);
+void doctor_lcm(const char *url, wm_findings *out);  // a route for messages, and their reach
 void doctor_can(const char *root, const wm_config *config, wm_findings *out);
 // For the requested and granted bytes (wm_can_queue_bytes) of a CAN socket's queue.
 void doctor_can_queue(int wanted, int granted, wm_findings *out);

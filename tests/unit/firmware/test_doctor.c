@@ -51,7 +51,8 @@ static wm_finding_id id_of(const char *what) {
               {"clock", WM_FOUND_COMPUTER_CLOCK},
               {"governor", WM_FOUND_COMPUTER_SLOW},
               {"temperature", WM_FOUND_COMPUTER_SLOW},
-              {"memory lock", WM_FOUND_COMPUTER_MEMORY},
+              {"memory l", WM_FOUND_COMPUTER_MEMORY},
+              {"processor quota", WM_FOUND_COMPUTER_REALTIME},
               {"can ", WM_FOUND_CAN_INTERFACE},
               {"camera ", WM_FOUND_CAMERA_DEVICE},
               {"lcm", WM_FOUND_LCM_ROUTE}};
@@ -70,6 +71,22 @@ static void expect(const char *what, wm_severity level, const char *text) {
   TEST_ASSERT_EQUAL_MESSAGE(level == WM_SEVERITY_GOOD, f->fix[0] == '\0', f->fix);
 }
 
+TEST(limits_of_the_control_group_and_of_those_around_it) {
+  put("/proc/self/cgroup", "0::/robot/waymark.service\n");
+  put("/sys/fs/cgroup/robot/waymark.service/cpu.max", "max 100000\n");
+  put("/sys/fs/cgroup/robot/waymark.service/memory.max", "64000000\n");
+  put("/sys/fs/cgroup/robot/memory.max", "max\n");
+  doctor_group(root, &found);
+  TEST_ASSERT_EQUAL_size_t(1, found.count);
+  expect("memory limit", WM_SEVERITY_NOTE, "may have 64 MB");
+  put("/sys/fs/cgroup/robot/cpu.max", "20000 100000\n");
+  put("/sys/fs/cgroup/memory.max", "20000000\n");  // a container's own root
+  memset(&found, 0, sizeof found);
+  doctor_group(root, &found);
+  expect("processor quota", WM_SEVERITY_BAD, "0.2 CPUs");
+  expect("memory limit", WM_SEVERITY_NOTE, "may have 20 MB");
+}
+
 TEST(a_good_computer_is_found_good) {
   put("/sys/kernel/realtime", "1\n");
   put("/proc/sys/kernel/sched_rt_runtime_us", "950000\n");
@@ -77,6 +94,7 @@ TEST(a_good_computer_is_found_good) {
   put("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor", "performance\n");
   put("/sys/class/thermal/thermal_zone0/temp", "45000\n");
   doctor_kernel(root, &found);
+  doctor_group(root, &found);
   doctor_clocks(root, &found);
   doctor_power(root, &found);
   expect("kernel", WM_SEVERITY_GOOD, "PREEMPT_RT");
