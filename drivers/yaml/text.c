@@ -117,7 +117,7 @@ const char *wm_word_nearest(const char *word, const char *const *known) {
   int best = 3;
   for (; *known; known++) {
     int distance = wm_word_distance(word, *known);
-    if (distance < best && (size_t)distance < strlen(word)) {
+    if (distance < best && 2 * (size_t)distance < strlen(word)) {  // most letters are the same
       best = distance;
       nearest = *known;
     }
