@@ -9,13 +9,14 @@
 #include "waymark/event_fields.h"
 #include "waymark/streams.h"
 
-// Limits of plausible values, as of events (event_fields.h).
-#define SPEED WM_SPEED_LIMITS
-#define RATE WM_RATE_LIMITS
+// Limits of what is read. Where they are wider than those of events (event_fields.h), a table in another unit is still
+// read, and `check` names the unit.
+#define SPEED -1000.0, 1000.0
+#define RATE -1000.0, 1000.0
 #define ACCELERATION -10000.0, 10000.0
 #define TEMPERATURE -273.15, 1000.0
 #define ANGLE WM_ANGLE_LIMITS
-#define PLACE WM_PLACE_LIMITS
+#define PLACE -1e8, 1e8
 #define SIGMA WM_SIGMA_LIMITS
 #define PIXEL WM_PIXEL_LIMITS
 #define VARIANCE 0.0, 1e12
@@ -472,5 +473,5 @@ wm_status wm_stream_event(const wm_stream *self, const wm_stream_row *row, const
   out->arrival_ns = row->arrival_ns;
   out->kind = (uint8_t)self->event;
   const char *problem = self->fill(&context, &values, out);
-  return problem ? wm_fail(err, WM_BAD_DATA, "%s", problem) : WM_OK;
+  return problem ? wm_fail(err, WM_BAD_DATA, "%s", problem) : wm_event_check(out, err);
 }

@@ -10,13 +10,8 @@
 namespace wm {
 namespace {
 
-// Beyond these, as beyond kSpeedMost_mps and kRateMost_radps, a value is a decoding fault.
-constexpr double kSteeringMost_rad = 200.0;  // of a steering wheel: 32 turns
-constexpr double kActuatorMost_m = 10.0;
-constexpr double kAccelerationMost_mps2 = 2000.0;  // 200 g: the largest range of accelerometers of vehicles
-constexpr double kTicksMost = 1e15;                // doubles still count singly there
-constexpr double kFlicker_ticks = 3.0;             // of the wheels' difference at rest: each encoder may sit on an edge
-constexpr double kRoadWheelMost_rad = 1.5;         // tan is finite; no wheel is turned across
+constexpr double kFlicker_ticks = 3.0;      // of the wheels' difference at rest: each encoder may sit on an edge
+constexpr double kRoadWheelMost_rad = 1.5;  // tan is finite; no wheel is turned across
 
 // Sensors without a sign give zero errors of either; the largest seen is 0.05 m/s. Not swept.
 constexpr double kSignedBelow_mps = -0.1;
@@ -28,24 +23,6 @@ constexpr double kOtherTurnScale = 0.2, kOtherSteeringOffset_rad = 0.02;
 // is then its second source (wheel_heading); steering knows less of the turn than the rear wheels' ticks.
 constexpr uint8_t kPreferred[] = {WM_MOTION_INCREMENTS, WM_MOTION_SPEED_YAW_RATE, WM_MOTION_TICKS, WM_MOTION_ACKERMANN,
                                   WM_MOTION_TWIST};
-
-double limit_of(int quantity) {
-  switch (quantity) {
-    case WM_Q_WHEEL_TICKS_LEFT:
-    case WM_Q_WHEEL_TICKS_RIGHT: return kTicksMost;
-    case WM_Q_ROLL_RATE:
-    case WM_Q_PITCH_RATE:
-    case WM_Q_YAW_RATE: return kRateMost_radps;
-    case WM_Q_ACCELERATION_X:
-    case WM_Q_ACCELERATION_Y:
-    case WM_Q_ACCELERATION_Z: return kAccelerationMost_mps2;
-    case WM_Q_STEERING_WHEEL:
-    case WM_Q_ROAD_WHEEL: return kSteeringMost_rad;
-    case WM_Q_STEERING_ACTUATOR: return kActuatorMost_m;
-    case WM_Q_GEAR: return 1.0;
-    default: return kSpeedMost_mps;
-  }
-}
 
 wm_status check_value(double value, double limit) {
   if (!finite(value)) return WM_NOT_FINITE;
@@ -85,7 +62,7 @@ wm_status motion_front_end::check(const wm_event &event) const {
       const wm_quantities &q = event.as.quantities;
       if (q.count > WM_QUANTITIES_MAX) return WM_OUT_OF_RANGE;
       for (int i = 0; i < q.count && status == WM_OK; i++)
-        status = q.id[i] < WM_Q_COUNT ? check_value(q.value[i], limit_of(q.id[i])) : WM_OUT_OF_RANGE;
+        status = q.id[i] < WM_Q_COUNT ? check_value(q.value[i], wm_quantity_most(q.id[i])) : WM_OUT_OF_RANGE;
       break;
     }
     case WM_EVENT_TWIST2:

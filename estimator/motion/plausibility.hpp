@@ -7,13 +7,14 @@
 
 #include <cstdint>
 
+#include "waymark/event_fields.h"
 #include "waymark/time.h"
 
 namespace wm {
 
 // Bounds of land robots' motion.
-inline constexpr double kSpeedMost_mps = 150.0;  // beyond is a decoding fault
-inline constexpr double kRateMost_radps = 50.0;
+inline constexpr double kSpeedMost_mps = WM_SPEED_MOST_MPS;  // beyond is a decoding fault
+inline constexpr double kRateMost_radps = WM_RATE_MOST_RADPS;
 // Change from one sample to the next that needs no time: commands, coarse sensors, noise. Beyond what 15 m/s2 and 30
 // rad/s2 allow, the largest in 35 recordings are 1.9 m/s (a late count) and 3.9 rad/s (a differentiated heading).
 inline constexpr double kSpeedStep_mps = 3.0;

@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "math/elementary.hpp"
-#include "waymark/event.h"
+#include "waymark/event_fields.h"
 #include "waymark/status.h"
 
 namespace wm {
@@ -15,10 +15,8 @@ namespace wm {
 inline constexpr double kMaxRange_m = 1e6, kMaxSigma = 1e6;  // beyond, a number is an error of the sender
 inline constexpr double kMaxAngle_rad = 100.0;               // unwrapped angles may have turned a few times
 
-inline constexpr double kMaxMarker_m = 1e4;           // the same of a marker's place in the sensor's frame
-inline constexpr double kMaxPosition_m = 1e7;         // beyond, a coordinate is an error of the sender
-inline constexpr double kMaxHeadingSigma_rad = 10.0;  // of a stated pose; pi is an unknown heading
-inline constexpr double kUnitNorm = 0.01;             // a quaternion's squared length may differ from 1 by this
+inline constexpr double kMaxMarker_m = WM_MARKER_MOST_M, kMaxPosition_m = WM_PLACE_MOST_M;
+inline constexpr double kMaxHeadingSigma_rad = WM_HEADING_SIGMA_MOST_RAD, kUnitNorm = WM_UNIT_NORM;
 
 // NaN: the sensor's own sigma.
 inline bool is_sigma(double value) { return std::isnan(value) || (value > 0.0 && value < kMaxSigma); }

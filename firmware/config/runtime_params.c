@@ -35,7 +35,7 @@ static const wm_param kParams[] = {
     F64("publish.useless_m", publish_useless_m, 1.0, 1e-3, 1000,
         "m. Sigma of the position above which a pose is useless: health has the metres and seconds of dead reckoning "
         "until then."),
-    F64("integrity.risk_per_pose", integrity_risk_per_pose, 1e-4, 1e-7, 0.1,
+    F64("integrity.risk_per_pose", integrity_risk_per_pose, 1e-4, 1e-4, 0.1,
         "Probability that a pose is off by more than its bound: 1e-4 is the smallest that drives could test "
         "(docs/usable.md)."),
     F64("integrity.alert_limit_m", integrity_alert_limit_m, 0, 0, 1e6,

@@ -52,6 +52,12 @@ static void about_lateness(const wm_source_health *s, wm_findings *out) {
   f->size = s->received > 0 ? (double)s->late / (double)s->received : 0;
 }
 
+static uint64_t refused_by_estimator(const wm_source_health *s) {
+  uint64_t sum = 0;
+  for (size_t i = 0; i < WM_STATUS_COUNT; i++) sum += s->refused[i];
+  return sum;
+}
+
 static void about_losses(const wm_source_health *s, const char *reason, wm_findings *out) {
   const struct {
     wm_finding_id id;
@@ -63,6 +69,7 @@ static void about_losses(const wm_source_health *s, const char *reason, wm_findi
       {WM_FOUND_DATA_MISSING, s->lost, "missing by the sender's own count (pictures: by their stamps)", NULL},
       {WM_FOUND_ROWS_SKIPPED, s->malformed, "could not be read", NULL},
       {WM_FOUND_ROWS_SKIPPED, s->not_finite, "were no finite numbers, or outside of what can be", NULL},
+      {WM_FOUND_ROWS_SKIPPED, refused_by_estimator(s), "were of no use to the estimator", NULL},
       {WM_FOUND_ROWS_DISORDERED, s->out_of_order, "were older than the one before", NULL},
       {WM_FOUND_ROWS_DISORDERED, s->duplicates, "were sent twice and fused once",
        "look for two programs that send or record the same data"},
@@ -82,6 +89,7 @@ static void about_losses(const wm_source_health *s, const char *reason, wm_findi
             kinds[i].count, all, kinds[i].what, is_refused && reason[0] ? "; the first: " : "",
             is_refused ? reason : "")
         ->size = all > 0 ? (double)kinds[i].count / (double)all : 0;
+    if (is_refused) reason = "";  // it is of one of them
   }
 }
 

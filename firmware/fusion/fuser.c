@@ -117,6 +117,10 @@ static void write_row(wm_fuser *self) {
   self->output.put(self->output.context, WM_OUTPUT_POSE, &estimate, sizeof estimate);
 }
 
+static void note_unused(wm_fuser_counts *counts, wm_status status, wm_time_ns t_ns, int32_t landmark_id) {
+  if (counts->first_unused.status == WM_OK) counts->first_unused = (wm_unused_event){status, t_ns, landmark_id};
+}
+
 // The monitor gets each event that the estimator took, with its records.
 static void monitor(wm_fuser *self, const wm_event *event, const wm_innovation *records, size_t count) {
   if (!wm_monitor_take(&self->monitor, event, records, count)) return;
@@ -155,6 +159,8 @@ static wm_status correct(wm_fuser *self, const wm_event *event) {
     counts->fused++;
   } else {
     counts->rejected[out[0].verdict]++;
+    if (out[0].verdict == WM_REJECTED_UNKNOWN_ID && out[0].landmark_id >= 0)
+      note_unused(counts, WM_NOT_FOUND, event->t_ns, out[0].landmark_id);
   }
   return WM_OK;
 }
@@ -196,21 +202,17 @@ void wm_fuser_feed(wm_fuser *self, const wm_event *event) {
   self->events++;
 
   wm_fuser_counts *counts = &self->counts[event->source];
-  if (wm_event_is_motion(event)) {
-    wm_status status = predict(self, event);
-    if (status != WM_OK) {
-      counts->refused[status]++;
-      return;
-    }
-    counts->fused++;
-  } else {
-    wm_status status = correct(self, event);
-    if (status != WM_OK) {
-      counts->refused[status]++;
-      return;
-    }
-    write_particles(self, event);
+  const int is_motion = wm_event_is_motion(event);
+  const wm_status status = is_motion ? predict(self, event) : correct(self, event);
+  if (status != WM_OK) {
+    counts->refused[status]++;
+    note_unused(counts, status, event->t_ns, -1);
+    return;
   }
+  if (is_motion)
+    counts->fused++;
+  else
+    write_particles(self, event);
   if (wm_driving_is(&self->driving, event)) self->row_ns = event->t_ns;
   self->until_ns = event->t_ns;
 }

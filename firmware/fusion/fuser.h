@@ -28,7 +28,15 @@ typedef struct wm_driving {
 wm_driving wm_driving_choose(uint32_t kinds, uint32_t quantities);
 int wm_driving_is(const wm_driving *driving, const wm_event *event);
 
+// A source's first event that the estimator could not use.
+typedef struct wm_unused_event {
+  wm_status status;  // WM_OK: none yet; WM_NOT_FOUND: its identity is not in the map
+  wm_time_ns t_ns;
+  int32_t landmark_id;
+} wm_unused_event;
+
 typedef struct wm_fuser_counts {
+  wm_unused_event first_unused;
   uint64_t fused;
   uint64_t rejected[WM_VERDICT_COUNT];
   uint64_t refused[WM_STATUS_COUNT];

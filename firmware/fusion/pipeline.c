@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fusion/pipeline.h"
 
+#include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -120,6 +121,26 @@ void wm_pipeline_finish(wm_pipeline *self) {
   wm_fuser_finish(&self->fuser);
 }
 
+const char *wm_pipeline_unused(const wm_pipeline *self, size_t source, char text[WM_HEALTH_REASON_MAX]) {
+  const wm_unused_event *first = &self->fuser.counts[source].first_unused;
+  const char *name = self->assembly->sources[source].name;
+  const double t_s = wm_seconds_between(0, first->t_ns);
+  if (first->status == WM_OK)
+    text[0] = '\0';
+  else if (first->status == WM_NOT_FOUND)
+    (void)snprintf(text, WM_HEALTH_REASON_MAX,
+                   "%.40s: landmark %" PRId32
+                   ", seen at %.3f s, is not in the map: is it the map of this place, with "
+                   "the numbers that the sensor gives?",
+                   name, first->landmark_id, t_s);
+  else
+    (void)snprintf(
+        text, WM_HEALTH_REASON_MAX,
+        "%.40s: the estimator can't use the datum of %.3f s: %s: look at its numbers, their sigmas and units", name,
+        t_s, wm_status_text(first->status));
+  return text;
+}
+
 static void source_health(const wm_pipeline *self, size_t i, wm_time_ns now_ns, wm_source_health *out) {
   const wm_merge_counts *merged = wm_merge_source_counts(self->merge, i);
   const wm_fuser_counts *fused = &self->fuser.counts[i];
@@ -161,5 +182,8 @@ void wm_pipeline_health(wm_pipeline *self, wm_time_ns now_ns, wm_health *out) {
   out->published = self->published;
   reckoning_left(self, &estimate, out);
   out->source_count = (uint32_t)self->assembly->source_count;
-  for (size_t i = 0; i < self->assembly->source_count; i++) source_health(self, i, now_ns, &out->sources[i]);
+  for (size_t i = 0; i < self->assembly->source_count; i++) {
+    source_health(self, i, now_ns, &out->sources[i]);
+    (void)wm_pipeline_unused(self, i, out->refused_because[i]);
+  }
 }

@@ -58,6 +58,9 @@ WM_REALTIME void wm_pipeline_bound(wm_pipeline *self, const wm_published *publis
 WM_REALTIME int wm_pipeline_expect(const wm_pipeline *self, wm_time_ns now_ns, wm_estimate *out);
 WM_REALTIME void wm_pipeline_finish(wm_pipeline *self);
 
+// Why the estimator could not use a source's first datum of that kind: refused, or of a landmark that is not in the
+// map. "": there was none. Returns `text`.
+WM_REALTIME const char *wm_pipeline_unused(const wm_pipeline *self, size_t source, char text[WM_HEALTH_REASON_MAX]);
 // Fills all but the counters of sources and loop. Tens of us: once a second.
 WM_REALTIME void wm_pipeline_health(wm_pipeline *self, wm_time_ns now_ns, wm_health *out);
 

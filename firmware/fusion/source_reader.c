@@ -145,6 +145,6 @@ void wm_source_readers_health(const wm_source_reader *readers, size_t count, wm_
     out->stamp_uncertainty_ns = counts.stamp_uncertainty_ns;
     memcpy(out->looks, counts.looks, sizeof out->looks);
     _Static_assert(sizeof health->refused_because[0] == sizeof counts.first_problem, "a reason fits");
-    memcpy(health->refused_because[i], counts.first_problem, sizeof counts.first_problem);
+    if (counts.first_problem[0]) memcpy(health->refused_because[i], counts.first_problem, sizeof counts.first_problem);
   }
 }

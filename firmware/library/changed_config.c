@@ -14,17 +14,17 @@
 static wm_status change(char **text, size_t *length, const char *line, size_t line_length, wm_error *err) {
   char key[LINE_MAX_BYTES];
   if (line_length >= sizeof key)
-    return wm_fail(err, WM_BAD_USAGE, "changes: '%.40s...': longer than %d bytes", line, LINE_MAX_BYTES - 1);
+    return wm_fail(err, WM_BAD_USAGE, "options.changes: '%.40s...': longer than %d bytes", line, LINE_MAX_BYTES - 1);
   memcpy(key, line, line_length);
   key[line_length] = '\0';
   char *colon = strstr(key, ": ");
-  if (!colon) return wm_fail(err, WM_BAD_USAGE, "changes: '%.60s': \"KEY: VALUE\" is needed", key);
+  if (!colon) return wm_fail(err, WM_BAD_USAGE, "options.changes: '%.60s': \"KEY: VALUE\" is needed", key);
   *colon = '\0';
   char *changed;
   size_t changed_length;
   wm_status status =
       wm_yaml_edit(*text, *length, key, colon + 2 + strspn(colon + 2, " "), "", &changed, &changed_length, err);
-  if (status != WM_OK) return wm_fail_in(err, "changes");
+  if (status != WM_OK) return wm_fail_in(err, "options.changes");
   free(*text);
   *text = changed;
   *length = changed_length;
@@ -45,7 +45,10 @@ wm_status changed_config_parse(const char *text, size_t length, const char *path
     if (strspn(line, " \t") < end) status = change(&changed, &length, line, end, err);
     line += end + (line[end] == '\n');
   }
-  if (status == WM_OK) status = parse(changed, length, path, out, err);
+  if (status == WM_OK) {
+    status = parse(changed, length, path, out, err);
+    if (status != WM_OK && changes && *changes) status = wm_fail_in(err, "with options.changes");
+  }
   free(changed);
   if (status == WM_OK && note && out->estimator) wm_config_each_warning(out, note, context);
   return status;

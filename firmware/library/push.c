@@ -7,8 +7,8 @@
 #include "library/session.h"
 
 #define FARTHEST_NS (INT64_MAX / 4)  // stamps beyond it would overflow in differences
-// A time may be so far ahead of the newest one. Programs seldom stand still for longer; UTC, TAI and GPS differ by more
-// (18 s and above), as does a clock that was not set.
+// A time may be so far ahead of the newest one, and the caller's clock so far behind it. Programs seldom stand still
+// for longer; UTC, TAI and GPS differ by more (18 s and above), as does a clock that was not set.
 #define AHEAD_MAX_NS (10 * WM_NS_PER_S)
 // A wrong stamp is alone among right ones. Behind a pause all are far ahead: they are taken once they went on for so
 // long, none of them within the bound.
@@ -24,10 +24,13 @@ static wm_status check_time(const char *name, wm_time_ns t_ns, wm_error *err) {
   return wm_fail(err, WM_OUT_OF_RANGE, "%s: %lld ns is not a time", name, (long long)t_ns);
 }
 
-// A time that may become the session's newest.
-static wm_status check_ahead(session *self, const char *name, wm_time_ns t_ns, wm_error *err) {
+// A time that may become the session's newest, or the clock's.
+static wm_status check_clock(session *self, const char *name, wm_time_ns t_ns, wm_error *err) {
   const int goes_on =
       self->ahead_to_ns != WM_TIME_NONE && t_ns >= self->ahead_from_ns && t_ns - self->ahead_to_ns <= AHEAD_MAX_NS;
+  if (self->now_ns != WM_TIME_NONE && self->now_ns - t_ns > AHEAD_MAX_NS)
+    return wm_fail(err, WM_TIME_RAN_BACK, "%s: %.3f s behind the newest time of this session: is it of another clock?",
+                   name, wm_seconds_between(t_ns, self->now_ns));
   if (self->now_ns == WM_TIME_NONE || t_ns - self->now_ns <= AHEAD_MAX_NS ||
       (goes_on && t_ns - self->ahead_from_ns >= PAUSE_PROVEN_NS)) {
     self->ahead_from_ns = self->ahead_to_ns = WM_TIME_NONE;
@@ -82,9 +85,19 @@ static wm_status open_readers(session *self, wm_time_ns first_ns, wm_error *err)
   return status;
 }
 
+void session_note_unused(session *self) {
+  for (size_t i = 0; self->options.note && i < self->assembly.source_count; i++) {
+    char text[WM_HEALTH_REASON_MAX];
+    if (self->noted >> i & 1u || !wm_pipeline_unused(&self->pipeline, i, text)[0]) continue;
+    self->noted |= UINT32_C(1) << i;
+    self->options.note(self->options.context, text);
+  }
+}
+
 static void advance(session *self, wm_time_ns now_ns) {
   if (self->now_ns == WM_TIME_NONE || now_ns > self->now_ns) self->now_ns = now_ns;
   wm_pipeline_advance(&self->pipeline, self->now_ns);
+  session_note_unused(self);
 }
 
 // Hands on all that the source has now.
@@ -117,10 +130,15 @@ static wm_status check_times(wm_time_ns t_ns, wm_time_ns arrival_ns, wm_error *e
 }
 
 // The first one's text is kept, for the health.
-static void count_refused(pushed_source *source, wm_status status, const wm_error *err) {
+static void keep_reason(pushed_source *source, const wm_error *err) {
   wm_source_counts *counts = &source->base.counts;
   if (!counts->first_problem[0] && err)
     (void)snprintf(counts->first_problem, sizeof counts->first_problem, "%.255s", err->text);
+}
+
+static void count_refused(pushed_source *source, wm_status status, const wm_error *err) {
+  wm_source_counts *counts = &source->base.counts;
+  keep_reason(source, err);
   *(status == WM_NOT_FINITE || status == WM_OUT_OF_RANGE ? &counts->not_finite : &counts->malformed) += 1;
 }
 
@@ -129,7 +147,7 @@ static wm_status deliver(session *self, pushed_source *source, wm_time_ns arriva
   const wm_time_ns t_ns = source->event.t_ns;
   source->event.arrival_ns = arrival_of(self, t_ns, arrival_ns);
   wm_status status =
-      check_ahead(self, arrival_ns == WM_TIME_NONE ? "t_ns" : "arrival_ns", source->event.arrival_ns, err);
+      check_clock(self, arrival_ns == WM_TIME_NONE ? "t_ns" : "arrival_ns", source->event.arrival_ns, err);
   if (status != WM_OK) {
     count_refused(source, WM_BAD_DATA, err);
     return wm_fail_in(err, "%s", source->base.name);
@@ -194,17 +212,29 @@ wm_status session_push_event(session *self, uint32_t source, const wm_event *eve
 }
 
 wm_status session_push_can(session *self, const char *interface, const wm_can_frame *frame, wm_error *err) {
-  wm_status status = session_check_started(self, "waymark_push_can", err);
+  wm_status status = session_check_started(self, "waymark_push_can", err), first = WM_OK;
   if (status == WM_OK) status = check_time("t_ns", frame->t_ns, err);
   if (status != WM_OK) return status;
+  size_t takers = 0;
   for (size_t i = 0; i < self->source_count; i++) {
     pushed_source *to = self->sources[i];
+    wm_error why;
     if (!to->decoder || (to->interface[0] && strcmp(to->interface, interface) != 0)) continue;
-    status = wm_can_event(to->decoder, to->part, &to->gnss, frame, &to->event, &to->base.counts, err);
-    if (status == WM_OK) status = deliver(self, to, WM_TIME_NONE, err);
-    if (status != WM_OK && status != WM_AGAIN && status != WM_BAD_DATA) return status;
+    takers++;
+    status = wm_can_event(to->decoder, to->part, &to->gnss, frame, &to->event, &to->base.counts, &why);
+    if (status == WM_BAD_DATA) {
+      status = wm_fail_in(&why, "%s", to->base.name);
+      keep_reason(to, &why);
+    }
+    if (status == WM_OK) status = deliver(self, to, WM_TIME_NONE, &why);
+    if (first != WM_OK || status == WM_OK || status == WM_AGAIN) continue;
+    first = status;
+    if (err) *err = why;
   }
-  return WM_OK;
+  if (takers > 0) return first;
+  return wm_fail(err, WM_NOT_FOUND,
+                 "waymark_push_can: this session has no source for '%.40s': add \"can\" or \"can:%.40s\"", interface,
+                 interface);
 }
 
 wm_status session_push_picture(session *self, const char *camera, const wm_frame *frame, wm_error *err) {
@@ -221,10 +251,12 @@ wm_status session_push_picture(session *self, const char *camera, const wm_frame
                    frame->width_px, frame->height_px, frame->stride_bytes, is->width_px, is->height_px);
   wm_frame taken = *frame;
   taken.arrival_ns = arrival_of(self, frame->t_ns, frame->arrival_ns);
-  status = check_ahead(self, camera, taken.arrival_ns, err);
+  status = check_clock(self, camera, taken.arrival_ns, err);
   if (status == WM_OK) status = open_readers(self, frame->t_ns, err);
   if (status != WM_OK) return status;
-  pushed_pictures_put(self->pictures, index, &taken);
+  if (!pushed_pictures_put(self->pictures, index, &taken))
+    return wm_fail(err, WM_NOT_FOUND, "waymark_push_picture: no detector of `vision:` looks at the camera '%.40s'",
+                   camera);
   for (size_t i = 0; status == WM_OK && i < wm_vision_count(self->assembly.vision); i++)
     status = read_source(self, wm_vision_source(self->assembly.vision, i), err);
   return status;
@@ -233,7 +265,7 @@ wm_status session_push_picture(session *self, const char *camera, const wm_frame
 wm_status session_advance(session *self, const char *function, wm_time_ns now_ns, wm_error *err) {
   wm_status status = session_check_started(self, function, err);
   if (status == WM_OK) status = check_time("now_ns", now_ns, err);
-  if (status == WM_OK) status = check_ahead(self, "now_ns", now_ns, err);
+  if (status == WM_OK) status = check_clock(self, "now_ns", now_ns, err);
   if (status == WM_OK && self->has_data) advance(self, now_ns);  // else a wrong one would make all data late
   return status;
 }

@@ -104,14 +104,17 @@ pushed_pictures *pushed_pictures_make(void) {
 
 wm_pictures *pushed_pictures_base(pushed_pictures *self) { return &self->base; }
 
-void pushed_pictures_put(pushed_pictures *self, int32_t camera, const wm_frame *frame) {
+size_t pushed_pictures_put(pushed_pictures *self, int32_t camera, const wm_frame *frame) {
+  size_t readers = 0;
   for (size_t i = 0; i < self->count; i++) {
     reader *one = self->readers[i];
     if (one->camera != camera) continue;
+    readers++;
     one->replaced += (uint64_t)one->has_frame;
     one->frame = *frame;
     one->frame.camera = camera;
     one->frame.number = one->pictures++;
     one->has_frame = 1;
   }
+  return readers;
 }

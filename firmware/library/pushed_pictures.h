@@ -11,7 +11,8 @@ typedef struct pushed_pictures pushed_pictures;
 // For wm_recording_set_pictures, which owns it.
 pushed_pictures *pushed_pictures_make(void);
 wm_pictures *pushed_pictures_base(pushed_pictures *self);
-// The next picture of a camera, for all of its readers. One that they have not taken is replaced, and counted.
-void pushed_pictures_put(pushed_pictures *self, int32_t camera, const wm_frame *frame);
+// The next picture of a camera, for all of its readers, whose number is returned. One that they have not taken is
+// replaced, and counted.
+size_t pushed_pictures_put(pushed_pictures *self, int32_t camera, const wm_frame *frame);
 
 #endif

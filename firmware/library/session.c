@@ -276,6 +276,7 @@ wm_status session_close(session *self, wm_error *err) {
   wm_status status = WM_OK;
   if (self->has_started) {
     wm_pipeline_finish(&self->pipeline);
+    session_note_unused(self);
     if (self->folder) status = write_summary(self, err);
     wm_error close_error;
     const wm_status closed = wm_run_folder_close(self->folder, &close_error);

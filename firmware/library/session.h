@@ -32,6 +32,7 @@ typedef struct session {
   // First and last of the times that were refused, one behind the other, because they are far ahead; WM_TIME_NONE:
   // none.
   wm_time_ns ahead_from_ns, ahead_to_ns;
+  uint32_t noted;  // bit per source of the assembly: its first datum without use to the estimator was noted
 } session;
 
 // Of a log: the reader and terminated copies of its texts.
@@ -49,6 +50,9 @@ wm_status library_check_size(const char *function, const void *out, size_t bytes
 wm_status library_put_health(const char *function, const wm_health *health, void *out, size_t bytes, wm_error *err);
 // WM_BAD_USAGE before the start.
 wm_status session_check_started(const session *self, const char *function, wm_error *err);
+
+// A note for each source's first datum that was taken, and is of no use to the estimator.
+void session_note_unused(session *self);
 
 // The functions of the interface behind its entry guard (interface.c): no pointer that they need is NULL, and no other
 // call has the session.

@@ -123,8 +123,11 @@ static int start_where_it_was(live *self) {
     live_say(self, "start: the saved pose is %.0f s old, more than start.max_age_s; it is not used", age_s);
     return 0;
   }
-  live_say(self, "start: saved pose of %.0f s ago: x %.2f m, y %.2f m, heading %.1f deg, sigma %.2f m", age_s,
-           start->p_m[0], start->p_m[1], start->heading_rad * 180 / M_PI, start->sigma_xy_m);
+  char age[64];
+  (void)snprintf(age, sizeof age, age_s >= 0 ? "%.0f s ago" : "an unknown age, as this clock is %.0f s behind it",
+                 fabs(age_s));
+  live_say(self, "start: saved pose of %s: x %.2f m, y %.2f m, heading %.1f deg, sigma %.2f m", age, start->p_m[0],
+           start->p_m[1], start->heading_rad * 180 / M_PI, start->sigma_xy_m);
   return 1;
 }
 

@@ -33,9 +33,9 @@ static const wm_event_field kLocalized[] = {
 static const wm_event_field kMarker[] = {WHOLE(marker, sensor, U16),
                                          WHOLE(marker, poses, U16),
                                          WHOLE(marker, id, I32),
-                                         NUMBERS(marker, p_m, 3, 2, WM_PLACE_LIMITS),
+                                         NUMBERS(marker, p_m, 3, 2, WM_MARKER_LIMITS),
                                          NUMBERS(marker, yaw_rad, 1, 0, WM_ANGLE_LIMITS),
-                                         NUMBERS(marker, other_p_m, 3, 0, WM_PLACE_LIMITS),
+                                         NUMBERS(marker, other_p_m, 3, 0, WM_MARKER_LIMITS),
                                          NUMBERS(marker, other_yaw_rad, 1, 0, WM_ANGLE_LIMITS),
                                          NUMBERS_FROM(marker, along_sigma_m, 1, 0, 4, WM_SIGMA_LIMITS),
                                          NUMBERS_FROM(marker, yaw_sigma_rad, 1, 0, 4, WM_SIGMA_LIMITS),
@@ -46,10 +46,10 @@ static const wm_event_field kStereo[] = {
     NUMBERS(stereo, right_px, 2, 0, WM_PIXEL_LIMITS),
     {"appearance", (uint16_t)offsetof(wm_event, as.stereo.appearance), WM_FIELD_U64, 4, 6, 0, 0, NO_LIMITS}};
 static const wm_event_field kLooked[] = {WHOLE(looked, sensor, U16)};
-static const wm_event_field kSetPose[] = {NUMBERS(set_pose, pose_map_base.p_m, 3, 2, WM_PLACE_LIMITS),
-                                          NUMBERS(set_pose, pose_map_base.q_xyzw, 4, 4, -1.001, 1.001),
-                                          NUMBERS(set_pose, sigma_xy_m, 1, 0, WM_SIGMA_LIMITS),
-                                          NUMBERS(set_pose, sigma_heading_rad, 1, 0, WM_SIGMA_LIMITS)};
+static const wm_event_field kSetPose[] = {
+    NUMBERS(set_pose, pose_map_base.p_m, 3, 2, WM_PLACE_LIMITS),
+    NUMBERS(set_pose, pose_map_base.q_xyzw, 4, 4, -1.001, 1.001), NUMBERS(set_pose, sigma_xy_m, 1, 1, WM_SIGMA_LIMITS),
+    NUMBERS(set_pose, sigma_heading_rad, 1, 1, WM_SIGMA_LEAST, WM_HEADING_SIGMA_MOST_RAD)};
 
 #define HOLDS(rows) rows, sizeof(rows) / sizeof((rows)[0])
 #define HOLDS_NO_FIELDS NULL, 0

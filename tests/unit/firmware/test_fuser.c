@@ -65,6 +65,8 @@ TEST(refused_motion_makes_no_row) {
   TEST_ASSERT_EQUAL_UINT64(1, fuser.counts[0].refused[WM_NOT_FINITE]);
   TEST_ASSERT_EQUAL_UINT64(1, fuser.counts[0].refused[WM_TIME_RAN_BACK]);
   TEST_ASSERT_EQUAL_UINT64(2, fuser.counts[0].fused);
+  TEST_ASSERT_EQUAL(WM_NOT_FINITE, fuser.counts[0].first_unused.status);  // the first one alone is kept
+  TEST_ASSERT_EQUAL_INT64(100 * MS, fuser.counts[0].first_unused.t_ns);
 }
 
 TEST(observations_are_counted_by_their_verdict) {

@@ -10,16 +10,10 @@
 #include <string.h>
 #include <sys/stat.h>
 
-#include "../drivers/folder.h"
-#include "common/suite.h"
-#include "waymark/waymark.h"
+#include "library_robot.h"
 
-#define NS(seconds) ((wm_time_ns)((seconds)*1e9))
-#define NANV ((double)NAN)
 #define INFV ((double)INFINITY)
 
-static char dir[256], config[300];
-static wm_error err;
 // An open session that has started and is at 1 s; one that has not; one that was closed. A log, and one that was
 // closed.
 static waymark_session *started, *fresh, *closed;
@@ -29,6 +23,7 @@ static waymark_log *opened_log, *closed_log;
 static uint32_t motion, eye, gnss, heading, increments, markers, commands, stereo, points;
 static wm_event event;
 static wm_published pose;
+static wm_bound bound;
 static wm_health health;
 static wm_innovation innovation;
 static uint32_t number;
@@ -51,11 +46,6 @@ static wm_status open_sized(size_t bytes) {
   return waymark_open(&options, &session, &err);
 }
 
-static wm_status open_into(waymark_session **out) {
-  const waymark_options options = {.bytes = sizeof options, .config = config, .site = dir};
-  return waymark_open(&options, out, &err);
-}
-
 static wm_status open_out_twice(void) {
   waymark_session *session[2] = {NULL, NULL};
   char out[300];
@@ -71,11 +61,6 @@ static wm_status open_out_twice(void) {
   wm_error not_this;
   for (int i = 0; i < 2; i++) (void)waymark_close(session[i], &not_this);
   return status;
-}
-
-static wm_status row(waymark_session *session, uint32_t source, double t_s, double a, double b, double c) {
-  const double numbers[3] = {a, b, c};
-  return waymark_push_row(session, source, NS(t_s), WM_TIME_NONE, numbers, 3, &err);
 }
 
 static wm_status push_to(waymark_session *session, uint32_t source) {
@@ -98,6 +83,11 @@ static wm_status marker(double x_m, double yaw_rad, double sigma_m) {
       (wm_event){.kind = WM_EVENT_MARKER,
                  .as.marker = {.poses = 1, .id = 1, .p_m = {x_m, 0, 0}, .yaw_rad = yaw_rad, .along_sigma_m = sigma_m}};
   event.as.marker.yaw_sigma_rad = event.as.marker.bloom_px = NANV;
+  return push(markers);
+}
+
+static wm_status marker_of(uint16_t poses) {
+  event = (wm_event){.kind = WM_EVENT_MARKER, .as.marker = {.poses = poses, .id = 1, .p_m = {1, 0, 0}}};
   return push(markers);
 }
 
@@ -196,7 +186,7 @@ typedef struct row_of_table {
   char text[WM_ERROR_TEXT_MAX];
 } row_of_table;
 
-#define ROWS_MAX 160
+#define ROWS_MAX 200
 static row_of_table rows[ROWS_MAX];
 static size_t row_count;
 
@@ -227,6 +217,7 @@ static void misuse_handles(void) {
   MISUSE(waymark_advance(NULL, 0, &err), WM_BAD_USAGE, "`session` is NULL");
   MISUSE(waymark_pose(NULL, 0, &pose, sizeof pose, &err), WM_BAD_USAGE, "waymark_pose: `session` is NULL");
   MISUSE(waymark_health(NULL, &health, sizeof health, &err), WM_BAD_USAGE, "`session` is NULL");
+  MISUSE(waymark_bound(NULL, &bound, sizeof bound, &err), WM_BAD_USAGE, "`session` is NULL");
   MISUSE(waymark_log_next(NULL, &event, sizeof event, NULL, &err), WM_BAD_USAGE, "`log` is NULL");
   MISUSE(waymark_add_source(closed, "motion", &number, &err), WM_BAD_USAGE, "was closed before");
   MISUSE(waymark_start(closed, &err), WM_BAD_USAGE, "was closed before");
@@ -236,6 +227,8 @@ static void misuse_handles(void) {
   MISUSE(waymark_advance(closed, 0, &err), WM_BAD_USAGE, "was closed before");
   MISUSE(waymark_pose(closed, 0, &pose, sizeof pose, &err), WM_BAD_USAGE, "was closed before");
   MISUSE(waymark_health(closed, &health, sizeof health, &err), WM_BAD_USAGE, "was closed before");
+  MISUSE(waymark_bound(closed, &bound, sizeof bound, &err), WM_BAD_USAGE, "was closed before");
+  MISUSE(waymark_push_picture(closed, "front", &(wm_frame){0}, sizeof(wm_frame), &err), WM_BAD_USAGE, "closed before");
   MISUSE(waymark_close(closed, &err), WM_BAD_USAGE, "was closed before");
   MISUSE(waymark_log_next(closed_log, &event, sizeof event, NULL, &err), WM_BAD_USAGE, "this log was closed before");
   MISUSE(row(foreign, motion, 1, 0.5, NANV, 0), WM_BAD_USAGE, "is no session of this library");
@@ -244,6 +237,7 @@ static void misuse_handles(void) {
   MISUSE(waymark_start(as_session(UINTPTR_MAX), &err), WM_BAD_USAGE, "no session");
   MISUSE(waymark_start(as_session((uintptr_t)fresh + 2), &err), WM_BAD_USAGE, "session");
   MISUSE(waymark_advance(log, 0, &err), WM_BAD_USAGE, "is no session of this library");
+  MISUSE(waymark_bound(log, &bound, sizeof bound, &err), WM_BAD_USAGE, "is no session of this library");
   MISUSE(waymark_log_next(session, &event, sizeof event, NULL, &err), WM_BAD_USAGE, "is no log of this library");
   MISUSE(from_its_callback(), WM_BAD_USAGE, "a callback may not call it");
 }
@@ -265,7 +259,8 @@ static void misuse_pointers(void) {
   MISUSE(open_with(config, config, NULL), WM_NOT_FOUND, "options.site: there is no such folder");
   MISUSE(open_with(config, long_path, NULL), WM_BAD_USAGE, "too long");
   MISUSE(open_with(config, dir, "no colon"), WM_BAD_USAGE, "KEY: VALUE");
-  MISUSE(open_with(config, dir, "motion.sped: 1"), WM_BAD_CONFIG, "sped");
+  MISUSE(open_with(config, dir, "motion.sped: 1"), WM_BAD_CONFIG, "with options.changes: ");
+  MISUSE(open_with(config, dir, "integrity.risk_per_pose: 1e-6"), WM_BAD_CONFIG, "from 0.0001 to 0.1 is needed");
   MISUSE(open_with(dir, dir, NULL), WM_IO, dir);
   MISUSE(open_out_twice(), WM_BAD_USAGE, "another run writes to this folder");
   MISUSE(waymark_add_source(fresh, NULL, &number, &err), WM_BAD_USAGE, "`name` is NULL");
@@ -284,6 +279,7 @@ static void misuse_pointers(void) {
   MISUSE(picture("front", 64, 64, 0), WM_BAD_DATA, "front: a picture");
   MISUSE(waymark_pose(started, NS(1), NULL, sizeof pose, &err), WM_BAD_USAGE, "`out` is NULL");
   MISUSE(waymark_health(started, NULL, sizeof health, &err), WM_BAD_USAGE, "`out` is NULL");
+  MISUSE(waymark_bound(started, NULL, sizeof bound, &err), WM_BAD_USAGE, "`out` is NULL");
   MISUSE(waymark_log_open(NULL, &log, &err), WM_BAD_USAGE, "`path` is NULL");
   MISUSE(waymark_log_open(config, NULL, &err), WM_BAD_USAGE, "`out` is NULL");
   MISUSE(waymark_log_open(config, &log, &err), WM_BAD_DATA, config);
@@ -292,6 +288,11 @@ static void misuse_pointers(void) {
   MISUSE(waymark_read_pose(NULL, 10, &pose, sizeof pose, &err), WM_BAD_USAGE, "`message` is NULL");
   MISUSE(waymark_read_pose("abc", 3, NULL, sizeof pose, &err), WM_BAD_USAGE, "`out` is NULL");
   MISUSE(waymark_read_pose("abc", 3, &pose, sizeof pose, &err), WM_BAD_DATA, "pose_t");
+  MISUSE(waymark_read_bound(NULL, 10, &bound, sizeof bound, &err), WM_BAD_USAGE, "`message` is NULL");
+  MISUSE(waymark_read_bound("abc", 3, NULL, sizeof bound, &err), WM_BAD_USAGE, "`out` is NULL");
+  MISUSE(waymark_read_bound("abc", 3, &bound, sizeof bound, &err), WM_BAD_DATA, "bound_t");
+  MISUSE(waymark_read_health("abc", 3, NULL, sizeof health, &err), WM_BAD_USAGE, "`out` is NULL");
+  MISUSE(waymark_read_innovation("abc", 3, NULL, sizeof innovation, &err), WM_BAD_USAGE, "`out` is NULL");
   MISUSE(waymark_read_health(NULL, 10, &health, sizeof health, &err), WM_BAD_USAGE, "`message` is NULL");
   MISUSE(waymark_read_health("", 0, &health, sizeof health, &err), WM_BAD_DATA, "health_t");
   MISUSE(waymark_read_innovation(NULL, 1, &innovation, sizeof innovation, &err), WM_BAD_USAGE, "`message` is NULL");
@@ -317,6 +318,10 @@ static void misuse_order_and_sizes(void) {
   MISUSE(waymark_pose(fresh, 0, &pose, sizeof pose, &err), WM_BAD_USAGE, "waymark_pose: waymark_start");
   MISUSE(waymark_advance(fresh, 0, &err), WM_BAD_USAGE, "waymark_advance: waymark_start");
   MISUSE(waymark_health(fresh, &health, sizeof health, &err), WM_BAD_USAGE, "waymark_start has to be called before");
+  MISUSE(waymark_bound(fresh, &bound, sizeof bound, &err), WM_BAD_USAGE, "waymark_bound: waymark_start");
+  MISUSE(waymark_bound(started, &bound, 3, &err), WM_BAD_USAGE, "its struct has 3 bytes");
+  MISUSE(waymark_push_event(fresh, 0, &event, sizeof event, &err), WM_BAD_USAGE, "waymark_push_event: waymark_start");
+  MISUSE(waymark_push_can(fresh, 0, "can0", 1, 0, "", 0, &err), WM_BAD_USAGE, "waymark_push_can: waymark_start");
   MISUSE(waymark_start(started, &err), WM_BAD_USAGE, "has started already");
   MISUSE(waymark_add_source(started, "imu", &number, &err), WM_BAD_USAGE, "added before waymark_start");
   MISUSE(row(started, 99, 1, 0.5, NANV, 0), WM_NOT_FOUND, "99 is not a source");
@@ -328,11 +333,13 @@ static void misuse_order_and_sizes(void) {
   MISUSE(waymark_health(started, &health, SIZE_MAX, &err), WM_BAD_USAGE, "its struct has");
   MISUSE(waymark_push_picture(started, "front", &(wm_frame){0}, 8, &err), WM_BAD_USAGE, "8 bytes");
   MISUSE(picture("rear", 64, 64, 1), WM_NOT_FOUND, "'rear' is not a camera");
+  MISUSE(picture("front", 64, 64, 1), WM_NOT_FOUND, "no detector of `vision:` looks at the camera 'front'");
   MISUSE(picture("front", 640, 640, 1), WM_BAD_DATA, "calibration.yaml has 64 x 48");
   MISUSE(picture("front", 64, 3, 1), WM_BAD_DATA, "rows of 3 bytes");
   MISUSE(can("can0", 0x800, 0, 8), WM_BAD_DATA, "id 800");
   MISUSE(can("can0", 0x20000000, 1, 8), WM_BAD_DATA, "id 20000000");
   MISUSE(can("can0", 1, 0, 65), WM_BAD_DATA, "65 bytes");
+  MISUSE(can("can0", 1, 0, 8), WM_NOT_FOUND, "no source for 'can0': add");
   MISUSE(of_kind(0, eye, 0), WM_BAD_DATA, "none");
   MISUSE(of_kind(200, eye, 0), WM_BAD_DATA, "kind ?");
   MISUSE(of_kind(WM_EVENT_POSITION, eye, 0), WM_BAD_DATA, "no events of the kind position");
@@ -342,6 +349,8 @@ static void misuse_numbers(void) {
   MISUSE(row(started, motion, 1, NANV, NANV, 0), WM_NOT_FINITE, "motion: v_mps is not a finite number");
   MISUSE(row(started, motion, 1, INFV, NANV, 0), WM_NOT_FINITE, "v_mps is not a finite number");
   MISUSE(row(started, motion, 1, 1e4, NANV, 0), WM_OUT_OF_RANGE, "v_mps: 10000 is outside of what can be");
+  MISUSE(row(started, motion, 1, 900, NANV, 0), WM_OUT_OF_RANGE, "v_mps: 900 is outside of what can be (-150 to 150)");
+  MISUSE(row(started, motion, 1, 0, NANV, 60), WM_OUT_OF_RANGE, "w_radps: 60 is outside of what can be (-50 to 50)");
   MISUSE(row(started, motion, 1, 0, INFV, 0), WM_NOT_FINITE, "vy_mps");
   MISUSE(row(started, motion, 1, 0, NANV, -DBL_MAX), WM_OUT_OF_RANGE, "w_radps");
   MISUSE(row(started, gnss, 1, 1e300, 0, NANV), WM_OUT_OF_RANGE, "x_m");
@@ -357,18 +366,27 @@ static void misuse_numbers(void) {
   MISUSE(sighting(90, 5, NANV, NANV), WM_OUT_OF_RANGE, "bearing_rad: 90");
   MISUSE(sighting(0.1, 5, -1, NANV), WM_OUT_OF_RANGE, "bearing_sigma_rad: -1");
   MISUSE(sighting(0.1, 5, 0, NANV), WM_OUT_OF_RANGE, "bearing_sigma_rad: 0");
+  MISUSE(sighting(0.1, 5, 1e-9, NANV), WM_OUT_OF_RANGE, "bearing_sigma_rad: 1e-09");
   MISUSE(sighting(0.1, 5, 0.01, 2), WM_OUT_OF_RANGE, "elevation_rad: 2");
   MISUSE(sighting(NANV, NANV, NANV, NANV), WM_BAD_DATA, "both absent");
   MISUSE(marker(NANV, 0, 0.1), WM_NOT_FINITE, "p_m");
   MISUSE(marker(1, 0, 0), WM_OUT_OF_RANGE, "along_sigma_m: 0");
+  MISUSE(marker(1e5, 0, 0.1), WM_OUT_OF_RANGE, "p_m: 100000");
+  MISUSE(marker_of(0), WM_BAD_DATA, "markers:eye: 0 poses; a marker has 1, or 2");
+  MISUSE(marker_of(7), WM_BAD_DATA, "7 poses");
   MISUSE(marker(1, INFV, 0.1), WM_NOT_FINITE, "yaw_rad");
   MISUSE(increment(0.9, NANV, 0), WM_NOT_FINITE, "dx_m");
   MISUSE(increment(0.9, 0.1, 1e9), WM_OUT_OF_RANGE, "dheading_rad");
   MISUSE(increment(1.0, 0.1, 0), WM_BAD_DATA, "from_ns is not before t_ns");
   MISUSE(position(INFV, 1), WM_NOT_FINITE, "p_m");
   MISUSE(position(1, -1), WM_OUT_OF_RANGE, "sigma_xy_m: -1");
+  MISUSE(position(1, 0), WM_OUT_OF_RANGE, "sigma_xy_m: 0");
+  MISUSE(position(1, 1e-9), WM_OUT_OF_RANGE, "sigma_xy_m: 1e-09 is outside of what can be (1e-06");
+  MISUSE(position(5e7, 1), WM_OUT_OF_RANGE, "p_m: 50000000");
   MISUSE(set_pose(NANV, 1, 0.1), WM_NOT_FINITE, "p_m");
   MISUSE(set_pose(0, 1e9, 0.1), WM_OUT_OF_RANGE, "q_xyzw");
+  MISUSE(set_pose(0, 0, 0.1), WM_OUT_OF_RANGE, "q_xyzw: its length is 0, of a rotation it is 1");
+  MISUSE(set_pose(0, 1, NANV), WM_NOT_FINITE, "sigma_xy_m");
   MISUSE(set_pose(0, 1, -1), WM_OUT_OF_RANGE, "sigma_xy_m");
   MISUSE(point(WM_POINTS_MAX + 1, 0, 0.1f), WM_BAD_DATA, "513 points");
   MISUSE(point(UINT32_MAX, 0, 0.1f), WM_BAD_DATA, "4294967295 points");
@@ -387,6 +405,10 @@ static void misuse_times(void) {
   MISUSE(row(started, motion, 61, 0.5, NANV, 0), WM_OUT_OF_RANGE, "motion: t_ns: 60.000 s ahead of the newest time");
   MISUSE(waymark_pose(started, NS(3601), &pose, sizeof pose, &err), WM_OUT_OF_RANGE, "3600.000 s ahead");
   MISUSE(waymark_advance(started, NS(3601), &err), WM_OUT_OF_RANGE, "at most 10 s can be");
+  MISUSE(waymark_pose(started, NS(-10), &pose, sizeof pose, &err), WM_TIME_RAN_BACK,
+         "now_ns: 11.000 s behind the newest");
+  MISUSE(waymark_advance(started, NS(-3600), &err), WM_TIME_RAN_BACK, "is it of another clock?");
+  MISUSE(arrives(1, -3600), WM_TIME_RAN_BACK, "motion: arrival_ns: 3601.000 s behind");
   MISUSE(arrives(1, 61), WM_OUT_OF_RANGE, "motion: arrival_ns: 60.000 s ahead");
   MISUSE(arrives(1.7e9, 1), WM_OUT_OF_RANGE, "later than its arrival");
   MISUSE(arrives(3, 1), WM_OUT_OF_RANGE, "its stamp is 2.000 s later than its arrival");
@@ -396,14 +418,6 @@ static void misuse_times(void) {
 }
 
 // ── the tests ───────────────────────────────────────────────────────────────────────────────────────────────────────
-
-static void ok(wm_status status) { TEST_ASSERT_EQUAL_MESSAGE(WM_OK, status, err.text); }
-
-static waymark_session *open_session(void) {
-  waymark_session *session = NULL;
-  ok(open_into(&session));
-  return session;
-}
 
 // With every source that its estimator takes; odometry up to 1 s.
 static waymark_session *start_with_all(void) {
@@ -443,17 +457,7 @@ static void write_map(void) {
 }
 
 void setUp(void) {
-  (void)snprintf(dir, sizeof dir, "%s", folder_make());
-  folder_write("recording.yaml",
-               "format: waymark-recording/1\nvehicle: {initial_pose: {x_m: 0, y_m: 0, heading_rad: 0}}\n");
-  folder_write("calibration.yaml",
-               "sensors: {eye: {mounting: {xyz_m: [0.1, 0, 0]}, bearing_sigma_rad: 0.01, range_sigma_m: 0.05}}\n"
-               "cameras:\n  front: {model: equidistant, size: [64, 48], intrinsics: [30, 30, 32, 24], "
-               "distortion: [0, 0, 0, 0], mounting: {xyz_m: [0, 0, 0.4], rpy_deg: [0, 22, 0]}}\n");
-  folder_write("landmarks.csv", "id,x_m,y_m,z_m,sigma_m\n1,5,1,0,0.01\n2,5,-3,0,0.01\n");
-  folder_write("robot.yaml", "format: waymark-config/1\nestimator: landmark_ekf\n");
-  (void)snprintf(config, sizeof config, "%s", folder_path("robot.yaml"));
-
+  robot_write();
   closed = open_session();
   ok(waymark_close(closed, &err));
   fresh = open_session();
@@ -478,15 +482,13 @@ void setUp(void) {
 }
 
 void tearDown(void) {
-  char command[400];
   waymark_log_close(opened_log);
   waymark_log_close(closed_log);  // again: no effect
   ok(waymark_close(fresh, &err));
   ok(waymark_close(started, &err));
   ok(waymark_close(of_pair, &err));
   ok(waymark_close(of_map, &err));
-  (void)snprintf(command, sizeof command, "rm -r '%s'", dir);
-  TEST_ASSERT_EQUAL(0, system(command));
+  robot_remove();
 }
 
 TEST(test_each_misuse_has_a_status_and_a_text) {
@@ -526,42 +528,6 @@ TEST(test_each_misuse_has_a_status_and_a_text) {
   TEST_ASSERT_EQUAL(pose.now.state, other.now.state);
   TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.65, pose.now.pose_map_base.p_m[0]);
   ok(waymark_close(misused, &err));
-}
-
-TEST(test_one_stamp_far_ahead_makes_nothing_late) {
-  for (int i = 51; i < 250; i++) {
-    if (i % 10 == 0) TEST_ASSERT_EQUAL(WM_OUT_OF_RANGE, row(started, motion, i * 0.02 + 60, 0.5, NANV, 0));
-    if (i % 10 == 5) TEST_ASSERT_EQUAL(WM_OUT_OF_RANGE, waymark_advance(started, NS(i * 0.02 + 3600), &err));
-    ok(row(started, motion, i * 0.02, 0.5, NANV, 0));
-  }
-  ok(waymark_health(started, &health, sizeof health, &err));
-  TEST_ASSERT_EQUAL_UINT64(0, health.sources[0].late);
-  TEST_ASSERT_EQUAL_UINT64(19, health.sources[0].malformed);  // none is left out without a count
-  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(health.refused_because[0], "60.0"), health.refused_because[0]);
-}
-
-// Before the first datum the session has no clock.
-TEST(test_a_time_before_the_first_datum_makes_nothing_late) {
-  waymark_session *session = open_session();
-  ok(waymark_add_source(session, "motion", &motion, &err));
-  ok(waymark_start(session, &err));
-  ok(waymark_advance(session, NS(3600), &err));
-  TEST_ASSERT_EQUAL(WM_AGAIN, waymark_pose(session, NS(1.7e9), &pose, sizeof pose, &err));
-  for (int i = 0; i < 50; i++) ok(row(session, motion, i * 0.02, 0.5, NANV, 0));
-  ok(waymark_pose(session, NS(1), &pose, sizeof pose, &err));
-  TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.5, pose.now.pose_map_base.p_m[0]);
-  ok(waymark_close(session, &err));
-}
-
-TEST(test_after_a_pause_data_are_taken_again) {
-  int refused = 0, taken = 0;
-  for (int i = 0; i < 100; i++) {
-    const wm_status status = row(started, motion, 600 + i * 0.02, 0.5, NANV, 0);
-    TEST_ASSERT_TRUE(status == WM_OK || status == WM_OUT_OF_RANGE);
-    status == WM_OK ? taken++ : refused++;
-  }
-  TEST_ASSERT_EQUAL(50, refused);  // one second of them
-  TEST_ASSERT_EQUAL(50, taken);
 }
 
 TEST(test_many_handles) {

@@ -216,6 +216,7 @@ static wm_event possible(unsigned kind) {
       memcpy((char *)&out + field->offset + i * sizeof value, &value, sizeof value);
   }
   if (kind == WM_EVENT_MARKER) out.as.marker.poses = 2;
+  if (kind == WM_EVENT_SET_POSE) out.as.set_pose.pose_map_base.q_xyzw[3] = 1.0;
   if (kind == WM_EVENT_QUANTITIES) out.as.quantities = (wm_quantities){.count = 1, .id = {WM_Q_VEHICLE_SPEED}};
   if (kind == WM_EVENT_POINTS) {
     out.as.points.count = 1;

@@ -108,10 +108,12 @@ wm_status waymark_start(waymark_session *session, wm_error *err);
 //   WM_OUT_OF_RANGE   a number or a time that can't be
 //   WM_TIME_RAN_BACK  newer data were fused already, or the datum is of another clock than the session's first one
 //   WM_FULL           the queue is full
-// A time may be 10 s ahead of the newest one that the session was given: programs seldom stand still for longer, and
-// UTC, TAI and GPS differ by 18 s and more. A stamp may be merge.horizon_ms ahead of its arrival. After a pause of the
-// whole program all times are farther ahead: they are taken again once they went on for 1 s without one that is nearer.
-// The first datum sets the session's clock; waymark_advance and waymark_pose before it do not.
+// WM_OK: it waits for its turn, and is in the health as fused or rejected then. A source's first datum of a landmark
+// that is not in the map, or that the estimator refuses, is a note, and `refused_because` of the health. A time may be
+// 10 s ahead of the newest one that the session was given: programs seldom stand still for longer, and UTC, TAI and GPS
+// differ by 18 s and more. A stamp may be merge.horizon_ms ahead of its arrival. After a pause of the whole program all
+// times are farther ahead: they are taken again once they went on for 1 s without one that is nearer. The first datum
+// sets the session's clock; waymark_advance and waymark_pose before it do not.
 //
 // A row of "motion", "motion6", "ticks", "speeds", "steering", "imu", "heading", "depth", "gnss" or "localizer": the
 // numbers of the table's columns behind the stamps (docs/recording-format.md), NaN where absent; missing ones at the
@@ -121,14 +123,17 @@ wm_status waymark_push_row(waymark_session *session, uint32_t source, wm_time_ns
 // Any event of a kind that the source gives. `source`, `seq` and, with "NAME:SENSOR", the sensor are set here.
 wm_status waymark_push_event(waymark_session *session, uint32_t source, const wm_event *event, size_t bytes,
                              wm_error *err);
-// A CAN frame of `interface`, for all CAN sources of it; others are left out. `length` up to 64.
+// A CAN frame of `interface`, for all CAN sources of it; ids that they don't bind are left out. `length` up to 64.
+// WM_NOT_FOUND: the session has no CAN source of that interface.
 wm_status waymark_push_can(waymark_session *session, wm_time_ns t_ns, const char *interface, uint32_t id,
                            int is_extended, const void *data, size_t length, wm_error *err);
 // A grey picture for the detectors of `vision:` on that camera; they are done when this returns. frame->camera and
 // number are set here. The pixels are read during the call; of a stereo pair, until its other picture was pushed.
+// WM_NOT_FOUND: no such camera, or no detector that looks at it.
 wm_status waymark_push_picture(waymark_session *session, const char *camera, const wm_frame *frame, size_t bytes,
                                wm_error *err);
-// The clock is at `now_ns`, without a datum: what waits and is final is fused.
+// The clock is at `now_ns`, without a datum: what waits and is final is fused. WM_TIME_RAN_BACK, as of waymark_pose: it
+// is more than 10 s behind the newest time, and so of another clock.
 wm_status waymark_advance(waymark_session *session, wm_time_ns now_ns, wm_error *err);
 
 // The pose of `now_ns`, by the odometry since the fused one. WM_AGAIN: there is none yet, or it was asked for already.
