@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# Metrics of a run: `waymark watch --metrics` and /metrics of the live page say what the run does, and that it is gone. Where
-# promtool is (Debian: prometheus), it judges both; prometheus itself, where it is, reads the page. metrics.sh BIN.
+# Metrics of a run: `waymark watch --metrics` and /metrics of the live page say what the run does, and that it is gone. The
+# parser of prometheus_client (tests/judges) reads both; prometheus itself, where it is, reads the page. metrics.sh BIN.
 # In a network of its own; skipped (77) where there is no right to one.
 set -euo pipefail
 if [ "${WM_OWN_NETWORK:-}" != 1 ]; then
@@ -45,7 +45,20 @@ cp "$dir/waymark.prom" "$dir/first.prom" || fail "no file"
 grep -qx 'waymark_up 1' "$dir/first.prom" || fail "the run is not up"
 grep -qx 'waymark_state{state="dead_reckoning"} 1' "$dir/first.prom" || fail "another state"
 grep -qE '^waymark_source_received_total\{source="motion"\} [1-9]' "$dir/first.prom" || fail "no data counted"
-judge() { command -v promtool >/dev/null || return 0; promtool check metrics <"$1" || fail "promtool refuses $1"; echo "promtool takes $1"; }
+judge() {
+  .cache/venv/bin/python -c 'import prometheus_client' 2>/dev/null || { echo "not judged: tests/judges/setup.sh has not run"; return 0; }
+  .cache/venv/bin/python - "$1" <<'EOT' || fail "prometheus_client refuses $1"
+import sys
+from prometheus_client.parser import text_string_to_metric_families
+families = list(text_string_to_metric_families(open(sys.argv[1]).read()))
+for family in families:
+    assert family.documentation and family.type in ("gauge", "counter"), family
+names = [family.name for family in families]
+samples = [(sample.name, *sorted(sample.labels.items())) for family in families for sample in family.samples]
+assert len(set(names)) == len(names) and len(set(samples)) == len(samples), "something is there twice"
+print("prometheus_client reads", len(families), "metrics of", len(samples), "samples")
+EOT
+}
 judge "$dir/first.prom"
 if [ -x "$bin/waymark-web" ]; then
   python3 - "$dir/page.prom" <<'EOT'

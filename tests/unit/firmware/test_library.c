@@ -263,6 +263,12 @@ TEST(test_can_frames_give_the_replay_s_bits) {
     ok(waymark_push_can(session, i * STEP_NS, "can0", 0x100, 0, data, 8, &err));
     ok(waymark_push_can(session, i * STEP_NS, "can0", 0x123, 0, data, 8, &err));  // of nobody
   }
+  TEST_ASSERT_EQUAL(WM_BAD_DATA, waymark_push_can(session, STEPS * STEP_NS, "can0", 0x100, 0, data, 1, &err));
+  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(err.text, "can: "), err.text);
+  static wm_health health;
+  ok(waymark_health(session, &health, sizeof health, &err));
+  TEST_ASSERT_EQUAL_UINT64(1, health.sources[0].malformed);
+  TEST_ASSERT_EQUAL_STRING(err.text, health.refused_because[0]);
   TEST_ASSERT_EQUAL(WM_BAD_DATA, waymark_push_can(session, 0, "can0", 0x800, 0, data, 8, &err));
   TEST_ASSERT_EQUAL(WM_BAD_DATA, waymark_push_can(session, 0, "can0", 0x100, 0, data, 65, &err));
   ok(waymark_close(session, &err));
