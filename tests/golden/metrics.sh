@@ -68,6 +68,7 @@ assert answer.headers["Content-Type"] == "text/plain; version=0.0.4; charset=utf
 open(sys.argv[1], "wb").write(answer.read())
 EOT
   grep -qx 'waymark_up 1' "$dir/page.prom" || fail "the page has no run"
+  [ "$(grep -c '^# TYPE' "$dir/page.prom")" = "$(grep -c '^# TYPE' "$dir/waymark.prom")" ] || fail "page and file differ"
   judge "$dir/page.prom"
 fi
 if [ -x "$bin/waymark-web" ] && command -v prometheus >/dev/null; then

@@ -79,6 +79,7 @@ Json source_json(const wm_source_health &s) {
 void Live::take(const std::string &what, const void *message, size_t length, int64_t now_ns) {
   if (what == "POSE") take_pose(message, length, now_ns);
   if (what == "REFUSED") watch_refused(&seen_, message, length);
+  if (what == "POSE_BOUND") watch_bound(&seen_, message, length);
   if (what == "HEALTH") watch_health(&seen_, message, length, now_ns);
   if (what == "INNOVATION") take_innovation(message, length);
   if (what == "OBSERVATIONS") take_sightings(message, length, now_ns);

@@ -49,8 +49,8 @@ void on_message(const lcm_recv_buf_t *message, const char *channel, void *contex
 }
 
 void listen_to(lcm_t *lcm, Shown *shown) {
-  for (const char *what :
-       {"POSE", "HEALTH", "INNOVATION", "OBSERVATIONS", "LANDMARKS", "MAP", "PARTICLES", "HYPOTHESES", "REFUSED"}) {
+  for (const char *what : {"POSE", "POSE_BOUND", "HEALTH", "INNOVATION", "OBSERVATIONS", "LANDMARKS", "MAP",
+                           "PARTICLES", "HYPOTHESES", "REFUSED"}) {
     // The channel is a pattern there: a prefix is meant letter by letter.
     std::string pattern;
     for (const char c : shown->prefix + what)

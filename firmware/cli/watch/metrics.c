@@ -52,6 +52,13 @@ static void of_pose(const watch *self, wm_time_ns now_ns, FILE *to) {
         (double)(e->t_ns - self->pose.fused_until_ns) * 1e-9);
 }
 
+static void of_bound(const wm_bound *b, FILE *to) {
+  gauge(to, "pose_usable", "1 where both bounds are within the alert limits.", b->usable);
+  gauge(to, "pose_bound_meters", "How far the position may be off at that risk.", b->horizontal_m);
+  gauge(to, "pose_bound_heading_radians", "How far the heading may be off at that risk.", b->heading_rad);
+  gauge(to, "pose_bound_risk", "Probability that the pose is off by more.", b->risk);
+}
+
 static void of_state(const watch *self, FILE *to) {
   head(to, "state", "gauge", "1 for the state of the pose, 0 for the others.");
   for (unsigned i = 0; strcmp(wm_state_name(i), "?") != 0; i++) {
@@ -131,6 +138,16 @@ static void source_head(FILE *to, const char *name, const wm_source_health *s) {
   label(to, "source", s->name);
 }
 
+// Nothing where the count is 0.
+static void count_of(FILE *to, const char *name, const wm_source_health *s, const char *key, const char *word,
+                     uint64_t count) {
+  if (count == 0) return;
+  source_head(to, name, s);
+  (void)fputc(',', to);
+  label(to, key, word);
+  (void)fprintf(to, "} %" PRIu64 "\n", count);
+}
+
 static void of_sources(const wm_health *h, FILE *to) {
   char name[48];
   const wm_source_health *end = h->sources + h->source_count;
@@ -144,13 +161,12 @@ static void of_sources(const wm_health *h, FILE *to) {
   }
   head(to, "source_rejected_total", "counter", "Updates that were refused, by verdict.");
   for (const wm_source_health *s = h->sources; s < end; s++)
-    for (unsigned i = 1; i < WM_VERDICT_COUNT; i++) {
-      if (s->rejected[i] == 0) continue;
-      source_head(to, "rejected_total", s);
-      (void)fputc(',', to);
-      label(to, "verdict", wm_verdict_name(i));
-      (void)fprintf(to, "} %" PRIu64 "\n", s->rejected[i]);
-    }
+    for (unsigned i = 1; i < WM_VERDICT_COUNT; i++)
+      count_of(to, "rejected_total", s, "verdict", wm_verdict_name(i), s->rejected[i]);
+  head(to, "source_refused_total", "counter", "Data that the estimator could not use, by status.");
+  for (const wm_source_health *s = h->sources; s < end; s++)
+    for (unsigned i = 1; i < WM_STATUS_COUNT; i++)
+      count_of(to, "refused_total", s, "status", wm_status_text((wm_status)i), s->refused[i]);
   for (const counted *c = kTimesOfSource; c < kTimesOfSource + sizeof kTimesOfSource / sizeof kTimesOfSource[0]; c++) {
     (void)snprintf(name, sizeof name, "source_%s_seconds", c->name);
     head(to, name, "gauge", c->about);
@@ -161,13 +177,8 @@ static void of_sources(const wm_health *h, FILE *to) {
     }
   }
   head(to, "source_device", "gauge", "1 for the state of its device.");
-  for (const wm_source_health *s = h->sources; s < end; s++) {
-    if (s->device == WM_DEVICE_NONE) continue;
-    source_head(to, "device", s);
-    (void)fputc(',', to);
-    label(to, "state", wm_device_state_name(s->device));
-    (void)fputs("} 1\n", to);
-  }
+  for (const wm_source_health *s = h->sources; s < end; s++)
+    count_of(to, "device", s, "state", wm_device_state_name(s->device), s->device != WM_DEVICE_NONE);
 }
 
 void watch_metrics(const watch *self, wm_time_ns now_ns, FILE *to) {
@@ -175,6 +186,7 @@ void watch_metrics(const watch *self, wm_time_ns now_ns, FILE *to) {
   gauge(to, "up", "1 where a run is heard.", is_up);
   if (!is_up) return;
   if (self->has_pose) of_pose(self, now_ns, to);
+  if (self->has_bound) of_bound(&self->bound, to);
   of_state(self, to);
   of_run(&self->health, to);
   of_sources(&self->health, to);

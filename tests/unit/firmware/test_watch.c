@@ -240,6 +240,9 @@ TEST(a_run_is_metrics) {
   health.sources[0].silent_ns = -1, health.sources[0].lateness_p99_ns = 25 * WM_NS_PER_MS;
   health.deadlines_missed = 12;
   health.sources[0].received = UINT64_C(9007199254740993);  // whole, beyond what a double holds
+  health.sources[0].refused[WM_OUT_OF_RANGE] = 3;
+  const wm_bound bound = {.risk = 1e-4, .horizontal_m = 0.25, .heading_rad = HUGE_VAL, .usable = 0};
+  watch_bound(&seen, bytes, wm_lcm_bound(&bound, bytes, sizeof bytes));
   health.lost_probability = (double)NAN;
   (void)snprintf(health.host, sizeof health.host, "robot-7");
   health.pid = 42, health.run_id = 0xabc;
@@ -259,6 +262,10 @@ TEST(a_run_is_metrics) {
                                "\nwaymark_reckoning_left_meters 41.6\n",
                                "\nwaymark_source_received_total{source=\"can\"} 9007199254740993\n",
                                "\nwaymark_source_rejected_total{source=\"a\\\"b\\\\c\",verdict=\"gate\"} 7\n",
+                               "\nwaymark_source_refused_total{source=\"can\",status=\"out of range\"} 3\n",
+                               "\nwaymark_pose_usable 0\n",
+                               "\nwaymark_pose_bound_meters 0.25\n",
+                               "\nwaymark_pose_bound_heading_radians +Inf\n",
                                "\nwaymark_source_device{source=\"can\",state=\"works\"} 1\n",
                                "\nwaymark_run_info{host=\"robot-7\",pid=\"42\",run=\"0000000000000abc\"} 1\n"};
   const char *text = metrics_at(11 * WM_NS_PER_S);
