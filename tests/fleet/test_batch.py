@@ -137,6 +137,12 @@ class Batch(unittest.TestCase):
         self.assertEqual([r["status"] for r in rows], ["done", "failed"] * 3)
         self.fleet.configure("noisy", "")
         self.batch()
+        for truth in (self.fleet.folder / "drives").glob("*/truth.csv"):
+            truth.write_text("t_ns\n")
+        self.assertEqual(call("batch", self.fleet.plan(), "--out", self.out)[0], 1)
+        said = "".join(file.read_text() for file in (self.out / "failed").iterdir())
+        self.assertIn("written to run\n", said)  # the cell's folder is gone
+        self.assertNotIn(".part", said)
 
     def test_parts_make_up_the_whole(self):
         whole = self.batch("--jobs", 1)

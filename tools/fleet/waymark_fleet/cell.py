@@ -71,7 +71,9 @@ def execute(cell, folder):
             code, *_ = call([*cell.judge, run, cell.truth, "--json", *cell.evaluation], judged, said)
         result["status"] = "done" if code == 0 else "failed"
     if code != 0:
-        lines = (folder / "said.txt").read_text(errors="replace").strip().splitlines()
+        said = (folder / "said.txt").read_text(errors="replace").replace(f"{folder}/", "")  # which is gone afterwards
+        (folder / "said.txt").write_text(said)
+        lines = said.strip().splitlines()
         result["error"] = lines[-1].removeprefix("waymark: ") if lines else f"exit code {code}"
         return result
     result["figures"] = figures(run, folder / "eval.json")
