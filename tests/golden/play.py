@@ -125,11 +125,12 @@ def check_mistakes(work, recording):
             ([recording, "--faults", work / "none.yaml"], 2, "none.yaml"),
             ([recording, "--faults", work / "bad.yaml"], 2, "'bus_of' is unknown; did you mean 'bus_off'?"),
             ([recording, "--faults", work / "elsewhere.yaml"], 2, "has no stream 'imu'; it has motion, sightings"),
+            ([recording, "--faults", work / "elsewhere.yaml", "--print-faults"], 2, "has no stream 'imu'; it has motion, sightings"),
             (["--print-faults"], 2, "--print-faults needs --faults FILE")):
         done = play(*words)
         assert done.returncode == code and text in done.stderr, (words, done.returncode, done.stderr)
         assert "sent to" not in done.stdout, words
-    print("12 mistakes are refused")
+    print("13 mistakes are refused")
 
 
 def check_reference():

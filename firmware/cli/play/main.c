@@ -33,7 +33,7 @@ static const char kHelp[] =
     "  --faults FILE    what breaks and when (docs/faults.md)\n"
     "  --start-at N     CLOCK_MONOTONIC in nanoseconds at which --from is due (default: in half a second)\n"
     "  --json FILE      the summary, at the start and again at the end\n"
-    "  --print-faults   print --faults FILE as JSON, with defaults, and end\n"
+    "  --print-faults   print --faults FILE as JSON, with defaults, and end; a RECORDING is compared with it\n"
     "  --print-streams  print the recording's streams as JSON, and end\n"
     "  --print-kinds    print all kinds of faults, and end\n"
     "\n"
@@ -100,7 +100,7 @@ static wm_status parse(int argc, char *const *argv, arguments *a, wm_error *err)
   a->recording = words[0];
   if (status != WM_OK || a->help || a->print_kinds) return status;
   if (a->print_faults && !a->faults) return wm_fail(err, WM_BAD_USAGE, "--print-faults needs --faults FILE");
-  if (a->print_faults) return WM_OK;
+  if (a->print_faults && !a->recording) return WM_OK;
   if (!a->recording) return wm_fail(err, WM_BAD_USAGE, "play needs a RECORDING (waymark play --help)");
   if (a->passes == 0 || a->passes > 1000000)
     return wm_fail(err, WM_BAD_USAGE, "--loop: a number from 1 to 1000000 is needed");
@@ -216,8 +216,11 @@ static wm_status play_recording(const arguments *a, const wm_config *config, con
   wm_status status = wm_play_open(a->recording, &options, &self.play, err);
   if (status != WM_OK) return status;
   const places_wanted wanted = {config, &a->can, &a->cameras, a->lcm, a->prefix};
-  if (a->print_streams) {
-    report_streams(self.play, a->recording, stdout);
+  if (a->print_faults || a->print_streams) {
+    if (a->print_faults)
+      wm_faults_json(faults, stdout);
+    else
+      report_streams(self.play, a->recording, stdout);
     wm_play_close(self.play);
     return WM_OK;
   }
@@ -233,7 +236,7 @@ static wm_status work(const arguments *a, wm_error *err) {
   wm_faults faults = {.count = 0};
   wm_status status = a->faults ? wm_faults_load(a->faults, &faults, err) : WM_OK;
   if (status == WM_NOT_FOUND || status == WM_IO) err->status = WM_BAD_USAGE;
-  if (status == WM_OK && a->print_faults) {
+  if (status == WM_OK && a->print_faults && !a->recording) {
     wm_faults_json(&faults, stdout);
     wm_faults_free(&faults);
     return WM_OK;
