@@ -30,6 +30,11 @@ def turn(t):
     return 0.3 if 6 < t < 11 else -0.25 if 14 < t < 18 else 0.0
 
 
+def weave(t):
+    """rad/s: left and right in turn, 30 s each way."""
+    return 0.2 * math.sin(2 * math.pi * t / 60)
+
+
 def speed(t):
     return 1.0 + 0.2 * math.sin(0.7 * t)
 
@@ -55,7 +60,7 @@ def table(head, rows):
     return head + "\n" + "".join(",".join(str(c) for c in row) + "\n" for row in rows)
 
 
-def motion(rate_hz=50, v=1.0, w=1.0, sigma=0.01, stamp=ns, repeat=1, arrival=None, exact=False, steady=False, seconds=SECONDS):
+def motion(rate_hz=50, v=1.0, w=1.0, sigma=0.01, stamp=ns, repeat=1, arrival=None, exact=False, steady=False, seconds=SECONDS, turn=turn):
     """motion.csv: speed and turn rate times a factor each; each value `repeat` times."""
     n, rows, held = noise(1), [], None
     for k, t in enumerate(times(rate_hz, seconds)):
@@ -77,7 +82,7 @@ def commands():
     return table("t_ns,v_mps,w_radps", rows)
 
 
-def imu(rate_hz=100, axes=(0, 0, 1), factor=1.0, up=(0, 0, 1), gravity=9.81, sigma=0.003, stamp=ns, zero=None, lag_s=0.0, bias=0.0, every=1, seconds=SECONDS):
+def imu(rate_hz=100, axes=(0, 0, 1), factor=1.0, up=(0, 0, 1), gravity=9.81, sigma=0.003, stamp=ns, zero=None, lag_s=0.0, bias=0.0, every=1, seconds=SECONDS, turn=turn):
     """imu.csv: the turn about an axis, gravity along another; `zero`: which samples are 0."""
     n, rows = noise(2), []
     for k, t in enumerate(times(rate_hz, seconds)):
@@ -175,9 +180,9 @@ def drifts(share, later_s=0.0):
     return lambda t: ns(t * (1 + share) + later_s)
 
 
-def apart(stamp, seconds=80, sigma=0.003, of_motion=ns):
+def apart(stamp, seconds=80, sigma=0.003, of_motion=ns, turn=turn, lag_s=0.0):
     """Twist and gyro of a longer drive, of a gyro with another clock."""
-    return {"motion.csv": motion(seconds=seconds, stamp=of_motion), "imu.csv": imu(seconds=seconds, stamp=stamp, sigma=sigma)}
+    return {"motion.csv": motion(seconds=seconds, stamp=of_motion, turn=turn), "imu.csv": imu(seconds=seconds, stamp=stamp, sigma=sigma, turn=turn, lag_s=lag_s)}
 
 
 def counters(bits, stated, rate_hz=200):
@@ -237,10 +242,12 @@ FAULTS = [
     *[(f"counter of {bits} bits in a table", {"ticks.csv": ticks(wraps_at=2**bits, rate_hz=200, begin=50000), "imu.csv": imu(), "calibration.yaml": WHEELS}, ("bad", "value-implausible", "ticks"), f"anew after {2**bits} counts", f"plus {2**bits} from") for bits in (8, 12, 16)],
     ("counter of 12 bits in a signal of 16", counters(12, 16), ("bad", "value-implausible", "can"), "a counter of 12 bits", "|12@1+"),
     ("counter of 8 bits in a signal of 16", counters(8, 16), ("bad", "value-implausible", "can"), "a counter of 8 bits", "|8@1+"),
-    ("gyro whose clock is 2 % fast", apart(drifts(0.02)), ("bad", "clock-drifts", "imu"), "runs 2 % fast", "less 0.02"),
+    ("gyro whose clock is 2 % fast", apart(drifts(0.02)), ("bad", "clock-drifts", "imu"), "runs 2 % fast", "less 0.019"),
     ("gyro whose clock is 1.2 % slow, noise", apart(drifts(-0.012), sigma=0.05), ("bad", "clock-drifts", "imu"), "1.2 % slow", "less -0.01"),
     ("gyro that is stamped 1.5 s late", apart(drifts(0, 1.5)), ("bad", "clock-drifts", "imu"), "s late against that of motion", "t_ns of imu less 1."),
     ("gyro whose clock is 5 % fast beside CAN and increments", {**can(), "increments.csv": increments(), "imu.csv": imu(stamp=drifts(0.05))}, ("bad", "clock-drifts", "imu"), "% fast", "t_ns of imu"),
+    ("gyro whose clock is 2 % fast, slow turns", apart(drifts(0.02), turn=weave), ("bad", "clock-drifts", "imu"), "runs 2 % fast", "less 0.019"),
+    ("gyro whose clock is 0.5 % slow, slow turns, noise", apart(drifts(-0.005), 300, 0.05, turn=weave), ("bad", "clock-drifts", "imu"), "runs 0.5", "less -0.005"),
     ("clock set back by 8 s", both(motion_csv=motion(stamp=jump(9, -8))), ("bad", STAMPS, "motion"), "back by 7.98 s, 8.980 s after", "add 7.98 s"),
     ("clock set back by 2 s, arrivals go on", both(motion_csv=motion(stamp=jump(9, -2), arrival=lambda t: ns(t) + 2_000_000)), ("bad", STAMPS, "motion"), "back by 1.98 s", "add 1.98 s"),
     ("gyro's clock set back by 3 s", both(imu_csv=imu(stamp=jump(12, -3))), ("bad", STAMPS, "imu"), "back by 2.99 s", "add 2.99 s"),
@@ -288,6 +295,7 @@ RIGHT = [
     *[(f"counters of {bits} bits on CAN", counters(bits, bits)) for bits in (8, 12, 16)],
     ("a long drive, a gyro of much noise", apart(ns, sigma=0.08)),
     ("a clock that is 0.1 % fast", apart(drifts(0.001))),
+    ("slow turns, a gyro of much noise that lags by 0.3 s", apart(ns, 300, 0.08, turn=weave, lag_s=0.3)),
     ("a left wheel that is 4 % larger, and a gyro", {"ticks.csv": ticks(larger=1.04), "imu.csv": imu(), "calibration.yaml": WHEELS}),
     ("straight on, a gyro of noise", {"motion.csv": motion(w=0), "imu.csv": imu(axes=(0, 0, 0))}, "not-observable"),
     ("an accelerometer without gravity", both(imu_csv=imu(gravity=0))),

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A source's clock that runs fast, slow or apart, by the turns that two sources show: moved onto each other by a delay
-// and a rate they are alike, as they are stamped they are not.
+// A source's clock that runs fast, slow or apart, by the turns that two sources show. Each block of the drive gives the
+// delay of one turn rate against the other by least squares. The line through the blocks' delays is the clock's offset
+// and rate; the delays' scatter about the line gives their sigmas.
 #include <math.h>
 #include <stdio.h>
 
@@ -8,22 +9,38 @@
 
 #define WINDOWS_MOST 2400  // ten minutes of a drive tell a clock
 #define WINDOWS_MIN 40
+#define BLOCKS 20
+#define WEIGHT_MIN 0.1  // of the mean block's: a block that hardly turns tells no delay
+// By how much a lag differs from turn to turn, before the blocks say so: a period of a slow sensor. As good as so many
+// blocks: few turns alone hardly tell their scatter.
+#define LAG_S 0.05
+#define LAG_BLOCKS 8
+#define CHANCE_SIGMAS 3.9  // of a normal distribution: one of 10,000 by chance
+#define APART_MIN_S 0.7    // at one end of the drive; below, a filter's or a robot's own lag
+#define GROWN_MIN_S 0.25   // over the drive: a lag does not grow; at 1 rad/s the heading is off by 14 degrees
 #define RATE_MOST 0.06     // of a clock: quartz is off by 1e-4, a sampling rate that is stated wrong by some per cent
 #define DELAY_MOST 24      // windows
-#define APART_MIN_S 0.7    // at one end of the drive; below, a filter's or a robot's own lag
 #define LIKE 0.8           // correlation of turns that are the same
-#define ALIKE 0.98         // so that no clock has to be looked for
-#define REST 0.5           // share of what was unlike that may be left for another clock to be believed
+#define ALIKE 0.98         // so that no clock has to be looked for far away
+#define REST 0.5           // share of what was unlike that a clock far away may leave: turns repeat themselves
 #define TURN_RMS_MIN 0.02  // rad/s
-#define STEP_WINDOWS 2.0   // of a search, at the end of the drive
-#define FINE 8             // parts of a step
-#define RATE_SEEN 0.0015   // below, over ten minutes, a delay alone
+#define AWAY (0.1 / DELAY_MOST)  // of r, a window: of turns that repeat themselves the nearest delay is taken
+#define STEP_WINDOWS 2.0         // of a search; of the rate, at the end of the drive
+#define SLOPE_WINDOWS 2.0        // to each side of a slope
+#define ROUNDS 8                 // of least squares
 #define SOURCES_MOST 8
 
+// Two turn rates over the windows that both have.
+typedef struct pair {
+  const channel *a, *b;
+  size_t first, count;
+} pair;
+
 typedef struct clock_fit {
-  double r;      // size of the correlation
-  double delay;  // windows by which b is later at the beginning
-  double rate;   // by which b's clock is faster
+  double delay, rate;                               // b is later: windows at the first window, windows a window
+  double r;                                         // correlation of the turns, moved so
+  double gain, zero;                                // b is gain times a, plus zero
+  double freedom, delay_sigma, rate_sigma, middle;  // of the delay at `middle`, windows, where it is best known
 } clock_fit;
 
 // Mean of b over the window that begins at `at`; NaN: not covered.
@@ -35,51 +52,132 @@ static double held(const channel *b, double at) {
   return (1 - part) * (double)b->sum[k] + part * (double)b->sum[k + 1];
 }
 
-static double likeness(const channel *a, const channel *b, size_t first, size_t count, double delay, double rate) {
-  double aa = 0, bb = 0, ab = 0;
-  size_t pairs = 0;
-  for (size_t i = 0; i < count; i++) {
-    const double x = held(a, (double)(first + i)), y = held(b, (double)first + (double)i * (1 + rate) + delay);
-    if (isnan(x) || isnan(y)) continue;
-    aa += x * x;
-    bb += y * y;
-    ab += x * y;
-    pairs++;
+// Of b, where it shows what a shows at window i.
+static double moved(const pair *p, const clock_fit *f, size_t i) {
+  return (double)p->first + (double)i * (1 + f->rate) + f->delay;
+}
+
+typedef struct sums {
+  double n, x, y, xx, xy, yy;
+} sums;
+
+static void add(sums *s, double weight, double x, double y) {
+  s->n += weight;
+  s->x += weight * x;
+  s->y += weight * y;
+  s->xx += weight * x * x;
+  s->xy += weight * x * y;
+  s->yy += weight * y * y;
+}
+
+// Means, and the squares about them.
+static sums centred(const sums *s) {
+  const double x = s->x / s->n, y = s->y / s->n;
+  return (sums){s->n, x, y, s->xx - s->x * x, s->xy - s->x * y, s->yy - s->y * y};
+}
+
+// Fills in r, gain and zero.
+static void compare(const pair *p, clock_fit *f) {
+  sums all = {0};
+  for (size_t i = 0; i < p->count; i++) {
+    const double x = held(p->a, (double)(p->first + i)), y = held(p->b, moved(p, f, i));
+    if (!isnan(x) && !isnan(y)) add(&all, 1, x, y);
   }
-  const double rms = sqrt(fmin(aa, bb) / (double)(pairs ? pairs : 1)) / WINDOW_S;
-  return pairs < WINDOWS_MIN || 2 * pairs < count || rms < TURN_RMS_MIN ? 0 : fabs(ab) / sqrt(aa * bb);
+  const sums c = centred(&all);
+  const int is_known =
+      c.n >= WINDOWS_MIN && 2 * c.n >= (double)p->count && sqrt(fmin(c.xx, c.yy) / c.n) >= TURN_RMS_MIN * WINDOW_S;
+  f->r = is_known ? fabs(c.xy) / sqrt(c.xx * c.yy) : 0;
+  f->gain = is_known ? c.xy / c.xx : 0;
+  f->zero = c.y - f->gain * c.x;
 }
 
 // The best of a grid about a delay and a rate.
-static void search(const channel *a, const channel *b, size_t first, size_t count, const double most[2],
-                   const double step[2], clock_fit *best) {
-  const clock_fit middle = *best;
-  for (double rate = -most[1]; rate <= most[1] + 1e-12; rate += step[1])
-    for (double delay = -most[0]; delay <= most[0] + 1e-9; delay += step[0]) {
-      const double r = likeness(a, b, first, count, middle.delay + delay, middle.rate + rate);
-      if (r > best->r) *best = (clock_fit){r, middle.delay + delay, middle.rate + rate};
-      if (step[0] <= 0) break;
+static clock_fit search(const pair *p, double most_delay, double most_rate) {
+  clock_fit best = {0};
+  compare(p, &best);
+  const double rate_step = STEP_WINDOWS / (double)p->count;
+  for (double rate = -most_rate; rate <= most_rate + 1e-12; rate += rate_step)
+    for (double delay = -most_delay; delay <= most_delay; delay += STEP_WINDOWS) {
+      clock_fit f = {.delay = delay, .rate = rate};
+      compare(p, &f);
+      if (f.r - AWAY * fabs(f.delay) > best.r - AWAY * fabs(best.delay)) best = f;
     }
+  return best;
 }
 
-// Whether b's clock is another one than a's, and which; `before`: the likeness as they are stamped.
-static int is_apart(const channel *a, const channel *b, clock_fit *out, double *before) {
+// Change of a turn over SLOPE_WINDOWS to each side, a window.
+static double slope_of(const channel *c, double at) {
+  return (held(c, at + SLOPE_WINDOWS) - held(c, at - SLOPE_WINDOWS)) / (2 * SLOPE_WINDOWS);
+}
+
+// A step of least squares: the delay that is left in each block, and the line through them. The slope of a is the
+// instrument for that of b, so that the noise of neither adds to the weights. 0: too few blocks turn.
+static int step(const pair *p, clock_fit *f) {
+  double weight[BLOCKS] = {0}, left[BLOCKS] = {0}, whole = 0;
+  sums line = {0};
+  int blocks = 0;
+  for (size_t i = 0; i < p->count; i++) {
+    const double from = (double)(p->first + i), to = moved(p, f, i);
+    const double slope = f->gain * slope_of(p->a, from), both = slope * slope_of(p->b, to);
+    const double off = slope * (f->gain * held(p->a, from) + f->zero - held(p->b, to));
+    if (isnan(both) || isnan(off)) continue;
+    weight[i * BLOCKS / p->count] += both;
+    left[i * BLOCKS / p->count] += off;
+    whole += both;
+  }
+  for (int k = 0; k < BLOCKS; k++) {
+    if (!(weight[k] > WEIGHT_MIN * whole / BLOCKS)) continue;
+    add(&line, weight[k], (k + 0.5) * (double)p->count / BLOCKS, left[k] / weight[k]);
+    blocks++;
+  }
+  const sums c = centred(&line);
+  if (blocks < 3 || !(c.xx > 0)) return 0;
+  const double rate = c.xy / c.xx, lag = LAG_S / WINDOW_S, freedom = LAG_BLOCKS + blocks - 2;
+  const double scatter = (LAG_BLOCKS * lag * lag * c.n / blocks + fmax(0, c.yy - rate * c.xy)) / freedom;
+  f->delay += c.y - rate * c.x;
+  f->rate += rate;
+  f->middle = c.x;
+  f->freedom = freedom;
+  f->delay_sigma = sqrt(scatter / c.n);
+  f->rate_sigma = sqrt(scatter / c.xx);
+  return fabs(f->rate) < 2 * RATE_MOST && fabs(f->delay) < 2 * DELAY_MOST;
+}
+
+static clock_fit refined(const pair *p, clock_fit f) {
+  for (int k = 0; k < ROUNDS; k++) {
+    if (!step(p, &f)) return (clock_fit){0};
+    compare(p, &f);
+  }
+  return f;
+}
+
+// Sigmas by chance of Student's distribution [Wallace1959].
+static double sigmas_by_chance(double freedom) {
+  const double z = CHANCE_SIGMAS * (8 * freedom + 3) / (8 * freedom + 1);
+  return sqrt(freedom * expm1(z * z / freedom));
+}
+
+// Whether b's clock is another one than a's, and which. A rate that is none is 0.
+static int is_apart(const channel *a, const channel *b, clock_fit *out) {
   size_t first = 0, end = a->windows < b->windows ? a->windows : b->windows;
   while (first < end && !((double)a->cover[first] > 0 && (double)b->cover[first] > 0)) first++;
   while (end > first && !((double)a->cover[end - 1] > 0 && (double)b->cover[end - 1] > 0)) end--;
-  const size_t count = end - first < WINDOWS_MOST ? end - first : WINDOWS_MOST;
-  if (count < WINDOWS_MIN) return 0;
-  *out = (clock_fit){likeness(a, b, first, count, 0, 0), 0, 0};
-  search(a, b, first, count, (double[2]){APART_MIN_S / WINDOW_S, 0}, (double[2]){0.5, 1}, out);
-  *before = out->r;
-  if (*before > ALIKE) return 0;
-  const double rate_step = STEP_WINDOWS / (double)count;
-  search(a, b, first, count, (double[2]){DELAY_MOST, RATE_MOST}, (double[2]){STEP_WINDOWS, rate_step}, out);
-  search(a, b, first, count, (double[2]){STEP_WINDOWS, rate_step}, (double[2]){STEP_WINDOWS / FINE, rate_step / FINE},
-         out);
-  const double end_windows = out->delay + out->rate * (double)count;
-  if (!(out->r > LIKE) || 1 - out->r > REST * (1 - *before)) return 0;
-  return fmax(fabs(out->delay), fabs(end_windows)) * WINDOW_S > APART_MIN_S;
+  const pair p = {a, b, first, end - first < WINDOWS_MOST ? end - first : WINDOWS_MOST};
+  if (p.count < WINDOWS_MIN) return 0;
+  *out = search(&p, APART_MIN_S / WINDOW_S, 0);
+  if (out->r > LIKE) *out = refined(&p, *out);
+  if (out->r < ALIKE) {
+    const clock_fit far = refined(&p, search(&p, DELAY_MOST, RATE_MOST));
+    if (1 - far.r < REST * (1 - out->r)) *out = far;
+  }
+  const double sigmas = sigmas_by_chance(out->freedom);
+  const double grown_s = fabs(out->rate) * (double)p.count * WINDOW_S;
+  const double middle_s = fabs(out->delay + out->rate * out->middle) * WINDOW_S;
+  const int runs = fabs(out->rate) > sigmas * out->rate_sigma && grown_s > GROWN_MIN_S;
+  const int is_late = middle_s > APART_MIN_S && middle_s > sigmas * out->delay_sigma * WINDOW_S;
+  if (!runs) out->delay += out->rate * out->middle;
+  if (!runs) out->rate = 0;
+  return out->r > LIKE && (runs || is_late);
 }
 
 // The turn that a source shows best: of a twist, else of what is integrated, else of a gyro. NULL: none, a command, or
@@ -97,12 +195,13 @@ static const channel *turn_of(const channels *all, uint16_t source, const char *
   return NULL;
 }
 
-static void says(const char *name, const char *other, const clock_fit *f, double before, wm_findings *out) {
-  char fix[WM_FINDING_FIX_MAX], runs[48] = "", later[48] = "", by_rate[64] = "", by_delay[48] = "";
+static void says(const char *name, const char *other, const clock_fit *f, wm_findings *out) {
+  char fix[WM_FINDING_FIX_MAX], runs[64] = "", later[48] = "", by_rate[64] = "", by_delay[48] = "";
   const double delay_s = f->delay * WINDOW_S;
-  const int has_rate = fabs(f->rate) > RATE_SEEN, has_delay = fabs(delay_s) > WINDOW_S || !has_rate;
+  const int has_rate = f->rate != 0, has_delay = fabs(delay_s) > WINDOW_S || !has_rate;
   if (has_rate) {
-    (void)snprintf(runs, sizeof runs, "runs %.2g %% %s", 100 * fabs(f->rate), f->rate > 0 ? "fast" : "slow");
+    (void)snprintf(runs, sizeof runs, "runs %.2g %% %s (sigma %.2g %%)", 100 * fabs(f->rate),
+                   f->rate > 0 ? "fast" : "slow", 100 * f->rate_sigma);
     (void)snprintf(by_rate, sizeof by_rate, " less %.3g times the time since the first row", f->rate / (1 + f->rate));
   }
   if (has_delay) {
@@ -114,9 +213,7 @@ static void says(const char *name, const char *other, const clock_fit *f, double
                  "t_ns of %.40s%s%s; or that of %.40s is wrong, the other way round. Stamp both by one clock", name,
                  by_rate, by_delay, other);
   wm_find(out, WM_FOUND_CLOCK_DRIFTS, WM_SEVERITY_BAD, name, fix,
-          "its clock %s%s against that of %s: moved so, their turns are alike (r %.2f), as they are stamped less so "
-          "(r %.2f)",
-          runs, later, other, f->r, before)
+          "its clock %s%s against that of %s: moved so, their turns are alike (r %.2f)", runs, later, other, f->r)
       ->size = has_rate ? f->rate : delay_s;
 }
 
@@ -124,7 +221,6 @@ static void says(const char *name, const char *other, const clock_fit *f, double
 void drifts_judge(const channels *self, const wm_assembly *assembly, wm_findings *out) {
   const channel *of[SOURCES_MOST];
   clock_fit fit;
-  double before = 0;
   int apart[SOURCES_MOST] = {0};
   size_t count = 0, best = 0;
   for (uint16_t source = 0; source < assembly->source_count && count < SOURCES_MOST; source++)
@@ -132,11 +228,11 @@ void drifts_judge(const channels *self, const wm_assembly *assembly, wm_findings
         of[count]->windows > 0)
       count++;
   for (size_t i = 0; i < count; i++)
-    for (size_t k = 0; k < count; k++) apart[i] += k != i && is_apart(of[k], of[i], &fit, &before);
+    for (size_t k = 0; k < count; k++) apart[i] += k != i && is_apart(of[k], of[i], &fit);
   for (size_t i = 1; i < count; i++)
     if (apart[i] < apart[best]) best = i;
   for (size_t i = 0; i < count; i++)
-    if (i != best && is_apart(of[best], of[i], &fit, &before))
+    if (i != best && is_apart(of[best], of[i], &fit))
       says(wm_assembly_source_name(assembly, of[i]->source), wm_assembly_source_name(assembly, of[best]->source), &fit,
-           before, out);
+           out);
 }
