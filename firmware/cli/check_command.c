@@ -71,15 +71,31 @@ static void print_map(const wm_raster *map, const char *path) {
        map->edges ? "" : ", no edges", map->drivable ? "" : ", no drivable");
 }
 
-static void print_driving(const wm_driving *driving) {
+// By its column, where a table gives it: "left of ticks.csv".
+static void print_quantity(const wm_assembly *assembly, unsigned quantity, int is_first) {
+  const char *between = is_first ? "" : ", ";
+  for (size_t i = 0; i < assembly->source_count; i++) {
+    const wm_assembled_source *s = &assembly->sources[i];
+    const char *column = motion_data_column(s->name, quantity);
+    if (column && !((s->drops >> quantity) & 1u)) {
+      fact("%s%s of %s.csv", between, column, s->name);
+      return;
+    }
+  }
+  fact("%s%s (CAN)", between, wm_quantity_name(quantity));
+}
+
+static void print_driving(const wm_assembly *assembly) {
+  const wm_driving *driving = &assembly->driving;
+  int count = 0;
   fact("driven by    ");
   if (!(driving->kinds & WM_EVENT_BIT(WM_EVENT_QUANTITIES))) {
     fact("twists (motion*.csv): a row of the trajectory at each\n");
     return;
   }
   for (unsigned q = 0; q < WM_Q_COUNT; q++)
-    if ((driving->quantities >> q) & 1u) fact("%s ", wm_quantity_name(q));
-  fact("(CAN): a row of the trajectory at each\n");
+    if ((driving->quantities >> q) & 1u) print_quantity(assembly, q, count++ == 0);
+  fact(": a row of the trajectory at each\n");
 }
 
 static void print_quantities(uint32_t quantities) {
@@ -140,7 +156,7 @@ static void check_setup(const wm_assembly *assembly, wm_recording *recording, wm
   check_map(assembly, found);
   if (status != WM_OK) return;
   print_quantities(wm_recording_quantities(recording));
-  print_driving(&assembly->driving);
+  print_driving(assembly);
 }
 
 static void assembled(void *context, const wm_assembly *assembly, wm_status status) {
@@ -193,13 +209,13 @@ static void ask_for_causes(checked *self) {
   json_causes = answer.json;
 }
 
-// Whether a finding from this place on is one that a mistake of the setup may explain: not of a clock, or of data that
-// are not used, which say themselves what is wrong.
+// Whether a finding from this place on is one that a mistake of the setup may explain: not of a clock, of a counter, or
+// of data that are not used, which say themselves what is wrong.
 static int may_have_a_cause(const wm_findings *found, size_t from) {
   for (size_t i = from; i < found->count; i++) {
     const wm_finding_id id = found->at[i].id;
     const int says_it = id == WM_FOUND_DATA_UNUSED || id == WM_FOUND_ROWS_UNUSED || id == WM_FOUND_CLOCK_JUMPED ||
-                        id == WM_FOUND_CLOCK_COARSE || id == WM_FOUND_CLOCK_DRIFTS;
+                        id == WM_FOUND_CLOCK_COARSE || id == WM_FOUND_CLOCK_DRIFTS || id == WM_FOUND_COUNTER_RESTARTS;
     if (found->at[i].severity == WM_SEVERITY_BAD && !says_it) return 1;
   }
   return 0;

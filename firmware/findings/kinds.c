@@ -67,6 +67,8 @@ const wm_finding_kind kFindingKinds[WM_FOUND_COUNT] = {
                               "choose a model or an estimator that uses them, or leave them out"},
     [WM_FOUND_VALUE_IMPLAUSIBLE] = {"value-implausible", "a signal's unit, scale, byte order or bits differ",
                                     "compare the signal with the DBC: unit, scale, first bit, byte order, sign"},
+    [WM_FOUND_COUNTER_RESTARTS] = {"counter-restarts", "a wheel's counter starts anew: at the end of its bits, or once",
+                                   "write counts that go on, or state the counter's bits in the DBC"},
     [WM_FOUND_SENSORS_DISAGREE] = {"sensors-disagree", "a sign, a unit or a side of one of two sensors is wrong",
                                    "correct the sensor that differs from the robot's real motion"},
     [WM_FOUND_LIKELY_CAUSE] = {"likely-cause", "a usual mistake, which was undone in a trial of the recording",

@@ -38,10 +38,13 @@ typedef struct quantity_seen {
   double least, most, last;
   uint64_t zeros, as_float;  // as_float: values whose bits, taken for a float, are a usual number
 } quantity_seen;
-// A counter of wheel ticks that starts anew before the end of its bits.
+// A counter of wheel ticks that starts anew: each time at the end of its bits, or once, because its sender did.
 #define WRAP_BITS 6  // usual numbers of bits
 typedef struct ticks_wrap {
   double last, step, step_before;
+  wm_time_ns last_ns, first_ns;                   // stamps of the last and of the first count
+  uint64_t restarts;                              // jumps to 0
+  double restart_from, restart_s;                 // of the first one: the count before, and when, since the first
   uint64_t counts, jumps, alike;                  // alike: jumps of the size of the first one
   double since, between, first_jump;              // counts: since the last jump, between the jumps
   uint64_t folds[WRAP_BITS], misfits[WRAP_BITS];  // large steps that are a small one less a cycle, and others
@@ -55,6 +58,8 @@ typedef struct motion_data {
   ticks_wrap wraps[2];  // left, right
 } motion_data;
 
+// Column of a stream that gives this quantity, "wz_radps"; NULL: its own name, as on CAN.
+const char *motion_data_column(const char *source, unsigned quantity);
 void motion_data_init(motion_data *self, const wm_wheels *wheels);
 void motion_data_take(motion_data *self, const wm_event *event);
 // `bound`: bit per wm_quantity of the binding.

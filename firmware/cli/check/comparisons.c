@@ -151,6 +151,15 @@ static int is_can(const channel *c, const wm_assembly *assembly) {
   return strncmp(source_of(c, assembly), "can", 3) == 0;
 }
 
+int comparisons_is_broken(const channel *c, const wm_assembly *assembly, const wm_findings *found) {
+  static const wm_finding_id kOfClock[] = {WM_FOUND_CLOCK_JUMPED, WM_FOUND_CLOCK_COARSE, WM_FOUND_CLOCKS_APART};
+  const char *name = source_of(c, assembly);
+  for (size_t i = 0; i < sizeof kOfClock / sizeof kOfClock[0]; i++)
+    if (wm_findings_has(found, kOfClock[i], name)) return 1;
+  return (c->kind == CHANNEL_TICKS_TURN || c->kind == CHANNEL_TICKS_WAY) &&
+         wm_findings_has(found, WM_FOUND_COUNTER_RESTARTS, name);
+}
+
 static const char *word_of(const channel *c, const wm_assembly *assembly) {
   static const char *const kOfCan[CHANNEL_KINDS] = {[CHANNEL_YAW_RATE] = "yaw_rate",
                                                     [CHANNEL_ROLL_RATE] = "roll_rate",
@@ -453,7 +462,9 @@ static void judge_quantity(const scene *s, int of_way) {
   fit f;
   for (size_t i = 0; i < s->all->count; i++) {
     const channel *c = &s->all->at[i];
-    if (channel_is_way(c->kind) == of_way && !channel_is_tilt(c->kind) && c->values > 0) of[count++] = c;
+    if (channel_is_way(c->kind) == of_way && !channel_is_tilt(c->kind) && c->values > 0 &&
+        !comparisons_is_broken(c, s->assembly, s->out))
+      of[count++] = c;
   }
   for (size_t i = 0; i < count; i++)
     for (size_t k = i + 1; k < count; k++) {

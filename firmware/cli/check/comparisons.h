@@ -9,6 +9,8 @@
 #include "findings/findings.h"
 #include "fusion/assembly.h"
 
+// Whether a finding of fact says that this channel's clock or counter is broken: it is no witness then.
+int comparisons_is_broken(const channel *c, const wm_assembly *assembly, const wm_findings *found);
 // Findings about the sensors that contradict the others.
 void comparisons_judge(const channels *self, const wm_assembly *assembly, wm_findings *out);
 // A line for each pair: "compared  A with B: 0.99 times, r 0.98", or that the drive does not show it.

@@ -181,16 +181,15 @@ static int is_apart(const channel *a, const channel *b, clock_fit *out) {
 }
 
 // The turn that a source shows best: of a twist, else of what is integrated, else of a gyro. NULL: none, a command, or
-// of a clock that jumps or is coarse.
-static const channel *turn_of(const channels *all, uint16_t source, const char *name, const wm_findings *found) {
+// of a clock or a counter that is known to be broken.
+static const channel *turn_of(const channels *all, uint16_t source, const wm_assembly *assembly,
+                              const wm_findings *found) {
   static const channel_kind kBest[] = {CHANNEL_TWIST_TURN, CHANNEL_INCREMENT_TURN, CHANNEL_YAW_RATE, CHANNEL_TICKS_TURN,
                                        CHANNEL_WHEELS_TURN};
-  const wm_finding_id said[] = {WM_FOUND_CLOCK_JUMPED, WM_FOUND_CLOCK_COARSE, WM_FOUND_CLOCKS_APART};
-  for (size_t i = 0; i < sizeof said / sizeof said[0]; i++)
-    if (wm_findings_has(found, said[i], name)) return NULL;
   for (size_t k = 0; k < sizeof kBest / sizeof kBest[0]; k++)
     for (size_t i = 0; i < all->count; i++)
-      if (all->at[i].kind == kBest[k] && all->at[i].source == source)
+      if (all->at[i].kind == kBest[k] && all->at[i].source == source &&
+          !comparisons_is_broken(&all->at[i], assembly, found))
         return channels_are_commands(all, &all->at[i]) ? NULL : &all->at[i];
   return NULL;
 }
@@ -224,9 +223,7 @@ void drifts_judge(const channels *self, const wm_assembly *assembly, wm_findings
   int apart[SOURCES_MOST] = {0};
   size_t count = 0, best = 0;
   for (uint16_t source = 0; source < assembly->source_count && count < SOURCES_MOST; source++)
-    if ((of[count] = turn_of(self, source, wm_assembly_source_name(assembly, source), out)) != NULL &&
-        of[count]->windows > 0)
-      count++;
+    if ((of[count] = turn_of(self, source, assembly, out)) != NULL && of[count]->windows > 0) count++;
   for (size_t i = 0; i < count; i++)
     for (size_t k = 0; k < count; k++) apart[i] += k != i && is_apart(of[k], of[i], &fit);
   for (size_t i = 1; i < count; i++)

@@ -20,12 +20,32 @@
 #define WRAP_STEPS 10.0
 #define WRAP_COUNTS 100.0
 #define WRAP_ALIKE 0.05
+#define RESTART_CYCLE \
+  65536.0                // CAN's counts go on by the shorter side of their bits: a restart at 0 is at whole cycles
 #define FOLD_COUNTS 2.0  // of a wheel that stands, where its counter trembles about its end
 
 void motion_data_init(motion_data *self, const wm_wheels *wheels) {
   memset(self, 0, sizeof *self);
   self->wheels = wheels;
   self->ticks_ns = WM_TIME_NONE;
+}
+
+const char *motion_data_column(const char *source, unsigned quantity) {
+  static const struct {
+    const char *source, *column;
+    wm_quantity quantity;
+  } kColumns[] = {{"ticks", "left", WM_Q_WHEEL_TICKS_LEFT},
+                  {"ticks", "right", WM_Q_WHEEL_TICKS_RIGHT},
+                  {"speeds", "left_mps", WM_Q_WHEEL_SPEED_REAR_LEFT},
+                  {"speeds", "right_mps", WM_Q_WHEEL_SPEED_REAR_RIGHT},
+                  {"steering", "v_mps", WM_Q_VEHICLE_SPEED},
+                  {"steering", "road_wheel_rad", WM_Q_ROAD_WHEEL},
+                  {"imu", "wz_radps", WM_Q_YAW_RATE},
+                  {"imu", "wx_radps", WM_Q_ROLL_RATE},
+                  {"imu", "wy_radps", WM_Q_PITCH_RATE}};
+  for (size_t i = 0; i < sizeof kColumns / sizeof kColumns[0]; i++)
+    if (strcmp(source, kColumns[i].source) == 0 && quantity == kColumns[i].quantity) return kColumns[i].column;
+  return NULL;
 }
 
 // ── counters that wrap ──────────────────────────────────────────────────────────────────────────────────────────────
@@ -42,30 +62,42 @@ static void take_jump(ticks_wrap *self, double jump) {
 
 static const int kBits[WRAP_BITS] = {8, 10, 12, 16, 24, 32};
 
-// A step of more than half a cycle, against the way of the steps beside it, that is one of them less a cycle.
-static void take_fold(ticks_wrap *self, double after) {
+// A step of more than half a cycle, against the way of the steps beside it, that is one of them less a cycle. Returns
+// whether it is one of any cycle.
+static int take_fold(ticks_wrap *self, double after, int is_restart) {
   const double size = fmax(fabs(self->step_before), fabs(after)), by = (self->step_before + after) / 2;
+  int is_fold = 0;
   for (int k = 0; k < WRAP_BITS; k++) {
     const double cycle = ldexp(1, kBits[k]);
     if (fabs(self->step) <= cycle / 2) continue;
     const double left = fabs(self->step - copysign(cycle, self->step) - by);
-    if (size < cycle / 4 && self->step * by <= 0 && left <= size + FOLD_COUNTS)
-      self->folds[k]++;
-    else
-      self->misfits[k]++;
+    const int fits = size < cycle / 4 && self->step * by <= 0 && left <= size + FOLD_COUNTS;
+    self->folds[k] += fits;
+    self->misfits[k] += !fits && !is_restart;
+    is_fold |= fits;
   }
+  return is_fold;
 }
 
-// A step that is far larger than the one before and the one behind it is a jump.
-static void take_count(ticks_wrap *self, double value, int is_doubtful) {
-  const double step = value - self->last;
+// A step that is far larger than the one before and the one behind it is a jump. To 0, it may be a restart.
+static void take_count(ticks_wrap *self, double value, wm_time_ns t_ns, int is_doubtful) {
+  const double step = value - self->last, around = fabs(self->step_before) + fabs(step), to = self->last;
+  const double at_s = wm_seconds_between(self->first_ns, self->last_ns);
   self->last = value;
-  if (self->counts++ == 0 || is_doubtful) return;
-  if (self->counts > 3) take_fold(self, step);
-  if (fabs(self->step) > WRAP_STEPS * (fabs(self->step_before) + fabs(step)) + WRAP_COUNTS)
+  self->last_ns = t_ns;
+  if (self->counts++ == 0) self->first_ns = t_ns;
+  if (self->counts == 1 || is_doubtful) return;
+  const int is_jump = fabs(self->step) > WRAP_STEPS * around + WRAP_COUNTS;
+  const int to_zero = is_jump && fabs(remainder(to, RESTART_CYCLE)) <= around + FOLD_COUNTS;
+  const int is_fold = self->counts > 4 && take_fold(self, step, to_zero);
+  if (is_jump)
     take_jump(self, self->step - (self->step_before + step) / 2);
   else
     self->since += self->step;
+  if (to_zero && !is_fold && self->restarts++ == 0) {
+    self->restart_from = to - self->step;
+    self->restart_s = at_s;
+  }
   self->step_before = self->step;
   self->step = step;
 }
@@ -91,11 +123,23 @@ static double wraps_at(const ticks_wrap *self) {
   return fabs(between + self->first_jump - whole) < WRAP_ALIKE * whole ? rint(whole - self->first_jump) : 0;
 }
 
+// As the recording has it: "left", or "wheel_ticks_left" on CAN.
+static const char *name_of(const char *about, int side) {
+  const wm_quantity quantity = side ? WM_Q_WHEEL_TICKS_RIGHT : WM_Q_WHEEL_TICKS_LEFT;
+  const char *column = motion_data_column(about, quantity);
+  return column ? column : wm_quantity_name(quantity);
+}
+
+static int restarted(const ticks_wrap *self) {
+  uint64_t folds = 0;
+  return self->restarts > 0 && (bits_of(self, &folds) > 0 || wraps_at(self) == 0);
+}
+
 static void judge_wrap(const motion_data *self, int side, const char *about, wm_findings *out) {
   const double at = wraps_at(&self->wraps[side]);
   uint64_t folds = 0;
   const int bits = bits_of(&self->wraps[side], &folds);
-  const char *name = wm_quantity_name(side ? WM_Q_WHEEL_TICKS_RIGHT : WM_Q_WHEEL_TICKS_LEFT);
+  const char *name = name_of(about, side);
   if (at == 0) return;
   if (bits > 0) {
     char fix[WM_FINDING_FIX_MAX];
@@ -106,14 +150,14 @@ static void judge_wrap(const motion_data *self, int side, const char *about, wm_
       (void)snprintf(fix, sizeof fix,
                      "%s.csv: counts that go on: %s plus %.0f from each row on at which it falls by more than %.0f, "
                      "less where it rises so",
-                     about, side ? "right" : "left", at, at / 2);
-    wm_find(out, WM_FOUND_VALUE_IMPLAUSIBLE, WM_SEVERITY_BAD, about, fix,
+                     about, name, at, at / 2);
+    wm_find(out, WM_FOUND_COUNTER_RESTARTS, WM_SEVERITY_BAD, about, fix,
             "%s starts anew after %.0f counts, %" PRIu64 " times: a counter of %d bits, read as a longer one", name, at,
             folds, bits)
         ->size = at;
     return;
   }
-  wm_find(out, WM_FOUND_VALUE_IMPLAUSIBLE, WM_SEVERITY_BAD, about,
+  wm_find(out, WM_FOUND_COUNTER_RESTARTS, WM_SEVERITY_BAD, about,
           "let the sender count on to the last of the signal's bits, or write the unwrapped counts to ticks.csv",
           "%s jumps by about %.0f counts, %" PRIu64
           " times, %.0f counts apart: the counter starts anew at about %.0f, not "
@@ -121,6 +165,20 @@ static void judge_wrap(const motion_data *self, int side, const char *about, wm_
           name, self->wraps[side].first_jump, self->wraps[side].jumps,
           self->wraps[side].between / (double)(self->wraps[side].jumps - 1), at)
       ->size = at;
+}
+
+// Counters that jumped to 0, and not at each end of their bits: their sender started anew.
+static void judge_restarts(const motion_data *self, const char *about, wm_findings *out) {
+  const ticks_wrap *w[2] = {&self->wraps[0], &self->wraps[1]};
+  const int is[2] = {restarted(w[0]), restarted(w[1])}, first = !is[0];
+  if (!is[0] && !is[1]) return;
+  wm_find(out, WM_FOUND_COUNTER_RESTARTS, WM_SEVERITY_NOTE, about,
+          "did the motor controller start anew? Its first step is refused, and the drive goes on; what was driven "
+          "meanwhile is not counted. Until its counts go on, they are not compared with other sensors",
+          "%s%s%s: the counter restarts at 0, %.3f s after its first count, from %.0f%s", name_of(about, first),
+          is[0] && is[1] ? " and " : "", is[0] && is[1] ? name_of(about, 1) : "", w[first]->restart_s,
+          w[first]->restart_from, w[first]->restarts > 1 ? " (the first of several times)" : "")
+      ->size = w[first]->restart_s;
 }
 
 // ── what arrives ────────────────────────────────────────────────────────────────────────────────────────────────────
@@ -162,7 +220,7 @@ void motion_data_take(motion_data *self, const wm_event *event) {
     seen[id].as_float += is_float(value);
     seen[id].zeros += value == 0;
     has_ticks |= id <= WM_Q_WHEEL_TICKS_RIGHT;
-    if (id <= WM_Q_WHEEL_TICKS_RIGHT) take_count(&self->wraps[id], value, q->doubt != 0);
+    if (id <= WM_Q_WHEEL_TICKS_RIGHT) take_count(&self->wraps[id], value, event->t_ns, q->doubt != 0);
   }
   if (has_ticks) take_ticks(self, seen, event->t_ns);
 }
@@ -182,21 +240,13 @@ static const limit kLimits[] = {
     {WM_Q_ROAD_WHEEL, WM_Q_ROAD_WHEEL, 1.4, "rad", "degrees", "is its unit degrees, or is it the steering wheel?"},
 };
 
-// Column of a stream that gives this quantity: "wz_radps"; NULL: its own name.
-static const char *column_of(const char *source, unsigned quantity) {
-  if (strcmp(source, "imu") == 0 && quantity == WM_Q_YAW_RATE) return "wz_radps";
-  if (strcmp(source, "speeds") == 0 && quantity <= WM_Q_WHEEL_SPEED_REAR_RIGHT)
-    return (quantity - WM_Q_WHEEL_SPEED_FRONT_LEFT) % 2 ? "right_mps" : "left_mps";
-  return NULL;
-}
-
 static void judge_range(const quantity_seen *seen, const limit *of, unsigned quantity, const char *source,
                         wm_findings *out) {
   const double most = fmax(fabs(seen->least), fabs(seen->most));
   const uint64_t values = seen->count - seen->zeros;
   if (seen->count == 0 || most <= of->most) return;
   const int is_can = strncmp(source, "can", 3) == 0;
-  const char *column = column_of(source, quantity);
+  const char *column = motion_data_column(source, quantity);
   const char *name = column ? column : wm_quantity_name(quantity);
   char fix[WM_FINDING_FIX_MAX];
   if ((double)seen->as_float > FLOAT_SHARE * (double)values) {
@@ -213,13 +263,13 @@ static void judge_range(const quantity_seen *seen, const limit *of, unsigned qua
           "%s: the largest value is %.4g %s", name, most, of->si);
 }
 
-static void ranges(const motion_data *self, const wm_assembly *assembly, wm_findings *out) {
+static void ranges(const motion_data *self, const wm_assembly *assembly, const char *counter, wm_findings *out) {
   for (size_t s = 0; s < assembly->source_count && s < WM_SOURCES_MAX; s++)
     for (size_t i = 0; i < sizeof kLimits / sizeof kLimits[0]; i++)
       for (unsigned q = kLimits[i].first; q <= kLimits[i].last; q++)
         judge_range(&self->at[s][q], &kLimits[i], q, assembly->sources[s].name, out);
-  if (self->fastest_mps > FASTEST_MPS && wraps_at(&self->wraps[0]) == 0 && wraps_at(&self->wraps[1]) == 0)
-    wm_find(out, WM_FOUND_VALUE_IMPLAUSIBLE, WM_SEVERITY_BAD, ABOUT,
+  if (self->fastest_mps > FASTEST_MPS && !wm_findings_has(out, WM_FOUND_COUNTER_RESTARTS, counter))
+    wm_find(out, WM_FOUND_VALUE_IMPLAUSIBLE, WM_SEVERITY_BAD, counter,
             "look at wheels.ticks_per_turn and radius_m, and at the signal's bits and sign",
             "the wheels' ticks would be %.0f m/s", self->fastest_mps);
   const wm_wheels *w = self->wheels;
@@ -263,8 +313,9 @@ void motion_data_judge(const motion_data *self, const wm_assembly *assembly, uin
       wm_find(out, WM_FOUND_NO_DATA, WM_SEVERITY_BAD, ABOUT,
               "look at message and bus in can-signals.yaml, and at what candump receives",
               "%s is bound, but no frame with a value of it came", wm_quantity_name(q));
-  ranges(self, assembly, out);
+  for (int side = 0; side < 2; side++) judge_wrap(self, side, counter, out);
+  judge_restarts(self, counter, out);
+  ranges(self, assembly, counter, out);
   for (size_t s = 0; s < assembly->source_count && s < WM_SOURCES_MAX; s++)
     dead(self, self->at[s], assembly->sources[s].name, out);
-  for (int side = 0; side < 2; side++) judge_wrap(self, side, counter, out);
 }

@@ -143,6 +143,29 @@ def identities(file: str, table: dict[int, int], only: str = "") -> Rows:
                 said, only)
 
 
+@dataclass(frozen=True)
+class Counted(Edit):
+    """Counters of so many bits, whose counts go on."""
+
+    bits: int
+    columns: tuple[str, ...] = ("left", "right")
+
+    def words(self) -> str:
+        return f"{' and '.join(self.columns)}: counts that go on at {2**self.bits}"
+
+    def apply(self, before: bytes) -> bytes:
+        head, *lines = before.decode().splitlines()
+        at = [head.strip().split(",").index(name) for name in self.columns]
+        rows = [line.split(",") for line in lines if line]
+        for i in at:
+            counts = np.array([int(row[i]) for row in rows])
+            half = 2 ** (self.bits - 1)
+            steps = (np.diff(counts) + half) % (2 * half) - half
+            for row, count in zip(rows, np.concatenate([counts[:1], counts[0] + np.cumsum(steps)])):
+                row[i] = str(count)
+        return ("\n".join([head, *(",".join(row) for row in rows)]) + "\n").encode()
+
+
 Mounting = tuple[tuple[float, float, float], tuple[float, float, float]]
 """Place, m, and roll, pitch, yaw, rad, in base_link."""
 
@@ -256,13 +279,13 @@ _LAYOUT = re.compile(r"(\d+)\|(\d+)@([01])([+-])\s*\(([^,]+),([^)]+)\)")
 
 @dataclass(frozen=True)
 class Signal(Edit):
-    """A signal of a DBC: the other byte order (of the same bytes, or of the same first bit), the other sign, or a first bit that
-    is off by some."""
+    """A signal of a DBC: the other byte order (of the same bytes, or of the same first bit), the other sign, a first bit that
+    is off by some, or fewer bits, the lower ones."""
 
     message: str
     signal: str
-    layout: str  # "order", "order, start", "sign", "bit"
-    shift: int = 0
+    layout: str  # "order", "order, start", "sign", "bit", "bits"
+    shift: int = 0  # of "bits": how many are left
 
     def apply(self, before: bytes) -> bytes:
         text = before.decode("utf-8", "replace")
@@ -271,6 +294,10 @@ class Signal(Edit):
         if not layout:
             raise Impossible(f"{self.file} has no signal {self.signal}")
         start, bits, order, sign, scale, offset = layout.groups()
+        if self.layout == "bits":
+            if order == "0" or self.shift >= int(bits):
+                raise Impossible(f"{self.signal} has not more bits")
+            return f"{text[:layout.start()]}{start}|{self.shift}@{order}{sign} ({scale},{offset}){text[layout.end():]}".encode()
         first = int(start) + self.shift
         if first < 0:
             raise Impossible("no bit before the first")

@@ -26,6 +26,7 @@ class Clock:
     source: str  # "sightings": all of the kind
     begin_ns: int
     is_rate: bool = False
+    is_motion: bool = False
 
     def original(self, size: Size) -> tuple[float, float]:
         """Of an original stamp, ns since begin_ns: factor of the changed one, and what is added to it."""

@@ -14,7 +14,7 @@ from ..replaying import parameters
 from . import motion_faults
 from .changes import CONFIG, TURNS, Edit, Seen, Sorted, Turned, Value, column, degrees, identities, numbers, stretched, swapped
 from .fault import DEG, LENGTHS, NEAR, Clock, Fault, Size, discrete, factor_words
-from .robot import Robot, Source
+from .robot import MOTION, OBSERVED, Robot, Source
 
 PLACE_MOST_M = 6.0  # of a sensor from base_link: half of a lorry
 PLACE_LEAST_M = 0.05  # of one that was measured at all
@@ -23,7 +23,8 @@ AROUND = tuple((round(away * math.cos(k * math.pi / 4), 3), round(away * math.si
 CLOCK_MOST_S = 60.0
 CLOCKS_S = tuple(sign * s for s in (0.15, 0.4, 0.8, 1.2, 1.6, 2.0, 2.5, 3.0, 3.5, 4.0, 5.0, 10.0, 18.0, 37.0) for sign in (-1, 1))
 """The last ones: leap seconds of GPS, of TAI."""
-CLOCKS_OF_SCANS_S = (-4.0, -1.6, -0.8, -0.3, 0.3, 0.8, 1.6, 4.0)  # fewer: a drive on a floor plan is slow to begin
+CLOCKS_FEWER_S = (-4.0, -1.6, -0.8, -0.3, 0.3, 0.8, 1.6, 4.0)  # of scans, with which a drive is slow to begin, and of motion
+STAMPS = ("t_ns", "from_ns", "arrival_ns")
 DRIFTS = (-0.01, 0.01, 0.02, 0.03, 0.04, 0.05)  # of a clock that is too fast, or of a lag that grows, s/s
 CRUMB = 0.03  # of a map's breadth
 SETTING_FAR = 4.0  # times a default, or a part of it: nearer ones are a matter of tuning, which `waymark suggest` does
@@ -33,6 +34,9 @@ FAMILIES = ("tag36h11", "tag25h9", "tag16h5", "tagStandard41h12")
 def all_faults(robot: Robot) -> list[Fault]:
     """Every row that this robot has something of; first what it has few of: a long list may not be tried to its end."""
     found = [*_settings(robot), *_maps(robot), *motion_faults.all_of(robot), *_markers(robot), *_satellites(robot)]
+    streams = [Source(file.removesuffix(".csv"), file) for file in MOTION if len(robot.table(file).get("t_ns", ()))]
+    for stream in streams if len(streams) + robot.has("can.log") > 1 else []:  # of one alone, the clock is that of all observations
+        found += _clocks(robot, stream)
     common = {source.file: source for source in robot.sources if sum(other.file == source.file for other in robot.sources) > 1}
     for one in (Source(source.kind, file) for file, source in common.items()):  # a mistake of the whole file
         found += [*_clocks(robot, one), *_values(robot, one)]
@@ -61,7 +65,7 @@ def _settings(robot: Robot) -> Iterator[Fault]:
 
 def _stamps(source: Source, factor: float, offset_ns: float) -> list[Edit]:
     only = source.sensor if source.kind != "pictures" else ""
-    return [column(source.file, name, factor, offset_ns, only, name == "arrival_ns") for name in ("t_ns", "arrival_ns")]
+    return [column(source.file, name, factor, offset_ns, only, name != "t_ns") for name in STAMPS]
 
 
 def _clocks(robot: Robot, source: Source) -> Iterator[Fault]:
@@ -87,14 +91,14 @@ def _clocks(robot: Robot, source: Source) -> Iterator[Fault]:
         yield Fault(f"clock of {name}", ((gap,), (float(round(gap)),)), shift, late)
         return
     begin, only, offset = int(stamps.min()), source.sensor if source.kind != "pictures" else "", f"{source.sensor or source.kind}.time_offset_s"
-    yield Fault(f"clock of {name}", tuple((s,) for s in (CLOCKS_OF_SCANS_S if source.kind == "points" else CLOCKS_S)), shift, late, step=(0.25,), smallest=(0.01,),
+    yield Fault(f"clock of {name}", tuple((s,) for s in (CLOCKS_S if source.file in OBSERVED and source.kind != "points" or source.kind == "pictures" else CLOCKS_FEWER_S)), shift, late, step=(0.25,), smallest=(0.01,),
                 is_possible=lambda size: abs(size[0]) <= CLOCK_MOST_S, clock=Clock(name, begin), group=f"along the way of {name}",
                 settled=lambda size, states: (size[0] - states.get(offset, 0.0),))
     yield Fault(f"drift of {name}", tuple((rate,) for rate in DRIFTS),
-                lambda size: [stretched(source.file, n, size[0], begin, only, n == "arrival_ns") for n in ("t_ns", "arrival_ns")],
+                lambda size: [stretched(source.file, n, size[0], begin, only, n != "t_ns") for n in STAMPS],
                 lambda size: f"the stamps of {name} run away: {abs(size[0]) * 1e3:.3g} ms {'more' if size[0] > 0 else 'less'} each second "
                              "(a queue that nobody empties, or a clock of its own)",
-                step=(0.01,), smallest=(1e-4,), is_possible=lambda size: abs(size[0]) < 0.3, clock=Clock(name, begin, is_rate=True), group=f"along the way of {name}",
+                step=(0.01,), smallest=(1e-4,), is_possible=lambda size: abs(size[0]) < 0.3, clock=Clock(name, begin, is_rate=True, is_motion=source.file in MOTION), group=f"along the way of {name}",
                 settled=lambda size, states: (size[0] - 2e9 * states.get(offset, 0.0) / max(1, int(stamps.max()) - begin),))  # the state is that of half the time
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..tables import Array
-from .changes import Edit, Signal, Value, column, degrees, numbers, swapped
+from .changes import Counted, Edit, Signal, Value, column, degrees, numbers, swapped
 from .fault import DEG, NEAR, Fault, Size, discrete, factor_words
 from .robot import Robot
 
@@ -17,6 +17,7 @@ SPEEDS = (-1.0, 1 / 3.6, 3.6, 0.44704, 0.1, 10.0)
 TURNS = (-1.0, DEG, 1 / DEG, -DEG, 0.1, 10.0)
 # What wheels can be: of a toy and of a mine's lorry.
 LIMITS = {"radius_m": (0.01, 2.5), "ticks_per_turn": (1, 1e7), "track_m": (0.06, 6), "wheelbase_m": (0.06, 12), "steering_ratio": (0.5, 40)}
+BITS = (8, 10, 12, 16, 24, 32)  # of counters
 STEERED = ("wheelbase_m", "steering_ratio")  # alike in gentle turns
 UPRIGHT = 0.94  # cos of 20 degrees: a floor is no steeper
 
@@ -70,6 +71,10 @@ def _wheels(robot: Robot, bound: dict[str, int]) -> Iterator[Fault]:
     for sides, counted in (((0,), "wheel_ticks_left counts"), ((1,), "wheel_ticks_right counts"), ((0, 1), "both wheels' ticks count")):
         yield discrete(f"ticks {sides}", lambda _, s=sides: turned(s), lambda _, w=counted: f"{w} backwards (scale: -1)")
 
+    for bits in BITS:
+        if edits := _counters(robot, bound, bits):
+            yield discrete(f"counters of {bits} bits", lambda _, e=edits: e, lambda _, b=bits: f"the wheels' counters have {b} bits, and are read as longer ones")
+
     # The way of a tick is radius over ticks: the drive shows it, not which of both is wrong.
     def places(size: Size) -> list[list[Edit]]:
         by_radius, by_ticks = _wheel(robot, "radius_m", size[0]), _wheel(robot, "ticks_per_turn", 1 / size[0])
@@ -87,6 +92,16 @@ def _wheels(robot: Robot, bound: dict[str, int]) -> Iterator[Fault]:
                 is_possible=lambda s: bool(places(s)) and abs(math.log(s[0])) > 0.02, other_places=lambda s: places(s)[1:],
                 settled=lambda s, states: (s[0] * states.get("motion.speed_scale", 1.0),))
     yield from _numbers(robot, ("track_m",))
+
+
+def _counters(robot: Robot, bound: dict[str, int], bits: int) -> list[Edit]:
+    """What undoes counters of so many bits that are read as longer ones; empty: they are not."""
+    if not robot.has("ticks.csv"):
+        items = [robot.bindings[bound[name]] for name in TICKS]
+        return [Signal("vehicle.dbc", str(item.get("message")), str(item.get("signal")), "bits", bits) for item in items]
+    counts = [robot.table("ticks.csv")[name] for name in ("left", "right")]
+    wraps = all(np.ptp(c) < 2**bits for c in counts) and any((np.abs(np.diff(c)) > 2 ** (bits - 1)).any() for c in counts)
+    return [Counted("ticks.csv", bits)] if wraps else []
 
 
 def _scaled(robot: Robot, item: int, factor: float) -> Value:

@@ -16,7 +16,8 @@ from .changes import CONFIG, NAMED, Files
 OBSERVED = {"sightings.csv": "sightings", "markers.csv": "markers", "marker-corners.csv": "corners", "stereo.csv": "stereo", "points.csv": "points",
             "gnss.csv": "gnss", "heading.csv": "heading"}
 """Tables of observations, and their sources' names."""
-
+MOTION = ("motion.csv", "motion6.csv", "ticks.csv", "increments.csv", "speeds.csv", "steering.csv", "imu.csv")
+"""Tables of motion."""
 
 Place = tuple[float, float, float]
 """In base_link, m."""
@@ -149,7 +150,7 @@ class Robot:
     @cached_property
     def motion_span(self) -> tuple[int, int] | None:
         """First and last stamp of the motion, ns."""
-        for file in ("motion.csv", "motion6.csv", "ticks.csv", "increments.csv", "speeds.csv", "steering.csv", "imu.csv"):
+        for file in MOTION:
             stamps = self.table(file).get("t_ns")
             if stamps is not None and len(stamps):
                 return int(stamps.min()), int(stamps.max())

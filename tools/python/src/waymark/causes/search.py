@@ -181,6 +181,8 @@ class Search:
         self.trials.settings = {}
         told = self._by_states(rows, now)
         growing = [Candidate(*change, now) for change in told if change[0].clock and change[0].clock.is_rate]  # which the whole drive shows
+        late = [(row, size) for row in rows if row.clock and row.clock.is_rate and row.clock.is_motion for size in row.start]  # of motion, no state tells
+        growing += self._within_reach(self._best_sizes(self._tried(late, fixed, 0.0), 0.0), now, 0.0)
         told = [c for c in told if c[0] not in [g.fault for g in growing]] + self._fitted(growing, fixed, 0.0)
         final = self._tried([*fitted, *others, *told], fixed, 0.0, has_states=True)
         return self._ordered(final)
