@@ -157,6 +157,25 @@ static void weightless(const drive_evidence *self, const wm_assembly *assembly, 
       ->size = sqrt(squares / (double)fused);
 }
 
+// A number of a table of parameters; NaN where it has none of this name.
+static double number_of(const wm_param_table *table, const void *params, const char *key) {
+  for (size_t i = 0; i < table->count; i++)
+    if (strcmp(table->params[i].key, key) == 0 && table->params[i].type == WM_PARAM_F64) {
+      double value;
+      memcpy(&value, (const char *)params + table->params[i].offset, sizeof value);
+      return value;
+    }
+  return (double)NAN;
+}
+
+// Of a stated sigma, what an innovation's variance has as new each time (positions.noise.factor): the rest is a lasting
+// error, a state, so that a receiver whose errors are all new has innovations of 1 over this.
+static double new_share(const wm_assembly *assembly, size_t residual) {
+  const int is_place = residual == WM_RESIDUAL_X || residual == WM_RESIDUAL_Y || residual == WM_RESIDUAL_Z;
+  if (!is_place || !assembly->config->positions) return 1;
+  return fmin(number_of(&wm_position_params_table, assembly->config->positions, "noise.factor"), 1);
+}
+
 static void refused(const drive_evidence *self, const wm_assembly *assembly, size_t i, wm_findings *out) {
   uint64_t fused = 0, refused = 0, worst = 0;
   double squares = 0;
@@ -164,10 +183,10 @@ static void refused(const drive_evidence *self, const wm_assembly *assembly, siz
     const residual_evidence *r = &self->residuals[i][k];
     fused += r->fused;
     refused += r->refused;
-    if (r->fused >= OBSERVATIONS_MIN && r->squares / (double)r->fused > squares) {
-      squares = r->squares / (double)r->fused;
-      worst = k;
-    }
+    const double share = new_share(assembly, k), mean = share * share * r->squares / (double)r->fused;
+    if (r->fused < OBSERVATIONS_MIN || mean <= squares) continue;
+    squares = mean;
+    worst = k;
   }
   const char *name = wm_assembly_source_name(assembly, i);
   const double share = fused + refused > 0 ? (double)refused / (double)(fused + refused) : 0;
@@ -211,17 +230,6 @@ static void biased(const drive_evidence *self, const wm_assembly *assembly, size
           "its ranges are %.1f %% %s than the map has them, on average", 100 * fabs(ratio),
           ratio > 0 ? "longer" : "shorter")
       ->size = ratio;
-}
-
-// A number of a table of parameters; NaN where it has none of this name.
-static double number_of(const wm_param_table *table, const void *params, const char *key) {
-  for (size_t i = 0; i < table->count; i++)
-    if (strcmp(table->params[i].key, key) == 0 && table->params[i].type == WM_PARAM_F64) {
-      double value;
-      memcpy(&value, (const char *)params + table->params[i].offset, sizeof value);
-      return value;
-    }
-  return (double)NAN;
 }
 
 static double parameter(const wm_config *config, const char *key) {
@@ -408,15 +416,15 @@ static int is_skid_track(const wm_assembly *assembly, const wm_calibration_value
   return 0;
 }
 
-// A factor of noise against the stated sigma: of a position's only a share counts as new (positions.noise.factor). Of
-// an antenna the way from where calibration.yaml has it; 0 where it has none.
+// A factor of noise against the stated sigma. Of an antenna the way from where calibration.yaml has it; 0 where it has
+// none.
 static double judged_value(const wm_assembly *assembly, const wm_calibration_value *c) {
   if (strstr(c->name, ".antenna_")) {
     const double stated_m = assembly->setup.rig->antenna_m[strcmp(c->name, "gnss.antenna_y_m") == 0];
     return isfinite(stated_m) ? c->value - stated_m : 0;
   }
   if (strcmp(c->name, "noise.place_factor") != 0) return c->value;
-  return c->value * fmin(number_of(&wm_position_params_table, assembly->config->positions, "noise.factor"), 1.0);
+  return c->value * new_share(assembly, WM_RESIDUAL_X);
 }
 
 // A state of calibration that ended where no tape measure and no data sheet would put it.

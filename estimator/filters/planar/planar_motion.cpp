@@ -62,6 +62,8 @@ void planar_motion::take_kind() {
   kind_ = kind;
   for (int i = 0; i < kCalibrationCount; i++) {
     if (kind == kKindCommands) stated_.leave_untested(own_state_[i]);  // it stands for how the robot obeys
+    // Beside a gyro only the wheels' difference has it, which slip moves as far, and the pose follows the gyro.
+    if (kind == kKindGyro && i == kTrackScale) stated_.leave_untested(own_state_[i]);
     if (!by_kind_[i]) continue;
     motion_state_[i] = is_state(-1.0, i, kind) ? own_state_[i] : -1;
     if (motion_state_[i] < 0) calibration_.value[i] = kNeutralCalibration.value[i];

@@ -110,10 +110,13 @@ TEST(each_broken_health_makes_its_finding_alone) {
   }
 }
 
-// A thousand updates of a range of 10 m, each this many of its sigmas (0.1 m) off and the mean of them, too.
-static void drive_with_mean(double sigmas, double mean_sigmas, wm_verdict verdict) {
+// A thousand updates of this residual, 10 m, each this many of its sigmas (0.1 m) off and the mean of them, too.
+static void drive_of(int residual, double sigmas, double mean_sigmas, wm_verdict verdict) {
   static drive_evidence evidence;
   static wm_config config;
+  static double positions[32];
+  wm_params_defaults(&wm_position_params_table, positions);
+  config.positions = (void *)positions;
   static wm_assembly assembly;
   memset(&evidence, 0, sizeof evidence);
   assembly.config = &config;
@@ -121,7 +124,7 @@ static void drive_with_mean(double sigmas, double mean_sigmas, wm_verdict verdic
   assembly.setup.start.p_m[0] = (double)NAN;
   (void)snprintf(assembly.sources[0].name, sizeof assembly.sources[0].name, "eye");
   for (int i = 0; i < 1000; i++) {
-    const wm_innovation in = {.residual = WM_RESIDUAL_RANGE,
+    const wm_innovation in = {.residual = (uint8_t)residual,
                               .expected = 10,
                               .landmark_id = -1,
                               .observed = 10 + ((i % 2 ? 1 : -1) * sigmas + mean_sigmas) * 0.1,
@@ -130,6 +133,10 @@ static void drive_with_mean(double sigmas, double mean_sigmas, wm_verdict verdic
     evidence_put(&evidence, WM_OUTPUT_INNOVATION, &in);
   }
   evidence_judge(&evidence, &assembly, &health, 0, &found);
+}
+
+static void drive_with_mean(double sigmas, double mean_sigmas, wm_verdict verdict) {
+  drive_of(WM_RESIDUAL_RANGE, sigmas, mean_sigmas, verdict);
 }
 
 static void drive_with(double sigmas, wm_verdict verdict) { drive_with_mean(sigmas, 0, verdict); }
@@ -155,6 +162,15 @@ TEST(innovations_of_their_sigma_are_good_and_larger_ones_are_found) {
   drive_with(1, WM_FUSED);
   TEST_ASSERT_EQUAL(0, found.count);
   drive_with(2.5, WM_FUSED);
+  TEST_ASSERT_TRUE(wm_findings_has(&found, WM_FOUND_NOISE_TOO_SMALL, "eye"));
+  TEST_ASSERT_EQUAL_DOUBLE(2.5, round(found.at[0].size * 1e6) / 1e6);
+}
+
+// By default half of a position's stated sigma is new in each: a receiver without lasting errors has innovations of 2.
+TEST(positions_are_judged_by_what_was_stated) {
+  drive_of(WM_RESIDUAL_Y, 2.0, 0, WM_FUSED);
+  TEST_ASSERT_EQUAL(0, found.count);
+  drive_of(WM_RESIDUAL_Y, 5.0, 0, WM_FUSED);
   TEST_ASSERT_TRUE(wm_findings_has(&found, WM_FOUND_NOISE_TOO_SMALL, "eye"));
   TEST_ASSERT_EQUAL_DOUBLE(2.5, round(found.at[0].size * 1e6) / 1e6);
 }
