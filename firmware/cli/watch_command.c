@@ -18,8 +18,11 @@
 static const char kHelp[] =
     "usage: waymark watch [options]\n"
     "\n"
-    "Shows a run as it goes, from its messages: state and why, pose, what is left of dead reckoning, sources. Until\n"
-    "Ctrl-C. On a terminal the view stays in its place; into a pipe or a file it is written anew each second.\n"
+    "Shows a run as it goes, from its messages: state and why, pose, its bound and whether the pose is usable, what "
+    "is\n"
+    "left of dead reckoning, sources. Until Ctrl-C. On a terminal the view stays in its place; into a pipe or a file "
+    "it\n"
+    "is written anew each second.\n"
     "\n"
     "  --url URL      LCM's (default: LCM_DEFAULT_URL, else this computer's)\n"
     "  --prefix TEXT  of the channels (default WAYMARK_)\n"

@@ -13,6 +13,26 @@ def landmarks_robot(folder, seed):
     small_robot.write(folder, seed)
 
 
+def tables_robot(folder, seed):
+    """The same robot, whose ticks and gyro are in tables."""
+    small_robot.write(folder, seed)
+    rng, ticks, turns = random.Random(seed), [], []
+    for stamp, _, frame in map(str.split, (folder / "can.log").read_text().splitlines()):
+        t_ns, data = int(stamp[1:-1].replace(".", "")) * 1000, bytes.fromhex(frame.partition("#")[2])
+        left, right = (int.from_bytes(part, "little", signed=True) for part in (data[:len(data) // 2], data[len(data) // 2:]))
+        if len(data) == 8:
+            ticks.append({"t_ns": t_ns, "left": left, "right": right})
+        else:
+            rate = int.from_bytes(data, "little", signed=True) * 0.0002
+            turns.append({"t_ns": t_ns, "wx_radps": rng.gauss(0, 0.003), "wy_radps": rng.gauss(0, 0.003), "wz_radps": rate})
+    (folder / "ticks.csv").write_text(small_robot.table(ticks))
+    (folder / "imu.csv").write_text(small_robot.table(turns))
+    about = folder / "recording.yaml"
+    about.write_text(about.read_text().replace("can.log, vehicle.dbc, can-signals.yaml", "ticks.csv, imu.csv"))
+    for name in ("can.log", "vehicle.dbc", "can-signals.yaml"):
+        (folder / name).unlink()
+
+
 def _path(duration_s, speed, turn):
     """[(t, x, y, heading, v, w)] each step."""
     x, y, heading, out = 0.0, 0.0, 0.3, []

@@ -22,7 +22,7 @@ import mistakes
 import plan_robots
 import replays
 import small_robot
-from cause_robots import fork_robot, landmarks_robot, satellites_robot, tags_robot
+from cause_robots import fork_robot, landmarks_robot, satellites_robot, tables_robot, tags_robot
 
 SIZE_WITHIN = 0.25  # of the planted size: a filter's own states take a part of it
 RIGHT_LEAST, WRONG_MOST = 0.85, 0.02  # shares of the drives
@@ -100,6 +100,20 @@ def lag(rng):
     rate = rng.uniform(0.008, 0.04)
     begin = small_robot.START_NS
     return {"sightings.csv": stamps(lambda t: t + round(rate * (t - begin)))}, "drift of sightings:front", [rate / (1 + rate)]
+
+
+def counter(rng):
+    return {"ticks.csv": each(left=lambda c: int(c) % 256, right=lambda c: int(c) % 256)}, "counters of 8 bits", [1.0]
+
+
+def clock_of(stream):
+    """A stream of motion whose clock is some per cent fast or slow."""
+    def mistake(rng):
+        rate = signed(rng, 0.03, 0.05)  # of less the pose hardly shows anything
+        begin = small_robot.START_NS
+        return {f"{stream}.csv": stamps(lambda t: t + round(rate * (t - begin)))}, f"drift of {stream}", [rate / (1 + rate)]
+    mistake.__name__ = f"{stream}_clock"
+    return mistake
 
 
 def bearings(rng):
@@ -264,6 +278,7 @@ def none(rng):
 
 
 PLANTED = [(landmarks_robot, m) for m in (none, map_scale, clock, yaw, place, tick, track, ranges, exchange, lag, bearings, gyro)]
+PLANTED += [(tables_robot, m) for m in (none, counter, clock_of("imu"), clock_of("ticks"))]
 PLANTED += [(satellites_robot, m) for m in (none, antenna, small_antenna, receiver, mirrored, turn_rate)]
 PLANTED += [(landmarks_robot, m) for m in (wheels_swapped, byte_order, setting)]
 PLANTED += [(tags_robot, m) for m in (none, tag_size, tilt, tag_yaw, tags_exchanged, tags_scaled, camera_late)]

@@ -7,11 +7,12 @@ import replays
 
 CAMERA = (0.33, 0.0, 0.5), (0.0, 20.0, 0.0)  # place, m; roll, pitch, yaw, degrees
 START = (0.0, 0.0)  # of the robot that was made last
-COMMON = f"""format: waymark-scenario/1
+HEAD = """format: waymark-scenario/1
 name: plan
 clock_start_s: 5000
-pictures: {{samples: 1}}
-cameras: [{{name: front, size: [640, 360], xyz_m: {list(CAMERA[0])}, rpy_deg: {list(CAMERA[1])}}}]
+pictures: {samples: 1}
+"""
+COMMON = HEAD + f"""cameras: [{{name: front, size: [640, 360], xyz_m: {list(CAMERA[0])}, rpy_deg: {list(CAMERA[1])}}}]
 sensors: [{{kind: edges, camera: front, name: floor, sigma_px: 0.7, range_m: 5, outlier_percent: 5, missed_percent: 20}}]
 errors: {{wheel_radius_percent: 0.7, track_percent: 1, yaw_rate_bias_mradps: 4, yaw_rate_noise_mradps: 3, slip_percent: 0.3,
   camera_mounting_deg: 0.2, camera_mounting_mm: 5, camera_intrinsics_percent: 0.1, frame_stamp_jitter_ms: 2, start_xy_m: 0.03, start_heading_deg: 0.5}}

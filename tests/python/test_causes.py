@@ -25,6 +25,7 @@ if not LIBRARY.exists():
     sys.exit(77)
 os.environ["WAYMARK_LIBRARY"] = str(LIBRARY)
 
+import plan_robots  # noqa: E402
 from waymark.causes import changes, plan, search  # noqa: E402
 from waymark.causes.features import with_points  # noqa: E402
 from waymark.causes.fault import Clock, Fault, discrete, factor_words  # noqa: E402
@@ -33,21 +34,7 @@ from waymark.causes.trial import Drive, Undo, likelihoods  # noqa: E402
 from waymark.maps import FloorPlan, write_floor_plan  # noqa: E402
 from waymark.replaying import replay  # noqa: E402
 
-SCENARIO = """format: waymark-scenario/1
-name: floor
-clock_start_s: 5000
-world: {kind: corridor, variant: easy}
-robot:
-  wheel_radius_m: 0.11
-  ticks_per_turn: 2048
-  track_m: 0.6
-  wheelbase_m: 1.0
-  wheels_send: speeds
-  steering_table: {actuator_mm: [8, 18, 30, 42, 52, 60, 71, 84, 98], road_wheel_deg: [-41, -29, -17, -7, 0, 5.5, 13, 25, 39]}
-bus: {wheels_hz: 100, yaw_rate_hz: 100, steering_hz: 50, gear_hz: 10}
-pictures: {samples: 1}
-cameras: [{name: front, size: [320, 180], xyz_m: [0.33, 0, 0.5], rpy_deg: [0, 20, 0], rate_hz: 5}]
-"""
+SCENARIO = plan_robots.HEAD + plan_robots.CORRIDOR + "cameras: [{name: front, size: [320, 180], xyz_m: [0.33, 0, 0.5], rpy_deg: [0, 20, 0], rate_hz: 5}]\n"
 YAML = b"# a robot\nsensors:\n  front:   # screwed on by eye\n    mounting: {xyz_m: [0.1, 0, 0.2]}\nwheels: {radius_m: 0.05}\n"
 DBC = b"BO_ 256 ODOMETRY: 8 R\n SG_ TICKS : 0|32@1- (1,0) [0|1] \"\" W\n\nBO_ 257 OTHER: 8 R\n SG_ TICKS : 8|16@1+ (2,0) [0|1] \"\" W\n"
 
@@ -75,11 +62,17 @@ class Changes(unittest.TestCase):
         self.assertEqual(changes.column("f", "range_m", 2, only="b").apply(table), table)
         self.assertEqual(changes.column("f", "range_m", 2, only="a").apply(table).splitlines()[1:], [b"1700000000000000001,a,5", b"1700000000000000002,b,"])
 
+    def test_counters_go_on_at_the_end_of_their_bits(self):
+        table = b"t_ns,left,right\n1,250,3\n2,4,1\n3,14,254\n4,251,250\n"
+        self.assertEqual(changes.Counted("f", 8).apply(table), b"t_ns,left,right\n1,250,3\n2,260,1\n3,270,-2\n4,251,-6\n")
+
     def test_a_signal_is_that_of_its_message(self):
         self.assertIn(b"TICKS : 7|32@0- (1,0)", changes.Signal("f", "ODOMETRY", "TICKS", "order").apply(DBC))
         self.assertIn(b"TICKS : 8|16@1- (2,0)", changes.Signal("f", "OTHER", "TICKS", "sign").apply(DBC))
-        with self.assertRaises(changes.Impossible):
-            changes.Signal("f", "OTHER", "NONE", "sign").apply(DBC)
+        self.assertIn(b"TICKS : 8|12@1+ (2,0)", changes.Signal("f", "OTHER", "TICKS", "bits", 12).apply(DBC))
+        for signal, layout, bits in (("NONE", "sign", 0), ("TICKS", "bits", 16)):
+            with self.assertRaises(changes.Impossible):
+                changes.Signal("f", "OTHER", signal, layout, bits).apply(DBC)
 
 
 def drive(gain, unusual=0.0, lost=0.0):

@@ -155,7 +155,7 @@ static void print_number(double value, double unit, const char *name, FILE *to) 
   (void)(isfinite(value) ? fprintf(to, "%.2f %s", value / unit, name) : fprintf(to, "no bound"));
 }
 
-static void print_bound(const wm_bound *b, FILE *to) {
+static void print_bound(const wm_bound *b, const wm_health *h, FILE *to) {
   static const char *const kWhy[WM_UNUSABLE_COUNT] = {
       [WM_UNUSABLE_NOT] = "usable",
       [WM_UNUSABLE_NO_POSE] = "not usable: there is no pose yet",
@@ -168,7 +168,11 @@ static void print_bound(const wm_bound *b, FILE *to) {
   print_number(b->horizontal_m, 1, "m", to);
   (void)fputs(", heading ", to);
   print_number(b->heading_rad, M_PI / 180, "deg", to);
-  (void)fprintf(to, " at a risk of %g: %s\n", b->risk, b->why < WM_UNUSABLE_COUNT ? kWhy[b->why] : "not usable");
+  (void)fprintf(to, " at a risk of %g: %s", b->risk, b->why < WM_UNUSABLE_COUNT ? kWhy[b->why] : "not usable");
+  if (b->why == WM_UNUSABLE_DOUBT && h && !isnan(h->lost_probability))
+    (void)fprintf(to, " with probability %.2g: %s", h->lost_probability,
+                  h->cause ? wm_cause_text(h->cause) : "each observation that fits makes it less");
+  (void)fputc('\n', to);
   if (b->heading_after_m > 0)
     (void)fprintf(to, "heading    not known well enough: drive %.1f m straight on\n", b->heading_after_m);
 }
@@ -211,7 +215,7 @@ void watch_print(const watch *self, wm_time_ns now_ns, FILE *to) {
     (void)fprintf(to, "   (lost with probability %.3g)", self->health.lost_probability);
   (void)fputc('\n', to);
   if (self->has_pose) print_pose(&self->pose, self->rate_hz, to);
-  if (self->has_bound) print_bound(&self->bound, to);
+  if (self->has_bound) print_bound(&self->bound, self->has_health ? &self->health : NULL, to);
   if (self->innovations > 0)
     (void)fprintf(to, "consistency %s (mean squared innovation %.2f of its variance)\n", watch_consistency(self),
                   self->nis);

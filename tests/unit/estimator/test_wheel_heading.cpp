@@ -149,6 +149,23 @@ TEST(test_slip_that_lasts_is_no_calibration) {
   TEST_ASSERT_DOUBLE_WITHIN(2.5 * car.sigma_heading(), 0, wm::wrap(car.filter->pose().heading_rad - heading));
 }
 
+// Such a slip, from the first metre on, looks like a track that is stated wrongly in the first bend: it is no alarm.
+TEST(test_slip_beside_a_gyro_accuses_no_track) {
+  for (uint64_t seed = 1; seed <= 20; seed++) {
+    Car car(true);
+    double slip = 0;
+    for (int i = 0; i < 1500; i++) {
+      slip +=
+          -slip * 0.01 / 5.0 + 0.014 * std::sqrt(2 * 0.01 / 5.0) * wm_random_normal(7, seed, static_cast<uint64_t>(i));
+      car.step(2.0, i > 800 ? 0.1 : 0, 0.004, 0.02, slip * 0.02);
+      wm_alarm alarms[4];
+      wm::calibration_list list(alarms, 4);
+      car.filter->list_motion_states(&list);
+      TEST_ASSERT_EQUAL(0, list.finish_alarms());
+    }
+  }
+}
+
 // GIVEN counts of 0.09 m WHEN the robot drives straight THEN the turn rate by the counts jumps by 3 rad/s, and the one
 // for a time offset's derivative stays 0. In a turn that is faster than the dead band it follows.
 TEST(test_steps_of_the_counts_are_no_turn) {

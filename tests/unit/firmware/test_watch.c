@@ -193,13 +193,30 @@ TEST(refused_data_have_their_reason) {
   }
 }
 
-static const char *shown_of(const wm_bound *bound) {
+static const char *shown_with(const wm_bound *bound, const wm_health *of) {
   memset(&seen, 0, sizeof seen);
+  if (of) seen.health = *of;
+  seen.has_health = of != NULL;
   watch_bound(&seen, bytes, wm_lcm_bound(bound, bytes, sizeof bytes));
   FILE *f = fmemopen(shown, sizeof shown, "w");
   watch_print(&seen, 10 * WM_NS_PER_S, f);
   (void)fclose(f);
   return shown;
+}
+
+static const char *shown_of(const wm_bound *bound) { return shown_with(bound, NULL); }
+
+TEST(a_doubted_pose_says_how_much_and_why) {
+  static wm_health doubted;
+  const wm_bound bound = {.risk = 1e-4, .horizontal_m = (double)INFINITY, .why = WM_UNUSABLE_DOUBT};
+  doubted.lost_probability = 0.0123;
+  TEST_ASSERT_NOT_NULL_MESSAGE(
+      strstr(shown_with(&bound, &doubted),
+             "not usable: the pose may be wrong with probability 0.012: each observation that fits makes it less\n"),
+      shown);
+  doubted.cause = WM_CAUSE_BIASED;
+  TEST_ASSERT_NOT_NULL_MESSAGE(
+      strstr(shown_with(&bound, &doubted), "may be wrong with probability 0.012: has biased innovations\n"), shown);
 }
 
 TEST(a_bound_says_whether_the_pose_is_usable) {

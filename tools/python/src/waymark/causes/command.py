@@ -13,7 +13,7 @@ from ..native import WaymarkError
 from .changes import NAMED, Impossible
 from .features import with_points
 from .robot import Robot
-from .search import GAIN_MIN, Search, Verdict
+from .search import GAIN_MIN, NAMED_MOST, Search, Verdict
 from .trial import Change, Drive, Trials, edits_of, scratch_folder
 
 EPILOG = """A mistake is named where it predicts the drive better than every other one, and than none, with a probability of 99 %, on the half of the
@@ -57,10 +57,12 @@ def report(robot: Robot, verdict: Verdict) -> dict[str, Any]:
         out["before"] = _share(verdict.before)
     if verdict.after and verdict.before:
         after = verdict.after
-        out |= {"after": _share(after), "probability": round(min(verdict.probability, 0.9999), 4), "gain_nats": round(verdict.gain, 3)}
-        before, surely = verdict.before, f"probability {min(verdict.probability, 0.9999):.4g}"
+        out |= {"after": _share(after), "probability": round(min(verdict.probability, NAMED_MOST), 4), "gain_nats": round(verdict.gain, 3)}
+        before, surely = verdict.before, f"probability {min(verdict.probability, NAMED_MOST):.4g}"
         if verdict.gain >= GAIN_MIN:
             better = (f"and each is {math.exp(min(20, verdict.gain)):.1f} times as likely, on the half of the drive that this was not fitted to ({surely})")
+        elif before.unusual - after.unusual < 1:
+            better = "and they fit as well without it: the filter refuses what it cannot use"
         else:
             better = (f"and what the calibration's states take up is no longer {math.sqrt(2 * before.unusual):.1f} but {math.sqrt(2 * after.unusual):.1f} "
                       f"of their start sigmas together ({surely})")

@@ -60,6 +60,8 @@ class Fault:
     prior: float = 0.0
     clock: Clock | None = None
     """What it does to stamps."""
+    is_fact: bool = False
+    """The data prove it without a drive: it is undone before other mistakes are looked for."""
     is_local: bool = False
     """It touches few observations: those of two landmarks, or those until a pose is found."""
     scales: str = ""
@@ -90,9 +92,9 @@ class Fault:
 
 
 def discrete(name: str, edits: Callable[..., Sequence[Edit]], say: Callable[..., str], *, group: str = "", size: float = 1.0,
-             prior: float = 0.0, scales: str = "", is_local: bool = False) -> Fault:
+             prior: float = 0.0, scales: str = "", is_local: bool = False, is_fact: bool = False) -> Fault:
     """A mistake that is there or not."""
-    return Fault(name, ((size,),), edits, say, group=group, prior=prior, scales=scales, is_local=is_local)
+    return Fault(name, ((size,),), edits, say, group=group, prior=prior, scales=scales, is_local=is_local, is_fact=is_fact)
 
 
 def factor_words(factor: float) -> str:

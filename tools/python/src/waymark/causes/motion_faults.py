@@ -17,6 +17,7 @@ SPEEDS = (-1.0, 1 / 3.6, 3.6, 0.44704, 0.1, 10.0)
 TURNS = (-1.0, DEG, 1 / DEG, -DEG, 0.1, 10.0)
 # What wheels can be: of a toy and of a mine's lorry.
 LIMITS = {"radius_m": (0.01, 2.5), "ticks_per_turn": (1, 1e7), "track_m": (0.06, 6), "wheelbase_m": (0.06, 12), "steering_ratio": (0.5, 40)}
+FOLD_COUNTS = 2  # of a wheel that stands, where its counter trembles about its end
 BITS = (8, 10, 12, 16, 24, 32)  # of counters
 STEERED = ("wheelbase_m", "steering_ratio")  # alike in gentle turns
 UPRIGHT = 0.94  # cos of 20 degrees: a floor is no steeper
@@ -73,7 +74,8 @@ def _wheels(robot: Robot, bound: dict[str, int]) -> Iterator[Fault]:
 
     for bits in BITS:
         if edits := _counters(robot, bound, bits):
-            yield discrete(f"counters of {bits} bits", lambda _, e=edits: e, lambda _, b=bits: f"the wheels' counters have {b} bits, and are read as longer ones")
+            yield discrete(f"counters of {bits} bits", lambda _, e=edits: e, lambda _, b=bits: f"the wheels' counters have {b} bits, and are read as longer ones",
+                           is_fact=robot.has("ticks.csv"))
 
     # The way of a tick is radius over ticks: the drive shows it, not which of both is wrong.
     def places(size: Size) -> list[list[Edit]]:
@@ -99,9 +101,13 @@ def _counters(robot: Robot, bound: dict[str, int], bits: int) -> list[Edit]:
     if not robot.has("ticks.csv"):
         items = [robot.bindings[bound[name]] for name in TICKS]
         return [Signal("vehicle.dbc", str(item.get("message")), str(item.get("signal")), "bits", bits) for item in items]
-    counts = [robot.table("ticks.csv")[name] for name in ("left", "right")]
-    wraps = all(np.ptp(c) < 2**bits for c in counts) and any((np.abs(np.diff(c)) > 2 ** (bits - 1)).any() for c in counts)
-    return [Counted("ticks.csv", bits)] if wraps else []
+    half = 2 ** (bits - 1)
+    steps = np.concatenate([np.diff(robot.table("ticks.csv")[name]) for name in ("left", "right")])
+    folded = np.abs(steps) > half
+    # Proof: each fall of more than half a cycle is a usual step less the cycle.
+    usual = np.abs(steps[~folded]).max(initial=0) + FOLD_COUNTS
+    wraps = folded.any() and np.abs((steps[folded] + half) % (2 * half) - half).max() <= min(usual, half / 2)
+    return [Counted("ticks.csv", bits)] if wraps and np.abs(steps).max() <= 2 * half else []
 
 
 def _scaled(robot: Robot, item: int, factor: float) -> Value:

@@ -24,6 +24,7 @@ FIT_ROUNDS, SETTLED_MOST = 4, 3
 REACH = 0.3  # of the best row's gain: below it no size makes a row the best
 FIT_GAIN_MIN = 0.03  # nats an update that the best row gains before its size is fitted; below, none explains the drive
 BLOCK_S, BLOCKS_MIN = 2.0, 20  # longer than errors that last, as the correlated ones of a sighting; of short drives shorter
+NAMED_MOST = 0.9999  # no probability is said to be more
 NAMED_FROM = 0.99  # probability that a cause predicts better than each other, and than none
 GAIN_MIN = 0.1  # nats an update, over no mistake
 APART_MIN = 0.02  # nats an update, over another cause: below, the drive does not tell them apart
@@ -85,6 +86,7 @@ class Search:
     def __init__(self, robot: Robot, trials: Trials, progress: Callable[[float], None] = lambda share: None):
         self.robot, self.trials, self.progress = robot, trials, progress
         self.rows: list[Fault] = []
+        self.facts: list[Change] = []
         self.cost = 0.0  # processor time of a second of the drive
         self.duration_s = 0.0
 
@@ -109,18 +111,22 @@ class Search:
         verdict = Verdict(before, rows=len(self.rows))
         if before is None:
             return verdict
-        fixed: list[Change] = []
-        now: Drive = before
+        self.facts = [(row, row.start[0]) for row in self.rows if row.is_fact]
+        mended = self.trials.run([self.facts], keeps=True, has_states=True)[0] if self.facts else None
+        self.facts = self.facts if mended else []
+        fixed: list[Change] = [*self.facts]
+        now: Drive = mended or before
+        verdict.probability = NAMED_MOST if mended else 0.0
         firsts: list[Candidate] = []
-        while len(fixed) < CAUSES_MOST:
+        while len(fixed) < CAUSES_MOST and not self._is_done(fixed, now):
             found = self._round(fixed, now)
-            if not fixed:
+            if fixed == self.facts:
                 firsts = found[:FIRSTS]
             if not found or not self._helps(found[0].drive, now):
                 break
             best, tied, probability = self._judge(found, now)
             if self._is_right(best.drive):
-                if tied and not fixed:
+                if tied and fixed == self.facts:
                     verdict.undecided = [(c.fault, c.size) for c in (best, *tied)]
                 if tied or probability < NAMED_FROM:
                     break
@@ -128,7 +134,7 @@ class Search:
             fixed.append((best.fault, best.size))
             verdict.probability = min(probability, verdict.probability or 1.0)
             now = best.drive
-            if now.explained >= EXPLAINED_ALL and self._is_right(now) or self.left_s() <= 0:
+            if self.left_s() <= 0:
                 break
         if not self._is_right(now) and not verdict.undecided:
             fixed, now = self._pairs(firsts, before, verdict) or (fixed, now)
@@ -138,9 +144,13 @@ class Search:
         return verdict
 
     def _are_needed(self, fixed: list[Change], now: Drive) -> bool:
-        """Whether each of several mistakes has a part in it."""
-        without = self.trials.run([[c for c in fixed if c is not one] for one in fixed], has_states=True) if len(fixed) > 1 else []
+        """Whether each of several mistakes has a part in it; facts need none."""
+        without = self.trials.run([[c for c in fixed if c is not one] for one in fixed if one not in self.facts], has_states=True) if len(fixed) > 1 else []
         return all(drive is None or self._beats(now, drive, GAIN_MIN)[0] for drive in without)
+
+    def _is_done(self, fixed: list[Change], now: Drive) -> bool:
+        """Whether nothing is left for another mistake."""
+        return bool(fixed) and now.explained >= EXPLAINED_ALL and self._is_right(now) and (fixed != self.facts or now.unusual < STATES_APART)
 
     def _begin(self) -> Drive | None:
         """The drive as it is."""
@@ -385,7 +395,7 @@ class Search:
         for first in firsts:
             if self.left_s() < 0.2 * self.budget_s():
                 break
-            fixed: list[Change] = [(first.fault, first.size)]
+            fixed = [*self.facts, (first.fault, first.size)]
             found = self._round(fixed, first.drive)
             if not found or not self._helps(found[0].drive, first.drive) or not self._helps(found[0].drive, before):
                 continue
