@@ -106,13 +106,13 @@ def counter(rng):
     return {"ticks.csv": each(left=lambda c: int(c) % 256, right=lambda c: int(c) % 256)}, "counters of 8 bits", [1.0]
 
 
-def clock_of(stream):
+def clock_of(stream, name):
     """A stream of motion whose clock is some per cent fast or slow."""
     def mistake(rng):
         rate = signed(rng, 0.03, 0.05)  # of less the pose hardly shows anything
         begin = small_robot.START_NS
         return {f"{stream}.csv": stamps(lambda t: t + round(rate * (t - begin)))}, f"drift of {stream}", [rate / (1 + rate)]
-    mistake.__name__ = f"{stream}_clock"
+    mistake.__name__ = name
     return mistake
 
 
@@ -278,7 +278,7 @@ def none(rng):
 
 
 PLANTED = [(landmarks_robot, m) for m in (none, map_scale, clock, yaw, place, tick, track, ranges, exchange, lag, bearings, gyro)]
-PLANTED += [(tables_robot, m) for m in (none, counter, clock_of("imu"), clock_of("ticks"))]
+PLANTED += [(tables_robot, m) for m in (none, counter, clock_of("imu", "gyro_clock"), clock_of("ticks", "counts_clock"))]
 PLANTED += [(satellites_robot, m) for m in (none, antenna, small_antenna, receiver, mirrored, turn_rate)]
 PLANTED += [(landmarks_robot, m) for m in (wheels_swapped, byte_order, setting)]
 PLANTED += [(tags_robot, m) for m in (none, tag_size, tilt, tag_yaw, tags_exchanged, tags_scaled, camera_late)]

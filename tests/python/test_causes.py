@@ -27,6 +27,7 @@ os.environ["WAYMARK_LIBRARY"] = str(LIBRARY)
 
 import plan_robots  # noqa: E402
 from waymark.causes import changes, plan, search  # noqa: E402
+from waymark.causes.faults import all_faults  # noqa: E402
 from waymark.causes.features import with_points  # noqa: E402
 from waymark.causes.fault import Clock, Fault, discrete, factor_words  # noqa: E402
 from waymark.causes.robot import Robot  # noqa: E402
@@ -84,6 +85,33 @@ def drive(gain, unusual=0.0, lost=0.0):
 
 def row(name, group=""):
     return discrete(name, lambda _: [], lambda _: name, group=group)
+
+
+class Rows(unittest.TestCase):
+    """Rows of motion in tables."""
+
+    def rows_of(self, **tables):
+        folder = Path(tempfile.mkdtemp())
+        self.addCleanup(shutil.rmtree, folder)
+        (folder / "robot.yaml").write_text("format: waymark-config/1\n")
+        for name, lines in tables.items():
+            (folder / f"{name}.csv").write_text("\n".join(lines) + "\n")
+        return {row.name: row for row in all_faults(Robot.read(folder, folder / "robot.yaml", {}))}
+
+    def ticks(self, counts):
+        return ["t_ns,left,right", *(f"{10**9 + k * 10**7},{c},{c}" for k, c in enumerate(counts))]
+
+    def test_clocks_of_motion_are_of_several_streams(self):
+        turns = ["t_ns,wx_radps,wy_radps,wz_radps", "1000000000,0,0,0.1", "1010000000,0,0,0.2"]
+        alone, both = self.rows_of(imu=turns), self.rows_of(imu=turns, ticks=self.ticks(range(9)))
+        self.assertFalse([name for name in alone if name.startswith(("clock of", "drift of"))])
+        self.assertTrue({"drift of imu", "clock of imu", "drift of ticks", "clock of ticks"} <= set(both))
+
+    def test_counters_of_fewer_bits_are_a_fact_and_a_restart_is_none(self):
+        counters = [name for name in self.rows_of(ticks=self.ticks(20 * k % 256 for k in range(60))) if name.startswith("counters")]
+        self.assertEqual(counters, ["counters of 8 bits"])
+        restart = self.rows_of(ticks=self.ticks([*range(0, 50000, 20), *range(0, 2000, 20)]))
+        self.assertFalse([name for name in restart if name.startswith("counters")])
 
 
 class Judgement(unittest.TestCase):
