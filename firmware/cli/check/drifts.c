@@ -22,7 +22,6 @@
 #define DELAY_MOST 24      // windows
 #define LIKE 0.8           // correlation of turns that are the same
 #define ALIKE 0.98         // so that no clock has to be looked for far away
-#define REST 0.5           // share of what was unlike that a clock far away may leave: turns repeat themselves
 #define TURN_RMS_MIN 0.02  // rad/s
 #define AWAY (0.1 / DELAY_MOST)  // of r, a window: of turns that repeat themselves the nearest delay is taken
 #define STEP_WINDOWS 2.0         // of a search; of the rate, at the end of the drive
@@ -165,11 +164,8 @@ static int is_apart(const channel *a, const channel *b, clock_fit *out) {
   const pair p = {a, b, first, end - first < WINDOWS_MOST ? end - first : WINDOWS_MOST};
   if (p.count < WINDOWS_MIN) return 0;
   *out = search(&p, APART_MIN_S / WINDOW_S, 0);
-  if (out->r > LIKE) *out = refined(&p, *out);
-  if (out->r < ALIKE) {
-    const clock_fit far = refined(&p, search(&p, DELAY_MOST, RATE_MOST));
-    if (1 - far.r < REST * (1 - out->r)) *out = far;
-  }
+  if (out->r < ALIKE) *out = search(&p, DELAY_MOST, RATE_MOST);
+  *out = refined(&p, *out);
   const double sigmas = sigmas_by_chance(out->freedom);
   const double grown_s = fabs(out->rate) * (double)p.count * WINDOW_S;
   const double middle_s = fabs(out->delay + out->rate * out->middle) * WINDOW_S;
