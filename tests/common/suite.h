@@ -1,7 +1,29 @@
 // SPDX-License-Identifier: Apache-2.0
 // A test program: each TEST(name) { ... } is a case of it. Its main is in suite.c and runs all cases, in the order of
-// the file.
+// the file. It brings the standard headers that most cases use.
 #pragma once
+
+#ifdef __cplusplus
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <initializer_list>
+#include <limits>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+#else
+#include <stdbool.h>
+#endif
+#include <inttypes.h>
+#include <math.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
 
 #include "unity.h"
 

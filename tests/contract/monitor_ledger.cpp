@@ -2,8 +2,6 @@
 // What the monitor counts from step to step, against a ledger in plain words, over random drives: the time of doubt, of
 // agreement, of contradiction, of proof, and what a found pose has to do. And what it reports of a silent source, of a
 // place off the map, and of the spread of a lost robot.
-#include <cmath>
-
 #include "common/suite.h"
 #include "lone_monitor.hpp"
 #include "waymark/random.h"

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the monitor counts: shares of refused sightings, means of several landmarks, contradictions that last, and what
 // makes up for them.
-#include <cmath>
-
 #include "common/suite.h"
 #include "lone_monitor.hpp"
 

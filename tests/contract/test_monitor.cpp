@@ -1,13 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The life cycle of each estimator with the monitor of innovations (waymark/monitor.h), as a run has it: observations
 // that contradict the pose make it degraded and then lost, with a cause; good ones do neither.
-#include <cmath>
-#include <cstdlib>
-#include <cstring>
-#include <memory>
-#include <string>
-#include <vector>
-
 #include "common/suite.h"
 #include "drives.hpp"
 #include "filters/core/calibration_list.hpp"

@@ -3,15 +3,10 @@
 // numbers of one drive are pinned, lateness changes nothing, faults do no lasting harm.
 #include <unistd.h>
 
-#include <cmath>
-#include <cstdio>
-#include <cstdlib>
-#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <functional>
 #include <iterator>
-#include <string>
 
 #include "simulate/angle.h"
 #include "simulate/simulate.h"

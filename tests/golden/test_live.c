@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A run with its real threads: its log gives its poses, it stops when told, LCM goes on without a way out.
 #include <pthread.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 

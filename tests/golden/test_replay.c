@@ -1,11 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // A recording in, files out: the same bytes every time, whatever arrives late, and an account of every datum.
-#include <inttypes.h>
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
 #include "common/suite.h"
 #include "findings/findings.h"
 #include "output/event_log.h"

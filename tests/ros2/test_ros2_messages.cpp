@@ -1,8 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Messages of ROS 2 from a run's, and back: axes of covariances, odometry of the robot's own, doubtful input.
-#include <cmath>
-#include <limits>
-
 #include "common/suite.h"
 #include "ros2/incoming.h"
 #include "ros2/outgoing.h"

@@ -7,11 +7,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <cstdint>
-#include <cstdio>
-#include <cstdlib>
-#include <cstring>
-#include <string>
 
 extern "C" {
 #include "aruco_codes.h"

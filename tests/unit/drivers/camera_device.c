@@ -4,9 +4,6 @@
 #include "camera_device.h"
 
 #include <errno.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <turbojpeg.h>
 
 #include "common/suite.h"

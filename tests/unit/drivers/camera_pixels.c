@@ -1,8 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Formats of cameras as grey, stamps, and numbers of pictures.
-#include <stdlib.h>
-#include <string.h>
-
 #include "common/suite.h"
 #include "frame_clock.h"
 #include "pixels.h"

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Bindings that a program makes, which no can-signals.yaml can state, a DBC from a file, and limits of one message.
-#include <math.h>
-#include <stdlib.h>
 #include <unistd.h>
 #include "common/suite.h"
 

@@ -1,9 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // candump's log lines: each form, exact times, and the limits.
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
 #include "common/suite.h"
 #include "waymark/can.h"
 

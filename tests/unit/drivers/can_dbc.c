@@ -1,8 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // DBC files as they come: what is passed over, what is read across it, and that parts of a file never crash the reader.
-#include <stdio.h>
-#include <stdlib.h>
-
 #include "common/suite.h"
 #include "dbc.h"
 

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // From frames to quantities: units, sums, gears, multiplexing, ticks that wrap, counters, and what is counted.
-#include <math.h>
 #include "common/suite.h"
 
 #include "can_fixture.h"

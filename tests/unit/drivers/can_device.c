@@ -2,7 +2,6 @@
 // A CAN interface as a source: stamps, filters, and what befalls an interface on a robot.
 #include "can_device.h"
 
-#include <stdlib.h>
 #include <time.h>
 
 #include <errno.h>

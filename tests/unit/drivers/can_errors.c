@@ -1,10 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Bad candump lines, DBC files and bindings, and the exact message that each one gives. `wm_errors_can --markdown`
 // prints the table for docs/errors.md; without arguments this is a test of it.
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
 #include "common/suite.h"
 #include "waymark/can.h"
 

@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Positions from a receiver on the bus, against lengths of a degree on WGS84 and figures of PROJ, and lines of a log
 // that are read again as they were written.
-#include <math.h>
-#include <string.h>
-
 #include "common/suite.h"
 #include "waymark/can.h"
 

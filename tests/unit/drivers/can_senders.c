@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Which frames are of a message: J1939 by its PGN, one sender of several, and what is said of messages that never come.
-#include <stdlib.h>
 #include "common/suite.h"
 
 #include "can_fixture.h"

@@ -1,9 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Cascades in OpenCV's format: what a file says, and what is said when it is wrong.
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
 #include "common/suite.h"
 #include "waymark/cascade_file.h"
 

@@ -4,11 +4,6 @@
 #include <apriltag/apriltag.h>
 #include <apriltag/tag36h11.h>
 
-#include <cmath>
-#include <cstdlib>
-#include <cstring>
-#include <vector>
-
 #include "common/suite.h"
 #include "waymark/detectors.h"
 

@@ -2,11 +2,6 @@
 // faults.yaml: what is read, what is refused and with which text, and its JSON.
 #include "waymark/faults.h"
 
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
 #include "common/suite.h"
 
 static wm_faults faults;

@@ -2,9 +2,6 @@
 // Reports of gpsd, as gpsd 3.22 writes them, and positions in the map.
 #include "gpsd_report.h"
 
-#include <math.h>
-#include <string.h>
-
 #include "common/suite.h"
 #include "waymark/local_frame.h"
 

@@ -1,8 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Scans of Linux IIO: types of elements, their places, mounting matrices.
-#include <math.h>
-#include <string.h>
-
 #include "common/suite.h"
 #include "scan.h"
 

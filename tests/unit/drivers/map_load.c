@@ -1,10 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Raster maps: what map.yaml and its pictures say, and what is said when they are wrong.
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
 #include "common/suite.h"
 #include "folder.h"
 #include "waymark/map.h"

@@ -1,8 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // One map as every kind of picture that people have it in: the same cells come out. And what a mode makes of a level.
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <zlib.h>
 
 #include "common/suite.h"

@@ -2,11 +2,6 @@
 // Coded markers of all families found and read in rendered views: mr_views [VIEWS]. Prints a table and holds the bars:
 // recall at least 0.95 where a module has 3 px or more, no false identity.
 #include <algorithm>
-#include <cmath>
-#include <cstdio>
-#include <cstdlib>
-#include <cstring>
-#include <memory>
 
 #include "common/marker_views.hpp"
 #include "common/suite.h"

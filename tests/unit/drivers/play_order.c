@@ -2,9 +2,6 @@
 // A recording's data in the order of their times, with faults; the same items each time, and from later on.
 #include "waymark/play.h"
 
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 

@@ -2,9 +2,6 @@
 // Opens every recording of WM_DATA_DIR and holds what its sources hand out against the `counts` that its
 // recording.yaml gives.
 #include <dirent.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <unistd.h>
 
 #include "common/suite.h"

@@ -1,9 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a recording's small files say, and what happens when they say it otherwise.
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <unistd.h>
 #include <zlib.h>
 

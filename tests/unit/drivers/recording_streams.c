@@ -1,10 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // The CSV streams: columns by name, stamps to the last digit, and each kind of broken row.
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
 #include "common/suite.h"
 #include "folder.h"
 #include "waymark/event_fields.h"

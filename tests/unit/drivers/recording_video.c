@@ -1,8 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Videos of a recording: what is there becomes frames with their stamps, what isn't right is counted.
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 

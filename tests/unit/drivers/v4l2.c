@@ -6,8 +6,6 @@
 #include <linux/videodev2.h>
 #include <poll.h>
 #include <stdarg.h>
-#include <stdio.h>
-#include <string.h>
 #include <sys/mman.h>
 
 #include "camera_io.h"

@@ -1,9 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <float.h>
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
 #include "common/suite.h"
 #include "waymark/yaml.h"

@@ -3,8 +3,6 @@
 #include "waymark/mr_code.h"
 
 #include <bit>
-#include <cstdio>
-#include <cstdlib>
 
 #include "common/suite.h"
 #include "vision/markers/bch.hpp"

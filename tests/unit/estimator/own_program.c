@@ -1,10 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A program with a filter in itself: the installed headers alone, no configuration file, no number filled in that is
 // not known.
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
-
 #include "common/suite.h"
 #include "waymark/own_program.h"
 

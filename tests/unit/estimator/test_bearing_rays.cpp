@@ -2,12 +2,6 @@
 // Landmarks seen by bearings alone, with the default's start distance and a motion that is uncertain: lines far beyond
 // that distance, a line that a tracker lost to another edge, a detector that states its sigma. GIVEN / WHEN / THEN;
 // noise is drawn from fixed seeds.
-#include <cmath>
-#include <cstdio>
-#include <cstdlib>
-#include <cstring>
-#include <limits>
-
 #include "common/suite.h"
 #include "events.hpp"
 #include "filters/slam/params.h"

@@ -1,9 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Wheel counters of few ticks: their rounding must not become a calibration.
-#include <cmath>
-#include <cstdlib>
-#include <cstring>
-
 #include "common/suite.h"
 #include "events.hpp"
 #include "filters/landmark_ekf/params.h"

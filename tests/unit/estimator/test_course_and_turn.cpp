@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Two tests of the measured turn, each against a plain computation of the same: likelihood ratios of another factor on
 // the turn (turn_check), and the way laid over positions as it is and mirrored (course_test).
-#include <cmath>
-#include <cstring>
-
 #include "common/suite.h"
 #include "events.hpp"
 #include "filters/core/course_test.hpp"

@@ -1,40 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 // A sensor's time offset beside what repeats it: the lag of commands, and the steps of coarse counts.
-#include <cmath>
-#include <cstdio>
-#include <memory>
-#include <string>
-#include <vector>
-
-#include "common/suite.h"
-#include "events.hpp"
-#include "math/arc.hpp"
-#include "math/elementary.hpp"
-#include "waymark/random.h"
+#include "world.hpp"
 
 namespace {
+
+using namespace world;
 
 constexpr double kStep_s = 0.001, kBearing_rad = 0.01, kRange_m = 0.03, kTrack_m = 0.5, kWheel_m = 0.1;
 
 const char *const kEstimators[] = {"landmark_ekf", "slam"};
-
-const wm_estimator *ekf;
-wm_motion_params motion;
 std::vector<char> params;
-wm_sensor sensor;
-wm_landmark landmarks[3];
-wm_setup setup;
-std::unique_ptr<void, void (*)(void *)> state(nullptr, std::free);
 
-void feed(const wm_event &e) { TEST_ASSERT_EQUAL(WM_OK, make::feed(*ekf, state.get(), e)); }
-
-wm_calibration_value found(const std::string &name) {
-  std::vector<wm_calibration_value> out(64);
-  out.resize(ekf->calibration(state.get(), out.data(), out.size()));
-  for (const wm_calibration_value &v : out)
-    if (name == v.name) return v;
-  TEST_FAIL_MESSAGE(name.c_str());
-  return {};
+wm_calibration_value found(const char *name) {
+  const wm_calibration_value out = calibrated(name);
+  TEST_ASSERT_FALSE_MESSAGE(std::isnan(out.value), name);
+  return out;
 }
 
 // The true drive of 120 s; commands change each two seconds, and the drive obeys them `lag_s` later with a first-order
@@ -75,10 +55,9 @@ class Robot {
   static void look(double t, const wm_pose2 &p, int k) {
     for (uint64_t i = 0; i < 3; i++) {
       const auto at = static_cast<uint64_t>(k) * 3 + i;
-      const double dx = landmarks[i].p_m[0] - p.x_m, dy = landmarks[i].p_m[1] - p.y_m;
-      const double bearing = std::atan2(dy, dx) - p.heading_rad + kBearing_rad * wm_random_normal(1, 1, at);
-      feed(make::sighting(t, landmarks[i].id, wm::wrap(bearing),
-                          std::hypot(dx, dy) + kRange_m * wm_random_normal(1, 2, at)));
+      const auto [bearing, range] = view_of(landmarks[i].p_m[0], landmarks[i].p_m[1], p);
+      feed(make::sighting(t, landmarks[i].id, wm::wrap(bearing + kBearing_rad * wm_random_normal(1, 1, at)),
+                          range + kRange_m * wm_random_normal(1, 2, at)));
     }
   }
 
@@ -86,25 +65,25 @@ class Robot {
 };
 
 // slam is without the map: its landmarks' places are unknown.
-void begin(const char *estimator = "landmark_ekf") {
-  ekf = wm_estimator_find(estimator);
-  params.resize(ekf->params.bytes);
-  wm_params_defaults(&ekf->params, params.data());
-  state.reset(make::begun(*ekf, params.data(), setup));
-  TEST_ASSERT_NOT_NULL(state.get());
+void begin_with(const char *name = "landmark_ekf") {
+  estimator = wm_estimator_find(name);
+  params.resize(estimator->params.bytes);
+  wm_params_defaults(&estimator->params, params.data());
+  chosen = params.data();
+  begin();
 }
 
 // Only the sum shows, and each keeps the sigma that the two priors leave: 0.2 0.1 / sqrt(0.2^2 + 0.1^2) = 0.089 s.
 TEST(test_a_lag_and_a_time_offset_are_observed_as_a_sum) {
-  for (const char *estimator : kEstimators)
+  for (const char *name : kEstimators)
     for (const auto &[lag_s, offset_s] : {std::pair{0.3, 0.05}, {0.1, 0.15}, {0.3, -0.1}}) {
-      begin(estimator);
+      begin_with(name);
       Robot(lag_s, offset_s).drive(0);
       const wm_calibration_value lag = found("motion.lag_s"), offset = found("camera.time_offset_s");
-      TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(0.05, lag_s + offset_s, lag.value + offset.value, estimator);
-      TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(0.015, 0.089, lag.sigma, estimator);
-      TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(0.015, 0.089, offset.sigma, estimator);
-      TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(3.5 * offset.sigma, offset_s, offset.value, estimator);
+      TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(0.05, lag_s + offset_s, lag.value + offset.value, name);
+      TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(0.015, 0.089, lag.sigma, name);
+      TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(0.015, 0.089, offset.sigma, name);
+      TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(3.5 * offset.sigma, offset_s, offset.value, name);
     }
 }
 
@@ -115,10 +94,10 @@ TEST(test_the_jitter_of_a_vague_heading_makes_nothing_known) {
   wm_rig rig = {};
   rig.antenna_m[0] = 0.8, rig.antenna_m[1] = -0.5;
   setup.rig = &rig;
-  setup.start = {WM_TIME_NONE, {NAN, NAN, 0}, {0, 0, 0, 1}, NAN, NAN, NAN};
+  start_at({NAN, NAN, NAN}, NAN, NAN);
   double of_heading = 0, of_place = 0;
   for (uint64_t drive = 0; drive < 12; drive++) {
-    begin();
+    begin_with();
     const double base = 0.3 + 0.03 * static_cast<double>(drive), phase = static_cast<double>(drive);
     wm_pose2 p = {1, -2, wm::wrap(0.7 * phase)}, before = p;
     for (uint64_t k = 0; k < 2000; k++) {
@@ -133,9 +112,8 @@ TEST(test_the_jitter_of_a_vague_heading_makes_nothing_known) {
       before = p;
       p = wm::compose(p, {a.x_m, a.y_m, a.turn_rad});
     }
-    wm_estimate out;
-    ekf->estimate(state.get(), &out);
-    of_heading += wm::square(wm::wrap(out.heading_rad - before.heading_rad)) / out.covariance[35] / 12;
+    const wm_estimate out = estimate();
+    of_heading += wm::square(turned_from(before)) / out.covariance[35] / 12;
     of_place += wm::square(out.pose_map_base.p_m[0] - before.x_m) / out.covariance[0] / 24;
     of_place += wm::square(out.pose_map_base.p_m[1] - before.y_m) / out.covariance[7] / 24;
   }
@@ -145,11 +123,11 @@ TEST(test_the_jitter_of_a_vague_heading_makes_nothing_known) {
 
 // No lag is below 0: what the sum has below it is the offset's.
 TEST(test_a_lag_at_its_limit_leaves_the_rest_to_the_offset) {
-  for (const char *estimator : kEstimators) {
-    begin(estimator);
+  for (const char *name : kEstimators) {
+    begin_with(name);
     Robot(0.0, -0.15).drive(0);
-    TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(0.02, 0, found("motion.lag_s").value, estimator);
-    TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(0.07, -0.15, found("camera.time_offset_s").value, estimator);
+    TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(0.02, 0, found("motion.lag_s").value, name);
+    TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(0.07, -0.15, found("camera.time_offset_s").value, name);
   }
 }
 
@@ -157,7 +135,7 @@ TEST(test_a_lag_at_its_limit_leaves_the_rest_to_the_offset) {
 // look like noise of the turns nor falsify the track.
 TEST(test_coarse_counts_behind_early_stamps_leave_the_track) {
   setup.wheels = {kWheel_m, 50, kTrack_m, NAN, NAN, NAN, 0, {}, {}};
-  begin();
+  begin_with();
   Robot(0.0, -0.15).drive(50);
   const wm_calibration_value track = found("motion.track_scale");
   TEST_ASSERT_DOUBLE_WITHIN(0.03, 1, track.value);
@@ -167,7 +145,7 @@ TEST(test_coarse_counts_behind_early_stamps_leave_the_track) {
 // A robot that stands, drives off and turns; its wheels' scale is anyone's. A receiver of 2 cm has no delay, of which
 // the filter knows half a second only. While the delay is vague, the robot may have stood then, or driven.
 double delay_of(uint64_t seed) {
-  begin();
+  begin_with();
   const double scale = 1.0 + 0.05 * wm_random_normal(5, seed, 0);
   wm_pose2 p{};
   for (int k = 0; k < 3000; k++) {
@@ -201,8 +179,8 @@ TEST(test_a_receivers_delay_is_found_when_a_robot_drives_off) {
 TEST(test_a_receivers_delay_is_not_observed_at_one_speed) {
   for (const bool is_given : {true, false}) {
     const double place = is_given ? 0.0 : static_cast<double>(NAN);
-    setup.start = {WM_TIME_NONE, {place, place, 0}, {0, 0, 0, 1}, place, 1.0, 0.1};
-    begin();
+    start_at({place, place, place}, 1.0, 0.1);
+    begin_with();
     for (int k = 0; k < 500; k++) {
       const double t = 0.02 * k;
       const auto at = static_cast<uint64_t>(3 * k);
@@ -222,15 +200,7 @@ TEST(test_a_receivers_delay_is_not_observed_at_one_speed) {
 }  // namespace
 
 void setUp() {
-  wm_params_defaults(&wm_motion_params_table, &motion);
-  wm_params_defaults(&wm_sighting_params_table, &make::sightings);
-  sensor = make::sensor("camera", kBearing_rad, kRange_m);
-  landmarks[0] = {0, {5, 0, 0}, 0.0, NAN, {}, 0};
-  landmarks[1] = {1, {2, 5, 0}, 0.0, NAN, {}, 0};
-  landmarks[2] = {2, {-3, -4, 0}, 0.0, NAN, {}, 0};
-  setup = make::setup(motion, sensor);
-  setup.landmarks = landmarks;
-  setup.landmark_count = 3;
-  setup.start = {WM_TIME_NONE, {0, 0, 0}, {0, 0, 0, 1}, 0.0, 0.05, 0.05};
+  prepare_ekf(make::sensor("camera", kBearing_rad, kRange_m));
+  all_by_default();
+  put_on_map({{5, 0}, {2, 5}, {-3, -4}}, 0);
 }
-void tearDown() { state.reset(); }

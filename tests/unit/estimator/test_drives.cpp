@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Drives beyond rolling wheels: holonomic bases with a scale and a noise of their own sideways, and skid steer, whose
 // centre of rotation and effective track are states.
-#include <cmath>
-#include <initializer_list>
-
 #include "common/suite.h"
 #include "events.hpp"
 #include "filters/planar/planar_filter.hpp"

@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Our own elementary functions and random numbers, held against the C library and the paper's own vectors.
 #include <cfloat>
-#include <cmath>
-#include <cstdint>
-#include <cstring>
 
 #include "common/suite.h"
 #include "common/trials.h"

@@ -3,14 +3,6 @@
 // odd states, too. And its kernels against their scalar twins, bit by bit, with wide vectors and without.
 #include "state/error_state.hpp"
 
-#include <cmath>
-#include <cstdlib>
-#include <cstring>
-#include <initializer_list>
-#include <memory>
-#include <utility>
-#include <vector>
-
 #include "common/suite.h"
 #include "waymark/random.h"
 #include "waymark/vectors.h"

@@ -2,7 +2,6 @@
 // The motion front end's bounds and choices, gone through as tables: the limit of every quantity, which part of the
 // motion a refused sensor leaves open, which source gives the speed, the steering's table, how far off the plane is
 // off, which samples follow others.
-#include <vector>
 #include "common/suite.h"
 
 #include "motion/event_time.hpp"

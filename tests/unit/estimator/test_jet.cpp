@@ -2,8 +2,6 @@
 // Jets against differences: each operation, alone and chained, by each of its arguments.
 #include "math/jet.hpp"
 
-#include <cmath>
-
 #include "common/suite.h"
 
 namespace {

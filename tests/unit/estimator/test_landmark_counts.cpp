@@ -3,9 +3,7 @@
 // (landmark_bias), whether the pose or a landmark is wrong (landmark_evidence), and whether refused sightings of a
 // sensor agree with its prior (first_sightings).
 #include <algorithm>
-#include <cmath>
 #include <map>
-#include <vector>
 
 #include "common/suite.h"
 #include "events.hpp"

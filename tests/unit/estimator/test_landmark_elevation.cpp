@@ -1,44 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // Elevations of landmarks in the landmark filter: what is expected and how it changes, what an absent or absurd one
 // does, how far it is believed, and that a pose isn't taken which heights contradict.
-#include <cmath>
-#include <cstdio>
-#include <cstdlib>
-#include <cstring>
-
-#include "common/suite.h"
-#include "events.hpp"
-#include "filters/landmark_ekf/params.h"
 #include "filters/landmark_ekf/start_hypotheses.hpp"
 #include "filters/relocalize/pose_search.hpp"
-#include "math/elementary.hpp"
-#include "motion/motion_params.h"
 #include "sensors/sensor_model.hpp"
-#include "waymark/estimator.h"
-#include "waymark/random.h"
+#include "world.hpp"
 
 namespace {
 
-const wm_estimator *ekf;
-wm_motion_params motion;
-wm_landmark_ekf_params params;
-wm_setup setup;
-wm_sensor sensor;
-wm_landmark landmarks[3];
-void *state;
-
-void begin() {
-  std::free(state);
-  state = make::begun(*ekf, &params, setup);
-  TEST_ASSERT_NOT_NULL(state);
-}
-
-wm_estimate estimate() {
-  wm_estimate e;
-  std::memset(&e, 0, sizeof e);
-  ekf->estimate(state, &e);
-  return e;
-}
+using namespace world;
 
 // Landmark `i` as it is seen from the start, with its elevation.
 wm_event seen(double t_s, int i, double sigma_rad) {
@@ -51,20 +21,8 @@ wm_event seen(double t_s, int i, double sigma_rad) {
   return out;
 }
 
-int verdict_of(const wm_event &e, wm_status wanted = WM_OK, size_t *count = nullptr) {
-  wm_innovation records[4];
-  size_t n;
-  TEST_ASSERT_EQUAL(wanted, ekf->correct(state, &e, records, 4, &n));
-  TEST_ASSERT_GREATER_THAN(0, n);
-  if (count) *count = n;
-  return records[0].verdict;
-}
-
 void stand(double from_s, double to_s) {
-  for (double t = from_s; t < to_s; t += 0.02) {
-    const wm_event twist = make::twist(t, 0, 0);
-    TEST_ASSERT_EQUAL(WM_OK, ekf->predict(state, &twist));
-  }
+  for (double t = from_s; t < to_s; t += 0.02) feed(make::twist(t, 0, 0));
 }
 
 TEST(test_expected_elevation_and_its_derivatives) {
@@ -129,32 +87,27 @@ TEST(test_a_ray_is_levelled) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, (1.9 - 0.7) / std::hypot(2.5 + 0.2, 3.0 - 0.4), ray.tangent);
 }
 
-void run_without(int use, bool told, wm_estimate *out) {
+wm_estimate run_without(int use, bool told) {
   make::sightings.use_elevation = use;
   begin();
-  wm_random noise = {5, 1, 0};
+  noise = {5, 1, 0};
   for (int i = 0; i < 100; i++) {
     const double t = 0.1 * i;
     stand(t, t + 0.09);
     wm_event e = seen(t + 0.1, i % 3, told ? 0.01 : 0.0);
     if (!told) e.as.sighting.elevation_rad = NAN;
-    e.as.sighting.bearing_rad += 0.01 * wm_random_next_normal(&noise);
-    wm_innovation records[4];
-    size_t count;
-    TEST_ASSERT_EQUAL(WM_OK, ekf->correct(state, &e, records, 4, &count));
+    e.as.sighting.bearing_rad += gauss(0.01);
+    feed(e);
     TEST_ASSERT_EQUAL(use && told ? 2 : 1, count);
   }
-  *out = estimate();
+  return estimate();
 }
 
 TEST(test_without_elevations_all_bits_are_as_without_the_parameter) {
-  wm_estimate off, on, not_used, used;
-  run_without(0, false, &off);
-  run_without(1, false, &on);
+  const wm_estimate off = run_without(0, false), on = run_without(1, false), not_used = run_without(0, true),
+                    used = run_without(1, true);
   TEST_ASSERT_EQUAL_MEMORY(&off, &on, sizeof off);
-  run_without(0, true, &not_used);
   TEST_ASSERT_EQUAL_MEMORY(&off, &not_used, sizeof off);
-  run_without(1, true, &used);
   TEST_ASSERT_TRUE(std::memcmp(&off, &used, sizeof off) != 0);
 }
 
@@ -174,9 +127,7 @@ TEST(test_absurd_elevations_are_refused_and_told) {
   // A thing at another height where the landmark should be: the bearing stays.
   wm_event e = seen(1, 0, 0.001);
   e.as.sighting.elevation_rad += 0.2;
-  wm_innovation records[4];
-  size_t count;
-  TEST_ASSERT_EQUAL(WM_OK, ekf->correct(state, &e, records, 4, &count));
+  feed(e);
   TEST_ASSERT_EQUAL(2, count);
   TEST_ASSERT_EQUAL(WM_FUSED, records[0].verdict);
   TEST_ASSERT_EQUAL(WM_RESIDUAL_ELEVATION, records[1].residual);
@@ -188,8 +139,7 @@ TEST(test_where_a_height_is_not_known_there_is_no_elevation) {
   stand(0, 1);
   const wm_event e = seen(1, 0, 0.01);
   landmarks[0].p_m[2] = NAN;
-  size_t count;
-  TEST_ASSERT_EQUAL(WM_FUSED, verdict_of(e, WM_OK, &count));
+  TEST_ASSERT_EQUAL(WM_FUSED, verdict_of(e));
   TEST_ASSERT_EQUAL(1, count);
 }
 
@@ -212,6 +162,23 @@ TEST(test_it_tells_the_distance_and_not_more_than_the_tilt_allows) {
   TEST_ASSERT_GREATER_THAN_DOUBLE(0.8 * lasting_m, std::sqrt(e.covariance[0]));
 }
 
+// Landmark `key` at this place, seen from (from_x_m, 0) where it hangs so high, `wrong_m` more than on the map.
+wm::observation observed(int key, const double place_m[2], double from_x_m, double height_m, double wrong_m) {
+  wm::observation seen{};
+  seen.kind = wm::kObservedBearing | (height_m > 0 ? wm::kObservedElevation : 0u);
+  seen.key = key * wm::kMaxSensors;
+  seen.sensor.x_m = seen.travelled_m = from_x_m;
+  for (int k = 0; k < 2; k++) seen.place_m[k] = place_m[k];
+  const auto [bearing_rad, range_m] = view_of(place_m[0], place_m[1], {from_x_m, 0, 0});
+  seen.bearing_rad = bearing_rad;
+  seen.height_m = height_m;
+  seen.tangent = (height_m + wrong_m) / range_m;
+  seen.sigma_angle_rad = 0.005;
+  seen.sigma_place_m = seen.sigma_height_m = 0.02;
+  seen.sigma_tangent = 0.008;
+  return seen;
+}
+
 // Bearings of three landmarks fit some pose, as three always do, and those of two while driving: the pose is found with
 // heights that agree with it and without heights, but not with one that contradicts it.
 TEST(test_a_contradicting_height_rejects_a_found_pose) {
@@ -221,20 +188,8 @@ TEST(test_a_contradicting_height_rejects_a_found_pose) {
     search.clear();
     for (int n = 0; n < 12; n++) {
       const int i = n % count;
-      const double x_m = 0.3 * n;
-      wm::observation seen{};
+      wm::observation seen = observed(i, place_m[i], 0.3 * n, heights, i == 1 ? wrong_m : 0.0);
       seen.t_ns = 400 * n * WM_NS_PER_MS;
-      seen.kind = wm::kObservedBearing | (heights > 0 ? wm::kObservedElevation : 0u);
-      seen.key = i * wm::kMaxSensors;
-      seen.sensor.x_m = seen.travelled_m = x_m;
-      for (int k = 0; k < 2; k++) seen.place_m[k] = place_m[i][k];
-      const double dx = place_m[i][0] - x_m, dy = place_m[i][1];
-      seen.bearing_rad = wm::atan2(dy, dx);
-      seen.height_m = heights;
-      seen.tangent = (heights + (i == 1 ? wrong_m : 0.0)) / std::hypot(dx, dy);
-      seen.sigma_angle_rad = 0.005;
-      seen.sigma_place_m = seen.sigma_height_m = 0.02;
-      seen.sigma_tangent = 0.008;
       search.add(seen);
     }
     return search.find(0, {{3.3, 0.0, 0.0}, 3.3, 0.0}, nullptr, 0, {5.0, 1.0, 5}).found;
@@ -256,18 +211,9 @@ TEST(test_heights_reject_a_wrong_start) {
   const auto off = [&](bool heights, double short_m) {
     observations.clear();
     for (int n = 0; n < 30; n++) {
-      const int i = n % 3;
-      wm::observation seen{};
+      wm::observation seen = observed(n % 3, place_m[n % 3], 0.0, 1.5, 0.0);
+      if (!heights) seen.kind = wm::kObservedBearing;
       seen.t_ns = 150 * n * WM_NS_PER_MS;
-      seen.kind = wm::kObservedBearing | (heights ? wm::kObservedElevation : 0u);
-      seen.key = i * wm::kMaxSensors;
-      for (int k = 0; k < 2; k++) seen.place_m[k] = place_m[i][k];
-      seen.bearing_rad = wm::atan2(place_m[i][1], place_m[i][0]);
-      seen.height_m = 1.5;
-      seen.tangent = 1.5 / std::hypot(place_m[i][0], place_m[i][1]);
-      seen.sigma_angle_rad = 0.005;
-      seen.sigma_place_m = seen.sigma_height_m = 0.02;
-      seen.sigma_tangent = 0.008;
       observations.add(seen);
     }
     const double covariance[3][3] = {{0.0025, 0, 0}, {0, 0.0025, 0}, {0, 0, 0.0001}};
@@ -286,23 +232,10 @@ TEST(test_heights_reject_a_wrong_start) {
 }  // namespace
 
 void setUp(void) {
-  ekf = wm_estimator_find("landmark_ekf");
-  make::exact_sensors(&motion);
-  make::exact_map(&params);
+  prepare_ekf(make::sensor("camera", 0.01, 0.05));
+  put_on_map({{8, 0, 2.5}, {3, 5, 1.8}, {2, -6, 3}}, 10, 1, 0.02);
+  sensor.mounting.xyz_m[2] = 1.0;
   make::sightings.use_elevation = 1;
   make::sightings.states.sigma[WM_SENSOR_ROW_kRoll] = 0.0035;
   make::sightings.map_slots = 3;
-  const double places[3][3] = {{8, 0, 2.5}, {3, 5, 1.8}, {2, -6, 3}};
-  for (int i = 0; i < 3; i++) landmarks[i] = {10 + i, {places[i][0], places[i][1], places[i][2]}, 0.02, NAN, {}, 0};
-  sensor = make::sensor("camera", 0.01, 0.05);
-  sensor.mounting.xyz_m[2] = 1.0;
-  setup = make::setup(motion, sensor);
-  setup.landmarks = landmarks;
-  setup.landmark_count = 3;
-  setup.start = {WM_TIME_NONE, {0, 0, 0}, {0, 0, 0, 1}, 0, 0.05, 0.05};
-}
-
-void tearDown(void) {
-  std::free(state);
-  state = nullptr;
 }

@@ -2,66 +2,32 @@
 // What the landmark filter does with what makes no sense: closed-form resection, witnesses, and whole filters that are
 // shown wrong identities, no numbers, landmarks in a line, on the robot, or too few of them. Never a confident wrong
 // pose, never NaN.
-#include <cmath>
-#include <cstdlib>
-#include <cstring>
-
-#include "common/suite.h"
-#include "events.hpp"
 #include "filters/core/landmark_bias.hpp"
 #include "filters/core/landmark_evidence.hpp"
-#include "filters/landmark_ekf/params.h"
 #include "filters/relocalize/pose_search.hpp"
 #include "filters/relocalize/resection.hpp"
-#include "math/arc.hpp"
-#include "math/elementary.hpp"
-#include "motion/motion_params.h"
-#include "waymark/estimator.h"
-#include "waymark/random.h"
+#include "world.hpp"
 
 namespace {
+
+using namespace world;
 
 constexpr int kLandmarks = 5;
 const double kPlaces[kLandmarks][2] = {{12, 3}, {-4, 11}, {-9, -6}, {7, -10}, {2, 14}};
 
-const wm_estimator *ekf;
-wm_motion_params motion;
-wm_landmark_ekf_params params;
-wm_setup setup;
-wm_sensor sensor;
-wm_landmark landmarks[kLandmarks];  // on the map
-double stands_m[kLandmarks][2];     // truly
-void *state;
-wm_random noise;
-wm_pose2 truth;
-double now_s, judged_from_s;
+double stands_m[kLandmarks][2];  // truly
+double judged_from_s;
 int in_turn;  // 1: all are seen at each step; n: of n steps each has one
 
-void begin() {
+void start() {
   for (int i = 0; i < kLandmarks; i++)
     for (int k = 0; k < 2; k++) stands_m[i][k] = landmarks[i].p_m[k];
-  state = make::begun(*ekf, &params, setup);
-  TEST_ASSERT_NOT_NULL(state);
+  world::begin();
 }
 
 void begin_without_pose() {
-  setup.start.p_m[0] = setup.start.p_m[1] = setup.start.heading_rad = NAN;
-  begin();
-}
-
-wm_estimate estimate() {
-  wm_estimate e;
-  ekf->estimate(state, &e);
-  return e;
-}
-
-wm_counter counter(wm_counter_kind kind) {
-  wm_counter counters[16];
-  const size_t count = ekf->counters(state, counters, 16);
-  for (size_t i = 0; i < count; i++)
-    if (counters[i].kind == (uint32_t)kind) return counters[i];
-  TEST_FAIL_MESSAGE(wm_counter_name(kind));
-  return {};
+  without_a_start();
+  start();
 }
 
 enum class sees { right, wrong_identities, no_numbers };
@@ -71,41 +37,27 @@ enum class sees { right, wrong_identities, no_numbers };
 void drive(double for_s, int seen, sees how = sees::right) {
   const double dt = 0.1;
   for (const double until_s = now_s + for_s; now_s < until_s;) {
-    const wm_event twist = make::twist(now_s, 1.0, 0.15);
-    TEST_ASSERT_EQUAL(WM_OK, ekf->predict(state, &twist));
-    const wm::arc a = wm::make_arc(1.0 * dt, 0.15 * dt);
-    truth = wm::compose(truth, {a.x_m, a.y_m, a.turn_rad});
-    now_s += dt;
+    feed(make::twist(now_s, 1.0, 0.15));
+    go_on(1.0, 0.15, dt);
     for (int i = 0; i < seen; i++) {
       if ((static_cast<int>(std::lround(10 * now_s)) + 2 * i) % in_turn != 0) continue;
-      const double dx = stands_m[i][0] - truth.x_m, dy = stands_m[i][1] - truth.y_m;
-      const double error = 0.005 * wm_random_next_normal(&noise);
-      const double bearing = wm::wrap(wm::atan2(dy, dx) - truth.heading_rad + error);
+      const double error = gauss(0.005);
+      const double bearing = wm::wrap(view_of(stands_m[i][0], stands_m[i][1]).bearing_rad + error);
       const int other = (i + 1 + (int)(wm_random_next_uniform(&noise) * (kLandmarks - 1))) % kLandmarks;
-      const wm_event e = make::sighting(now_s, landmarks[how == sees::wrong_identities ? other : i].id,
-                                        how == sees::no_numbers ? static_cast<double>(NAN) : bearing, NAN);
-      wm_innovation records[8];
-      size_t count;
-      ekf->correct(state, &e, records, 8, &count);
+      (void)tell(make::sighting(now_s, landmarks[how == sees::wrong_identities ? other : i].id,
+                                how == sees::no_numbers ? static_cast<double>(NAN) : bearing, NAN));
     }
     const wm_estimate e = estimate();
-    const double off =
-        std::sqrt(wm::square(e.pose_map_base.p_m[0] - truth.x_m) + wm::square(e.pose_map_base.p_m[1] - truth.y_m));
     for (const double value : e.covariance) TEST_ASSERT_DOUBLE_IS_DETERMINATE(value);
-    TEST_ASSERT_DOUBLE_IS_DETERMINATE(off);
+    TEST_ASSERT_DOUBLE_IS_DETERMINATE(off());
     TEST_ASSERT_DOUBLE_IS_DETERMINATE(e.heading_rad);
     const double p = e.lost_probability;
     TEST_ASSERT_GREATER_OR_EQUAL_DOUBLE(0.0, p);
     TEST_ASSERT_LESS_OR_EQUAL_DOUBLE(1.0, p);
     const bool tracks = e.state == WM_STATE_TRACKING || e.state == WM_STATE_DEAD_RECKONING;
     if (tracks && p < 0.5 && now_s > judged_from_s)
-      TEST_ASSERT_LESS_THAN_DOUBLE(0.3 + 5.0 * std::sqrt(e.covariance[0] + e.covariance[7]), off);
+      TEST_ASSERT_LESS_THAN_DOUBLE(0.3 + 5.0 * sigma(), off());
   }
-}
-
-double off() {
-  const wm_estimate e = estimate();
-  return std::sqrt(wm::square(e.pose_map_base.p_m[0] - truth.x_m) + wm::square(e.pose_map_base.p_m[1] - truth.y_m));
 }
 
 // ---- resection ----
@@ -356,25 +308,12 @@ TEST(test_a_second_landmark_seen_from_one_place_alone_is_not_enough) {
 // count.
 TEST(test_a_vague_pose_set_anew_is_searched_anew) {
   setup.start.sigma_heading_rad = 1.0;
-  begin();
-  const auto verdict_of_a_sighting = [] {
-    const wm_event e = make::sighting(now_s, landmarks[0].id, 0.3, NAN);
-    wm_innovation records[8];
-    size_t count = 0;
-    TEST_ASSERT_EQUAL(WM_OK, ekf->correct(state, &e, records, 8, &count));
-    TEST_ASSERT_EQUAL(1, count);
-    return records[0].verdict;
-  };
+  start();
+  const auto verdict_of_a_sighting = [] { return verdict_of(make::sighting(now_s, landmarks[0].id, 0.3, NAN)); };
   drive(0.5, 0);
   TEST_ASSERT_EQUAL(WM_REJECTED_SEARCHING, verdict_of_a_sighting());
   drive(6.0, 0);
-  wm_event pose = make::empty(now_s, WM_EVENT_SET_POSE);
-  pose.as.set_pose.pose_map_base = {{truth.x_m, truth.y_m, 0},
-                                    {0, 0, wm::sin(0.5 * truth.heading_rad), wm::cos(0.5 * truth.heading_rad)}};
-  pose.as.set_pose.sigma_xy_m = 0.1;
-  pose.as.set_pose.sigma_heading_rad = 1.0;
-  size_t count = 0;
-  TEST_ASSERT_EQUAL(WM_OK, ekf->correct(state, &pose, nullptr, 0, &count));
+  feed(make::set_pose(now_s, truth.x_m, truth.y_m, truth.heading_rad, 0.1, 1.0));
   TEST_ASSERT_EQUAL(WM_REJECTED_SEARCHING, verdict_of_a_sighting());
 }
 
@@ -387,7 +326,7 @@ TEST(test_two_landmarks_and_driving_are_enough) {
 
 TEST(test_a_known_place_and_an_unknown_heading) {
   setup.start.heading_rad = NAN;
-  begin();
+  start();
   drive(3, 1);
   TEST_ASSERT_EQUAL(WM_STATE_TRACKING, estimate().state);
   TEST_ASSERT_LESS_THAN_DOUBLE(0.3, off());
@@ -397,7 +336,7 @@ TEST(test_a_known_place_and_an_unknown_heading) {
 TEST(test_a_start_that_is_surer_than_right_is_told_and_mended) {
   setup.start.p_m[0] += 0.8;
   setup.start.p_m[1] += 0.6;
-  begin();
+  start();
   judged_from_s = 0.5;
   const uint32_t before = estimate().resets;
   drive(1, kLandmarks);
@@ -413,12 +352,10 @@ TEST(test_a_start_that_is_surer_than_right_is_told_and_mended) {
 TEST(test_a_good_start_is_kept) {
   for (const int seen : {2, kLandmarks}) {
     setUp();
-    begin();
+    start();
     const uint32_t before = estimate().resets;
     drive(10, seen);
     TEST_ASSERT_EQUAL(before, estimate().resets);
-    free(state);
-    state = nullptr;
   }
 }
 
@@ -445,7 +382,7 @@ TEST(test_landmarks_in_a_line) {
 TEST(test_a_landmark_on_top_of_the_robot) {
   landmarks[0].p_m[0] = truth.x_m;
   landmarks[0].p_m[1] = truth.y_m;
-  begin();
+  start();
   drive(10, kLandmarks);
   TEST_ASSERT_LESS_THAN_DOUBLE(0.3, off());
 }
@@ -460,7 +397,7 @@ TEST(test_landmarks_all_in_one_place) {
 // as another pose explains all that is seen since.
 TEST(test_carried_off_it_says_so_though_little_is_seen) {
   in_turn = 10;
-  begin();
+  start();
   drive(10, kLandmarks);
   TEST_ASSERT_EQUAL(WM_STATE_TRACKING, estimate().state);
   truth = {truth.x_m + 4.0, truth.y_m - 7.0, wm::wrap(truth.heading_rad + 1.0)};
@@ -474,7 +411,7 @@ TEST(test_carried_off_it_says_so_though_little_is_seen) {
 }
 
 TEST(test_a_moved_landmark_is_told_and_does_no_harm) {
-  begin();
+  start();
   drive(3, kLandmarks);
   stands_m[2][0] += 3.0;
   stands_m[2][1] -= 2.0;
@@ -487,19 +424,9 @@ TEST(test_a_moved_landmark_is_told_and_does_no_harm) {
 }  // namespace
 
 void setUp(void) {
-  ekf = wm_estimator_find("landmark_ekf");
-  make::exact_sensors(&motion);
-  make::exact_map(&params);
-  for (int i = 0; i < kLandmarks; i++) landmarks[i] = {10 + i, {kPlaces[i][0], kPlaces[i][1], 0}, 0.0, NAN, {}, 0};
-  sensor = make::sensor("camera", 0.006, NAN);
-  setup = make::setup(motion, sensor);
-  setup.landmarks = landmarks;
-  setup.landmark_count = kLandmarks;
-  truth = {-1, 0.5, 0.2};
-  setup.start = {WM_TIME_NONE, {-1, 0.5, 0}, {0, 0, 0, 1}, 0.2, 0.05, 0.02};
-  noise = {7, 1, 0};
-  now_s = judged_from_s = 0;
+  prepare_ekf(make::sensor("camera", 0.006, NAN), 7);
+  put_on_map({{12, 3}, {-4, 11}, {-9, -6}, {7, -10}, {2, 14}}, 10);
+  start_at({-1, 0.5, 0.2}, 0.05, 0.02);
+  judged_from_s = 0;
   in_turn = 1;
-  state = nullptr;
 }
-void tearDown(void) { free(state); }

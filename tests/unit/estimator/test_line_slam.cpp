@@ -1,13 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Line SLAM among lies: six of ten sightings are of nothing or of another line than they say. What is published is the
 // pose, the map, and how many were refused.
-#include <cmath>
-#include <cstdio>
-#include <cstdlib>
-#include <cstring>
-#include <initializer_list>
-#include <limits>
-
 #include "common/suite.h"
 #include "events.hpp"
 #include "filters/slam/params.h"

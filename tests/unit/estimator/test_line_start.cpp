@@ -4,10 +4,6 @@
 // worse in error or in consistency beyond two standard errors. Prints the table of docs/estimators.md.
 #include <time.h>
 
-#include <cmath>
-#include <cstdio>
-#include <initializer_list>
-
 #include "common/suite.h"
 #include "filters/slam/bearing_tracks.hpp"
 #include "math/elementary.hpp"

@@ -1,10 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Poses of another localizer: in the map's frame and in its own, right, wrong, and right again.
-#include <cmath>
-#include <cstring>
-#include <memory>
-#include <vector>
-
 #include "common/suite.h"
 #include "events.hpp"
 #include "math/arc.hpp"

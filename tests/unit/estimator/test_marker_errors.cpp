@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Markers whose errors last: each print is seen turned by an amount that wanders over seconds. A filter that takes such
 // errors as fresh believes the mean of many and is far too sure; one that is told so is not.
-#include <cmath>
-#include <cstdlib>
-
 #include "common/suite.h"
 #include "events.hpp"
 #include "filters/slam/params.h"

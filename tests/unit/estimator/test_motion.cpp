@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // The motion front end: models and their derivatives, ticks as positions, signs by the gear, standstill, dead sensors.
-#include <cstring>
-#include <initializer_list>
 #include "common/suite.h"
 
 #include "motion_fixture.hpp"

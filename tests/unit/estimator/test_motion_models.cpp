@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The choice of the motion's model: by the data that come, and by what is known to be there before the drive. Factors
 // of its noise. Counts that come twice, and again after a silence.
-#include <cmath>
-#include <initializer_list>
-
 #include "common/suite.h"
 #include "events.hpp"
 #include "math/arc.hpp"

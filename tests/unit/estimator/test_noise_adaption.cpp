@@ -1,10 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Simulated drives whose noise is stated wrong: the estimate stays consistent by the adapted noise. GIVEN / WHEN /
 // THEN; all noise is drawn from fixed seeds.
-#include <cmath>
-#include <cstdlib>
-#include <cstring>
-
 #include "common/suite.h"
 #include "events.hpp"
 #include "filters/core/noise_adaption.hpp"

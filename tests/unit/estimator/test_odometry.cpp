@@ -1,9 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Dead reckoning as the predictor uses it: exact arcs, a short memory, and a pose carried from then to now.
-#include <cmath>
-#include <cstdlib>
-#include <cstring>
-
 #include "common/suite.h"
 #include "events.hpp"
 #include "math/arc.hpp"

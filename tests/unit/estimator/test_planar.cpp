@@ -1,10 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The planar filter's algebra: kernels and their scalar twins, prediction's derivatives against finite differences,
 // Joseph's form against the plain one, one number after the other against all at once.
-#include <cmath>
-#include <cstdlib>
-#include <cstring>
-
 #include "common/suite.h"
 #include "events.hpp"
 #include "filters/planar/planar_filter.hpp"

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Motion in the plane with all three of its components: sideways twists, increments with a covariance, and twists that
 // leave the plane.
-#include <cmath>
-
 #include "common/suite.h"
 #include "events.hpp"
 #include "filters/planar/past_pose.hpp"

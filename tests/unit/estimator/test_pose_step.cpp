@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // One step of the prediction against numeric derivatives: the columns of F by the heading, by calibration states and by
 // the lag, and each term of the noise, with all covariances of a segment.
-#include <cmath>
-
 #include "common/suite.h"
 #include "filters/planar/pose_step.hpp"
 

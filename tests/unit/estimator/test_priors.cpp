@@ -1,53 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the defaults leave open: calibration states with priors by the kind of the motion and by the sensor's own sigma,
 // which keep these priors where the data cannot observe them.
-#include <memory>
-#include <string>
-#include <vector>
-
-#include "common/suite.h"
-#include "events.hpp"
 #include "filters/core/sensor_slots.hpp"
-#include "math/arc.hpp"
 #include "motion/motion_kind.hpp"
 #include "motion/step.hpp"
-#include "waymark/random.h"
+#include "world.hpp"
 
 namespace {
 
-const wm_estimator *ekf;
-wm_motion_params motion;
-wm_landmark_ekf_params params;
-wm_sensor sensor;
-wm_landmark landmarks[2];
-wm_setup setup;
-std::unique_ptr<void, void (*)(void *)> state(nullptr, std::free);
-
-void begin() {
-  state.reset(make::begun(*ekf, &params, setup));
-  TEST_ASSERT_NOT_NULL(state.get());
-}
-
-void feed(const wm_event &e) { TEST_ASSERT_EQUAL(WM_OK, make::feed(*ekf, state.get(), e)); }
-
-std::vector<wm_calibration_value> calibration() {
-  std::vector<wm_calibration_value> out(64);
-  out.resize(ekf->calibration(state.get(), out.data(), out.size()));
-  return out;
-}
-
-// NaN: not listed.
-double sigma_of(const std::string &name) {
-  for (const wm_calibration_value &v : calibration())
-    if (name == v.name) return v.sigma;
-  return NAN;
-}
-
-double value_of(const std::string &name) {
-  for (const wm_calibration_value &v : calibration())
-    if (name == v.name) return v.value;
-  return NAN;
-}
+using namespace world;
 
 // A joystick's command each half second, or what wheels measure of it.
 wm_event driven(int i, bool commands) {
@@ -95,9 +56,7 @@ TEST(test_the_kind_gives_the_noise) {
     for (double &sigma : motion.states.sigma) sigma = 0.0;
     begin();
     for (int i = 0; i < 200; i++) feed(driven(i, commands));
-    wm_estimate e;
-    ekf->estimate(state.get(), &e);
-    variance[commands] = e.covariance[wm_cov_index(5, 5)];
+    variance[commands] = estimate().covariance[wm_cov_index(5, 5)];
   }
   TEST_ASSERT_GREATER_THAN_DOUBLE(3.0 * variance[0], variance[1]);
 }
@@ -176,7 +135,7 @@ TEST(test_sightings_with_sigmas_are_as_those_of_a_sensor_with_them) {
       feed(e);
     }
     by[stated] = calibration();
-    ekf->estimate(state.get(), &end[stated]);
+    end[stated] = estimate();
   }
   TEST_ASSERT_EQUAL_size_t(by[0].size(), by[1].size());
   for (size_t i = 0; i < by[0].size(); i++) {
@@ -191,18 +150,16 @@ TEST(test_sightings_with_sigmas_are_as_those_of_a_sensor_with_them) {
 // The limit of a found place follows the positions that find it: a receiver of 10 m finds what one of 1 m does.
 TEST(test_a_vague_receiver_finds_the_robot_too) {
   for (const double sigma_m : {1.0, 10.0}) {
-    setup.start.p_m[0] = setup.start.p_m[1] = setup.start.heading_rad = NAN;
+    without_a_start();
     begin();
-    wm_estimate e;
     int found = -1;
     for (int i = 0; i < 600 && found < 0; i++) {
       feed(make::twist(0.1 * i, 10.0, 0.0));
       if (i % 10 == 0) feed(make::position(0.1 * i, 1.0 * i, 0.0, sigma_m));
-      ekf->estimate(state.get(), &e);
-      if (e.state == WM_STATE_TRACKING) found = i;
+      if (published_state() == WM_STATE_TRACKING) found = i;
     }
     TEST_ASSERT_GREATER_THAN(0, found);
-    TEST_ASSERT_GREATER_THAN_DOUBLE(0.01 * sigma_m * sigma_m, e.covariance[0]);
+    TEST_ASSERT_GREATER_THAN_DOUBLE(0.01 * sigma_m * sigma_m, estimate().covariance[0]);
   }
 }
 
@@ -228,9 +185,7 @@ TEST(test_a_receivers_lasting_error_falls_with_its_sigma) {
     feed(make::twist(t_s, 10.0 + 0.001 * (i % 7), 0.0));
     if (i % 10 == 0) feed(make::position(t_s, 10.0 * t_s, t_s < 20.0 ? 40.0 : 0.0, t_s < 20.0 ? 30.0 : 1.0));
   }
-  wm_estimate e;
-  ekf->estimate(state.get(), &e);
-  TEST_ASSERT_DOUBLE_WITHIN(2.0, 0.0, e.pose_map_base.p_m[1]);
+  TEST_ASSERT_DOUBLE_WITHIN(2.0, 0.0, estimate().pose_map_base.p_m[1]);
 }
 
 // A compass is off by 4 degrees. Positions show it; without them it stays open, and so does the heading.
@@ -247,8 +202,7 @@ TEST(test_a_compass_deviation_is_found_or_stays_open) {
         feed(make::position(t_s, 10 * std::sin(turned_rad) + 0.01 * noise(3),
                             10 - 10 * std::cos(turned_rad) + 0.01 * noise(4), 0.02));
     }
-    wm_estimate e;
-    ekf->estimate(state.get(), &e);
+    const wm_estimate e = estimate();
     const double off_rad = std::remainder(e.heading_rad - 0.1 * 59.9, 2 * M_PI),
                  sigma_rad = std::sqrt(e.covariance[35]);
     TEST_ASSERT_LESS_THAN_DOUBLE(3.0, std::fabs(off_rad) / sigma_rad);
@@ -271,7 +225,7 @@ TEST(test_the_antennas_place_is_found_by_turns) {
     if (stated) rig.antenna_m[0] = 0.4, rig.antenna_m[1] = 0.2, rig.antenna_m[2] = 1;
     begin();
     TEST_ASSERT_DOUBLE_IS_NAN(sigma_of("gnss.antenna_x_m"));  // nothing of a receiver before its first position
-    wm_pose2 truth = {0, 0, 0};
+    truth = {};
     for (int i = 0; i < 600; i++) {
       const double t_s = 0.1 * i, v = 1 + 0.3 * std::sin(0.7 * t_s), w = 0.3 * std::sin(0.4 * t_s);
       const auto noise = [i](uint64_t of) { return wm_random_normal(6, of, static_cast<uint64_t>(i)); };
@@ -280,13 +234,10 @@ TEST(test_the_antennas_place_is_found_by_turns) {
       if (i % 2 == 0) feed(make::position(t_s, antenna.x_m + 0.01 * noise(3), antenna.y_m + 0.01 * noise(4), 0.02));
       if (stated && i == 0) TEST_ASSERT_LESS_THAN_DOUBLE(0.0201, sigma_of("gnss.antenna_x_m"));
       if (i == 599) break;
-      const wm::arc step = wm::make_arc(0.1 * v, 0.1 * w);
-      truth = wm::compose(truth, {step.x_m, step.y_m, step.turn_rad});
+      go_on(v, w, 0.1);
     }
-    wm_estimate e;
-    ekf->estimate(state.get(), &e);
-    TEST_ASSERT_DOUBLE_WITHIN(0.04, truth.x_m, e.pose_map_base.p_m[0]);
-    TEST_ASSERT_DOUBLE_WITHIN(0.04, truth.y_m, e.pose_map_base.p_m[1]);
+    TEST_ASSERT_DOUBLE_WITHIN(0.04, truth.x_m, estimate().pose_map_base.p_m[0]);
+    TEST_ASSERT_DOUBLE_WITHIN(0.04, truth.y_m, estimate().pose_map_base.p_m[1]);
     TEST_ASSERT_DOUBLE_WITHIN(0.05, 0.4, value_of("gnss.antenna_x_m"));
     TEST_ASSERT_DOUBLE_WITHIN(0.05, 0.2, value_of("gnss.antenna_y_m"));
   }
@@ -312,9 +263,7 @@ TEST(test_an_outlier_among_the_first_sightings_does_not_keep_the_yaw) {
     TEST_ASSERT_DOUBLE_WITHIN(0.03, -off_rad, value_of("camera.yaw_rad"));
     for (int i = 1; i < 20; i++) {
       see(0.1 * i, i % 2, 0.0);
-      wm_estimate e;
-      ekf->estimate(state.get(), &e);
-      TEST_ASSERT_EQUAL(WM_STATE_TRACKING, e.state);
+      TEST_ASSERT_EQUAL(WM_STATE_TRACKING, published_state());
     }
     TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.0, value_of("camera.yaw_rad"));
     TEST_ASSERT_LESS_THAN_DOUBLE(0.02, sigma_of("camera.yaw_rad"));
@@ -345,16 +294,7 @@ TEST(test_a_yaw_that_many_sightings_confirm_is_kept) {
 }  // namespace
 
 void setUp() {
-  ekf = wm_estimator_find("landmark_ekf");
-  wm_params_defaults(&wm_motion_params_table, &motion);
-  wm_params_defaults(&wm_sighting_params_table, &make::sightings);
-  wm_params_defaults(&wm_landmark_ekf_params_table, &params);
-  sensor = make::sensor("camera", 0.01, 0.1);
-  landmarks[0] = {0, {5, 0, 0}, 0.0, NAN, {}, 0};
-  landmarks[1] = {1, {2, 5, 0}, 0.0, NAN, {}, 0};
-  setup = make::setup(motion, sensor);
-  setup.landmarks = landmarks;
-  setup.landmark_count = 2;
-  setup.start = {WM_TIME_NONE, {0, 0, 0}, {0, 0, 0, 1}, 0.0, 0.05, 0.05};
+  prepare_ekf(make::sensor("camera", 0.01, 0.1));
+  all_by_default();
+  put_on_map({{5, 0}, {2, 5}}, 0);
 }
-void tearDown() { state.reset(); }

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // A camera that sees coded markers and is not quite what calibration.yaml says.
-#include "common/suite.h"
 #include "slam_room.hpp"
 
 using namespace room;
@@ -23,8 +22,8 @@ double worst_of_leaning(double sigma_rad) {
 
 TEST(test_a_camera_that_leans_is_found_by_how_high_markers_seem_to_hang) {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.05, worst_of_leaning(0.05));
-  TEST_ASSERT_DOUBLE_WITHIN(0.004, leans[0], calibrated("camera.roll_rad"));
-  TEST_ASSERT_DOUBLE_WITHIN(0.004, leans[1], calibrated("camera.pitch_rad"));
+  TEST_ASSERT_DOUBLE_WITHIN(0.004, leans[0], value_of("camera.roll_rad"));
+  TEST_ASSERT_DOUBLE_WITHIN(0.004, leans[1], value_of("camera.pitch_rad"));
 }
 
 TEST(test_a_second_camera_that_sees_the_same_markers_has_its_own_tilt) {
@@ -35,8 +34,8 @@ TEST(test_a_second_camera_that_sees_the_same_markers_has_its_own_tilt) {
   setup.sensor_count = 2;
   in_turn = true;
   TEST_ASSERT_LESS_THAN_DOUBLE(0.05, worst_of_leaning(0.05));
-  TEST_ASSERT_DOUBLE_WITHIN(0.01, leans[0], calibrated("camera.roll_rad"));
-  TEST_ASSERT_DOUBLE_WITHIN(0.01, leans[1], calibrated("camera.pitch_rad"));
+  TEST_ASSERT_DOUBLE_WITHIN(0.01, leans[0], value_of("camera.roll_rad"));
+  TEST_ASSERT_DOUBLE_WITHIN(0.01, leans[1], value_of("camera.pitch_rad"));
 }
 
 // A rotating laser whose angle encoder sits beside its axis: found while the map is built.
@@ -46,12 +45,9 @@ TEST(test_an_eccentric_turntable_is_found) {
   eccentric[1] = -0.03;
   begin();
   drive(120);
-  const char *const names[] = {"camera.eccentric_x_rad", "camera.eccentric_y_rad"};
-  for (int i = 0; i < 2; i++) {
-    double sigma = 0.0;
-    const double got = calibrated(names[i], &sigma);
-    TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(3 * sigma, eccentric[i], got, names[i]);
-    TEST_ASSERT_LESS_THAN_DOUBLE_MESSAGE(0.02, sigma, names[i]);
+  for (const auto &[name, want] : {std::pair{"camera.eccentric_x_rad", 0.04}, {"camera.eccentric_y_rad", -0.03}}) {
+    TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(3 * sigma_of(name), want, value_of(name), name);
+    TEST_ASSERT_LESS_THAN_DOUBLE_MESSAGE(0.02, sigma_of(name), name);
   }
 }
 
@@ -68,17 +64,14 @@ void drive_calibrated(double seconds, double camera_rad) {
   for (double until = now_s + seconds; now_s < until; now_s += dt) {
     truth = wm::compose(truth, {step.x_m, step.y_m, step.turn_rad});
     const wm_pose2 felt = {step.x_m + gauss(1e-3), step.y_m + gauss(1e-3), step.turn_rad + gauss(1e-3)};
-    const wm_event moved = make::increment(now_s, now_s + dt, felt, covariance);
-    TEST_ASSERT_EQUAL(WM_OK, slam->predict(state, &moved));
-    const wm_pose2 eye = wm::compose(truth, {0.2, 0, camera_rad});
+    feed(make::increment(now_s, now_s + dt, felt, covariance));
     for (int i = 0; i < kCount; i++) {
-      const double dx = place[i][0] - eye.x_m, dy = place[i][1] - eye.y_m;
-      const double bearing = wm::wrap(wm::atan2(dy, dx) - eye.heading_rad);
+      const auto [bearing, range] = seen(i, camera_rad);
       if (std::fabs(bearing) > 1.2) continue;
-      wm_event seen = make::sighting(now_s + dt, 10 + i, bearing + gauss(0.01), std::hypot(dx, dy) + gauss(0.03));
-      seen.as.sighting.bearing_sigma_rad = 0.01;
-      seen.as.sighting.range_sigma_m = 0.03;
-      see(seen);
+      wm_event e = make::sighting(now_s + dt, 10 + i, bearing + gauss(0.01), range + gauss(0.03));
+      e.as.sighting.bearing_sigma_rad = 0.01;
+      e.as.sighting.range_sigma_m = 0.03;
+      see(e);
     }
   }
 }
@@ -86,19 +79,14 @@ void drive_calibrated(double seconds, double camera_rad) {
 // Who states all sigmas has calibrated the mounting to 0.3 degrees and the clock to 20 ms: states of these sigmas. A
 // yaw that is wrong by ten of them is found nevertheless.
 TEST(test_a_calibrated_sensor_is_nearly_as_stated) {
-  double yaw_sigma_rad, offset_sigma_s;
   drive_calibrated(0.1, 0.0);
-  calibrated("camera.yaw_rad", &yaw_sigma_rad);
-  calibrated("camera.time_offset_s", &offset_sigma_s);
-  TEST_ASSERT_DOUBLE_WITHIN(1e-4, 0.005, yaw_sigma_rad);
-  TEST_ASSERT_DOUBLE_WITHIN(1e-4, 0.02, offset_sigma_s);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-4, 0.005, sigma_of("camera.yaw_rad"));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-4, 0.02, sigma_of("camera.time_offset_s"));
   make_room();
   drive_calibrated(120, 0.05);
-  const double yaw_rad = calibrated("camera.yaw_rad", &yaw_sigma_rad);
-  calibrated("camera.time_offset_s", &offset_sigma_s);
-  TEST_ASSERT_LESS_THAN_DOUBLE(0.004, yaw_sigma_rad);
-  TEST_ASSERT_LESS_THAN_DOUBLE(0.019, offset_sigma_s);
-  TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.05, yaw_rad);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.004, sigma_of("camera.yaw_rad"));
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.019, sigma_of("camera.time_offset_s"));
+  TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.05, value_of("camera.yaw_rad"));
   size_t found;
   TEST_ASSERT_LESS_THAN_DOUBLE(0.1, worst_landmark(&found));
 }
@@ -127,17 +115,14 @@ TEST(test_a_late_stamp_turns_all_bearings_alike) {
     params.sensor_stamp_sigma_s = 0.1 * i;
     begin();
     drive(20);
-    wm_estimate before, after;
-    slam->estimate(state, &before);
+    const double before_rad = estimate().heading_rad;
     const wm::arc way = wm::make_arc(-0.05, -0.025);  // 0.1 s ago
     const wm_pose2 eye = wm::compose(wm::compose(truth, {way.x_m, way.y_m, way.turn_rad}), {0.2, 0, 0});
     for (int k = 0; k < kCount; k++) {
-      const double dx = place[k][0] - eye.x_m, dy = place[k][1] - eye.y_m;
-      const double bearing = wm::wrap(wm::atan2(dy, dx) - eye.heading_rad);
-      if (std::fabs(bearing) < 1.2) see(make::sighting(now_s, 10 + k, bearing, std::sqrt(dx * dx + dy * dy)));
+      const auto [bearing, range] = view_of(place[k][0], place[k][1], eye);
+      if (std::fabs(bearing) < 1.2) see(make::sighting(now_s, 10 + k, bearing, range));
     }
-    slam->estimate(state, &after);
-    turned_rad[i] = std::fabs(wm::wrap(after.heading_rad - before.heading_rad));
+    turned_rad[i] = std::fabs(wm::wrap(estimate().heading_rad - before_rad));
   }
   TEST_ASSERT_LESS_THAN_DOUBLE(0.6 * turned_rad[0], turned_rad[1]);
 }
@@ -156,14 +141,14 @@ TEST(test_each_error_of_the_mounting_is_found) {
       make_room();
       coded = of_markers;
       params.map = WM_SLAM_MAP_FROZEN;
-      for (int i = 0; i < kCount; i++) known[i].yaw_rad = wm::wrap(0.5 * i);
+  put_yaws_on_map();
       sensor.mounting.xyz_m[0] -= c.x_m;
       sensor.mounting.xyz_m[1] -= c.y_m;
       sensor.mounting.rpy_rad[2] -= c.yaw_rad;
       make::sightings.states.sigma[c.row] = 0.1;
       begin();
       drive(40);
-      TEST_ASSERT_DOUBLE_WITHIN(0.02, c.yaw_rad + c.x_m + c.y_m, calibrated(c.name));
+      TEST_ASSERT_DOUBLE_WITHIN(0.02, c.yaw_rad + c.x_m + c.y_m, value_of(c.name));
       TEST_ASSERT_LESS_THAN_DOUBLE(0.03, off());
     }
 }
@@ -171,4 +156,3 @@ TEST(test_each_error_of_the_mounting_is_found) {
 }  // namespace
 
 void setUp(void) { make_room(); }
-void tearDown(void) { leave_room(); }

@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // SLAM and the kidnapped robot: the state LOST, the map held meanwhile, the pose found on it.
-#include "common/suite.h"
 #include "filters/relocalize/line_search.hpp"
 #include "slam_room.hpp"
 
 using namespace room;
 
 void setUp(void) { make_room(); }
-void tearDown(void) { leave_room(); }
 
 namespace {
 
@@ -83,7 +81,7 @@ TEST(test_starts_without_a_pose_on_a_given_map) {
   for (const int32_t map : {WM_SLAM_MAP_EXTEND, WM_SLAM_MAP_FROZEN}) {
     make_room();
     params.map = map;
-    setup.start.p_m[0] = setup.start.p_m[1] = setup.start.heading_rad = kAbsent;
+    without_a_start();
     begin();
     TEST_ASSERT_EQUAL(WM_STATE_SEARCHING, published_state());
     drive(5);
@@ -105,7 +103,7 @@ TEST(test_recovery_can_be_switched_off) {
 TEST(test_large_identities_keep_their_slots) {
   make::sightings.correlated_slots = 4;
   make::sightings.correlated_bearing_rad = 0.02;
-  for (int i = 0; i < kCount; i++) known[i].id = INT32_MAX - i;
+  for (int i = 0; i < kCount; i++) landmarks[i].id = INT32_MAX - i;
   params.map = WM_SLAM_MAP_EXTEND;
   begin();
   for (int i = 0; i < 20; i++) see(make::sighting(now_s += 0.01, INT32_MAX - 1, 0.0, 3.0));

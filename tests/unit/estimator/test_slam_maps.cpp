@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // SLAM on a map that is already there: frozen or extended, with gaps, wrong in a place, and begun without a pose.
-#include "common/suite.h"
 #include "slam_room.hpp"
 
 namespace {
@@ -10,7 +9,7 @@ using namespace room;
 TEST(test_a_marker_that_moved_is_told_on_a_frozen_map_too) {
   coded = true;
   params.map = WM_SLAM_MAP_FROZEN;
-  for (int i = 0; i < kCount; i++) known[i].yaw_rad = wm::wrap(0.5 * i);
+  put_yaws_on_map();
   place[0][0] += 1.5;
   begin();
   drive(60);
@@ -33,26 +32,20 @@ TEST(test_a_saved_map_frozen_or_extended_needs_no_first_lap) {
     drive(30);
     TEST_ASSERT_LESS_THAN_DOUBLE(0.1, off());
     TEST_ASSERT_EQUAL_DOUBLE(map == WM_SLAM_MAP_FROZEN ? kCount / 2 : kCount, counted(WM_COUNTER_LANDMARKS));
-    wm_landmark l[64];
-    double covariance[64][4];
-    slam->landmarks(state, l, covariance, 64);
-    if (map == WM_SLAM_MAP_FROZEN) TEST_ASSERT_EQUAL_DOUBLE(known[0].p_m[0], l[0].p_m[0]);
+    if (map == WM_SLAM_MAP_FROZEN) TEST_ASSERT_EQUAL_DOUBLE(landmarks[0].p_m[0], world::map()[0].landmark.p_m[0]);
   }
 }
 
 TEST(test_started_lost_on_a_map_of_markers_it_finds_itself) {
   coded = true;
   params.map = WM_SLAM_MAP_FROZEN;
-  for (int i = 0; i < kCount; i++) known[i].yaw_rad = wm::wrap(0.5 * i);
-  setup.start.p_m[0] = setup.start.p_m[1] = setup.start.heading_rad = kAbsent;
+  put_yaws_on_map();
+  without_a_start();
   begin();
-  wm_estimate e;
-  slam->estimate(state, &e);
-  TEST_ASSERT_EQUAL(WM_STATE_SEARCHING, e.state);
+  TEST_ASSERT_EQUAL(WM_STATE_SEARCHING, published_state());
   false_share = 0.3;  // wrong ones don't agree
   drive(3);
-  slam->estimate(state, &e);
-  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, e.state);
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, published_state());
   false_share = 0.0;
   drive(3);
   TEST_ASSERT_LESS_THAN_DOUBLE(0.05, off());
@@ -71,11 +64,10 @@ wm_verdict see_from_start(int i, double far_m, double turned_rad) {
 
 void start_lost_before_markers(int map = WM_SLAM_MAP_FROZEN) {
   params.map = map;
-  for (int i = 0; i < kCount; i++) known[i].yaw_rad = wm::wrap(0.5 * i);
-  setup.start.p_m[0] = setup.start.p_m[1] = setup.start.heading_rad = kAbsent;
+  put_yaws_on_map();
+  without_a_start();
   begin();
-  const wm_event e = make::twist(now_s, 0, 0);
-  TEST_ASSERT_EQUAL(WM_OK, slam->predict(state, &e));
+  feed(make::twist(now_s, 0, 0));
 }
 
 // How small prints are turned is hardly seen, where they are is.
@@ -86,9 +78,7 @@ TEST(test_started_lost_it_finds_itself_by_the_places_of_two_markers_whose_turns_
   now_s += 0.25;  // the next search
   TEST_ASSERT_EQUAL(WM_REJECTED_SEARCHING, see_from_start(3, 0, -0.2));
   TEST_ASSERT_EQUAL(WM_FUSED, see_from_start(1, 0, 0.2));
-  wm_estimate e;
-  slam->estimate(state, &e);
-  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, e.state);
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, published_state());
   TEST_ASSERT_LESS_THAN_DOUBLE(0.05, off());
 }
 
@@ -113,9 +103,7 @@ TEST(test_started_lost_two_markers_are_not_believed_that_are_not_as_far_apart_as
     TEST_ASSERT_EQUAL(WM_REJECTED_SEARCHING, see_from_start(1, 0, 0));
     TEST_ASSERT_EQUAL(WM_REJECTED_SEARCHING, see_from_start(3, 0.6, 0));
   }
-  wm_estimate e;
-  slam->estimate(state, &e);
-  TEST_ASSERT_EQUAL(WM_STATE_SEARCHING, e.state);
+  TEST_ASSERT_EQUAL(WM_STATE_SEARCHING, published_state());
 }
 
 // Drives as fast and sees marker number `i` alone, ten times a second: what is upright so surely turned, or its mirror
@@ -123,8 +111,7 @@ TEST(test_started_lost_two_markers_are_not_believed_that_are_not_as_far_apart_as
 void pass_by(int i, double speed_mps, double seconds, double yaw_sigma_rad, bool mirrored) {
   const double dt = 0.02, until = now_s + seconds;
   for (int step = 0; now_s < until; step++) {
-    const wm_event e = make::twist(now_s, speed_mps, 0);
-    TEST_ASSERT_EQUAL(WM_OK, slam->predict(state, &e));
+    feed(make::twist(now_s, speed_mps, 0));
     if (step % 5 == 0) {
       const wm_pose2 at = wm::between(wm::compose(truth, {0.2, 0, 0}), {place[i][0], place[i][1], 0.5 * i});
       const double yaw = mirrored ? 2.0 * wm::atan2(at.y_m, at.x_m) + wm::kPi - at.heading_rad : at.heading_rad;
@@ -133,12 +120,9 @@ void pass_by(int i, double speed_mps, double seconds, double yaw_sigma_rad, bool
       seen.as.marker.yaw_sigma_rad = yaw_sigma_rad;
       see(seen);
     }
-    const wm::arc a = wm::make_arc(speed_mps * dt, 0);
-    truth = wm::compose(truth, {a.x_m, a.y_m, a.turn_rad});
-    now_s += dt;
+    go_on(speed_mps, 0, dt);
   }
-  const wm_event e = make::twist(now_s, speed_mps, 0);
-  TEST_ASSERT_EQUAL(WM_OK, slam->predict(state, &e));
+  feed(make::twist(now_s, speed_mps, 0));
 }
 
 TEST(test_started_lost_it_finds_itself_by_one_marker_that_it_drives_past) {
@@ -206,8 +190,8 @@ TEST(test_a_start_by_one_marker_that_was_moved_is_taken_back_when_others_are_see
 
 TEST(test_a_map_with_nan_loses_those_landmarks_alone) {
   params.map = WM_SLAM_MAP_EXTEND;
-  known[3].p_m[1] = kAbsent;
-  known[5].sigma_m = kAbsent;
+  landmarks[3].p_m[1] = kAbsent;
+  landmarks[5].sigma_m = kAbsent;
   begin();
   TEST_ASSERT_EQUAL_DOUBLE(kCount - 1, counted(WM_COUNTER_LANDMARKS));
   drive(30);
@@ -219,10 +203,10 @@ TEST(test_a_map_with_nan_loses_those_landmarks_alone) {
 TEST(test_a_frozen_map_of_markers_with_nan_locates_by_the_others) {
   coded = true;
   params.map = WM_SLAM_MAP_FROZEN;
-  for (int i = 0; i < kCount; i++) known[i].yaw_rad = wm::wrap(0.5 * i);
-  known[3].p_m[1] = kAbsent;
-  known[5].yaw_rad = kAbsent;
-  known[7].sigma_m = kAbsent;
+  put_yaws_on_map();
+  landmarks[3].p_m[1] = kAbsent;
+  landmarks[5].yaw_rad = kAbsent;
+  landmarks[7].sigma_m = kAbsent;
   begin();
   for (int i = 0; i < 20; i++) {
     drive(1);
@@ -235,4 +219,3 @@ TEST(test_a_frozen_map_of_markers_with_nan_locates_by_the_others) {
 }  // namespace
 
 void setUp(void) { make_room(); }
-void tearDown(void) { leave_room(); }

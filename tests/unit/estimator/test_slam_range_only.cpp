@@ -1,8 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // SLAM on beacons that give ranges alone, at unknown places. The noise is drawn from fixed seeds.
-#include <cmath>
-#include <cstdlib>
-
 #include "common/suite.h"
 #include "events.hpp"
 #include "filters/slam/params.h"

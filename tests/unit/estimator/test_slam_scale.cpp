@@ -2,10 +2,6 @@
 // How large a map is, where nothing measures it: a robot whose speed is commanded and a camera whose ranges' scale
 // nobody knows; two wheels and prints. And the axis along which a camera's depths are measured. GIVEN / WHEN / THEN;
 // noise is drawn from fixed seeds.
-#include <cmath>
-#include <cstdlib>
-#include <cstring>
-
 #include "common/suite.h"
 #include "events.hpp"
 #include "filters/slam/params.h"

@@ -1,11 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Rotations, kernels on a triangle, and the filter core in space against slow and plain references.
-#include <cmath>
-#include <cstdlib>
-#include <cstring>
-#include <memory>
-#include <vector>
-
 #include "common/suite.h"
 #include "filters/relocalize/pose_consensus.hpp"
 #include "filters/stereo_ekf/space_filter.hpp"

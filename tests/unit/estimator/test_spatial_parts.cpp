@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Motion in space, part by part: each axis' own plausibility, how long a twist holds and what is assumed then, the pose
 // some time ago, the noise of a step on each axis, and what a gyro that sticks has missed.
-#include <cmath>
-#include <vector>
-
 #include "common/suite.h"
 #include "events.hpp"
 #include "motion/spatial.hpp"

@@ -2,9 +2,6 @@
 // Priors that are stated wrongly: the closed forms against a filter that really begins with the wide prior.
 #include "belief/stated_prior.hpp"
 
-#include <cmath>
-#include <utility>
-
 #include "common/suite.h"
 #include "waymark/random.h"
 

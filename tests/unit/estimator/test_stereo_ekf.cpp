@@ -1,10 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // stereo_ekf through the contract: a made scene, exact truth, every attitude.
 #include <algorithm>
-#include <cmath>
-#include <cstdlib>
-#include <cstring>
-#include <vector>
 #include "common/suite.h"
 
 #include "filters/stereo_ekf/params.h"

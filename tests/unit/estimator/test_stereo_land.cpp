@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // stereo_ekf on a street: far tracks that drift, others that move by themselves, a camera that repeats a picture.
-#include <cmath>
 #include "common/suite.h"
 
 #include "filters/stereo_ekf/picture_motion.hpp"

@@ -1,8 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // stereo_ekf: focal lengths and the principal point of the pair as states.
-#include <cmath>
-#include <cstring>
-#include <vector>
 #include "common/suite.h"
 
 #include "stereo_scene.hpp"

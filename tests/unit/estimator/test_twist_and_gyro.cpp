@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // A twist's speeds with a gyro's turn rate: of any drive, sideways, too; a gyro that is silent or stuck; standstill.
-#include <cmath>
-
 #include "common/suite.h"
 #include "events.hpp"
 #include "math/arc.hpp"

@@ -3,12 +3,6 @@
 // edge_mcl and pf_edges whole, state by state.
 #include "waymark/vectors.h"
 
-#include <cmath>
-#include <cstdlib>
-#include <cstring>
-#include <memory>
-#include <vector>
-
 #include "common/suite.h"
 #include "filters/pf_edges/particles.hpp"
 #include "math/lanes.hpp"

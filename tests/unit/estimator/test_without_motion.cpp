@@ -1,9 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // landmark_ekf without motion data: a tag or a receiver that is carried.
-#include <cmath>
-#include <memory>
-#include <vector>
-
 #include "common/suite.h"
 #include "events.hpp"
 #include "math/elementary.hpp"

@@ -2,13 +2,7 @@
 // Cascades: bright squares in a drawn fisheye picture are found where they are and as far away as they are; the files
 // that the tool writes are read again; windows are judged as OpenCV's CascadeClassifier judges them.
 #include <algorithm>
-#include <cmath>
-#include <cstdio>
-#include <cstdlib>
-#include <cstring>
 #include <set>
-#include <string>
-#include <vector>
 
 #include "common/fisheye_rig.hpp"
 #include "common/suite.h"

@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What makes false edges on a floor: lamps' reflections, joints of tiles, the mirror image of a skirting board; and
 // that the edge that is looked for is found among them, with its normal.
-#include <cmath>
 #include <functional>
-#include <string>
-#include <vector>
 
 #include "common/fisheye_rig.hpp"
 #include "common/suite.h"

@@ -1,9 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // The fast Hough transform against the sums it stands for, and its vectors against its scalar twin.
-#include <cstdlib>
-#include <cstring>
-#include <memory>
-
 #include "common/suite.h"
 #include "vision/edges_hough/hough.hpp"
 #include "waymark/random.h"

@@ -1,12 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Known landmarks in drawn fisheye pictures: found where they are, with the sigma that they have; not found where they
 // are hidden, changed, dark or elsewhere, and why.
-#include <cmath>
-#include <cstdio>
-#include <cstdlib>
-#include <cstring>
-#include <vector>
-
 #include "common/fisheye_rig.hpp"
 #include "common/suite.h"
 #include "vision/landmarks/params.h"

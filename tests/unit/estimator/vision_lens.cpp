@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Camera models: there and back, and where a model has no pixel or no ray.
-#include <cmath>
-
 #include "common/suite.h"
 #include "waymark/internal/sensors/lens.hpp"
 

@@ -2,12 +2,7 @@
 // Upright lines in pictures of a hemispherical camera whose azimuths are known: found to a part of a pixel, with a
 // sigma that keeps its word; followed through turns; and what pictures that no camera takes make of it.
 #include <algorithm>
-#include <cmath>
-#include <cstring>
 #include <map>
-#include <memory>
-#include <string>
-#include <vector>
 
 #include "common/suite.h"
 #include "vision/lines/line_tracks.hpp"

@@ -1,11 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Detector `mr` on drawn views: place and turn, and pictures that nobody means.
 #include <algorithm>
-#include <cmath>
-#include <cstdio>
-#include <cstdlib>
-#include <cstring>
-#include <memory>
 
 #include "common/marker_views.hpp"
 #include "common/suite.h"

@@ -3,11 +3,6 @@
 // wall.
 #include "vision/edges_hough/polylines.hpp"
 
-#include <cmath>
-#include <cstdlib>
-#include <memory>
-#include <vector>
-
 #include "common/suite.h"
 #include "waymark/random.h"
 

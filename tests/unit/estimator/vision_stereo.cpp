@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Detector `stereo` and its parts, on pictures of which everything is known.
 #include <algorithm>
-#include <cstring>
 #include <map>
-#include <memory>
 #include <set>
 
 #include "common/suite.h"

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Every configuration that is shipped is read, with the real estimators.
 #include <dirent.h>
-#include <stdio.h>
-#include <string.h>
 
 #include "common/suite.h"
 #include "config/config.h"

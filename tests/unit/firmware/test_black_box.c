@@ -2,11 +2,6 @@
 // What is left of the last seconds, after a loss, a death, and an end in order.
 #include <fcntl.h>
 #include <glob.h>
-#include <inttypes.h>
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A pair of the robot's cameras: pictures of one instant together, others alone and counted.
 #include <errno.h>
-#include <stdio.h>
-#include <string.h>
 
 #include "../drivers/fake_camera.h"
 #include "../drivers/folder.h"

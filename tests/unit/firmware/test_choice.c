@@ -1,9 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // A configuration that names no estimator: each row of the table that chooses one, what is read then, and what is said.
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
 #include "../drivers/folder.h"
 #include "common/suite.h"
 #include "fusion/assembly.h"

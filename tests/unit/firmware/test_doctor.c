@@ -1,8 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // The doctor's findings on a computer that the test breaks.
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/stat.h>
 
 #include "cli/doctor/doctor.h"

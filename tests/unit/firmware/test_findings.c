@@ -1,10 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Findings that a health or the records of a drive make, a row each: what is broken, and the finding that follows.
 // A health in order makes none.
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
-
 #include "common/suite.h"
 #include "output/drive_evidence.h"
 

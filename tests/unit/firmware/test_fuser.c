@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <stdio.h>
-
 #include "common/suite.h"
 #include "fusion/bound.h"
 #include "fusion/fuser.h"

@@ -3,9 +3,6 @@
 // fix, doubled, late, NaN, another clock, unplugged, back again.
 #include <arpa/inet.h>
 #include <fcntl.h>
-#include <math.h>
-#include <stdio.h>
-#include <string.h>
 #include <sys/socket.h>
 #include <time.h>
 #include <unistd.h>

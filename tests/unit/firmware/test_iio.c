@@ -2,10 +2,6 @@
 // An IMU of Linux IIO on a tree as sysfs has it, with a FIFO as its character device: set up, read, absent, without a
 // buffer, silent, doubled, late, of another clock, unplugged and back.
 #include <fcntl.h>
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>

@@ -2,8 +2,6 @@
 // A thread that was held up while messages came over LCM: it gets all of a second's, and more are no silent loss.
 // Needs the right to a network of its own (else 77).
 #include <sched.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <time.h>
 
 #include "common/suite.h"

@@ -1,10 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Streams over LCM: their events, and what a sender does to them: absent, silent, late, doubled, NaN, another clock,
 // too fast, back again.
-#include <math.h>
-#include <stdio.h>
-#include <string.h>
-
 #include "common/suite.h"
 #include "live/lcm_device.h"
 #include "live/row_source.h"

@@ -1,11 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // As many sensors as the filter takes, each with all its calibration states: no value and no alarm is lost on the way
 // from the estimator to health, health.json and LCM.
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
 #include "../drivers/folder.h"
 #include "common/suite.h"
 #include "fusion/fuser.h"

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The estimator's thread never waits for LCM or the disk: records that find no room are counted, and a hole in the log
 // is marked.
-#include <stdlib.h>
-
 #include "common/suite.h"
 #include "live/live.h"
 #include "log_fixture.h"

@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The player keeps the times: 2000 CAN frames a second and two cameras at 30 Hz, nothing lost, each datum in its order.
 #include <errno.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 

@@ -1,8 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a recorder writes is read again: candump's lines, and an AVI that was cut at any byte.
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 

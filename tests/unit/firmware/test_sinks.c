@@ -1,8 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // The publish thread: LCM (memq: published and received in one process) and systemd's protocol.
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/socket.h>
 #include <sys/un.h>
 #include <unistd.h>

@@ -1,9 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // The last pose on disk, and how far dead reckoning would carry.
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 

@@ -1,9 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a person sees of a run, from its messages.
-#include <math.h>
-#include <stdio.h>
-#include <string.h>
-
 #include "cli/watch/metrics.h"
 #include "cli/watch/watch.h"
 #include "common/suite.h"

@@ -3,11 +3,7 @@
 // there.
 #include <dirent.h>
 #include <malloc.h>
-#include <math.h>
 #include <stdatomic.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/stat.h>
 #include <turbojpeg.h>
 

@@ -1,8 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
-
 #include "common/suite.h"
 #include "waymark/bytes.h"
 #include "waymark/codec.h"

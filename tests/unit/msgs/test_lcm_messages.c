@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What our encoder writes, the decoders that lcm-gen makes read back.
 #include <ctype.h>
-#include <math.h>
-#include <stdio.h>
-#include <string.h>
 
 #include "common/suite.h"
 #include "waymark/event_fields.h"

@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Messages of a run, read again by a viewer: each field comes back as it was, and names from strangers are made
 // harmless.
-#include <math.h>
-#include <string.h>
-
 #include "common/suite.h"
 #include "waymark/event_fields.h"
 #include "waymark/lcm_messages.h"

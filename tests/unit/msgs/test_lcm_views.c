@@ -1,8 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Messages for viewers: what is written is read again, and what no run could have written is refused.
-#include <math.h>
-#include <string.h>
-
 #include "common/suite.h"
 #include "waymark/lcm_messages.h"
 #include "waymark/lcm_views.h"

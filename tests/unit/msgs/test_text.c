@@ -1,8 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Texts of statuses, errors and enumerations.
-#include <stdio.h>
-#include <string.h>
-
 #include "common/suite.h"
 #include "waymark/event.h"
 #include "waymark/health.h"

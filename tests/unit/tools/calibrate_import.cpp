@@ -2,8 +2,6 @@
 // Calibrations of other programs: each format is read, its rays are those of the other program's own forward formula
 // (written down here anew), and mistakes are named with file, line and key.
 #include <zlib.h>
-#include <cmath>
-#include <cstring>
 #include <filesystem>
 
 #include "calibrate/fit.h"

@@ -3,10 +3,6 @@
 // than it says, on wheels and a gyro that are off: all of it is found, within what is said of its sigmas.
 #include "calibrate/mounting.h"
 
-#include <cmath>
-#include <cstring>
-#include <vector>
-
 #include "common/failure.h"
 #include "common/suite.h"
 #include "waymark/random.h"

@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The solver of `waymark calibrate camera` on corners of known cameras: the lens functions are the renderer's, errors
 // are as large as their sigmas, pairs and mountings are found.
-#include <cmath>
-#include <cstdlib>
-#include <cstring>
 #include <optional>
 
 #include "calibrate/bundle.h"

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Points on the floor joined to polylines in the picture.
-#include <cmath>
-
 #include "common/suite.h"
 #include "detect/polylines.h"
 

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Upright lines against labels: what is found, right, false; how far off, and by how much all are turned.
-#include <cmath>
-#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "common/suite.h"

@@ -2,10 +2,7 @@
 // `waymark import`: a compressed video in MP4, made here, against what the robot's reader then reads of it.
 #include <unistd.h>
 
-#include <cmath>
-#include <cstring>
 #include <fstream>
-#include <memory>
 
 extern "C" {
 #include <libavcodec/avcodec.h>

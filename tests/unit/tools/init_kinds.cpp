@@ -2,8 +2,6 @@
 // What `waymark init` notes of URDFs that are valid and yet not meant so, and what it proposes of logs whose ids are
 // not those of the DBC, or that are of NMEA 2000 and have no DBC.
 #include <algorithm>
-#include <cmath>
-#include <cstring>
 #include <filesystem>
 #include <fstream>
 

@@ -2,10 +2,7 @@
 // What `waymark init` makes of broken files of other programs: the exact message of each, and of files that are damaged
 // at random either a message that names the file, or a configuration that the runtime accepts.
 // `wm_errors_init --markdown` prints the table for docs/errors.md; without arguments this is a test of it.
-#include <cmath>
-#include <cstring>
 #include <filesystem>
-#include <memory>
 
 #include "common/failure.h"
 #include "common/suite.h"

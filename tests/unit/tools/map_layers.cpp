@@ -1,8 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // `waymark map make` and `check`: a plan whose rooms are known gives layers whose walls and areas are known.
-#include <cmath>
-#include <cstring>
-
 #include "common/failure.h"
 #include "common/suite.h"
 #include "images/pictures.h"

@@ -2,7 +2,6 @@
 // waymark map survey: planted faults are named, and a good run has none.
 #include "map/survey.h"
 
-#include <cstdio>
 #include <nlohmann/json.hpp>
 
 #include "common/suite.h"

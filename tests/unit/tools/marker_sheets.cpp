@@ -2,8 +2,6 @@
 // Sheets of markers: pages at true scale, and what is refused.
 #include "map/print_markers.h"
 
-#include <cstdio>
-
 #include "common/failure.h"
 #include "common/suite.h"
 

@@ -2,8 +2,6 @@
 // The Cramér-Rao bound against cases that can be written down, and the statistics against numbers made by hand.
 #include "montecarlo/bound.h"
 
-#include <cmath>
-
 #include "common/suite.h"
 #include "montecarlo/montecarlo.h"
 #include "simulate/angle.h"

@@ -2,8 +2,6 @@
 // A folder of photos as people have it: empty and broken files and other files in it, and for boards a photo that lies
 // on its side. What can't be taken is named, and the others are used.
 #include <algorithm>
-#include <cmath>
-#include <cstring>
 #include <filesystem>
 
 #include "common/failure.h"

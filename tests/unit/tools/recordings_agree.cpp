@@ -3,7 +3,6 @@
 // makes it complain, and files, columns and keys of the other one are in ours.
 #include <unistd.h>
 
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <set>

@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The reference trajectory on a made drive: a room whose walls are known, odometry that turns and slips; smoothed, it
 // must lie on the way that was driven, also from a start that is off.
-#include <cmath>
-#include <cstdio>
-
 #include "common/suite.h"
 #include "reference/smoother.h"
 

@@ -2,9 +2,6 @@
 // Camera models against themselves, against finite differences, and against values worked out by hand.
 #include "images/camera.h"
 
-#include <cmath>
-#include <cstring>
-
 #include "common/suite.h"
 #include "render_cameras.h"
 

@@ -3,9 +3,6 @@
 // their centroids, long edges by the place where the brightness steps, for every camera model, standing, in motion with
 // exposure, and with rolling shutter.
 #include <algorithm>
-#include <cmath>
-#include <cstdio>
-#include <vector>
 
 #include "common/suite.h"
 #include "render/render.h"

@@ -1,8 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Light, textures and determinism of pictures.
-#include <cmath>
-#include <cstring>
-
 #include "common/suite.h"
 #include "render/patterns.h"
 #include "render/render.h"

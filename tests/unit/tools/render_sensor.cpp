@@ -2,10 +2,6 @@
 // The sensor's statistics measured back, and videos read back by ffmpeg.
 #include <sys/stat.h>
 
-#include <cmath>
-#include <cstdlib>
-#include <cstring>
-
 #include "common/suite.h"
 #include "images/video.h"
 #include "render/sensor.h"

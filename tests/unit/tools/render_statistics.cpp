@@ -3,8 +3,6 @@
 // and exposure, the skew of a rolling shutter; and from a video's CSV and labels the camera's clock and what is lost.
 #include <unistd.h>
 
-#include <cmath>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <map>

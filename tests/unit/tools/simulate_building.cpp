@@ -2,8 +2,6 @@
 // Buildings of one's own: the shipped polyline plan and the same flat as a ROS map become worlds that agree; what a
 // wrong plan, map or route says.
 #include <algorithm>
-#include <cmath>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <set>

@@ -2,8 +2,6 @@
 // What the simulator packs into frames, the decoder reads back from the DBC that the simulator writes.
 #include "simulate/bus.h"
 
-#include <cmath>
-#include <cstring>
 #include "common/suite.h"
 
 using namespace wm::sim;

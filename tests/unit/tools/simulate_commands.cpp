@@ -2,9 +2,6 @@
 // Drives whose recording has commands: what the robot does is what was published, by the drive that the scenario
 // states.
 #include <algorithm>
-#include <cmath>
-#include <cstdlib>
-#include <string>
 
 #include "common/suite.h"
 #include "simulate/simulate.h"

@@ -2,10 +2,6 @@
 // Detectors that err and maps that are old, on top of the same drive without: so many as asked for, marked as what they
 // are, and nothing else changed.
 #include <algorithm>
-#include <cmath>
-#include <cstdlib>
-#include <cstring>
-#include <string>
 
 #include "common/suite.h"
 #include "simulate/angle.h"

@@ -4,9 +4,6 @@
 // dead encoder, a slip, a robot that is carried away. And: hard doubles easy.
 #include <Eigen/Dense>
 #include <algorithm>
-#include <cmath>
-#include <cstdlib>
-#include <vector>
 
 #include "common/suite.h"
 #include "simulate/angle.h"

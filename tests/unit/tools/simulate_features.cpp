@@ -4,9 +4,6 @@
 #include <unistd.h>
 
 #include <Eigen/Geometry>
-#include <cmath>
-#include <cstdlib>
-#include <cstring>
 #include <filesystem>
 #include <map>
 

@@ -3,13 +3,9 @@
 // signs, units, stamps and arrivals from one end to the other.
 #include <unistd.h>
 
-#include <cmath>
-#include <cstdlib>
-#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
-#include <vector>
 
 #include "common/suite.h"
 #include "simulate/angle.h"

@@ -2,9 +2,6 @@
 // The true drive against an independent integration, and its derivatives against each other.
 #include "simulate/route.h"
 
-#include <cmath>
-#include <cstring>
-
 #include "common/suite.h"
 #include "simulate/angle.h"
 

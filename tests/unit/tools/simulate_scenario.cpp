@@ -2,9 +2,6 @@
 // The scenario file: what is read, and what each mistake says.
 #include "simulate/scenario.h"
 
-#include <cmath>
-#include <cstdlib>
-#include <cstring>
 #include <fstream>
 #include <iterator>
 

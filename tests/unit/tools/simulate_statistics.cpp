@@ -1,12 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a recording's sensors say, measured back against its truth: noise, biases, outliers and latency are those of the
 // scenario; one seed always says the same; landmarks don't change what the wheels say.
-#include <cmath>
-#include <cstdlib>
-#include <cstring>
 #include <map>
-#include <memory>
-#include <vector>
 
 #include "common/suite.h"
 #include "simulate/angle.h"

@@ -1,11 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Plans, ways and maps: the corridors that a seed draws can be driven, are connected, and are what their map says.
 #include <algorithm>
-#include <cmath>
-#include <cstdio>
-#include <cstring>
 #include <filesystem>
-#include <string>
 
 #include "common/suite.h"
 #include "common/trials.h"

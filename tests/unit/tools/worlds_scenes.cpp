@@ -2,13 +2,8 @@
 // The worlds as pictures: labels lie where the renderer draws what they name, the same request gives the same bytes,
 // another seed or level another world. Pictures here have no noise.
 #include <algorithm>
-#include <cmath>
-#include <cstdio>
 #include <map>
-#include <memory>
 #include <sstream>
-#include <string>
-#include <vector>
 
 #include "common/trials.h"
 #include "render/render.h"
