@@ -2,37 +2,24 @@
 // Landmarks seen by bearings alone, with the default's start distance and a motion that is uncertain: lines far beyond
 // that distance, a line that a tracker lost to another edge, a detector that states its sigma. GIVEN / WHEN / THEN;
 // noise is drawn from fixed seeds.
-#include "common/suite.h"
-#include "events.hpp"
 #include "filters/slam/params.h"
-#include "math/arc.hpp"
-#include "motion/motion_params.h"
-#include "waymark/estimator.h"
-#include "waymark/random.h"
+#include "world.hpp"
 
 namespace {
+
+using namespace world;
 
 constexpr int kLines = 16;
 constexpr double kSigma = 0.003;
 
-const wm_estimator *slam;
-wm_motion_params motion;
 wm_slam_params params;
-wm_setup setup;
-wm_sensor sensor;
-void *state;
 bool is_reused;  // the number of a line ahead, seen once, is another line's from 2 s on
 
-void prepare() {
+void prepare_rays() {
   is_reused = false;
-
-  slam = wm_estimator_find("slam");
-  make::exact_sensors(&motion);
-  wm_params_defaults(&slam->params, &params);
+  prepare("slam", &params, make::sensor("omni", kSigma, NAN));
   make::sightings.gate_hard = 50.0;  // the default's
-  sensor = make::sensor("omni", kSigma, NAN);
-  setup = make::setup(motion, sensor);
-  setup.start = {WM_TIME_NONE, {0, 0, 0}, {0, 0, 0, 1}, 0.0, 0.001, 0.001};
+  start_at({}, 0.001, 0.001);
 }
 
 struct straight {
@@ -42,18 +29,13 @@ struct straight {
 // 4 m at 0.5 m/s along two rows of lines; `wrong_from_s`: from then on the line named first in each picture goes over
 // to another edge, which moves by 4 mrad a picture. Error along the way, largest turn of the heading since then.
 straight drive(uint64_t seed, double wrong_from_s, double stated_sigma_rad) {
-  const char *why = "";
-  std::free(state);
-  state = aligned_alloc(16, (slam->state_bytes(&params, &setup, &why) + 15) / 16 * 16);
-  TEST_ASSERT_EQUAL(WM_OK, slam->init(state, &params, &setup));
-  wm_random noise = {seed, 1, 0};
+  begin();
+  noise = {seed, 1, 0};
   straight out{};
   double x_m = 0.0, slid_rad = 0.0, heading_rad = 0.0;
-  wm_estimate now;
   for (int step = 0; step < 400; step++) {
     const double t_s = 0.02 * step, v = 0.5;
-    const wm_event e = make::twist(t_s, v, 0.0);
-    TEST_ASSERT_EQUAL(WM_OK, slam->predict(state, &e));
+    feed(make::twist(t_s, v, 0.0));
     const bool wrong = t_s >= wrong_from_s;
     if (wrong && step % 5 == 0) slid_rad += 0.004;
     for (int i = 0; step % 5 == 0 && i < kLines; i++) {
@@ -64,32 +46,20 @@ straight drive(uint64_t seed, double wrong_from_s, double stated_sigma_rad) {
         along = step == 0 ? 3.0 : 0.2;
         aside = step == 0 ? 0.3 : 1.8;
       }
-      const double bearing = wm::atan2(aside, along - x_m) + kSigma * wm_random_next_normal(&noise);
-      wm_event seen = make::sighting(t_s, 10 + i, wm::wrap(bearing + (i == 0 ? slid_rad : 0.0)),
-                                     std::numeric_limits<double>::quiet_NaN());
+      const double bearing = wm::atan2(aside, along - x_m) + gauss(kSigma);
+      wm_event seen = make::sighting(t_s, 10 + i, wm::wrap(bearing + (i == 0 ? slid_rad : 0.0)), kAbsent);
       seen.as.sighting.bearing_sigma_rad = stated_sigma_rad;
-      wm_innovation records[WM_INNOVATIONS_PER_EVENT_MAX];
-      size_t count = 0;
-      TEST_ASSERT_EQUAL(WM_OK, slam->correct(state, &seen, records, WM_INNOVATIONS_PER_EVENT_MAX, &count));
+      feed(seen);
       for (size_t k = 0; k < count; k++)
         if (records[k].verdict == WM_FUSED) out.widest_rad = std::fmax(out.widest_rad, std::sqrt(records[k].variance));
     }
-    slam->estimate(state, &now);
+    const wm_estimate now = estimate();
     if (!wrong) heading_rad = now.heading_rad;
     out.turned_rad = std::fmax(out.turned_rad, std::fabs(now.heading_rad - heading_rad));
     x_m += 0.02 * v;
   }
-  out.along_m = now.pose_map_base.p_m[0] - (x_m - 0.01);
+  out.along_m = estimate().pose_map_base.p_m[0] - (x_m - 0.01);
   return out;
-}
-
-wm_calibration_value calibration(const char *name) {
-  wm_calibration_value values[32];
-  const size_t n = slam->calibration(state, values, 32);
-  for (size_t i = 0; i < n; i++)
-    if (std::strstr(values[i].name, name)) return values[i];
-  TEST_FAIL_MESSAGE(name);
-  return {};
 }
 
 // GIVEN lines 4 to 6 m away, and a speed with white noise and a scale known to 5 % (together 0.23 m of 4 m) THEN the
@@ -99,11 +69,11 @@ wm_calibration_value calibration(const char *name) {
 TEST(test_a_rays_first_guess_does_not_shorten_the_way) {
   double mean = 0.0, sigma = 0.0;
   for (uint64_t seed = 1; seed <= 4; seed++) {
-    prepare();
+    prepare_rays();
     motion.noise_speed_mps = 0.04;
     motion.states.sigma[WM_SPEED_SCALE] = 0.05;
     mean += 0.25 * drive(seed, 1e9, NAN).along_m;
-    sigma += 0.25 * calibration("speed_scale").sigma;
+    sigma += 0.25 * sigma_of("motion.speed_scale");
   }
   std::printf("along %.3f m, sigma of the scale %.4f\n", mean, sigma);
   TEST_ASSERT_DOUBLE_WITHIN(0.2, 0.0, mean);
@@ -115,7 +85,7 @@ TEST(test_a_rays_first_guess_does_not_shorten_the_way) {
 TEST(test_a_line_that_is_another_one_turns_nothing) {
   double most = 0.0;
   for (uint64_t seed = 1; seed <= 4; seed++) {
-    prepare();
+    prepare_rays();
     motion.noise_yaw_rate_radps = 0.1;
     most = std::fmax(most, drive(seed, 3.0, NAN).turned_rad);
   }
@@ -126,7 +96,7 @@ TEST(test_a_line_that_is_another_one_turns_nothing) {
 // GIVEN a line ahead that was seen once WHEN its number returns 1 m on, at another line beside the robot THEN the ray
 // begins anew: where its bearing is uncertain by a radian no linear update holds, and no gate.
 TEST(test_a_ray_whose_bearing_is_not_linear_begins_anew) {
-  prepare();
+  prepare_rays();
   is_reused = true;
   params.line_rejoin = WM_SLAM_REJOIN_OFF;
   motion.noise_yaw_rate_radps = 0.1;
@@ -136,18 +106,16 @@ TEST(test_a_ray_whose_bearing_is_not_linear_begins_anew) {
 // GIVEN a detector that states its sigma, and the default's states THEN rays leave the mounting's yaw alone, and the
 // clock is one of 20 ms.
 TEST(test_rays_of_stated_sigmas_leave_the_mounting_alone) {
-  prepare();
+  prepare_rays();
   motion.noise_yaw_rate_radps = 0.03;
   make::sightings.states.sigma[WM_SENSOR_ROW_kYaw] = -0.05;
   make::sightings.states.sigma[WM_SENSOR_ROW_kTimeOffset] = -0.1;
   drive(1, 1e9, kSigma);
-  TEST_ASSERT_EQUAL_DOUBLE(0.0, calibration("yaw_rad").value);
-  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.05, calibration("yaw_rad").sigma);
-  TEST_ASSERT_LESS_OR_EQUAL_DOUBLE(0.02, calibration("time_offset_s").sigma);
+  TEST_ASSERT_EQUAL_DOUBLE(0.0, value_of("omni.yaw_rad"));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.05, sigma_of("omni.yaw_rad"));
+  TEST_ASSERT_LESS_OR_EQUAL_DOUBLE(0.02, sigma_of("omni.time_offset_s"));
   drive(1, 1e9, NAN);
-  TEST_ASSERT_LESS_THAN_DOUBLE(0.03, calibration("yaw_rad").sigma);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.03, sigma_of("omni.yaw_rad"));
 }
 
 }  // namespace
-
-void suite_end() { std::free(state); }

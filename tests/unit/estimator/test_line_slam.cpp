@@ -1,27 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 // Line SLAM among lies: six of ten sightings are of nothing or of another line than they say. What is published is the
 // pose, the map, and how many were refused.
-#include "common/suite.h"
-#include "events.hpp"
 #include "filters/slam/params.h"
-#include "math/arc.hpp"
-#include "motion/motion_params.h"
 #include "sensors/sighting.hpp"
-#include "waymark/estimator.h"
-#include "waymark/random.h"
+#include "world.hpp"
 
 namespace {
+
+using namespace world;
 
 constexpr int kLines = 16, kGhosts = 12;
 constexpr double kSigma = 0.003;
 
-const wm_estimator *slam;
-wm_motion_params motion;
 wm_slam_params params;
-wm_setup setup;
-wm_sensor sensor;
-void *state;
-wm_random noise;
 double place[kLines][2];
 // What moves along with the robot, or a reflection: an azimuth that drifts, for a while.
 struct ghost {
@@ -29,7 +20,7 @@ struct ghost {
   double azimuth_rad, rate_radps, until_s;
 } ghosts[kGhosts];
 int32_t next_ghost;
-int fused, refused, waiting, told, lies;
+int taken, refused, waiting, told, lies;
 double renumbered_s;  // all lines are lost for 2 s and come back under other numbers so often; 0: never
 double moved_m;       // then each second one is another, so far beside it
 double jolt_rad;      // after 30 s the robot is turned by so much, and no wheel tells
@@ -37,13 +28,10 @@ bool is_stated;       // each sighting has its own sigma
 double lasting_rad;   // sigma of a line's error that is drawn anew every 2 s
 int shuffle;          // each look begins with another line, so many on; 0: always in order
 
-double gauss(double sigma) { return sigma * wm_random_next_normal(&noise); }
 double uniform(double from, double to) { return from + (to - from) * wm_random_next_uniform(&noise); }
 
 void begin(int method, bool rejoin = false, int clones = 24, bool wheels = false, bool stated = false) {
-  slam = wm_estimator_find("slam");
-  make::exact_sensors(&motion);
-  wm_params_defaults(&slam->params, &params);
+  prepare("slam", &params, make::sensor("omni", kSigma, NAN), 7);
   params.line_clones = clones;
   params.line_method = method;
   params.line_near_m = 1;
@@ -55,7 +43,6 @@ void begin(int method, bool rejoin = false, int clones = 24, bool wheels = false
   is_stated = stated;
   if (stated) make::sightings.correlated_slots = 16, make::sightings.correlated_bearing_rad = -1.0;
   shuffle = 0;
-  noise = {7, 1, 0};
   for (int i = 0; i < kLines; i++) {
     const wm::sin_cos a = wm::sincos(wm::kTwoPi * i / kLines + 0.1);
     const double radius = i % 2 == 0 ? 5.5 : 3.5;
@@ -64,36 +51,27 @@ void begin(int method, bool rejoin = false, int clones = 24, bool wheels = false
   }
   for (ghost &g : ghosts) g.until_s = -1;
   next_ghost = 1000;
-  fused = refused = waiting = told = lies = 0;
-  sensor = make::sensor("omni", kSigma, NAN);
+  taken = refused = waiting = told = lies = 0;
   sensor.mounting.rpy_rad[1] = -wm::kHalfPi;  // looks up: bearings are azimuths
-  setup = make::setup(motion, sensor);
   if (wheels) {
     setup.wheels.radius_m = 0.1;
     setup.wheels.ticks_per_turn = 2048;
     setup.wheels.track_m = 0.44;
     motion.noise_ticks_per_sqrt_m = 0.001;
   }
-  setup.start = {WM_TIME_NONE, {2, 0, 0}, {0, 0, 0, 1}, wm::kHalfPi, 0.001, 0.001};
-  const char *why = "";
-  const size_t bytes = slam->state_bytes(&params, &setup, &why);
-  TEST_ASSERT_GREATER_THAN_MESSAGE(0, bytes, why);
-  std::free(state);
-  state = std::aligned_alloc(16, (bytes + 15) / 16 * 16);
-  TEST_ASSERT_EQUAL(WM_OK, slam->init(state, &params, &setup));
+  start_at({2, 0, wm::kHalfPi}, 0.001, 0.001);
+  world::begin();
 }
 
 void say(double t_s, int32_t id, double bearing) {
-  wm_event e = make::sighting(t_s, id, wm::wrap(bearing), std::numeric_limits<double>::quiet_NaN());
+  wm_event e = make::sighting(t_s, id, wm::wrap(bearing), kAbsent);
   if (is_stated) e.as.sighting.bearing_sigma_rad = kSigma;
-  wm_innovation out[WM_INNOVATIONS_PER_EVENT_MAX];
-  size_t count = 0;
-  TEST_ASSERT_EQUAL(WM_OK, slam->correct(state, &e, out, WM_INNOVATIONS_PER_EVENT_MAX, &count));
+  feed(e);
   told++;
   if (count == 0) return;
-  fused += out[0].verdict == WM_FUSED;
-  refused += out[0].verdict == WM_REJECTED_GATE;
-  waiting += out[0].verdict == WM_REJECTED_SEARCHING;
+  taken += records[0].verdict == WM_FUSED;
+  refused += records[0].verdict == WM_REJECTED_GATE;
+  waiting += records[0].verdict == WM_REJECTED_SEARCHING;
 }
 
 void lie(double t_s, int which) {
@@ -115,14 +93,14 @@ struct outcome {
 // Circles of 2 m, a look ten times a second; `lies_of_ten` of ten sightings are lies.
 outcome drive(double seconds, int lies_of_ten) {
   outcome out{};
-  wm_pose2 truth = {2, 0, wm::kHalfPi};
+  truth = {2, 0, wm::kHalfPi};
+  now_s = 0.0;
   double nees = 0;
   int steps = 0;
   double error[kLines] = {};
   for (int step = 0; 0.02 * step < seconds; step++) {
     const double t_s = 0.02 * step, v = 0.5, w = 0.25;
-    const wm_event e = make::twist(t_s, v + gauss(0.01), w + gauss(0.005));
-    TEST_ASSERT_EQUAL(WM_OK, slam->predict(state, &e));
+    feed(make::twist(t_s, v + gauss(0.01), w + gauss(0.005)));
     const int epoch = renumbered_s > 0.0 ? static_cast<int>(t_s / renumbered_s) : 0;
     const bool dark = epoch > 0 && t_s - epoch * renumbered_s < 2.0;
     for (int i = 0; lasting_rad > 0.0 && step % 100 == 0 && i < kLines; i++) error[i] = gauss(lasting_rad);
@@ -130,39 +108,31 @@ outcome drive(double seconds, int lies_of_ten) {
       const int i = (k + shuffle * (step / 5)) % kLines;
       const double beside = epoch > 0 && i % 2 == 0 ? moved_m : 0.0;
       say(t_s, 10 + i + 100 * epoch,
-          wm::atan2(place[i][1] - truth.y_m, place[i][0] + beside - truth.x_m) - truth.heading_rad + gauss(kSigma) +
-              error[i]);
+          view_of(place[i][0] + beside, place[i][1]).bearing_rad + gauss(kSigma) + error[i]);
       // So many lies that they are their share of all.
       for (int twice = 0; twice < 2; twice++)
         if (uniform(0, 2) < lies_of_ten / (10.0 - lies_of_ten)) lie(t_s, static_cast<int>(uniform(0, 1000)));
     }
-    const wm::arc a = wm::make_arc(0.02 * v, 0.02 * w);
-    truth = wm::compose(truth, {a.x_m, a.y_m, a.turn_rad});
+    go_on(v, w, 0.02);
     if (step == 1500) truth.heading_rad = wm::wrap(truth.heading_rad + jolt_rad);
     if (step % 50 != 49) continue;
-    wm_estimate now;
-    slam->estimate(state, &now);
-    const double dx = now.pose_map_base.p_m[0] - truth.x_m, dy = now.pose_map_base.p_m[1] - truth.y_m,
-                 dh = wm::wrap(now.heading_rad - truth.heading_rad);
-    out.largest_m = std::fmax(out.largest_m, std::sqrt(dx * dx + dy * dy));
-    out.largest_rad = std::fmax(out.largest_rad, std::fabs(dh));
-    nees += dh * dh / now.covariance[wm_cov_index(5, 5)];
+    out.largest_m = std::fmax(out.largest_m, off());
+    out.largest_rad = std::fmax(out.largest_rad, heading_off());
+    nees += wm::square(heading_off()) / estimate().covariance[wm_cov_index(5, 5)];
     steps++;
   }
   out.nees = nees / steps;
-  wm_landmark map[256];
-  const size_t count = slam->landmarks(state, map, nullptr, 256);
-  out.landmarks = static_cast<int>(count);
-  for (size_t l = 0; l < count; l++)
+  out.landmarks = static_cast<int>(map().size());
+  for (const mapped &m : map())
     for (const auto &p : place)
-      if (std::fabs(map[l].p_m[0] - p[0]) < 0.3 && std::fabs(map[l].p_m[1] - p[1]) < 0.3) {
+      if (std::fabs(m.landmark.p_m[0] - p[0]) < 0.3 && std::fabs(m.landmark.p_m[1] - p[1]) < 0.3) {
         out.right++;
         break;
       }
   std::printf(
       "%d of 10 lies: %d told, %d lies, %d fused, %d refused, %d waiting; pose within %.3f m, %.2f deg; %d of %d "
       "landmarks are lines\n",
-      lies_of_ten, told, lies, fused, refused, waiting, out.largest_m, out.largest_rad * 180 / M_PI, out.right,
+      lies_of_ten, told, lies, taken, refused, waiting, out.largest_m, out.largest_rad * 180 / M_PI, out.right,
       out.landmarks);
   return out;
 }
@@ -231,26 +201,21 @@ TEST(test_the_time_offset_is_not_the_counts_age) {
   for (uint64_t trial = 0; trial < 4; trial++) {
     begin(WM_SLAM_LINE_INVERSE_DISTANCE, true, 24, true);
     noise = {11, trial, 0};
-    wm_pose2 truth = {2, 0, wm::kHalfPi};
+    truth = {2, 0, wm::kHalfPi};
     double rolled_m[2] = {};
     for (int step = 0; step < 50 * 40; step++) {
       const double t_s = 0.02 * step, v = 0.3, w = 0.6 * wm::cos(0.6 * t_s);
-      const wm_event e = make::quantities(t_s + uniform(-0.003, 0.003),
-                                          {{WM_Q_WHEEL_TICKS_LEFT, std::floor(rolled_m[0] / kPerTick_m)},
-                                           {WM_Q_WHEEL_TICKS_RIGHT, std::floor(rolled_m[1] / kPerTick_m)}});
-      TEST_ASSERT_EQUAL(WM_OK, slam->predict(state, &e));
-      const wm::arc seen = wm::make_arc(0.015 * v, 0.015 * w), all = wm::make_arc(0.02 * v, 0.02 * w);
+      feed(make::quantities(t_s + uniform(-0.003, 0.003),
+                            {{WM_Q_WHEEL_TICKS_LEFT, std::floor(rolled_m[0] / kPerTick_m)},
+                             {WM_Q_WHEEL_TICKS_RIGHT, std::floor(rolled_m[1] / kPerTick_m)}}));
+      const wm::arc seen = wm::make_arc(0.015 * v, 0.015 * w);
       const wm_pose2 from = wm::compose(truth, {seen.x_m, seen.y_m, seen.turn_rad});
       for (int i = 0; step % 5 == 0 && i < kLines; i++)
-        say(t_s + 0.015, 10 + i,
-            wm::atan2(place[i][1] - from.y_m, place[i][0] - from.x_m) - from.heading_rad + gauss(kSigma));
-      truth = wm::compose(truth, {all.x_m, all.y_m, all.turn_rad});
+        say(t_s + 0.015, 10 + i, view_of(place[i][0], place[i][1], from).bearing_rad + gauss(kSigma));
+      go_on(v, w, 0.02);
       for (int side = 0; side < 2; side++) rolled_m[side] += 0.02 * (v + (side == 0 ? -0.5 : 0.5) * kTrack_m * w);
     }
-    wm_calibration_value values[16];
-    const size_t count = slam->calibration(state, values, 16);
-    for (size_t i = 0; i < count; i++)
-      if (std::strstr(values[i].name, "time_offset")) offset_s += 0.25 * values[i].value;
+    offset_s += 0.25 * value_of("omni.time_offset_s");
   }
   std::printf("time offset %.1f ms\n", 1e3 * offset_s);
   TEST_ASSERT_LESS_THAN_DOUBLE(0.009, offset_s);  // 15.6 ms by the twist of the last count, 6.2 by the steady one
@@ -285,14 +250,6 @@ TEST(test_the_error_that_lasts_of_a_bearing) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.001, wm::correlated_bearing(p, r, 4.0));
 }
 
-double counted(wm_counter_kind kind) {
-  wm_counter counters[16];
-  const size_t n = slam->counters(state, counters, 16);
-  for (size_t i = 0; i < n; i++)
-    if (counters[i].kind == (uint32_t)kind) return (double)counters[i].count;
-  return -1.0;
-}
-
 // GIVEN lines that are well known WHEN the robot is turned, and no wheel tells THEN a second later it knows, and the
 // lines stay where they are.
 TEST(test_a_robot_that_is_turned_by_hand_keeps_its_map) {
@@ -310,5 +267,3 @@ TEST(test_a_robot_that_is_turned_by_hand_keeps_its_map) {
 }
 
 }  // namespace
-
-void suite_end() { std::free(state); }

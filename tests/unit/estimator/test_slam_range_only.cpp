@@ -1,52 +1,31 @@
 // SPDX-License-Identifier: Apache-2.0
 // SLAM on beacons that give ranges alone, at unknown places. The noise is drawn from fixed seeds.
-#include "common/suite.h"
-#include "events.hpp"
 #include "filters/slam/params.h"
-#include "math/arc.hpp"
-#include "motion/motion_params.h"
-#include "waymark/estimator.h"
-#include "waymark/random.h"
+#include "world.hpp"
 
 namespace {
+
+using namespace world;
 
 constexpr int kBeacons = 3;
 constexpr double kStep_s = 0.05, kSpeed_mps = 1.0;
 // White noise of the twist, as densities per sqrt(s), which the configuration states.
 constexpr double kSpeedNoise_mps = 0.02, kRateNoise_radps = 0.005;
 
-const wm_estimator *slam;
-wm_motion_params motion;
 wm_slam_params params;
-wm_setup setup;
-wm_sensor sensor;
-void *state;
-wm_random noise;
-wm_pose2 truth;
-double now_s, place[kBeacons][2], range_sigma_m;
-
-double gauss(double sigma) { return sigma * wm_random_next_normal(&noise); }
+double place[kBeacons][2], range_sigma_m;
 
 void begin(double spacing_m, double sigma_m, uint64_t seed) {
-  std::free(state);
-  slam = wm_estimator_find("slam");
-  make::exact_sensors(&motion);
-  wm_params_defaults(&slam->params, &params);
+  prepare("slam", &params, make::sensor("radio", NAN, sigma_m), seed);
   motion.noise_speed_mps = kSpeedNoise_mps;
   motion.noise_yaw_rate_radps = kRateNoise_radps;
   motion.noise_speed_rel = motion.noise_yaw_rate_rel = motion.noise_side_rel = 0.0;
-  sensor = make::sensor("radio", NAN, sigma_m);
-  setup = make::setup(motion, sensor);
-  setup.start = {WM_TIME_NONE, {0, 0, 0}, {0, 0, 0, 1}, 0.0, 0.001, 0.001};
+  start_at({}, 0.001, 0.001);
   const double corner[kBeacons][2] = {{0.5, 0.6}, {1.2, -0.7}, {-0.6, 0.3}};
   for (int i = 0; i < kBeacons; i++)
     for (int k = 0; k < 2; k++) place[i][k] = spacing_m * corner[i][k];
   range_sigma_m = sigma_m;
-  noise = {seed, 1, 0};
-  truth = {};
-  now_s = 0.0;
-  state = make::begun(*slam, &params, setup);
-  TEST_ASSERT_NOT_NULL(state);
+  world::begin();
 }
 
 // So many metres on a circle of this curvature; each beacon is heard twice a second.
@@ -54,22 +33,12 @@ void drive(double metres, double curvature_1pm) {
   const int steps = (int)(metres / (kSpeed_mps * kStep_s) + 0.5);
   for (int step = 0; step < steps; step++) {
     const double w = kSpeed_mps * curvature_1pm, spread = 1.0 / std::sqrt(kStep_s);
-    const wm_event e =
-        make::twist(now_s, kSpeed_mps + gauss(kSpeedNoise_mps * spread), w + gauss(kRateNoise_radps * spread));
-    TEST_ASSERT_EQUAL(WM_OK, slam->predict(state, &e));
-    for (int i = 0; step % 10 == 0 && i < kBeacons; i++) {
-      const double range = std::hypot(place[i][0] - truth.x_m, place[i][1] - truth.y_m) + gauss(range_sigma_m);
-      const wm_event seen = make::sighting(now_s, 10 + i, NAN, range);
-      wm_innovation out[WM_INNOVATIONS_PER_EVENT_MAX];
-      size_t count = 0;
-      TEST_ASSERT_EQUAL(WM_OK, slam->correct(state, &seen, out, WM_INNOVATIONS_PER_EVENT_MAX, &count));
-    }
-    const wm::arc a = wm::make_arc(kSpeed_mps * kStep_s, w * kStep_s);
-    truth = wm::compose(truth, {a.x_m, a.y_m, a.turn_rad});
-    now_s += kStep_s;
+    feed(make::twist(now_s, kSpeed_mps + gauss(kSpeedNoise_mps * spread), w + gauss(kRateNoise_radps * spread)));
+    for (int i = 0; step % 10 == 0 && i < kBeacons; i++)
+      feed(make::sighting(now_s, 10 + i, NAN, view_of(place[i][0], place[i][1]).range_m + gauss(range_sigma_m)));
+    go_on(kSpeed_mps, w, kStep_s);
   }
-  const wm_event e = make::twist(now_s, kSpeed_mps, kSpeed_mps * curvature_1pm);
-  TEST_ASSERT_EQUAL(WM_OK, slam->predict(state, &e));
+  feed(make::twist(now_s, kSpeed_mps, kSpeed_mps * curvature_1pm));
 }
 
 // A straight and a half circle, which closes with the next one; every other such loop turns to the right.
@@ -81,26 +50,13 @@ void drive_among(double spacing_m, int halves) {
 }
 
 // Landmarks on the map, of which those nearer than `near_m` to their true places are *right.
-size_t mapped(double near_m, int *right) {
-  wm_landmark l[64];
-  double covariance[64][4];
-  const size_t found = slam->landmarks(state, l, covariance, 64);
+size_t placed(double near_m, int *right) {
   *right = 0;
-  for (size_t i = 0; i < found; i++) {
-    const int k = l[i].id - 10;
-    *right += std::hypot(l[i].p_m[0] - place[k][0], l[i].p_m[1] - place[k][1]) < near_m;
+  for (const mapped &m : map()) {
+    const double *at = place[m.landmark.id - 10];
+    *right += std::hypot(m.landmark.p_m[0] - at[0], m.landmark.p_m[1] - at[1]) < near_m;
   }
-  return found;
-}
-
-double squared_error(double *nees) {
-  wm_estimate e;
-  slam->estimate(state, &e);
-  const double d[2] = {e.pose_map_base.p_m[0] - truth.x_m, e.pose_map_base.p_m[1] - truth.y_m};
-  const double xx = e.covariance[wm_cov_index(0, 0)], xy = e.covariance[wm_cov_index(0, 1)],
-               yy = e.covariance[wm_cov_index(1, 1)];
-  *nees = (yy * d[0] * d[0] - 2.0 * xy * d[0] * d[1] + xx * d[1] * d[1]) / (xx * yy - xy * xy);
-  return d[0] * d[0] + d[1] * d[1];
+  return map().size();
 }
 
 // A way along a line sees a beacon and its mirror image alike; the first curve decides.
@@ -109,9 +65,9 @@ TEST(test_a_mirror_image_is_left_open_on_a_line_and_decided_by_the_first_curve) 
     begin(spacing_m, 0.01 * spacing_m, 3);
     int right;
     drive(0.5 * spacing_m, 0.0);
-    TEST_ASSERT_EQUAL(0, mapped(0.1 * spacing_m, &right));
+    TEST_ASSERT_EQUAL(0, placed(0.1 * spacing_m, &right));
     drive_among(spacing_m, 4);
-    TEST_ASSERT_EQUAL(kBeacons, mapped(0.1 * spacing_m, &right));
+    TEST_ASSERT_EQUAL(kBeacons, placed(0.1 * spacing_m, &right));
     TEST_ASSERT_EQUAL(kBeacons, right);
   }
 }
@@ -127,9 +83,8 @@ TEST(test_the_pose_among_beacons_is_as_sure_as_it_states) {
       begin(kind[0], kind[1], (uint64_t)seed);
       drive_among(kind[0], 12);
       int right;
-      double nees;
-      mapped(0.1 * kind[0], &right);
-      const double error_m = std::sqrt(squared_error(&nees));
+      placed(0.1 * kind[0], &right);
+      const double error_m = off(), nees = nees_from(truth);
       if (right == kBeacons) worst = std::fmax(worst, error_m);
       all_right += right == kBeacons;
       inside += nees < 5.99;
@@ -150,18 +105,10 @@ TEST(test_the_scale_of_ranges_is_a_state_by_default) {
     begin(10.0, 0.1, 1);
     make::sightings.states.sigma[WM_SENSOR_ROW_kRangeScale] = -0.05;
     sensor.bearing_sigma_rad = bearing_sigma_rad;
-    std::free(state);
-    state = make::begun(*slam, &params, setup);
-    wm_calibration_value values[16];
-    const size_t count = slam->calibration(state, values, 16);
-    TEST_ASSERT_EQUAL(1, count);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-9, std::isnan(bearing_sigma_rad) ? 0.1 : 0.05, values[0].sigma);
+    world::begin();
+    TEST_ASSERT_EQUAL(1, calibration().size());
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, std::isnan(bearing_sigma_rad) ? 0.1 : 0.05, calibration()[0].sigma);
   }
 }
 
 }  // namespace
-
-void tearDown(void) {
-  std::free(state);
-  state = nullptr;
-}

@@ -2,59 +2,32 @@
 // How large a map is, where nothing measures it: a robot whose speed is commanded and a camera whose ranges' scale
 // nobody knows; two wheels and prints. And the axis along which a camera's depths are measured. GIVEN / WHEN / THEN;
 // noise is drawn from fixed seeds.
-#include "common/suite.h"
-#include "events.hpp"
 #include "filters/slam/params.h"
-#include "math/arc.hpp"
-#include "motion/motion_params.h"
 #include "motion/step.hpp"
-#include "waymark/estimator.h"
-#include "waymark/random.h"
+#include "world.hpp"
 
 namespace {
+
+using namespace world;
 
 constexpr int kCount = 14;
 constexpr double kPrior = 0.05;  // of the speed's and the ranges' scale
 
-const wm_estimator *slam;
-wm_motion_params motion;
 wm_slam_params params;
-wm_setup setup;
-wm_sensor sensor;
 double range_factor;  // of the measured depths
 bool is_stated;       // each sighting has its own sigmas
 bool has_covariance;  // of the motion's increments
 bool has_wheels;      // counts from the start on, and a gyro from the second sample on
-void *state;
 
 struct found {
   double speed, speed_sigma, range, axis, axis_sigma;
 };
 
-void make_room() {
-  slam = wm_estimator_find("slam");
-  make::exact_sensors(&motion);
-  wm_params_defaults(&slam->params, &params);
-  motion.states.sigma[0] = kPrior;  // speed_scale
-  make::sightings.states.sigma[WM_SENSOR_ROW_kRangeScale] = kPrior;
-  make::sightings.states.sigma[WM_SENSOR_ROW_kYaw] = 0.05;
-  motion.noise_yaw_rate_radps = 0.03;
-  sensor = make::sensor("camera", 0.005, 0.02);
-  sensor.range_is_depth = 1;
-  range_factor = 1.0;
-  is_stated = has_covariance = has_wheels = false;
-  setup = make::setup(motion, sensor);
-  setup.start = {WM_TIME_NONE, {3, 0, 0}, {0, 0, 0, 1}, wm::kHalfPi, 0.05, 0.05};
-}
-
 // Five minutes round a circle of 3 m, of which the middle third of each minute sees nothing.
 found drive(uint64_t seed, double axis_rad) {
-  const char *why = "";
-  std::free(state);
-  state = aligned_alloc(16, (slam->state_bytes(&params, &setup, &why) + 15) / 16 * 16);
-  TEST_ASSERT_EQUAL(WM_OK, slam->init(state, &params, &setup));
-  wm_random noise = {seed, 1, 0};
-  wm_pose2 truth = {3, 0, wm::kHalfPi};
+  begin();
+  noise = {seed, 1, 0};
+  truth = {3, 0, wm::kHalfPi};
   const double dt = 0.05;
   for (int step = 0; step < 6000; step++) {
     const double v = 0.3, w = 0.1;
@@ -67,42 +40,24 @@ found drive(uint64_t seed, double axis_rad) {
     };
     const wm_event wheels = make::quantities(
         step * dt, {{WM_Q_WHEEL_TICKS_LEFT, counted(v - 0.25 * w)}, {WM_Q_WHEEL_TICKS_RIGHT, counted(v + 0.25 * w)}});
-    TEST_ASSERT_EQUAL(WM_OK, slam->predict(state, has_wheels ? &wheels : &e));
-    const wm_event gyro = make::quantities(step * dt, {{WM_Q_YAW_RATE, w + 0.002 * wm_random_next_normal(&noise)}});
-    if (has_wheels && step > 0) TEST_ASSERT_EQUAL(WM_OK, slam->predict(state, &gyro));
+    feed(has_wheels ? wheels : e);
+    const wm_event gyro = make::quantities(step * dt, {{WM_Q_YAW_RATE, w + gauss(0.002)}});
+    if (has_wheels && step > 0) feed(gyro);
     for (int i = 0; step % 4 == 0 && step / 400 % 3 != 1 && i < kCount; i++) {
       const wm::sin_cos at = wm::sincos(wm::kTwoPi * i / kCount);
-      const double radius = 4.0 + i % 3, dx = radius * at.cos - truth.x_m, dy = radius * at.sin - truth.y_m;
-      const double bearing = wm::wrap(wm::atan2(dy, dx) - truth.heading_rad), distance = std::sqrt(dx * dx + dy * dy);
+      const double radius = 4.0 + i % 3;
+      const auto [bearing, distance] = view_of(radius * at.cos, radius * at.sin);
       if (std::fabs(bearing) > 0.6 || distance > 5.0) continue;
       const double depth = distance * wm::cos(bearing - axis_rad);
-      wm_innovation out[WM_INNOVATIONS_PER_EVENT_MAX];
-      size_t count = 0;
-      wm_event seen = make::sighting(step * dt, i, bearing + 0.005 * wm_random_next_normal(&noise),
-                                     range_factor * depth + 0.02 * wm_random_next_normal(&noise));
+      wm_event seen = make::sighting(step * dt, i, bearing + gauss(0.005), range_factor * depth + gauss(0.02));
       if (is_stated) seen.as.sighting.bearing_sigma_rad = 0.005, seen.as.sighting.range_sigma_m = 0.02;
-      TEST_ASSERT_EQUAL(WM_OK, slam->correct(state, &seen, out, WM_INNOVATIONS_PER_EVENT_MAX, &count));
+      feed(seen);
     }
-    const wm::arc a =
-        wm::make_arc((v + 0.1 * wm_random_next_normal(&noise)) * dt,
-                     w * dt + motion.noise_yaw_rate_radps * std::sqrt(dt) * wm_random_next_normal(&noise));
-    truth = wm::compose(truth, {a.x_m, a.y_m, a.turn_rad});
+    const double drifted = v + gauss(0.1);
+    go_on(drifted, w + gauss(motion.noise_yaw_rate_radps) / std::sqrt(dt), dt);
   }
-  wm_calibration_value values[64];
-  const size_t n = slam->calibration(state, values, 64);
-  found out{};
-  for (size_t i = 0; i < n; i++) {
-    if (std::strcmp(values[i].name, "motion.speed_scale") == 0) {
-      out.speed = values[i].value;
-      out.speed_sigma = values[i].sigma;
-    }
-    if (std::strcmp(values[i].name, "camera.range_scale") == 0) out.range = values[i].value;
-    if (std::strcmp(values[i].name, "camera.depth_axis_rad") == 0) {
-      out.axis = values[i].value;
-      out.axis_sigma = values[i].sigma;
-    }
-  }
-  return out;
+  const wm_calibration_value speed = calibrated("motion.speed_scale"), axis = calibrated("camera.depth_axis_rad");
+  return {speed.value, speed.sigma, value_of("camera.range_scale"), axis.value, axis.sigma};
 }
 
 // GIVEN a speed and ranges whose scales are known to 5 % each WHEN the map is driven through for minutes THEN only
@@ -168,17 +123,14 @@ worn drive_under_prints() {
   const double v = 0.4, w = 0.2, dt = 0.02, rolls[2] = {1.02, 1.01};
   setup.wheels = {0.1, 100000, 0.5, NAN, NAN, NAN, 0, {}, {}};
   setup.start = {WM_TIME_NONE, {2, 0, 0}, {0, 0, 0, 1}, wm::kHalfPi, 0.01, 0.01};
-  std::free(state);
-  state = make::begun(*slam, &params, setup);
-  TEST_ASSERT_NOT_NULL(state);
-  wm_random noise = {5, 1, 0};
-  wm_pose2 truth = {2, 0, wm::kHalfPi};
+  begin();
+  noise = {5, 1, 0};
+  truth = {2, 0, wm::kHalfPi};
   double turns[2] = {0.0, 0.0};
   for (int step = 0; step < 6000; step++) {
     const double ticks = 100000 / (wm::kTwoPi * 0.1);
-    const wm_event e = make::quantities(step * dt, {{WM_Q_WHEEL_TICKS_LEFT, std::floor(turns[0] * ticks)},
-                                                    {WM_Q_WHEEL_TICKS_RIGHT, std::floor(turns[1] * ticks)}});
-    TEST_ASSERT_EQUAL(WM_OK, slam->predict(state, &e));
+    feed(make::quantities(step * dt, {{WM_Q_WHEEL_TICKS_LEFT, std::floor(turns[0] * ticks)},
+                                      {WM_Q_WHEEL_TICKS_RIGHT, std::floor(turns[1] * ticks)}}));
     for (int i = 0; step % 5 == 0 && i < kCount; i++) {
       const wm::sin_cos at = wm::sincos(wm::kTwoPi * i / kCount), h = wm::sincos(truth.heading_rad);
       const double dx = (1.5 + i % 3) * at.cos - truth.x_m, dy = (1.5 + i % 3) * at.sin - truth.y_m;
@@ -186,29 +138,18 @@ worn drive_under_prints() {
       wm_event seen = make::empty(step * dt, WM_EVENT_MARKER);
       wm_marker &m = seen.as.marker;
       m.id = i;
-      m.p_m[0] = h.cos * dx + h.sin * dy + 0.012 + 0.0045 * wm_random_next_normal(&noise);
-      m.p_m[1] = h.cos * dy - h.sin * dx + 0.0045 * wm_random_next_normal(&noise);
+      m.p_m[0] = h.cos * dx + h.sin * dy + 0.012 + gauss(0.0045);
+      m.p_m[1] = h.cos * dy - h.sin * dx + gauss(0.0045);
       m.p_m[2] = 2.0;
       m.along_sigma_m = m.yaw_sigma_rad = m.bloom_px = NAN;
-      m.yaw_rad = wm::wrap(0.3 * i - truth.heading_rad + 0.009 * wm_random_next_normal(&noise));
-      wm_innovation out[WM_INNOVATIONS_PER_EVENT_MAX];
-      size_t count = 0;
-      TEST_ASSERT_EQUAL(WM_OK, slam->correct(state, &seen, out, WM_INNOVATIONS_PER_EVENT_MAX, &count));
+      m.yaw_rad = wm::wrap(0.3 * i - truth.heading_rad + gauss(0.009));
+      feed(seen);
     }
-    const wm::arc a = wm::make_arc(v * dt, w * dt);
-    truth = wm::compose(truth, {a.x_m, a.y_m, a.turn_rad});
+    go_on(v, w, dt);
     for (int side = 0; side < 2; side++) turns[side] += dt * (v + (side == 0 ? -0.25 : 0.25) * w) / rolls[side];
   }
-  wm_calibration_value values[64];
-  worn out{};
-  for (size_t i = 0, n = slam->calibration(state, values, 64); i < n; i++) {
-    const auto is = [&](const char *name) { return std::strcmp(values[i].name, name) == 0; };
-    if (is("camera.range_scale")) out.range = values[i].value;
-    if (is("motion.left_scale")) out.left = values[i].value;
-    if (is("motion.right_scale")) out.right = values[i].value;
-    if (is("motion.track_scale")) out.track = values[i].value;
-  }
-  return out;
+  return {value_of("camera.range_scale"), value_of("motion.left_scale"), value_of("motion.right_scale"),
+          value_of("motion.track_scale")};
 }
 
 // GIVEN wheels known to 2 % and prints to 0.3 %, and sightings worse than they are told WHEN it is driven round and
@@ -240,8 +181,14 @@ TEST(test_the_axis_of_depth_is_found) {
 
 }  // namespace
 
-void setUp(void) { make_room(); }
-void tearDown(void) {
-  std::free(state);
-  state = nullptr;
+void setUp(void) {
+  prepare("slam", &params, make::sensor("camera", 0.005, 0.02));
+  start_at({3, 0, wm::kHalfPi}, 0.05, 0.05);
+  motion.states.sigma[0] = kPrior;  // speed_scale
+  make::sightings.states.sigma[WM_SENSOR_ROW_kRangeScale] = kPrior;
+  make::sightings.states.sigma[WM_SENSOR_ROW_kYaw] = 0.05;
+  motion.noise_yaw_rate_radps = 0.03;
+  sensor.range_is_depth = 1;
+  range_factor = 1.0;
+  is_stated = has_covariance = has_wheels = false;
 }
