@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Twists that are commands: response, onset, gentle turns, what a change leaves unsure.
-#include "common/suite.h"
 #include "motion_fixture.hpp"
 
 namespace {
@@ -8,7 +7,7 @@ namespace {
 // Commands: y' = (c - y) / response, however the time is cut.
 void start_commands(double response_s, double delay_sigma_s) {
   start(make::no_wheels());
-  params.noise_speed_mps = params.noise_speed_rel = params.noise_yaw_rate_radps = params.noise_yaw_rate_rel = 0;
+  without_noise_of_rates();
   params.noise_hold_mps2 = params.noise_hold_radps2 = 0;
   params.twist = WM_TWIST_COMMANDS;
   params.commands_response_s = response_s;

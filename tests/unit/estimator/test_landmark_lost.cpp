@@ -103,62 +103,6 @@ TEST(test_bearings_that_say_nothing_give_no_pose) {
 
 // ---- witnesses ----
 
-// GIVEN a landmark that contradicts WHEN it is seen again after 9 s, as likely here as anywhere THEN of the old
-// contradiction exp(-3) is left.
-TEST(test_an_old_contradiction_is_forgotten) {
-  wm::landmark_evidence evidence;
-  const double prior = -3.0;
-  evidence.begin(prior);
-  wm::landmark_record record{};
-  for (int i = 0; i <= 20; i++) evidence.note(make::at(0.4 * i), 1, 1.6, 0.5, 5.0, &record);
-  TEST_ASSERT_GREATER_THAN_DOUBLE(prior + 2.5, evidence.log_odds());
-  evidence.note(make::at(17.0), 1, 0.0, 0.0, 0.0, &record);
-  TEST_ASSERT_LESS_THAN_DOUBLE(prior + 0.45, evidence.log_odds());
-  TEST_ASSERT_GREATER_THAN_DOUBLE(prior + 0.1, evidence.log_odds());
-}
-
-// GIVEN positions that contradict the pose WHEN they do so for twenty seconds THEN that is no multipath, which passes
-// in five: they count more than the one wrong position in twenty by which a single one is explained.
-TEST(test_positions_that_contradict_for_long_are_no_multipath) {
-  wm::landmark_evidence evidence;
-  const double prior = -3.0, by_multipath = std::log(1.0 / 0.05);
-  evidence.begin(prior);
-  for (int i = 0; i <= 20; i++) {
-    evidence.note(make::at(i), wm::kPositionKey, wm::landmark_evidence::max_log_bayes_factor(), NAN, 9.0, nullptr);
-    if (i < 3) TEST_ASSERT_LESS_THAN_DOUBLE(by_multipath, evidence.log_odds() - prior);
-  }
-  TEST_ASSERT_GREATER_THAN_DOUBLE(by_multipath + 1.0, evidence.log_odds() - prior);
-}
-
-// Landmarks of which the first `off`, or the last ones, have innovations with this mean.
-bool mean_contradicts(int off, int count, bool last = false, double sigmas = 2.0) {
-  wm_monitor_landmarks seen;
-  wm::landmark_bias_clear(&seen);
-  for (int k = 0; k < 100; k++)
-    for (int id = 0; id < count; id++) {
-      wm_innovation i{};
-      i.t_ns = make::at(0.1 * k);
-      i.landmark_id = id;
-      i.residual = WM_RESIDUAL_RANGE;
-      i.variance = 1.0;
-      i.observed = (last ? count - 1 - id : id) < off ? sigmas : k % 2 ? 0.5 : -0.5;
-      wm::landmark_bias_take(&seen, i);
-    }
-  wm::landmark_bias_test(&seen, make::at(10.0));
-  return wm::landmark_bias_contradicts(seen);
-}
-
-// The worst landmark may have moved, whichever it is; a second one whose innovations have a mean contradicts. Of one
-// alone nothing is left. What was tested before is of no effect.
-TEST(test_the_worst_landmark_is_left_out) {
-  for (int off = 0; off <= 3; off++)
-    for (int count = 1; count <= 3; count++) {
-      TEST_ASSERT_TRUE(mean_contradicts(5, 5, false, 3.0));
-      TEST_ASSERT_EQUAL(std::fmin(off, count) >= 2, mean_contradicts(off, count));
-      TEST_ASSERT_EQUAL(std::fmin(off, count) >= 2, mean_contradicts(off, count, true));
-    }
-}
-
 // GIVEN three landmarks WHEN so many others come that there is no room for all THEN those not seen for longest make
 // room.
 TEST(test_landmarks_not_seen_for_longest_make_room) {
@@ -179,71 +123,6 @@ TEST(test_landmarks_not_seen_for_longest_make_room) {
     for (uint32_t k = 0; k < seen.count; k++) kept += seen.entries[k].id < old;
     TEST_ASSERT_EQUAL(WM_MONITOR_LANDMARKS, seen.count);
     TEST_ASSERT_EQUAL(WM_MONITOR_LANDMARKS - later, kept);
-  }
-}
-
-TEST(test_one_that_contradicts_has_moved_and_many_mean_lost) {
-  wm::landmark_record record[kLandmarks] = {};
-  wm::landmark_evidence w;
-  std::memset(static_cast<void *>(&w), 0, sizeof w);
-  w.begin(-2.5);
-  const double fits = wm::landmark_evidence::log_bayes_factor(20.0, wm::kTwoPi),
-               contradicts = wm::landmark_evidence::max_log_bayes_factor();
-  int step = 0;
-  const auto look = [&](int wrong, int count) {
-    for (int k = 0; k < 40; k++, step++)
-      for (int i = 0; i < count; i++)
-        w.note(wm_ns_from_seconds(0.1 * step), i, i < wrong ? contradicts : fits, i < wrong ? 1.0 : 0.0,
-               i < wrong ? 50.0 : 0.0, record + i);
-  };
-  look(1, 4);
-  TEST_ASSERT_TRUE(w.moved(0));
-  TEST_ASSERT_FALSE(w.moved(1));
-  TEST_ASSERT_TRUE(w.fits());
-  look(4, 4);
-  TEST_ASSERT_TRUE(w.contradicted());
-  TEST_ASSERT_GREATER_THAN_DOUBLE(0.9, w.probability());
-}
-
-// Of two landmarks one fits and one doesn't, again and again: whoever stated the pose is as likely to be right as the
-// map and the picture. Two that don't fit are enough.
-TEST(test_one_against_one_is_doubt_not_lost) {
-  const double fits = wm::landmark_evidence::log_bayes_factor(20.0, wm::kTwoPi),
-               contradicts = wm::landmark_evidence::max_log_bayes_factor();
-  for (const int wrong : {1, 2}) {
-    wm::landmark_record record[3] = {};
-    wm::landmark_evidence w;
-    std::memset(static_cast<void *>(&w), 0, sizeof w);
-    w.begin(-2.5);
-    for (int step = 0; step < 30; step++)
-      for (int i = 0; i <= wrong; i++)
-        w.note(wm_ns_from_seconds(0.1 * step), i, i == 0 ? fits : contradicts, i == 0 ? 0.0 : 1.0, i == 0 ? 0.0 : 50.0,
-               record + i);
-    TEST_ASSERT_EQUAL(wrong == 2, w.contradicted());
-    TEST_ASSERT_TRUE(w.doubtful());
-  }
-}
-
-// Detections of nothing, 30 degrees apart, of three landmarks out of view, while one in view fits: not lost. The same
-// misfits all in one place: lost, whatever the one that fits says.
-TEST(test_misfits_that_scatter_say_nothing_those_in_one_place_do) {
-  const double fits = wm::landmark_evidence::log_bayes_factor(20.0, wm::kTwoPi),
-               contradicts = wm::landmark_evidence::max_log_bayes_factor();
-  for (const bool scattered : {true, false}) {
-    wm::landmark_record record[4] = {};
-    wm::landmark_evidence w;
-    std::memset(static_cast<void *>(&w), 0, sizeof w);
-    w.begin(-2.5);
-    for (int step = 0; step < 100; step++) {
-      const wm_time_ns t_ns = wm_ns_from_seconds(0.1 * step);
-      w.note(t_ns, 0, fits, 0.0, 0.0, record);
-      const double angle_rad = scattered ? wm::wrap(2.1 * step) : 1.0;
-      for (int i = 1; i < 4; i++)
-        if (step > 30) w.note(t_ns, i, contradicts, angle_rad, 50.0, record + i);
-      if (scattered) TEST_ASSERT_FALSE(w.contradicted());
-    }
-    TEST_ASSERT_EQUAL(!scattered, w.contradicted());
-    TEST_ASSERT_FALSE(w.moved(1));
   }
 }
 

@@ -1,16 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The motion front end: models and their derivatives, ticks as positions, signs by the gear, standstill, dead sensors.
-#include "common/suite.h"
-
 #include "motion_fixture.hpp"
 
 namespace {
-
-void ticks(double t_s, double left, double right) {
-  feed(make::quantities(t_s, {{WM_Q_WHEEL_TICKS_LEFT, left}, {WM_Q_WHEEL_TICKS_RIGHT, right}}));
-}
-
-constexpr double kTick = 2 * M_PI * 0.1 / 1000;  // of make::two_wheels()
 
 // Each model, each calibration state: derivative by central differences, and scales' meaning at a turn.
 TEST(test_every_derivative_of_every_model) {
@@ -96,8 +88,7 @@ TEST(test_a_count_right_behind_another_event_is_no_doubt) {
     for (int i = 0; i <= 50; i++) {
       const double stamp_s = 0.02 * i;
       if (behind && i == 40) advance(stamp_s - 2e-9);
-      const double count = (0.01 * i - (i == 40 ? 0.003 : 0.0)) / kTick;
-      ticks(stamp_s, count, count);
+      rolled(stamp_s, 0.01 * i - (i == 40 ? 0.003 : 0.0));
     }
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.5, pose.x_m);
     if (!behind) plain = side_var;
@@ -111,14 +102,13 @@ TEST(test_a_count_right_behind_another_event_is_no_doubt) {
 TEST(test_a_late_count_and_the_next_right_behind_it) {
   for (const double behind_s : {0.0012, 0.00015}) {
     start(make::two_wheels());
-    const double each = 0.06 / kTick;  // 3 m/s
-    for (int i = 0; i <= 50; i++) ticks(0.02 * i, each * i, each * i);
-    ticks(1.04 - behind_s, 51 * each, 51 * each);
-    ticks(1.04, 52 * each, 52 * each);
+    for (int i = 0; i <= 50; i++) rolled(0.02 * i, 0.06 * i);  // 3 m/s
+    rolled(1.04 - behind_s, 51 * 0.06);
+    rolled(1.04, 52 * 0.06);
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, 3.12, pose.x_m);
     advance(1.0599);
     TEST_ASSERT_DOUBLE_WITHIN(0.005, 3.0 * 1.0599, pose.x_m);
-    ticks(1.06, 53 * each, 53 * each);
+    rolled(1.06, 53 * 0.06);
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, 3.18, pose.x_m);
   }
 }
@@ -137,13 +127,13 @@ TEST(test_counts_of_both_wheels_may_come_one_after_the_other) {
 TEST(test_an_unsigned_speed_takes_its_sign_from_the_gear) {
   start(make::car());
   feed(make::quantities(0, {{WM_Q_GEAR, -1}, {WM_Q_VEHICLE_SPEED, 1.0}, {WM_Q_YAW_RATE, 0.0}}));
-  feed(make::quantities(1, {{WM_Q_VEHICLE_SPEED, 1.0}, {WM_Q_YAW_RATE, 0.0}}));
+  speed_and_gyro(1, 1.0, 0.0);
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, -1.0, pose.x_m);
   feed(make::quantities(1, {{WM_Q_GEAR, 1}, {WM_Q_VEHICLE_SPEED, 1.0}}));
-  feed(make::quantities(2, {{WM_Q_VEHICLE_SPEED, -1.0}}));  // so it has a sign of its own
+  speed(2, -1.0);  // so it has a sign of its own
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.0, pose.x_m);
   feed(make::quantities(2, {{WM_Q_GEAR, -1}}));
-  feed(make::quantities(3, {{WM_Q_VEHICLE_SPEED, -1.0}}));
+  speed(3, -1.0);
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, -1.0, pose.x_m);
 }
 
@@ -153,34 +143,22 @@ TEST(test_a_zero_error_is_no_sign) {
     start(make::car());
     feed(make::quantities(0, {{WM_Q_GEAR, 1}, {WM_Q_VEHICLE_SPEED, zero_mps}, {WM_Q_YAW_RATE, 0.0}}));
     feed(make::quantities(1, {{WM_Q_GEAR, -1}, {WM_Q_VEHICLE_SPEED, 1.0}}));
-    TEST_ASSERT_DOUBLE_WITHIN(1e-9, zero_mps < -0.1 ? 1.0 : -1.0, front.twist_at(make::at(1), calibration).v);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, zero_mps < -0.1 ? 1.0 : -1.0, speed_at(1));
   }
-}
-
-// Noise of the steering angle alone: the variance of the turn is that of the derivative by the angle.
-TEST(test_steering_noise_by_the_angles_derivative) {
-  start(make::car());
-  params.noise_speed_mps = params.noise_speed_rel = params.noise_yaw_rate_radps = params.noise_yaw_rate_rel = 0;
-  const double angle = 0.6, h = 1e-6;
-  feed(make::quantities(0, {{WM_Q_VEHICLE_SPEED, 2.0}, {WM_Q_ROAD_WHEEL, angle}}));
-  feed(make::quantities(0.2, {{WM_Q_VEHICLE_SPEED, 2.0}, {WM_Q_ROAD_WHEEL, angle}}));
-  const double by_angle = 2.0 * (std::tan(angle + h) - std::tan(angle - h)) / (2 * h) / wheels.wheelbase_m;
-  TEST_ASSERT_DOUBLE_WITHIN(1e-9, by_angle * by_angle * params.noise_steering_rad * params.noise_steering_rad * 0.2,
-                            turn_var);
 }
 
 TEST(test_rear_wheels_are_preferred_and_a_silent_source_yields) {
   start(make::car());
-  feed(make::quantities(0, {{WM_Q_VEHICLE_SPEED, 1.0}, {WM_Q_YAW_RATE, 0.0}}));
+  speed_and_gyro(0, 1.0, 0.0);
   TEST_ASSERT_FALSE(front.speed_source_changed());
   feed(make::quantities(0, {{WM_Q_WHEEL_SPEED_REAR_LEFT, 1.9}, {WM_Q_WHEEL_SPEED_REAR_RIGHT, 2.1}}));
   TEST_ASSERT_TRUE(front.speed_source_changed());
   TEST_ASSERT_FALSE(front.speed_source_changed());
-  feed(make::quantities(1, {{WM_Q_VEHICLE_SPEED, 1.0}}));
+  speed(1, 1.0);
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 2.0, pose.x_m);
-  for (int i = 11; i <= 100; i++) feed(make::quantities(0.1 * i, {{WM_Q_VEHICLE_SPEED, 1.0}, {WM_Q_YAW_RATE, 0.0}}));
+  for (int i = 11; i <= 100; i++) speed_and_gyro(0.1 * i, 1.0, 0.0);
   TEST_ASSERT_TRUE(front.speed_source_changed());
-  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1.0, front.twist_at(make::at(10.0), calibration).v);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1.0, speed_at(10.0));
 }
 
 // A speed that is overdue holds, and its way's variance is that of a robot that may have braked, however often it is
@@ -189,8 +167,8 @@ TEST(test_a_held_speed_is_doubted_more_and_more) {
   double grown[2];
   for (int steps : {1, 7}) {
     start(make::car());
-    params.noise_speed_mps = params.noise_speed_rel = params.noise_yaw_rate_radps = params.noise_yaw_rate_rel = 0;
-    for (int i = 0; i <= 10; i++) feed(make::quantities(0.1 * i, {{WM_Q_VEHICLE_SPEED, 1.0}, {WM_Q_YAW_RATE, 0.0}}));
+    without_noise_of_rates();
+    for (int i = 0; i <= 10; i++) speed_and_gyro(0.1 * i, 1.0, 0.0);
     advance(1.29);
     TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0, way_var);
     for (int i = 1; i <= steps; i++) advance(1.29 + (2.3 - 1.29) * i / steps);
@@ -202,7 +180,7 @@ TEST(test_a_held_speed_is_doubted_more_and_more) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, grown[0], grown[1]);
   start(make::car());
   params.noise_speed_mps = params.noise_speed_rel = 0;
-  for (int i = 0; i <= 10; i++) feed(make::quantities(i, {{WM_Q_VEHICLE_SPEED, 1.0}, {WM_Q_YAW_RATE, 0.0}}));
+  for (int i = 0; i <= 10; i++) speed_and_gyro(i, 1.0, 0.0);
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0, way_var - 0.25 * 0.75 * 0.75 * 0.75 * 0.75);  // the first one's habit isn't known
 }
 
@@ -211,7 +189,7 @@ TEST(test_a_held_speed_is_doubted_more_and_more) {
 TEST(test_a_change_between_samples_is_noise_of_its_moment) {
   for (const int model : {WM_MOTION_SPEED_YAW_RATE, WM_MOTION_TWIST}) {
     start(make::car(), model);
-    params.noise_speed_mps = params.noise_speed_rel = params.noise_yaw_rate_radps = params.noise_yaw_rate_rel = 0;
+    without_noise_of_rates();
     params.twist = WM_TWIST_MEASURED;
     for (int i = 0; i <= 10; i++) {
       const double v = i < 5 ? 1.0 : 3.0, w = i < 7 ? 0.2 : -0.4;
@@ -238,13 +216,12 @@ TEST(test_a_change_between_samples_is_noise_of_its_moment) {
 
 // The counts of so many steps of 20 ms at 1 m/s.
 double counts_of(int steps) { return 0.02 / kTick * steps; }
-void gyro(double t_s) { feed(make::quantities(t_s, {{WM_Q_YAW_RATE, 0.0}})); }
 
 // A second of driving straight on, by counts and a gyro.
 void drive_a_second(int model) {
   start(make::two_wheels(), model);
   for (int i = 0; i <= 50; i++) {
-    gyro(0.02 * i);
+    gyro(0.02 * i, 0.0);
     ticks(0.02 * i, counts_of(i), counts_of(i));
   }
 }
@@ -260,10 +237,10 @@ TEST(test_counts_after_a_silence) {
         if (looked) advance(4.97);
         const double before_m = pose.x_m;
         if (looked) TEST_ASSERT_GREATER_THAN_DOUBLE(0.5, way_var);
-        if (gyro_first) gyro(4.98);
+        if (gyro_first) gyro(4.98, 0.0);
         for (int i = 250; i <= 300; i++) {
           ticks(0.02 * i, counts_of(i), counts_of(i));
-          gyro(0.02 * i + 0.01);
+          gyro(0.02 * i + 0.01, 0.0);
         }
         TEST_ASSERT_DOUBLE_WITHIN(looked ? 0.04 : 1e-9, looked ? before_m + 1.04 : 6.01, pose.x_m);
         if (looked || model != WM_MOTION_TICKS) TEST_ASSERT_GREATER_THAN_DOUBLE(0.25, turn_var - still_var);
@@ -289,7 +266,7 @@ TEST(test_counts_that_may_have_wrapped) {
       const double x_m = pose.x_m, heading_rad = pose.heading_rad, before_m2 = way_var;
       for (int i = 1; i <= 50; i++) {
         ticks(11.0 + 0.02 * i, 1234.0 + counts_of(i), 9876.0 + counts_of(i));
-        gyro(11.0 + 0.02 * i);
+        gyro(11.0 + 0.02 * i, 0.0);
       }
       TEST_ASSERT_DOUBLE_WITHIN(1e-9, x_m + 1.0, pose.x_m);
       TEST_ASSERT_DOUBLE_WITHIN(1e-9, heading_rad, pose.heading_rad);
@@ -302,7 +279,7 @@ TEST(test_counts_that_may_have_wrapped) {
 TEST(test_an_unknown_motion_begins_at_the_last_correction) {
   start(make::car());
   params.noise_speed_mps = params.noise_speed_rel = 0;
-  for (int i = 0; i <= 10; i++) feed(make::quantities(0.1 * i, {{WM_Q_VEHICLE_SPEED, 1.5}, {WM_Q_YAW_RATE, 0.0}}));
+  for (int i = 0; i <= 10; i++) speed_and_gyro(0.1 * i, 1.5, 0.0);
   advance(3.0);
   for (int i = 1; i <= 60; i++) {  // as a filter that is not corrected
     front.set_position_variance(way_var + side_var);
@@ -329,15 +306,15 @@ TEST(test_ackermann_by_table_ratio_and_road_wheel) {
 TEST(test_standing_still_shows_the_gyros_bias_and_holds_the_heading) {
   start(make::car());
   double rate;
-  feed(make::quantities(0, {{WM_Q_VEHICLE_SPEED, 0.0}, {WM_Q_YAW_RATE, 0.01}}));
+  speed_and_gyro(0, 0.0, 0.01);
   TEST_ASSERT_FALSE(front.standstill_yaw_rate(&rate));
-  feed(make::quantities(1, {{WM_Q_VEHICLE_SPEED, 0.0}, {WM_Q_YAW_RATE, 0.012}}));
+  speed_and_gyro(1, 0.0, 0.012);
   TEST_ASSERT_TRUE(front.standstill_yaw_rate(&rate));
   TEST_ASSERT_EQUAL_DOUBLE(0.012, rate);
   const double heading = pose.heading_rad;
-  feed(make::quantities(2, {{WM_Q_VEHICLE_SPEED, 0.0}, {WM_Q_YAW_RATE, 0.01}}));
+  speed_and_gyro(2, 0.0, 0.01);
   TEST_ASSERT_EQUAL_DOUBLE(heading, pose.heading_rad);
-  feed(make::quantities(2.1, {{WM_Q_VEHICLE_SPEED, 0.5}, {WM_Q_YAW_RATE, 0.01}}));
+  speed_and_gyro(2.1, 0.5, 0.01);
   TEST_ASSERT_FALSE(front.standstill_yaw_rate(&rate));
 }
 
@@ -387,7 +364,7 @@ TEST(test_a_dead_encoder_is_noticed_and_not_taken_for_a_turn) {
 TEST(test_a_frozen_counter_is_doubt_not_standstill) {
   start(make::car());
   double rate;
-  for (int i = 0; i < 10; i++) feed(make::quantities(0.1 * i, {{WM_Q_VEHICLE_SPEED, 5.0}, {WM_Q_YAW_RATE, 0.0}}));
+  for (int i = 0; i < 10; i++) speed_and_gyro(0.1 * i, 5.0, 0.0);
   const double before = way_var;
   for (int i = 10; i < 20; i++) {
     wm_event e = make::quantities(0.1 * i, {{WM_Q_VEHICLE_SPEED, 0.0}, {WM_Q_YAW_RATE, 0.0}});
@@ -395,10 +372,10 @@ TEST(test_a_frozen_counter_is_doubt_not_standstill) {
     feed(e);
     TEST_ASSERT_FALSE(front.standstill_yaw_rate(&rate));
   }
-  TEST_ASSERT_TRUE(front.health() & WM_MOTION_HEALTH_COUNTER_FROZEN);
+  TEST_ASSERT_TRUE(has_health(WM_MOTION_HEALTH_COUNTER_FROZEN));
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 5.0 * 1.9, pose.x_m);
   TEST_ASSERT_GREATER_THAN_DOUBLE(10.0, way_var - before);
-  feed(make::quantities(2.0, {{WM_Q_VEHICLE_SPEED, 5.0}, {WM_Q_YAW_RATE, 0.0}}));
+  speed_and_gyro(2.0, 5.0, 0.0);
   TEST_ASSERT_EQUAL_UINT32(0, front.health());
 }
 
@@ -427,11 +404,11 @@ TEST(test_a_refused_speed_that_falls_silent_is_silent) {
   double held[2], grown[2];
   for (const bool wrong : {false, true}) {
     start(make::no_wheels());
-    for (int i = 0; i <= 50; i++) feed(make::quantities(0.02 * i, {{WM_Q_VEHICLE_SPEED, 3.0}, {WM_Q_YAW_RATE, 0.1}}));
-    if (wrong) feed(make::quantities(1.01, {{WM_Q_VEHICLE_SPEED, 138.0}}));
+    for (int i = 0; i <= 50; i++) speed_and_gyro(0.02 * i, 3.0, 0.1);
+    if (wrong) speed(1.01, 138.0);
     double before = 0.0;
     for (int i = 51; i <= 300; i++) {
-      feed(make::quantities(0.02 * i, {{WM_Q_YAW_RATE, 0.1}}));
+      gyro(0.02 * i, 0.1);
       if (i == 60) held[wrong] = way_var;
       if (i == 200) before = way_var;
     }
@@ -448,28 +425,27 @@ TEST(test_samples_that_agree_replace_the_trusted_ones) {
   start(make::no_wheels());
   feed(make::twist(0.0, 138.0, 0.0));
   for (int i = 1; i <= 3; i++) feed(make::twist(0.025 * i, 3.0, 0.0));
-  TEST_ASSERT_EQUAL_DOUBLE(3.0, front.twist_at(make::at(0.08), calibration).v);
+  TEST_ASSERT_EQUAL_DOUBLE(3.0, speed_at(0.08));
   for (int i = 4; i <= 80; i++) feed(make::twist(0.025 * i, 3.0, 0.0));
   for (int i = 81; i <= 100; i++) feed(make::twist(0.025 * i, 30.0, 0.0));
-  TEST_ASSERT_EQUAL_DOUBLE(3.0, front.twist_at(make::at(2.5), calibration).v);
+  TEST_ASSERT_EQUAL_DOUBLE(3.0, speed_at(2.5));
   for (int i = 101; i <= 122; i++) feed(make::twist(0.025 * i, 30.0, 0.0));
-  TEST_ASSERT_EQUAL_DOUBLE(30.0, front.twist_at(make::at(3.06), calibration).v);
+  TEST_ASSERT_EQUAL_DOUBLE(30.0, speed_at(3.06));
   start(make::no_wheels());
   params.limits_mps2 = 0.0;
   feed(make::twist(0.0, 3.0, 0.0));
   feed(make::twist(0.1, 30.0, 0.0));
-  TEST_ASSERT_EQUAL_DOUBLE(30.0, front.twist_at(make::at(0.1), calibration).v);
+  TEST_ASSERT_EQUAL_DOUBLE(30.0, speed_at(0.1));
 }
 
 // A count is off by a step / sqrt(12): the mean of both wheels' differences over a period, and their difference over
 // the track.
 TEST(test_noise_of_counts) {
-  const double each = 0.02 / kTick;
   double speed_mps, turn_radps;
   start(make::two_wheels());
   front.count_noise(&speed_mps, &turn_radps);
   TEST_ASSERT_EQUAL_DOUBLE(0.0, speed_mps);
-  for (int i = 0; i <= 50; i++) ticks(0.02 * i, each * i, each * i);
+  for (int i = 0; i <= 50; i++) rolled(0.02 * i, 0.02 * i);
   front.count_noise(&speed_mps, &turn_radps);
   const double expected = kTick / (0.02 * std::sqrt(12.0));
   TEST_ASSERT_DOUBLE_WITHIN(0.01 * expected, expected, speed_mps);
@@ -479,15 +455,13 @@ TEST(test_noise_of_counts) {
 // GIVEN counts each 20 ms WHEN one message's are 0.7 m off THEN they are refused with noise, and nothing of the way is
 // lost; so, too, with a gyro. A jump of one wheel refuses the message's other one.
 TEST(test_a_wrong_count_is_refused) {
-  for (bool gyro : {false, true}) {
+  for (bool has_gyro : {false, true}) {
     start(make::two_wheels());
-    const double each = 0.02 / kTick;  // 1 m/s
-    double before = 0.0;
+      double before = 0.0;
     for (int i = 0; i <= 50; i++) {
-      const double wrong = i == 40 ? 0.7 / kTick : 0.0;
-      if (gyro) feed(make::quantities(0.02 * i - 1e-3, {{WM_Q_YAW_RATE, 0.0}}));
+      if (has_gyro) gyro(0.02 * i - 1e-3, 0.0);
       if (i == 40) before = way_var;
-      ticks(0.02 * i, each * i, each * i + wrong);
+      ticks(0.02 * i, counts_of(i), counts_of(i) + (i == 40 ? 0.7 / kTick : 0.0));
       if (i == 40) TEST_ASSERT_EQUAL_UINT32(WM_MOTION_HEALTH_IMPLAUSIBLE, front.health());
       if (i > 30) TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.02 * i, pose.x_m);
       TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.0, pose.heading_rad);
@@ -500,10 +474,9 @@ TEST(test_a_wrong_count_is_refused) {
 // and the robot drove on meanwhile.
 TEST(test_counts_that_go_on_from_elsewhere_are_a_new_start) {
   start(make::two_wheels());
-  const double each = 0.02 / kTick;  // 1 m/s
-  for (int i = 0; i <= 100; i++) ticks(0.02 * i, each * (i - (i >= 50 ? 50 : 0)), each * (i - (i >= 50 ? 50 : 0)));
+  for (int i = 0; i <= 100; i++) rolled(0.02 * i, 0.02 * (i - (i >= 50 ? 50 : 0)));
   TEST_ASSERT_DOUBLE_WITHIN(1e-6, 2.0, pose.x_m);
-  TEST_ASSERT_DOUBLE_WITHIN(1e-6, 1.0, front.twist_at(make::at(2.0), calibration).v);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-6, 1.0, speed_at(2.0));
 }
 
 // GIVEN counts each 20 ms WHEN a message's counter claims that frames were lost THEN its jump of 6 cm is
@@ -538,23 +511,9 @@ TEST(test_a_stuck_yaw_rate_is_noticed_where_the_steering_turns) {
   start(make::car());
   for (int i = 0; i <= 60; i++)
     feed(make::quantities(0.1 * i, {{WM_Q_VEHICLE_SPEED, 5.0}, {WM_Q_YAW_RATE, 0.01}, {WM_Q_ROAD_WHEEL, 0.004 * i}}));
-  TEST_ASSERT_TRUE(front.health() & WM_MOTION_HEALTH_YAW_RATE_STUCK);
-  feed(make::quantities(6.1, {{WM_Q_VEHICLE_SPEED, 5.0}, {WM_Q_YAW_RATE, 0.3}}));
+  TEST_ASSERT_TRUE(has_health(WM_MOTION_HEALTH_YAW_RATE_STUCK));
+  speed_and_gyro(6.1, 5.0, 0.3);
   TEST_ASSERT_EQUAL_UINT32(0, front.health());
-}
-
-TEST(test_what_can_not_be_is_refused) {
-  start(make::car());
-  feed(make::twist(1, 1, 0));
-  TEST_ASSERT_EQUAL(WM_NOT_FINITE, front.check(make::twist(2, NAN, 0)));
-  TEST_ASSERT_EQUAL(WM_NOT_FINITE, front.check(make::quantities(2, {{WM_Q_YAW_RATE, INFINITY}})));
-  TEST_ASSERT_EQUAL(WM_OUT_OF_RANGE, front.check(make::twist(2, 1e6, 0)));
-  TEST_ASSERT_EQUAL(WM_OUT_OF_RANGE, front.check(make::quantities(2, {{WM_Q_YAW_RATE, 1e3}})));
-  TEST_ASSERT_EQUAL(WM_TIME_RAN_BACK, front.check(make::twist(0.5, 1, 0)));
-  TEST_ASSERT_EQUAL(WM_UNSUPPORTED, front.check(make::heading(2, 0, 1)));
-  wm_event e = make::twist(2, 1, 0);
-  e.t_ns = INT64_MAX;
-  TEST_ASSERT_EQUAL(WM_OUT_OF_RANGE, front.check(e));
 }
 
 }  // namespace

@@ -1,17 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // The choice of the motion's model: by the data that come, and by what is known to be there before the drive. Factors
 // of its noise. Counts that come twice, and again after a silence.
-#include "common/suite.h"
-#include "events.hpp"
-#include "math/arc.hpp"
-#include "motion/front_end.hpp"
+#include "motion_fixture.hpp"
 
 namespace {
 
 // Data that a model needs and that don't come are named before the drive; with all of them it drives (tests above).
 TEST(test_what_a_model_lacks) {
   const auto lacks = [](int model, const wm_wheels &w, uint32_t quantities, bool twists = false) {
-    wm_motion_params params;
     wm_params_defaults(&wm_motion_params_table, &params);
     params.model = model;
     const uint32_t kinds =
@@ -55,27 +51,16 @@ TEST(test_the_speed_of_front_wheels) {
   const double angle = 0.9, front_mps = 0.7, wheelbase_m = make::car().wheelbase_m;
   const double turn_radps = front_mps * std::sin(angle) / wheelbase_m;
   const auto pose_after = [](double mps, std::pair<wm_quantity, double> turn, int drive) {
-    wm_wheels w = make::car();
-    wm_motion_params params;
-    wm_params_defaults(&wm_motion_params_table, &params);
+    start(make::car());
     params.states.drive = drive;
-    wm::motion_front_end front;
-    front.init(&params, &w);
-    wm_pose2 pose{};
-    for (int k = 0; k <= 200; k++) {
-      front.feed(make::quantities(0.02 * k, {{WM_Q_WHEEL_SPEED_FRONT_LEFT, mps}, turn}));
-      front.advance(make::at(0.02 * k), wm::kNeutralCalibration,
-                    [&](const wm::motion_segment &s, const wm::motion_twist &t, const wm::motion_noise &) {
-                      const wm::arc a = wm::make_arc(t.v * s.dt_s, t.w * s.dt_s);
-                      pose = wm::compose(pose, {a.x_m, a.y_m, a.turn_rad});
-                    });
-    }
+    front.init(&params, &wheels);
+    for (int k = 0; k <= 200; k++) feed(make::quantities(0.02 * k, {{WM_Q_WHEEL_SPEED_FRONT_LEFT, mps}, turn}));
     return pose;
   };
-  const auto is_at = [](const wm_pose2 &pose, double v, double w) {
-    TEST_ASSERT_DOUBLE_WITHIN(1e-9, std::remainder(4 * w, 2 * M_PI), pose.heading_rad);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-9, v / w * std::sin(4 * w), pose.x_m);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-9, v / w * (1 - std::cos(4 * w)), pose.y_m);
+  const auto is_at = [](const wm_pose2 &at, double v, double w) {
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, std::remainder(4 * w, 2 * M_PI), at.heading_rad);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, v / w * std::sin(4 * w), at.x_m);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, v / w * (1 - std::cos(4 * w)), at.y_m);
   };
   for (const double sign : {1.0, -1.0}) {
     is_at(pose_after(sign * front_mps, {WM_Q_ROAD_WHEEL, angle}, WM_DRIVE_ROLLING), sign * front_mps * std::cos(angle),
@@ -87,98 +72,75 @@ TEST(test_the_speed_of_front_wheels) {
   is_at(pose_after(front_mps, {WM_Q_YAW_RATE, turn_radps}, WM_DRIVE_SKID_STEER), front_mps, turn_radps);
 }
 
-constexpr double kTick = 2 * M_PI * 0.1 / 1000;  // of make::two_wheels()
-
 // A robot with ticks whose right wheel is 4 % larger than its calibration, and a gyro that may fall silent.
-struct drive {
-  wm_motion_params params;
-  wm_wheels wheels = make::two_wheels();
-  wm::motion_front_end front;
-  wm_pose2 pose{};
-  int steps = 0;
-  double left = 0, right = 0;
+int steps;
+double left_ticks, right_ticks;
 
-  explicit drive(int model = WM_MOTION_AUTO) {
-    wm_params_defaults(&wm_motion_params_table, &params);
-    params.model = model;
-    front.init(&params, &wheels);
+void begin(int model = WM_MOTION_AUTO) {
+  start(make::two_wheels(), model);
+  steps = 0;
+  left_ticks = right_ticks = 0;
+}
+
+// At 0.5 m/s straight on; the right wheel's radius makes its counts a turn of 0.04 rad/s to the left.
+void go(double seconds, bool has_gyro) {
+  for (const int end = steps + (int)(50 * seconds); steps < end; steps++) {
+    left_ticks += 0.01 / kTick, right_ticks += 0.0104 / kTick;
+    ticks(0.02 * steps, left_ticks, right_ticks);
+    if (has_gyro) gyro(0.02 * steps + 0.005, steps % 2 ? 1e-6 : -1e-6);
   }
-  void feed(const wm_event &e) {
-    TEST_ASSERT_EQUAL(WM_OK, front.check(e));
-    front.feed(e);
-    advance(1e-9 * static_cast<double>(e.t_ns));
-  }
-  void advance(double t_s) {
-    front.advance(make::at(t_s), wm::kNeutralCalibration,
-                  [this](const wm::motion_segment &s, const wm::motion_twist &t, const wm::motion_noise &) {
-                    const wm::arc a = wm::make_arc(t.v * s.dt_s, t.w * s.dt_s);
-                    pose = wm::compose(pose, {a.x_m, a.y_m, a.turn_rad});
-                  });
-  }
-  // At 0.5 m/s straight on; the right wheel's radius makes its counts a turn of 0.04 rad/s to the left.
-  void go(double seconds, bool gyro, double gyro_noise_radps = 1e-6) {
-    for (const int end = steps + (int)(50 * seconds); steps < end; steps++) {
-      const double t = 0.02 * steps;
-      left += 0.01 / kTick, right += 0.0104 / kTick;
-      feed(make::quantities(t, {{WM_Q_WHEEL_TICKS_LEFT, left}, {WM_Q_WHEEL_TICKS_RIGHT, right}}));
-      if (gyro) feed(make::quantities(t + 0.005, {{WM_Q_YAW_RATE, steps % 2 ? gyro_noise_radps : -gyro_noise_radps}}));
-    }
-  }
-};
+}
 
 // GIVEN ticks and a gyro WHEN no model is configured THEN the way is the ticks' and the turn the gyro's.
 TEST(test_ticks_and_a_gyro_are_both_used) {
-  drive d;
-  d.go(10, true);
-  TEST_ASSERT_EQUAL(WM_MOTION_SPEED_YAW_RATE, d.front.model());
-  TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.0, d.pose.heading_rad);
-  TEST_ASSERT_DOUBLE_WITHIN(0.03, 0.5 * 10 * 1.02, d.pose.x_m);
-  drive without;
-  without.go(10, false);
-  TEST_ASSERT_EQUAL(WM_MOTION_TICKS, without.front.model());
-  TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.0004 / 0.02 / 0.5 * 10, without.pose.heading_rad);
+  begin();
+  go(10, true);
+  TEST_ASSERT_EQUAL(WM_MOTION_SPEED_YAW_RATE, front.model());
+  TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.0, pose.heading_rad);
+  TEST_ASSERT_DOUBLE_WITHIN(0.03, 0.5 * 10 * 1.02, pose.x_m);
+  begin();
+  go(10, false);
+  TEST_ASSERT_EQUAL(WM_MOTION_TICKS, front.model());
+  TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.0004 / 0.02 / 0.5 * 10, pose.heading_rad);
 }
 
 // GIVEN both WHEN the gyro falls silent THEN the wheels' difference turns on without a jump, and the gyro again later.
 TEST(test_a_silent_gyro_yields_to_the_ticks) {
-  drive d;
-  d.go(10, true);
-  d.go(10, false);
-  TEST_ASSERT_EQUAL(WM_MOTION_TICKS, d.front.model());
-  TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.04 * (10 - 0.25), d.pose.heading_rad);  // 0.25 s until it is overdue
-  const double way = std::sqrt(d.pose.x_m * d.pose.x_m + d.pose.y_m * d.pose.y_m);
+  begin();
+  go(10, true);
+  go(10, false);
+  TEST_ASSERT_EQUAL(WM_MOTION_TICKS, front.model());
+  TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.04 * (10 - 0.25), pose.heading_rad);  // 0.25 s until it is overdue
+  const double way = std::sqrt(pose.x_m * pose.x_m + pose.y_m * pose.y_m);
   TEST_ASSERT_DOUBLE_WITHIN(0.1, 0.5 * 20 * 1.02, way);
-  d.go(1, true);
-  TEST_ASSERT_EQUAL(WM_MOTION_SPEED_YAW_RATE, d.front.model());
+  go(1, true);
+  TEST_ASSERT_EQUAL(WM_MOTION_SPEED_YAW_RATE, front.model());
 }
 
 // A gyro that is stuck at a bias is left, but not where the configuration names the model.
 TEST(test_a_stuck_gyro_yields_to_the_ticks) {
   for (int model : {WM_MOTION_AUTO, WM_MOTION_SPEED_YAW_RATE}) {
-    drive d(model);
-    for (; d.steps < 50 * 60; d.steps++) {
-      d.left += 0.012 / kTick, d.right += 0.012 / kTick;
-      d.feed(make::quantities(0.02 * d.steps, {{WM_Q_WHEEL_TICKS_LEFT, d.left}, {WM_Q_WHEEL_TICKS_RIGHT, d.right}}));
-      d.feed(make::quantities(0.02 * d.steps + 0.005, {{WM_Q_YAW_RATE, 0.01}}));
+    begin(model);
+    for (; steps < 50 * 60; steps++) {
+      rolled(0.02 * steps, 0.012 * (steps + 1));
+      gyro(0.02 * steps + 0.005, 0.01);
     }
-    TEST_ASSERT_TRUE(d.front.health() & WM_MOTION_HEALTH_YAW_RATE_STUCK);
+    TEST_ASSERT_TRUE(has_health(WM_MOTION_HEALTH_YAW_RATE_STUCK));
     const double turned_s = model == WM_MOTION_AUTO ? 30.0 : 60.0;
-    TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.01 * turned_s, d.pose.heading_rad);
+    TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.01 * turned_s, pose.heading_rad);
   }
 }
 
 // Seconds of a robot whose wheels give this speed and turn rate, and whose gyro gives this number; true: found stuck.
 bool is_found_stuck(double seconds, double speed_mps, double turn_radps, double gyro_radps) {
-  drive d;
-  for (; d.steps < 50 * seconds; d.steps++) {
-    d.left += 0.02 * (speed_mps - 0.5 * turn_radps * d.wheels.track_m) / kTick;
-    d.right += 0.02 * (speed_mps + 0.5 * turn_radps * d.wheels.track_m) / kTick;
-    // Counts are whole: a slow wheel stands still in most of the periods.
-    d.feed(make::quantities(
-        0.02 * d.steps, {{WM_Q_WHEEL_TICKS_LEFT, std::floor(d.left)}, {WM_Q_WHEEL_TICKS_RIGHT, std::floor(d.right)}}));
-    d.feed(make::quantities(0.02 * d.steps + 0.005, {{WM_Q_YAW_RATE, gyro_radps}}));
+  begin();
+  for (; steps < 50 * seconds; steps++) {
+    left_ticks += 0.02 * (speed_mps - 0.5 * turn_radps * wheels.track_m) / kTick;
+    right_ticks += 0.02 * (speed_mps + 0.5 * turn_radps * wheels.track_m) / kTick;
+    ticks(0.02 * steps, std::floor(left_ticks), std::floor(right_ticks));  // a slow wheel stands in most of the periods
+    gyro(0.02 * steps + 0.005, gyro_radps);
   }
-  return (d.front.health() & WM_MOTION_HEALTH_YAW_RATE_STUCK) != 0;
+  return has_health(WM_MOTION_HEALTH_YAW_RATE_STUCK);
 }
 
 TEST(test_a_slow_robots_stuck_gyro_is_found) {
@@ -197,7 +159,6 @@ TEST(test_repeated_numbers_that_are_right_are_no_fault) {
 // Without motion data a robot may have braked, accelerated or turned for hold_max_s; then its heading walks by 0.3 rad
 // per sqrt(s).
 TEST(test_what_may_have_moved_unseen) {
-  wm_motion_params params;
   wm_params_defaults(&wm_motion_params_table, &params);
   params.hold_max_s = 2.0;
   params.noise_hold_mps2 = 0.6;
@@ -218,38 +179,10 @@ TEST(test_what_may_have_moved_unseen) {
   }
 }
 
-// A gyro that is overdue while the counts go on: the way is known, its direction walks, up to any direction at all.
-// The variance of the heading after it is that of a turn rate that changes by noise_hold_radps2 for hold_max_s, then of
-// 0.3 rad per sqrt(s).
-TEST(test_a_known_way_in_an_unknown_direction) {
-  wm_motion_params params;
-  wm_params_defaults(&wm_motion_params_table, &params);
-  params.hold_max_s = 2.0;
-  params.noise_hold_radps2 = 0.4;
-  const struct {
-    double overdue_s, dt_s, rotation_rad2;
-  } rows[] = {{0.0, 0.5, 0.2 * 0.2 * 0.0625}, {1.0, 1.0, 0.2 * 0.2 * 15.0}, {10.0, 2.0, 0.18}, {2.0, 100.0, 9.0}};
-  for (const auto &row : rows) {
-    wm::motion_segment segment{};
-    wm::motion_noise noise{};
-    segment.input.model = WM_MOTION_SPEED_YAW_RATE;
-    segment.input.a = 2.0;
-    segment.overdue_s = -1.0;
-    segment.turn_overdue_s = row.overdue_s;
-    segment.dt_s = row.dt_s;
-    wm::add_overdue_noise(segment, params, true, 0.0, &noise);
-    const double way_m2 = 4.0 * row.dt_s * row.dt_s, q = row.rotation_rad2;
-    TEST_ASSERT_DOUBLE_WITHIN(1e-12 * q, q, noise.rotation_rad2);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-12 * way_m2, way_m2 * std::fmin(q / 3.0, 0.5), noise.lateral_m2);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-12 * way_m2, way_m2 * std::fmin(q * q / 8.0, 0.5), noise.distance_m2);
-  }
-}
-
 // Factors of the variances of way and turn leave the correlation of the two as it is.
 TEST(test_factors_of_the_noise_keep_its_correlation) {
-  wm_motion_params params;
   wm_params_defaults(&wm_motion_params_table, &params);
-  const wm_wheels wheels = make::two_wheels();
+  wheels = make::two_wheels();
   const wm_motion_calibration c = wm::kNeutralCalibration;
   const wm::stated_noise none = {NAN, NAN, NAN};
   wm::motion_input input{};
@@ -265,21 +198,16 @@ TEST(test_factors_of_the_noise_keep_its_correlation) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 6.0, more.distance_rotation / plain.distance_rotation);
 }
 
-void count(drive *d, double t_s, double way_m) {
-  const double ticks = way_m / kTick;
-  d->feed(make::quantities(t_s, {{WM_Q_WHEEL_TICKS_LEFT, ticks}, {WM_Q_WHEEL_TICKS_RIGHT, ticks}}));
-}
-
 // GIVEN a bus on which a frame may come twice with one stamp WHEN the robot drives THEN each count counts once, and is
 // as exact as one of its period.
 TEST(test_a_count_that_comes_twice_counts_once) {
-  drive d;
+  begin();
   for (int i = 0; i <= 50; i++)
-    for (int twice = 0; twice < 2; twice++) count(&d, 0.02 * i, 0.02 * i);
-  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1.0, d.pose.x_m);
-  TEST_ASSERT_EQUAL_UINT32(0, d.front.health());
+    for (int twice = 0; twice < 2; twice++) rolled(0.02 * i, 0.02 * i);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1.0, pose.x_m);
+  TEST_ASSERT_EQUAL_UINT32(0, front.health());
   double speed_mps, turn_radps;
-  d.front.count_noise(&speed_mps, &turn_radps);
+  front.count_noise(&speed_mps, &turn_radps);
   const double expected = kTick / (0.02 * std::sqrt(12.0));
   TEST_ASSERT_DOUBLE_WITHIN(0.01 * expected, expected, speed_mps);
 }
@@ -288,47 +216,47 @@ TEST(test_a_count_that_comes_twice_counts_once) {
 // fallen before, they have one, and the gear is of no effect.
 TEST(test_counts_without_a_sign_take_it_from_the_gear) {
   for (const bool has_sign : {false, true}) {
-    drive d;
+    begin();
     double way_m = 0.0;
-    const auto go = [&](double from_s, double each_m) {
-      for (int i = 1; i <= 50; i++) count(&d, from_s + 0.02 * i, way_m += each_m);
+    const auto roll = [&](double from_s, double each_m) {
+      for (int i = 1; i <= 50; i++) rolled(from_s + 0.02 * i, way_m += each_m);
     };
-    go(0.0, has_sign ? -0.02 : 0.02);
-    const double before_m = d.pose.x_m;
+    roll(0.0, has_sign ? -0.02 : 0.02);
+    const double before_m = pose.x_m;
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, has_sign ? -0.98 : 0.98, before_m);
-    d.feed(make::quantities(1.0, {{WM_Q_GEAR, -1.0}}));
-    go(1.0, 0.02);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-9, has_sign ? 1.0 : -1.0, d.pose.x_m - before_m);
+    feed(make::quantities(1.0, {{WM_Q_GEAR, -1.0}}));
+    roll(1.0, 0.02);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, has_sign ? 1.0 : -1.0, pose.x_m - before_m);
   }
 }
 
 // GIVEN two seconds without counts, in which observations corrected the pose WHEN counts come again THEN from the first
 // one on the way is the counted one, whatever the speed and however often the pose is asked for between two counts.
 TEST(test_the_way_is_counted_again_after_a_silence) {
-  drive d;
-  for (int i = 0; i <= 50; i++) count(&d, 0.02 * i, 0.02 * i);
-  d.advance(3.0);
-  count(&d, 3.02, 3.02);
-  const double before_m = d.pose.x_m;
+  begin();
+  for (int i = 0; i <= 50; i++) rolled(0.02 * i, 0.02 * i);
+  advance(3.0);
+  rolled(3.02, 3.02);
+  const double before_m = pose.x_m;
   double way_m = 3.02;
   for (int i = 1; i <= 50; i++) {
-    d.advance(3.02 + 0.02 * i - 0.01);
+    advance(3.02 + 0.02 * i - 0.01);
     way_m += i % 3 ? 0.03 : 0.01;
-    count(&d, 3.02 + 0.02 * i, way_m);
+    rolled(3.02 + 0.02 * i, way_m);
   }
-  TEST_ASSERT_DOUBLE_WITHIN(1e-9, way_m - 3.02, d.pose.x_m - before_m);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, way_m - 3.02, pose.x_m - before_m);
 }
 
 // A count after 0.7 periods has a speed of its own; one after 0.4 is one of a burst, whose speed is that since the
 // count before the last one.
 TEST(test_the_speed_of_an_early_count) {
   for (const double share : {0.7, 0.4}) {
-    drive d(WM_MOTION_TICKS);
-    for (int i = 0; i <= 50; i++) count(&d, 0.02 * i, 0.02 * i);
+    begin(WM_MOTION_TICKS);
+    for (int i = 0; i <= 50; i++) rolled(0.02 * i, 0.02 * i);
     const double early_s = 0.02 * share;
-    count(&d, 1.0 + early_s, 1.0 + 2.0 * early_s);  // at 2 m/s
+    rolled(1.0 + early_s, 1.0 + 2.0 * early_s);  // at 2 m/s
     const double expected = share > 0.5 ? 2.0 : (0.02 + 2.0 * early_s) / (0.02 + early_s);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-9, expected, d.front.twist_at(make::at(1.0 + early_s), wm::kNeutralCalibration).v);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, expected, speed_at(1.0 + early_s));
   }
 }
 
@@ -337,31 +265,19 @@ TEST(test_the_speed_of_an_early_count) {
 TEST(test_a_refusal_ends_with_its_sensor) {
   double grown_m2[2];
   for (const bool refused : {false, true}) {
-    wm_motion_params params;
-    wm_params_defaults(&wm_motion_params_table, &params);
-    params.model = WM_MOTION_SPEED_YAW_RATE;
-    const wm_wheels car = make::car();
-    wm::motion_front_end front;
-    front.init(&params, &car);
-    double way_m2 = 0.0, before_m2 = 0.0;
-    const auto feed = [&](const wm_event &e) {
-      front.feed(e);
-      front.advance(e.t_ns, wm::kNeutralCalibration,
-                    [&](const wm::motion_segment &, const wm::motion_twist &, const wm::motion_noise &n) {
-                      way_m2 += n.distance_m2;
-                    });
-    };
+    start(make::car(), WM_MOTION_SPEED_YAW_RATE);
+    double before_m2 = 0.0;
     for (int i = 0; i <= 300; i++) {
       const double t_s = 0.02 * i;
       const double wheels_mps = refused && i == 50 ? 120.0 : 2.0;
       if (i < 50 || (refused && i == 50))
         feed(make::quantities(t_s,
                               {{WM_Q_WHEEL_SPEED_REAR_LEFT, wheels_mps}, {WM_Q_WHEEL_SPEED_REAR_RIGHT, wheels_mps}}));
-      feed(make::quantities(t_s + 0.002, {{WM_Q_VEHICLE_SPEED, 2.0}}));
-      feed(make::quantities(t_s + 0.005, {{WM_Q_YAW_RATE, 1e-3 * (i % 3)}}));
-      if (i == 250) before_m2 = way_m2;
+      speed(t_s + 0.002, 2.0);
+      gyro(t_s + 0.005, 1e-3 * (i % 3));
+      if (i == 250) before_m2 = way_var;
     }
-    grown_m2[refused] = way_m2 - before_m2;
+    grown_m2[refused] = way_var - before_m2;
   }
   TEST_ASSERT_DOUBLE_WITHIN(1e-9 + 1e-6 * grown_m2[0], grown_m2[0], grown_m2[1]);
 }

@@ -311,30 +311,31 @@ TEST(test_noise_of_an_overdue_sample) {
   for (const int model : {WM_MOTION_TICKS, WM_MOTION_SPEED_YAW_RATE, WM_MOTION_TWIST, WM_MOTION_INCREMENTS})
     for (const double way_s : overdue)
       for (const double turn_s : overdue)
-        for (int more = 0; more < 8; more++) {
+        for (int more = 0; more < 16; more++) {
           const bool is_counted = more & 1;
+          const double dt_s = more & 8 ? 100.0 : 0.5;
           wm::motion_segment segment{};
           segment.input = input_of(model, 1.5, 0.0, 0.2, kNone);
           segment.input.holonomic = more & 2 && model == WM_MOTION_TWIST;
           segment.input.counted = more & 4 && model == WM_MOTION_INCREMENTS;
-          segment.dt_s = 0.5, segment.overdue_s = way_s, segment.turn_overdue_s = turn_s;
-          const auto grown = [](double from) {
-            return fourth(std::fmin(std::fmax(from + 0.5, 0.0), 2.0)) - fourth(std::fmin(std::fmax(from, 0.0), 2.0));
+          segment.dt_s = dt_s, segment.overdue_s = way_s, segment.turn_overdue_s = turn_s;
+          const auto grown = [dt_s](double from) {
+            return fourth(std::fmin(std::fmax(from + dt_s, 0.0), 2.0)) - fourth(std::fmin(std::fmax(from, 0.0), 2.0));
           };
           const double held_m2 = square(0.3) * grown(way_s);
-          const double unknown_s = std::fmax(turn_s + 0.5, 2.0) - std::fmax(turn_s, 2.0);
+          const double unknown_s = std::fmax(turn_s + dt_s, 2.0) - std::fmax(turn_s, 2.0);
           double turn = square(0.2) * grown(turn_s) + 0.09 * unknown_s;
           double along = is_counted ? 0.0 : held_m2, across = segment.input.holonomic ? held_m2 : 0.0;
           if (is_counted && model == WM_MOTION_TICKS) turn = 0.0;
           if (is_counted) {
-            along += square(1.5 * 0.5) * std::fmin(square(turn) / 8.0, 0.5);
-            across += square(1.5 * 0.5) * std::fmin(turn / 3.0, 0.5);
+            along += square(1.5 * dt_s) * std::fmin(square(turn) / 8.0, 0.5);
+            across += square(1.5 * dt_s) * std::fmin(turn / 3.0, 0.5);
           }
           if (segment.input.counted) along = across = turn = 0.0;
           wm::motion_noise n{};
           wm::add_overdue_noise(segment, p, is_counted, 0.0, &n);
-          TEST_ASSERT_DOUBLE_WITHIN(1e-12, along, n.distance_m2);
-          TEST_ASSERT_DOUBLE_WITHIN(1e-12, across, n.lateral_m2);
+          TEST_ASSERT_DOUBLE_WITHIN(1e-12 * dt_s * dt_s, along, n.distance_m2);
+          TEST_ASSERT_DOUBLE_WITHIN(1e-12 * dt_s * dt_s, across, n.lateral_m2);
           TEST_ASSERT_DOUBLE_WITHIN(1e-12, turn, n.rotation_rad2);
         }
 }

@@ -6,7 +6,6 @@
 #include "filters/planar/planar_filter.hpp"
 #include "math/arc.hpp"
 #include "math/elementary.hpp"
-#include "motion/motion_params.h"
 #include "waymark/random.h"
 
 namespace {
@@ -108,126 +107,62 @@ TEST(test_a_row_s_part_of_the_pose) {
   for (int i = 0; i < wm::noise_adaption::kBlock; i++) TEST_ASSERT_EQUAL_DOUBLE(expected[i], by[i]);
 }
 
-TEST(test_josephs_form_is_the_plain_one_at_the_best_gain) {
-  make_busy_filter();
-  const int n = filter->states();
-  double p[kMax][kMax];
-  copy_covariance(p);
-  wm::planar_row row;
-  row.add(0, 0.3);
-  row.add(2, -1.1);
-  row.add(5, 0.7);
-  double h[kMax] = {};
-  h[0] = 0.3, h[2] = -1.1, h[5] = 0.7;
-  double g[kMax] = {}, s = 0.05;
-  for (int i = 0; i < n; i++)
-    for (int j = 0; j < n; j++) g[i] += p[i][j] * h[j];
-  for (int i = 0; i < n; i++) s += h[i] * g[i];
-  TEST_ASSERT_DOUBLE_WITHIN(1e-14, s - 0.05, filter->variance_of(row));
-  TEST_ASSERT_TRUE(filter->update(row, 0.2, 0.05));
-  for (int i = 0; i < n; i++) {
-    for (int j = 0; j < n; j++) {
-      // (I - KH) P (I - KH)' + K R K', written out in full.
-      double joseph = g[i] / s * 0.05 * g[j] / s;
-      for (int a = 0; a < n; a++)
-        for (int b = 0; b < n; b++) joseph += ((i == a) - g[i] / s * h[a]) * p[a][b] * ((j == b) - g[j] / s * h[b]);
-      TEST_ASSERT_DOUBLE_WITHIN(1e-13, joseph, filter->covariance(i, j));
-      TEST_ASSERT_DOUBLE_WITHIN(1e-13, p[i][j] - g[i] * g[j] / s, filter->covariance(i, j));
-      const double ij = filter->covariance(i, j), ji = filter->covariance(j, i);
-      TEST_ASSERT_EQUAL_MEMORY(&ij, &ji, sizeof ij);
-    }
-  }
-}
-
-// What a state that is considered contributes to the innovation counts in its covariance; it stays, and so does its own
-// covariance with others that stay. By the whole matrices: Joseph's form for the best gain without the rows of such
-// states.
-TEST(test_considered_states_stay) {
-  for (const int kept_to : {3, 6, 7}) {
-    make_busy_filter();
-    const int n = filter->states();
-    double p[kMax][kMax], x[kMax], g[2][kMax] = {}, k[2][kMax] = {};
-    copy_covariance(p);
-    for (int i = 0; i < n; i++) x[i] = filter->value(i);
-    const double h[2][kMax] = {{1.0, 0, 0.4, 0, 0.7}, {0, -0.8, 0.9, 0, 0.5}}, z[2] = {0.03, -0.05},
-                 r[2] = {0.01, 0.02};
-    wm::planar_row row[2];
-    for (int m = 0; m < 2; m++)
+// One number or two at once, by the whole matrices: Joseph's form for the best gain without the rows of states that are
+// considered. What such a state contributes to the innovation counts in its covariance; it stays, and so does its own
+// covariance with others that stay. Premise, asserted: the prior couples the two rows.
+TEST(test_an_update_is_josephs_form) {
+  for (const int count : {1, 2})
+    for (const int kept_to : {3, 6, 7}) {
+      make_busy_filter();
+      const int n = filter->states();
+      double p[kMax][kMax], x[kMax], g[2][kMax] = {}, k[2][kMax] = {};
+      copy_covariance(p);
+      for (int i = 0; i < n; i++) x[i] = filter->value(i);
+      const double h[2][kMax] = {{1.0, 0, 0.4, 0, 0.7}, {0, -0.8, 0.9, 0, 0.5}}, z[2] = {0.03, -0.05},
+                   r[2] = {0.01, 0.02};
+      wm::planar_row row[2];
+      for (int m = 0; m < count; m++)
+        for (int i = 0; i < n; i++) {
+          row[m].add(i, h[m][i]);
+          for (int j = 0; j < n; j++) g[m][i] += p[i][j] * h[m][j];
+        }
+      double s[2][2] = {{r[0], 0}, {0, count == 2 ? r[1] : 1.0}};
+      for (int m = 0; m < count; m++)
+        for (int l = 0; l < count; l++)
+          for (int i = 0; i < n; i++) s[m][l] += h[m][i] * g[l][i];
+      const double det = s[0][0] * s[1][1] - s[0][1] * s[1][0];
+      if (count == 2) TEST_ASSERT_GREATER_THAN_DOUBLE(0.05, std::fabs(s[0][1]) / sqrt(s[0][0] * s[1][1]));
+      const double inverse[2][2] = {{s[1][1] / det, -s[0][1] / det}, {-s[1][0] / det, s[0][0] / det}};
+      for (int i = 0; i < n; i++)
+        for (int m = 0; m < count && (i < 3 || i >= kept_to); m++)
+          k[m][i] = g[0][i] * inverse[0][m] + g[1][i] * inverse[1][m];
+      wm::planar_filter::update_options options;
+      options.kept_from = 3;
+      options.kept_to = kept_to;
+      const wm::sparse_row rows[2] = {row[0], row[1]};
+      if (count == 1 && kept_to == 3) {
+        TEST_ASSERT_DOUBLE_WITHIN(1e-14, s[0][0] - r[0], filter->variance_of(row[0]));
+        TEST_ASSERT_TRUE(filter->update(row[0], z[0], r[0]));
+      } else {
+        wm::innovation together = filter->prepare(rows, z, r, count);
+        if (count == 2) TEST_ASSERT_DOUBLE_WITHIN(1e-12, det, together.determinant);
+        if (count == 2) TEST_ASSERT_DOUBLE_WITHIN(1e-13, s[1][0], together.s[1][0]);
+        TEST_ASSERT_TRUE(filter->update(std::move(together), rows, options));
+      }
       for (int i = 0; i < n; i++) {
-        row[m].add(i, h[m][i]);
-        for (int j = 0; j < n; j++) g[m][i] += p[i][j] * h[m][j];
-      }
-    double s[2][2] = {{r[0], 0}, {0, r[1]}};
-    for (int m = 0; m < 2; m++)
-      for (int l = 0; l < 2; l++)
-        for (int i = 0; i < n; i++) s[m][l] += h[m][i] * g[l][i];
-    const double det = s[0][0] * s[1][1] - s[0][1] * s[1][0];
-    const double inverse[2][2] = {{s[1][1] / det, -s[0][1] / det}, {-s[1][0] / det, s[0][0] / det}};
-    for (int i = 0; i < n; i++)
-      for (int m = 0; m < 2 && (i < 3 || i >= kept_to); m++)
-        k[m][i] = g[0][i] * inverse[0][m] + g[1][i] * inverse[1][m];
-    wm::planar_filter::update_options options;
-    options.kept_from = 3;
-    options.kept_to = kept_to;
-    const wm::sparse_row rows[2] = {row[0], row[1]};
-    TEST_ASSERT_TRUE(filter->update(filter->prepare(rows, z, r, 2), rows, options));
-    for (int i = 0; i < n; i++) {
-      TEST_ASSERT_DOUBLE_WITHIN(1e-12, x[i] + k[0][i] * z[0] + k[1][i] * z[1], filter->value(i));
-      for (int j = 0; j < n; j++) {
-        double joseph = k[0][i] * r[0] * k[0][j] + k[1][i] * r[1] * k[1][j];
-        for (int a = 0; a < n; a++)
-          for (int b = 0; b < n; b++)
-            joseph += ((i == a) - k[0][i] * h[0][a] - k[1][i] * h[1][a]) * p[a][b] *
-                      ((j == b) - k[0][j] * h[0][b] - k[1][j] * h[1][b]);
-        TEST_ASSERT_DOUBLE_WITHIN(1e-13, joseph, filter->covariance(i, j));
+        TEST_ASSERT_DOUBLE_WITHIN(1e-12, x[i] + k[0][i] * z[0] + k[1][i] * z[1], filter->value(i));
+        for (int j = 0; j < n; j++) {
+          double joseph = k[0][i] * r[0] * k[0][j] + k[1][i] * r[1] * k[1][j];
+          for (int a = 0; a < n; a++)
+            for (int b = 0; b < n; b++)
+              joseph += ((i == a) - k[0][i] * h[0][a] - k[1][i] * h[1][a]) * p[a][b] *
+                        ((j == b) - k[0][j] * h[0][b] - k[1][j] * h[1][b]);
+          TEST_ASSERT_DOUBLE_WITHIN(1e-13, joseph, filter->covariance(i, j));
+          const double ij = filter->covariance(i, j), ji = filter->covariance(j, i);
+          TEST_ASSERT_EQUAL_MEMORY(&ij, &ji, sizeof ij);
+        }
       }
     }
-  }
-}
-
-// Two rows at once, by the whole matrices. Premise, asserted: the prior couples the two rows.
-TEST(test_two_numbers_at_once) {
-  make_busy_filter();
-  const int n = filter->states();
-  double p[kMax][kMax], x[kMax];
-  copy_covariance(p);
-  for (int i = 0; i < n; i++) x[i] = filter->value(i);
-  double h[2][kMax] = {};
-  h[0][0] = 1.0, h[0][2] = 0.4, h[1][1] = -0.8, h[1][2] = 0.9, h[1][4] = 0.5;
-  const double z[2] = {0.03, -0.05}, r[2] = {0.01, 0.02};
-  double s[2][2] = {{r[0], 0}, {0, r[1]}}, g[2][kMax] = {};
-  for (int k = 0; k < 2; k++)
-    for (int i = 0; i < n; i++)
-      for (int j = 0; j < n; j++) g[k][i] += p[i][j] * h[k][j];
-  for (int a = 0; a < 2; a++)
-    for (int b = 0; b < 2; b++)
-      for (int i = 0; i < n; i++) s[a][b] += h[a][i] * g[b][i];
-  TEST_ASSERT_GREATER_THAN_DOUBLE(0.05, std::fabs(s[0][1]) / sqrt(s[0][0] * s[1][1]));
-  const double det = s[0][0] * s[1][1] - s[0][1] * s[1][0];
-  const double inverse[2][2] = {{s[1][1] / det, -s[0][1] / det}, {-s[1][0] / det, s[0][0] / det}};
-
-  wm::planar_row row[2];
-  for (int k = 0; k < 2; k++)
-    for (int i = 0; i < n; i++) row[k].add(i, h[k][i]);
-  const wm::sparse_row rows[2] = {row[0], row[1]};
-  wm::innovation both = filter->prepare(rows, z, r, 2);
-  TEST_ASSERT_DOUBLE_WITHIN(1e-13, s[1][0], both.s[1][0]);
-  TEST_ASSERT_DOUBLE_WITHIN(1e-12, det, both.determinant);
-  const wm::planar_filter::update_options options;
-  TEST_ASSERT_TRUE(filter->update(std::move(both), rows, options));
-
-  for (int i = 0; i < n; i++) {
-    double want = x[i];
-    for (int a = 0; a < 2; a++)
-      for (int b = 0; b < 2; b++) want += g[a][i] * inverse[a][b] * z[b];
-    TEST_ASSERT_DOUBLE_WITHIN(1e-12, want, filter->value(i));
-    for (int j = 0; j < n; j++) {
-      double left = p[i][j];
-      for (int a = 0; a < 2; a++)
-        for (int b = 0; b < 2; b++) left -= g[a][i] * inverse[a][b] * g[b][j];
-      TEST_ASSERT_DOUBLE_WITHIN(1e-12, left, filter->covariance(i, j));
-    }
-  }
 }
 
 // GIVEN a car that stands WHEN its gyro says 0.015 rad/s THEN that is its bias.
@@ -240,20 +175,6 @@ TEST(test_standing_still_teaches_the_gyros_bias) {
   TEST_ASSERT_DOUBLE_WITHIN(0.001, 0.016, filter->calibration().value[wm::kYawRateBias]);
   TEST_ASSERT_LESS_THAN_DOUBLE(0.002, sqrt(filter->variance(3)));
   TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.4, filter->pose().heading_rad);
-}
-
-TEST(test_fading_and_forgetting_keep_the_rest) {
-  make_busy_filter();
-  const double other = filter->covariance(0, 1), own = filter->variance(4), with = filter->covariance(0, 4);
-  filter->fade(4, 0.5, 0.1);
-  TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0.25 * own + 0.1, filter->variance(4));
-  TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0.5 * with, filter->covariance(0, 4));
-  TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0.5 * with, filter->covariance(4, 0));
-  filter->forget(4, 1.0, 0.3);
-  TEST_ASSERT_EQUAL_DOUBLE(1.0, filter->value(4));
-  TEST_ASSERT_EQUAL_DOUBLE(0.0, filter->covariance(0, 4));
-  TEST_ASSERT_EQUAL_DOUBLE(0.3, filter->variance(4));
-  TEST_ASSERT_EQUAL_DOUBLE(other, filter->covariance(0, 1));
 }
 
 // By the whole matrix: P' = F P F' + Q, where F has one row beside the identity's.

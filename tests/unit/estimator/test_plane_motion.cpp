@@ -142,8 +142,6 @@ TEST(test_increments_that_overlap) {
 
 TEST(test_impossible_increments_are_refused) {
   begin();
-  TEST_ASSERT_EQUAL(WM_OUT_OF_RANGE, filter.check_motion(make::increment(1.0, 1.0, {1, 0, 0}, kCovariance)));
-  TEST_ASSERT_EQUAL(WM_OUT_OF_RANGE, filter.check_motion(make::increment(0.0, 1.0, {500, 0, 0}, kCovariance)));
   TEST_ASSERT_EQUAL(WM_NOT_FINITE, filter.check_motion(make::increment(0.0, 1.0, {1, NAN, 0}, kCovariance)));
   const double wide[6] = {1, 2, 1, 0, 0, 1};  // a correlation of 2
   TEST_ASSERT_EQUAL(WM_OUT_OF_RANGE, filter.check_motion(make::increment(0.0, 1.0, {1, 0, 0}, wide)));

@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // A sensor of the motion that is silent while others go on: what stands in for it, how unsure what holds becomes, and
 // what health states.
-#include "common/suite.h"
 #include "motion_fixture.hpp"
 
 namespace {
 
 // A car of which the rear wheels, the gyro and the steering come at 50 Hz each, at 1 m/s with a turn rate.
 struct car {
-  bool speed, wheels, gyro, steering;
+  bool dash, wheels, gyro, steering;
 };
 constexpr double kSpeed_mps = 1.0;
 
@@ -18,8 +17,8 @@ void drive(double from_s, double to_s, double turn_radps, const car &has) {
     if (has.wheels)
       feed(make::quantities(t, {{WM_Q_WHEEL_SPEED_REAR_LEFT, kSpeed_mps - half_mps},
                                 {WM_Q_WHEEL_SPEED_REAR_RIGHT, kSpeed_mps + half_mps}}));
-    if (has.speed) feed(make::quantities(t, {{WM_Q_VEHICLE_SPEED, kSpeed_mps}}));
-    if (has.gyro) feed(make::quantities(t + 0.005, {{WM_Q_YAW_RATE, turn_radps + (i % 2 ? 1e-6 : -1e-6)}}));
+    if (has.dash) speed(t, kSpeed_mps);
+    if (has.gyro) gyro(t + 0.005, turn_radps + (i % 2 ? 1e-6 : -1e-6));
     if (has.steering)
       feed(make::quantities(t + 0.01, {{WM_Q_ROAD_WHEEL, std::atan(turn_radps * wheels.wheelbase_m / kSpeed_mps)}}));
   }
@@ -27,7 +26,7 @@ void drive(double from_s, double to_s, double turn_radps, const car &has) {
 
 void begin(const car &has) {
   start(make::car());
-  params.noise_speed_mps = params.noise_speed_rel = params.noise_yaw_rate_radps = params.noise_yaw_rate_rel = 0;
+  without_noise_of_rates();
   params.noise_yaw_rate_per_mps = params.noise_steering_rad = 0;
   drive(0, 2, 0, has);
   TEST_ASSERT_EQUAL(WM_MOTION_SPEED_YAW_RATE, front.model());
@@ -40,8 +39,8 @@ void turn_without_gyro(car has) {
   has.gyro = false;
   drive(2, 2.3, 0, has);
   drive(2.3, 3.3, 0.5, has);
-  TEST_ASSERT_TRUE(front.health() & WM_MOTION_HEALTH_TURN_SILENT);
-  TEST_ASSERT_FALSE(front.health() & WM_MOTION_HEALTH_SPEED_SILENT);
+  TEST_ASSERT_TRUE(has_health(WM_MOTION_HEALTH_TURN_SILENT));
+  TEST_ASSERT_FALSE(has_health(WM_MOTION_HEALTH_SPEED_SILENT));
 }
 
 // GIVEN rear wheels, a gyro and steering WHEN the gyro falls silent THEN the steering gives the turn, and the gyro does
@@ -92,7 +91,7 @@ TEST(test_a_turn_that_nothing_measures_is_doubted) {
   drive(4.26, 9, 0, {true, false, false, false});
   TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.2 * 2.0, pose.heading_rad - before);
   TEST_ASSERT_GREATER_THAN_DOUBLE(1.0, turn_var);
-  TEST_ASSERT_TRUE(front.health() & WM_MOTION_HEALTH_TURN_SILENT);
+  TEST_ASSERT_TRUE(has_health(WM_MOTION_HEALTH_TURN_SILENT));
 }
 
 // GIVEN a speed and a gyro WHEN the speed falls silent THEN its way is doubted as after a silence of both.
@@ -102,7 +101,7 @@ TEST(test_a_speed_that_falls_silent_is_doubted) {
   drive(2, 3.24, 0, {false, false, true, false});
   TEST_ASSERT_DOUBLE_WITHIN(0.03, 1.24, pose.x_m - x);
   TEST_ASSERT_DOUBLE_WITHIN(0.06, 0.25, way_var);  // (1 m/s2 x 1 s^2 / 2)^2
-  TEST_ASSERT_TRUE(front.health() & WM_MOTION_HEALTH_SPEED_SILENT);
+  TEST_ASSERT_TRUE(has_health(WM_MOTION_HEALTH_SPEED_SILENT));
   drive(3.24, 6, 0, {false, false, true, false});
   TEST_ASSERT_DOUBLE_WITHIN(0.03, 2.0, pose.x_m - x);  // hold_max
   TEST_ASSERT_GREATER_THAN_DOUBLE(1.0, way_var);
@@ -115,11 +114,11 @@ TEST(test_a_silent_speed_shows_no_standstill) {
   start(make::car());
   double rate;
   for (int i = 0; i < 100; i++) {
-    feed(make::quantities(0.02 * i, {{WM_Q_VEHICLE_SPEED, 0.0}}));
-    feed(make::quantities(0.02 * i + 0.005, {{WM_Q_YAW_RATE, 0.01 + 1e-6 * (i % 2)}}));
+    speed(0.02 * i, 0.0);
+    gyro(0.02 * i + 0.005, 0.01 + 1e-6 * (i % 2));
   }
   TEST_ASSERT_TRUE(front.standstill_yaw_rate(&rate));
-  for (int i = 100; i < 120; i++) feed(make::quantities(0.02 * i, {{WM_Q_YAW_RATE, 0.3 + 1e-6 * (i % 2)}}));
+  for (int i = 100; i < 120; i++) gyro(0.02 * i, 0.3 + 1e-6 * (i % 2));
   TEST_ASSERT_FALSE(front.standstill_yaw_rate(&rate));
   TEST_ASSERT_FALSE(front.stands(make::at(2.4)));
 }
@@ -127,7 +126,6 @@ TEST(test_a_silent_speed_shows_no_standstill) {
 // GIVEN ticks and a gyro WHEN the counts are silent for 1 s and a half THEN the way is doubted meanwhile, and is the
 // counted one afterwards, unless observations have corrected the pose meanwhile.
 TEST(test_counts_that_fall_silent) {
-  constexpr double kTick_m = 2 * M_PI * 0.1 / 1000;  // of make::two_wheels()
   for (bool observed : {false, true}) {
     start(make::two_wheels());
     params.noise_speed_mps = params.noise_speed_rel = 0;
@@ -135,12 +133,10 @@ TEST(test_counts_that_fall_silent) {
     for (int i = 0; i <= 300; i++) {
       const double t = 0.02 * i;
       counted_m += t > 2.0 && t < 3.5 ? 0 : 0.01;  // it stands while its counts are silent
-      if (t <= 2.0 || t >= 3.5)
-        feed(make::quantities(
-            t, {{WM_Q_WHEEL_TICKS_LEFT, counted_m / kTick_m}, {WM_Q_WHEEL_TICKS_RIGHT, counted_m / kTick_m}}));
-      feed(make::quantities(t + 0.005, {{WM_Q_YAW_RATE, i % 2 ? 1e-6 : -1e-6}}));
+      if (t <= 2.0 || t >= 3.5) rolled(t, counted_m);
+      gyro(t + 0.005, i % 2 ? 1e-6 : -1e-6);
       if (observed && t > 2.5 && t < 3.5) advance(t + 0.01);  // as a filter does for an observation
-      if (i == 150) TEST_ASSERT_TRUE(front.health() & WM_MOTION_HEALTH_SPEED_SILENT);
+      if (i == 150) TEST_ASSERT_TRUE(has_health(WM_MOTION_HEALTH_SPEED_SILENT));
       if (i == 150) TEST_ASSERT_GREATER_THAN_DOUBLE(0.05, way_var);
     }
     TEST_ASSERT_EQUAL_HEX32(0, front.health());
@@ -154,11 +150,11 @@ TEST(test_steering_may_come_when_it_changes) {
   start(make::car());
   for (int i = 0; i < 50; i++) feed(make::quantities(0.02 * i, {{WM_Q_VEHICLE_SPEED, 1.0}, {WM_Q_ROAD_WHEEL, 0.1}}));
   const double before = turn_var;
-  for (int i = 50; i < 140; i++) feed(make::quantities(0.02 * i, {{WM_Q_VEHICLE_SPEED, 1.0}}));
+  for (int i = 50; i < 140; i++) speed(0.02 * i, 1.0);
   TEST_ASSERT_EQUAL_HEX32(0, front.health());
   const double usual = turn_var - before;
-  for (int i = 140; i < 230; i++) feed(make::quantities(0.02 * i, {{WM_Q_VEHICLE_SPEED, 1.0}}));
-  TEST_ASSERT_TRUE(front.health() & WM_MOTION_HEALTH_TURN_SILENT);
+  for (int i = 140; i < 230; i++) speed(0.02 * i, 1.0);
+  TEST_ASSERT_TRUE(has_health(WM_MOTION_HEALTH_TURN_SILENT));
   TEST_ASSERT_GREATER_THAN_DOUBLE(3.0 * usual, turn_var - before - usual);
 }
 
