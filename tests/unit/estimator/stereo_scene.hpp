@@ -1,19 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // A scene for tests of stereo_ekf through the contract: points on all sides of a vehicle, exact truth, every attitude.
-#ifndef WAYMARK_TESTS_STEREO_SCENE_HPP
-#define WAYMARK_TESTS_STEREO_SCENE_HPP
+#pragma once
 
-#include <cmath>
-#include <cstdlib>
-#include <cstring>
-#include <vector>
-
-#include "events.hpp"
+#include "common/suite.h"
 #include "math/eigen.hpp"
 #include "motion/motion_params.h"
-#include "unity.h"
+#include "space_events.hpp"
 #include "waymark/estimator.h"
-#include "waymark/internal/math/rotation.hpp"
 #include "waymark/random.h"
 
 namespace {
@@ -103,6 +96,10 @@ struct scene {
     const int32_t model = WM_MOTION_CONSTANT_VELOCITY;
     std::memcpy(&motion[offsetof(wm_motion_params, model)], &model, sizeof model);
   }
+  void without_a_start() {
+    setup.start = {
+        WM_TIME_NONE, {kAbsent, kAbsent, kAbsent}, {kAbsent, kAbsent, kAbsent, kAbsent}, kAbsent, kAbsent, kAbsent};
+  }
   void begin() {
     setup.motion = reinterpret_cast<const wm_motion_params *>(motion.data());
     setup.sightings = &sightings;
@@ -134,13 +131,14 @@ struct scene {
   }
   void say_twist(const vec3 &v, const vec3 &w) {
     if (reinterpret_cast<const wm_motion_params *>(motion.data())->model == WM_MOTION_CONSTANT_VELOCITY) return;
-    wm_event e = make::empty(t_s, WM_EVENT_TWIST6);
-    for (int i = 0; i < 3; i++) {
-      e.as.twist6.v_mps[i] = v[i] / log_scale + noise_v * noise();
-      e.as.twist6.w_radps[i] = w[i] + gyro_bias[i] + noise_w * noise();
-    }
-    TEST_ASSERT_EQUAL(WM_OK, ekf->predict(state, &e));
+    const auto noisy = [this](const vec3 &x, double sigma) {
+      const vec3 random = {noise(), noise(), noise()};
+      return x + sigma * random;
+    };
+    tell(make::log6(t_s, noisy((1 / log_scale) * v, noise_v), noisy(w + gyro_bias, noise_w)));
   }
+  // Motion, which must be taken.
+  void tell(const wm_event &e) { TEST_ASSERT_EQUAL(WM_OK, ekf->predict(state, &e)); }
   bool pixels(const wm_landmark &l, double px[4]) const {
     const vec3 b = transposed_times(matrix_of(truth.q), vec_of(l.p_m) - truth.p);
     const vec3 x = {-b.y, -b.z, b.x};
@@ -187,6 +185,26 @@ struct scene {
     substitute<3>(root, &whole);
     return off.dot(whole) / 3;
   }
+  // NaN: not listed.
+  wm_calibration_value calibrated(const char *name) const {
+    wm_calibration_value values[64];
+    const size_t count = ekf->calibration(state, values, 64);
+    for (size_t i = 0; i < count; i++)
+      if (std::strcmp(values[i].name, name) == 0) return values[i];
+    wm_calibration_value none{};
+    none.value = none.sigma = kAbsent;
+    return none;
+  }
+  std::vector<char> copy() const { return {static_cast<char *>(state), static_cast<char *>(state) + bytes}; }
+  // A point that the pair sees now, the last of them.
+  const wm_landmark &in_view() const {
+    const wm_landmark *shown = nullptr;
+    double px[4];
+    for (const wm_landmark &l : points)
+      if (pixels(l, px)) shown = &l;
+    TEST_ASSERT_NOT_NULL(shown);
+    return *shown;
+  }
   double place_error() const { return length(vec_of(estimate().pose_map_base.p_m) - truth.p); }
   double turn_error() const { return length(turn_of(conjugate(quat_of(estimate().pose_map_base.q_xyzw)) * truth.q)); }
 };
@@ -206,5 +224,3 @@ inline void assert_sound(const wm_estimate &e) {
 }
 
 }  // namespace
-
-#endif

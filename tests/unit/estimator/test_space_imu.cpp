@@ -1,29 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // An IMU with three axes in space: its rates beside a velocity log, an axis that sticks, silence; gravity for roll and
 // pitch, with vibration and bumps.
-#include "common/suite.h"
 #include "motion/spatial_source.hpp"
 #include "stereo_scene.hpp"
-#include "waymark/health.h"
 
 namespace {
 
 constexpr double kG = 9.80665;
 
-wm_event imu(double t_s, const vec3 &w, const vec3 &a) {
-  return make::quantities(t_s, {{WM_Q_YAW_RATE, w.z},
-                                {WM_Q_ROLL_RATE, w.x},
-                                {WM_Q_PITCH_RATE, w.y},
-                                {WM_Q_ACCELERATION_X, a.x},
-                                {WM_Q_ACCELERATION_Y, a.y},
-                                {WM_Q_ACCELERATION_Z, a.z}});
-}
-
-wm_event velocity_log(double t_s, const vec3 &v, const vec3 &w = {0, 0, 0}) {
-  wm_event e = make::empty(t_s, WM_EVENT_TWIST6);
-  e.as.twist6 = {{v.x, v.y, v.z}, {w.x, w.y, w.z}};
-  return e;
-}
+using make::imu;
 
 double jitter(int i) { return i % 2 ? 1e-6 : -1e-6; }
 
@@ -40,27 +25,21 @@ struct vehicle : scene {
     const int end = (int)std::lround(seconds * 100);
     for (int i = 0; i < end; i++, step_++) {
       const double t = 0.01 * step_;
-      if (step_ % 10 == 0) take(velocity_log(t, v, log_rates));
+      if (step_ % 10 == 0) tell(make::log6(t, v, log_rates));
       const vec3 w = rates(step_);
-      if (std::isfinite(w.x)) take(imu(t, w, force(step_)));
+      if (std::isfinite(w.x)) tell(imu(t, w, force(step_)));
     }
-  }
-  void take(const wm_event &e) { TEST_ASSERT_EQUAL(WM_OK, ekf->predict(state, &e)); }
-  wm_estimate now() const {
-    wm_estimate out;
-    ekf->estimate(state, &out);
-    return out;
   }
   // Roll and pitch: of the body's axes, how far they leave the level.
   void tilt(double *roll, double *pitch) const {
-    const wm_estimate e = now();
+    const wm_estimate e = estimate();
     const mat3 R = matrix_of(quat_of(e.pose_map_base.q_xyzw));
     *roll = R.m[2][1];
     *pitch = -R.m[2][0];
   }
   // Of a rotation about an axis of the map.
   double sigma_about(const vec3 &axis) const {
-    const wm_estimate e = now();
+    const wm_estimate e = estimate();
     const vec3 in_body = transposed_times(matrix_of(quat_of(e.pose_map_base.q_xyzw)), axis);
     double sum = 0;
     for (int i = 0; i < 3; i++)
@@ -80,7 +59,7 @@ TEST(test_the_rates_are_the_imus_and_the_velocity_the_logs) {
         return vec3{jitter(i), jitter(i), 0.2};
       },
       at_rest);
-  const wm_estimate e = v.now();
+  const wm_estimate e = v.estimate();
   TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.2 * 1.99, e.heading_rad);
   TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.5 / 0.2 * std::sin(0.398), e.pose_map_base.p_m[0]);
   TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.5 / 0.2 * (1 - std::cos(0.398)), e.pose_map_base.p_m[1]);
@@ -94,14 +73,14 @@ TEST(test_a_silent_imu_yields_to_the_logs_rates) {
         return vec3{jitter(i), jitter(i), 0.3};
       },
       at_rest);
-  const double before = v.now().heading_rad;
+  const double before = v.estimate().heading_rad;
   v.go(
       3, {0, 0, 0}, {0, 0, 0.1},
       [](int) {
         return vec3{NAN, 0, 0};
       },
       at_rest);
-  TEST_ASSERT_DOUBLE_WITHIN(0.07, before + 0.3, v.now().heading_rad);  // a quarter of a second until it is noticed
+  TEST_ASSERT_DOUBLE_WITHIN(0.07, before + 0.3, v.estimate().heading_rad);  // a quarter of a second until it is noticed
 }
 
 // A velocity that holds while the gyro goes on is not certain for ever.
@@ -110,7 +89,7 @@ TEST(test_a_velocity_holds_for_its_time_and_no_longer) {
   spatial_source source;
   source.init(2.0, {0.05, 0.02});
   spatial_twist now = {{0.5, 0.1, 0.0}, {0.0, 0.0, 0.0}};
-  TEST_ASSERT_TRUE(source.take(velocity_log(0.0, now.v), &now));
+  TEST_ASSERT_TRUE(source.take(make::log6(0.0, now.v), &now));
   wm_event e = imu(2.0, {0.0, 0.0, 0.01}, {0.0, 0.0, kG});
   TEST_ASSERT_TRUE(source.take(e, &now));
   TEST_ASSERT_EQUAL_DOUBLE(0.5, now.v.x);
@@ -130,7 +109,7 @@ TEST(test_an_axis_that_repeats_for_a_moment_is_not_stuck) {
   const auto go = [&](int from, int to, bool repeats) {
     for (int i = from; i < to; i++) {
       spatial_twist now = {{0.5, 0.0, 0.0}, {0.0, 0.0, 0.0}};
-      if (i % 10 == 0) source.take(velocity_log(0.01 * i, now.v), &now);
+      if (i % 10 == 0) source.take(make::log6(0.01 * i, now.v), &now);
       const double w = 0.01 * std::sin(i);
       source.take(imu(0.01 * i, {w, w, repeats ? 0.3 : w}, {w, w, kG + w}), &now);
     }
@@ -148,10 +127,10 @@ TEST(test_a_silent_log_beside_an_imu_makes_the_place_uncertain) {
   vehicle v(0);
   const auto turning = [](int i) { return vec3{jitter(i), jitter(i), 0.1}; };
   v.go(2, {0.5, 0, 0}, {0, 0, 0}, turning, at_rest);
-  const double before_m = std::sqrt(v.now().covariance[0]);
-  for (int i = 0; i < 1000; i++, v.step_++) v.take(imu(0.01 * v.step_, turning(v.step_), {0, 0, kG}));
+  const double before_m = std::sqrt(v.estimate().covariance[0]);
+  for (int i = 0; i < 1000; i++, v.step_++) v.tell(imu(0.01 * v.step_, turning(v.step_), {0, 0, kG}));
   TEST_ASSERT_LESS_THAN_DOUBLE(0.1, before_m);
-  TEST_ASSERT_GREATER_THAN_DOUBLE(1.0, std::sqrt(v.now().covariance[0]));
+  TEST_ASSERT_GREATER_THAN_DOUBLE(1.0, std::sqrt(v.estimate().covariance[0]));
 }
 
 TEST(test_a_stuck_axis_is_found) {
@@ -161,7 +140,7 @@ TEST(test_a_stuck_axis_is_found) {
   for (int i = 0; i < 500 && !stuck; i++) {
     const double t = 0.01 * i;
     spatial_twist log = {{0, 0, 0}, {0.2, 0, 0}}, none = {};
-    if (i % 10 == 0) (void)source.take(velocity_log(t, {0, 0, 0}, {0.2, 0, 0}), &log);
+    if (i % 10 == 0) (void)source.take(make::log6(t, {0, 0, 0}, {0.2, 0, 0}), &log);
     (void)source.take(imu(t, {0.0, jitter(i), jitter(i)}, {0, 0, kG}), &none);
     stuck = source.stuck_rates() == 1;
     if (stuck) TEST_ASSERT_DOUBLE_WITHIN(0.2, 3.0, t);
@@ -223,7 +202,7 @@ TEST(test_vibration_and_bumps_tilt_nothing) {
   });
   double roll, pitch;
   v.tilt(&roll, &pitch);
-  const double sigma = std::sqrt(v.now().covariance[wm_cov_index(4, 4)]);
+  const double sigma = std::sqrt(v.estimate().covariance[wm_cov_index(4, 4)]);
   TEST_ASSERT_DOUBLE_WITHIN(2 * sigma, 0, pitch);
   TEST_ASSERT_DOUBLE_WITHIN(0.03, 0, roll);
   TEST_ASSERT_LESS_THAN_DOUBLE(0.05, sigma);
@@ -235,8 +214,8 @@ TEST(test_an_acceleration_that_the_log_measures_is_no_tilt) {
   v.go(2, {0, 0, 0}, {0, 0, 0}, still, at_rest);
   for (int i = 0; i < 200; i++, v.step_++) {
     const double t = 0.01 * v.step_;
-    if (v.step_ % 10 == 0) v.take(velocity_log(t, {0.01 * i + 0.05, 0, 0}));
-    v.take(imu(t, still(v.step_), {1, 0, kG}));
+    if (v.step_ % 10 == 0) v.tell(make::log6(t, {0.01 * i + 0.05, 0, 0}));
+    v.tell(imu(t, still(v.step_), {1, 0, kG}));
   }
   v.go(1, {2, 0, 0}, {0, 0, 0}, still, at_rest);
   double roll, pitch;

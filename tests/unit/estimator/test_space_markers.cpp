@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Coded markers of the map in space.
-#include "common/suite.h"
 #include "stereo_scene.hpp"
 
 namespace {
@@ -40,10 +39,7 @@ struct diver : scene {
         for (int k = 0; k < 2; k++) TEST_ASSERT_EQUAL(WM_OK, take(marker(map[static_cast<size_t>((i + 5 * k) % 12)])));
     }
   }
-  vec3 off(wm_estimate *e) const {
-    ekf->estimate(state, e);
-    return vec_of(e->pose_map_base.p_m) - truth.p;
-  }
+  vec3 off() const { return vec_of(estimate().pose_map_base.p_m) - truth.p; }
 };
 
 // GIVEN 20 drives of 20 s WHEN two of twelve markers are seen five times a second THEN the place is known to 2 cm, and
@@ -53,8 +49,8 @@ TEST(markers_hold_the_pose) {
   for (uint64_t seed = 1; seed <= 20; seed++) {
     diver d(seed);
     d.dive(20, true);
-    wm_estimate e;
-    const vec3 off = d.off(&e);
+    const wm_estimate e = d.estimate();
+    const vec3 off = d.off();
     const double *c = e.covariance;
     const double xx = c[wm_cov_index(0, 0)], xy = c[wm_cov_index(0, 1)], yy = c[wm_cov_index(1, 1)];
     nees += (yy * off.x * off.x - 2 * xy * off.x * off.y + xx * off.y * off.y) / (xx * yy - xy * xy) / 20;
@@ -71,10 +67,8 @@ TEST(dead_reckoning_is_worse) {
   diver with(3), without(3);
   with.dive(20, true);
   without.dive(20, false);
-  wm_estimate e;
-  const double by_markers = length(with.off(&e)), variance = e.covariance[0];
-  TEST_ASSERT_LESS_THAN_DOUBLE(length(without.off(&e)), by_markers);
-  TEST_ASSERT_LESS_THAN_DOUBLE(0.1 * e.covariance[0], variance);
+  TEST_ASSERT_LESS_THAN_DOUBLE(length(without.off()), length(with.off()));
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.1 * without.estimate().covariance[0], with.estimate().covariance[0]);
 }
 
 TEST(a_record_tells_each_component) {

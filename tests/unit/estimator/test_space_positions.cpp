@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Positions in space: a receiver with an error that lasts, a delay, and solutions of other kinds.
-#include "common/suite.h"
 #include "stereo_scene.hpp"
 
 namespace {
@@ -31,32 +30,16 @@ struct boat : scene {
       e.as.position.sigma_z_m = stated_m;
       TEST_ASSERT_EQUAL(WM_OK, take(e));
       if (t_s < 20) continue;
-      const wm_estimate now = estimated();
+      const wm_estimate now = estimate();
       const double dx = now.pose_map_base.p_m[0] - truth.p.x, dy = now.pose_map_base.p_m[1] - truth.p.y;
       const double xx = now.covariance[0], xy = now.covariance[1], yy = now.covariance[7];
       inside_ += (dx * dx * yy - 2 * dx * dy * xy + dy * dy * xx) / (xx * yy - xy * xy) < 5.991;
       judged_++;
     }
   }
-  wm_estimate estimated() const {
-    wm_estimate out;
-    ekf->estimate(state, &out);
-    return out;
-  }
   double off() const {
-    const wm_estimate now = estimated();
+    const wm_estimate now = estimate();
     return std::hypot(now.pose_map_base.p_m[0] - truth.p.x, now.pose_map_base.p_m[1] - truth.p.y);
-  }
-  double calibration(const char *name, double *sigma) const {
-    wm_calibration_value values[64];
-    const size_t count = ekf->calibration(state, values, 64);
-    for (size_t i = 0; i < count; i++)
-      if (std::strcmp(values[i].name, name) == 0) {
-        *sigma = values[i].sigma;
-        return values[i].value;
-      }
-    TEST_FAIL_MESSAGE(name);
-    return kAbsent;
   }
   double delay_s = 0;
   vec3 antenna_m;
@@ -70,17 +53,15 @@ TEST(test_an_error_that_lasts_is_not_averaged_away) {
   b.sail(150, 0.5, 1.0);
   TEST_ASSERT_GREATER_OR_EQUAL(90, 100 * b.inside_ / b.judged_);
   TEST_ASSERT_LESS_THAN_DOUBLE(1.0, b.off());
-  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, b.estimated().state);
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, b.estimate().state);
 }
 
 TEST(test_the_receivers_delay_is_found) {
   boat b;
   b.delay_s = 0.2;
   b.sail(100, 0.1, 0.2);
-  double sigma;
-  const double found = b.calibration("gnss.time_offset_s", &sigma);
-  TEST_ASSERT_DOUBLE_WITHIN(0.05, 0.2, found);
-  TEST_ASSERT_DOUBLE_WITHIN(3 * sigma, 0.2, found);
+  const wm_calibration_value found = b.calibrated("gnss.time_offset_s");
+  TEST_ASSERT_DOUBLE_WITHIN(std::fmin(0.05, 3 * found.sigma), 0.2, found.value);
 }
 
 // RTK is lost for ten seconds: the receiver falls back to a solution that is half a metre off, and states it.
@@ -88,7 +69,7 @@ TEST(test_another_solution_has_an_error_of_its_own) {
   boat b;
   b.sail(20, 0.02, 0.02);
   b.sail(10, 0.3, 0, 0.5);
-  TEST_ASSERT_LESS_THAN_DOUBLE(2.5, b.off() / std::sqrt(b.estimated().covariance[0]));
+  TEST_ASSERT_LESS_THAN_DOUBLE(2.5, b.off() / std::sqrt(b.estimate().covariance[0]));
   b.sail(1, 0.02, 0.02);
   TEST_ASSERT_LESS_THAN_DOUBLE(0.05, b.off());
 }
@@ -96,18 +77,16 @@ TEST(test_another_solution_has_an_error_of_its_own) {
 TEST(test_the_antennas_place_is_found_by_turns) {
   boat b({0.5, -0.3, 0});
   b.sail(100, 0.05, 0.05);
-  double sigma;
-  TEST_ASSERT_DOUBLE_WITHIN(0.06, 0.5, b.calibration("gnss.antenna_x_m", &sigma));
-  TEST_ASSERT_DOUBLE_WITHIN(0.06, -0.3, b.calibration("gnss.antenna_y_m", &sigma));
+  TEST_ASSERT_DOUBLE_WITHIN(0.06, 0.5, b.calibrated("gnss.antenna_x_m").value);
+  TEST_ASSERT_DOUBLE_WITHIN(0.06, -0.3, b.calibrated("gnss.antenna_y_m").value);
   TEST_ASSERT_LESS_THAN_DOUBLE(0.15, b.off());
 }
 
 TEST(test_a_stated_mounting_is_taken) {
   boat b({0.5, -0.3, 1.2}, true);
-  double sigma;
   b.sail(1, 0.05, 0.05);
-  TEST_ASSERT_DOUBLE_WITHIN(0.03, 1.2, b.calibration("gnss.antenna_z_m", &sigma));
-  TEST_ASSERT_LESS_THAN_DOUBLE(0.021, sigma);
+  TEST_ASSERT_DOUBLE_WITHIN(0.03, 1.2, b.calibrated("gnss.antenna_z_m").value);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.021, b.calibrated("gnss.antenna_z_m").sigma);
 }
 
 // Nothing of a receiver stands in the calibration of a vehicle without one.

@@ -2,8 +2,8 @@
 // Motion in space, part by part: each axis' own plausibility, how long a twist holds and what is assumed then, the pose
 // some time ago, the noise of a step on each axis, and what a gyro that sticks has missed.
 #include "common/suite.h"
-#include "events.hpp"
 #include "motion/spatial.hpp"
+#include "space_events.hpp"
 
 namespace {
 
@@ -191,28 +191,27 @@ TEST(test_the_motion_since_some_time_ago) {
 
 // ── spatial_motion ──────────────────────────────────────────────────────────────────────────────────────────────────
 
-wm_motion_params parameters() {
+// With the default parameters and no wheels.
+struct motion_by_default {
   wm_motion_params p;
-  wm_params_defaults(&wm_motion_params_table, &p);
-  return p;
-}
+  wm_wheels wheels = make::no_wheels();
+  spatial_motion motion;
+  explicit motion_by_default(const spatial_noise &noise = {}) {
+    wm_params_defaults(&wm_motion_params_table, &p);
+    motion.init(&p, &wheels, noise);
+  }
+};
 
-wm_event twist6(double t_s, const spatial_twist &t) {
-  wm_event e = make::empty(t_s, WM_EVENT_TWIST6);
-  e.as.twist6 = {{t.v.x, t.v.y, t.v.z}, {t.w.x, t.w.y, t.w.z}};
-  return e;
-}
+wm_event twist6(double t_s, const spatial_twist &t) { return make::log6(t_s, t.v, t.w); }
 
 // A sample's error, and a third of the square of a change beyond the noise of two samples, held for a period: on each
 // axis its own.
 TEST(test_noise_of_a_step_on_each_axis) {
-  const wm_motion_params p = parameters();
-  const wm_wheels wheels = make::no_wheels();
   const spatial_noise noise = {{0.01, 0.02, 0.03}, {0.004, 0.005, 0.006}, 0.05, 0.07};
   const spatial_twist a = {{1.0, 0.5, -0.3}, {0.1, -0.2, 0.3}}, change = {{0.2, -0.01, 0.3}, {-0.1, 0.05, 0.002}};
   for (const double dt_s : {0.1, 0.05, 0.15}) {
-    spatial_motion motion;
-    motion.init(&p, &wheels, noise);
+    motion_by_default by(noise);
+    spatial_motion &motion = by.motion;
     motion.feed(twist6(0.0, a));
     motion.feed(twist6(0.1, {a.v + change.v, a.w + change.w}));
     const vec3 v = a.v + change.v, w = a.w + change.w;
@@ -251,10 +250,8 @@ TEST(test_noise_of_a_step_on_each_axis) {
 // While samples are refused the body may have changed by up to the limits, evenly distributed: a t^2 / (2 sqrt 3) since
 // the last good one, of place and rotation alike.
 TEST(test_noise_of_refused_samples_in_space) {
-  const wm_motion_params p = parameters();
-  const wm_wheels wheels = make::no_wheels();
-  spatial_motion motion;
-  motion.init(&p, &wheels, {});
+  motion_by_default by;
+  spatial_motion &motion = by.motion;
   for (int i = 0; i <= 10; i++) motion.feed(twist6(0.1 * i, {}));
   motion.feed(twist6(1.1, {{90, 0, 0}, {}}));
   TEST_ASSERT_EQUAL_UINT32(WM_MOTION_HEALTH_IMPLAUSIBLE, motion.health());
@@ -265,18 +262,16 @@ TEST(test_noise_of_refused_samples_in_space) {
   });
   const double grown = (std::pow(0.2, 4) - std::pow(0.1, 4)) / 12.0;
   for (int i = 0; i < 3; i++) {
-    TEST_ASSERT_DOUBLE_WITHIN(1e-9, square(p.limits_mps2) * grown, place[i]);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-9, square(p.limits_radps2) * grown, turn[i]);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, square(by.p.limits_mps2) * grown, place[i]);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, square(by.p.limits_radps2) * grown, turn[i]);
   }
 }
 
 // A planar twist, and what wheels and a gyro give, are motion in space without other components.
 TEST(test_planar_motion_in_space) {
-  const wm_motion_params p = parameters();
-  const wm_wheels wheels = make::no_wheels();
   for (const bool twists : {false, true}) {
-    spatial_motion motion;
-    motion.init(&p, &wheels, {});
+    motion_by_default by;
+    spatial_motion &motion = by.motion;
     for (int i = 0; i <= 20; i++)
       motion.feed(twists ? make::twist(0.05 * i, 0.7, -0.3)
                          : make::quantities(0.05 * i, {{WM_Q_VEHICLE_SPEED, 0.7}, {WM_Q_YAW_RATE, -0.3}}));
@@ -290,10 +285,8 @@ TEST(test_planar_motion_in_space) {
 
 // Over a silence velocity and rates walk by 0.3 per sqrt(s).
 TEST(test_noise_of_a_silence_in_space) {
-  const wm_motion_params p = parameters();
-  const wm_wheels wheels = make::no_wheels();
-  spatial_motion motion;
-  motion.init(&p, &wheels, {});
+  motion_by_default by;
+  spatial_motion &motion = by.motion;
   motion.feed(twist6(0.0, {{1, 0, 0}, {}}));
   motion.feed(twist6(0.1, {{1, 0, 0}, {}}));
   double place[3] = {}, turn[3] = {};
@@ -309,13 +302,12 @@ TEST(test_noise_of_a_silence_in_space) {
 
 // ── spatial_source ──────────────────────────────────────────────────────────────────────────────────────────────────
 
-wm_event imu(double t_s, const vec3 &w, const vec3 &f) {
-  return make::quantities(t_s, {{WM_Q_ROLL_RATE, w.x},
-                                {WM_Q_PITCH_RATE, w.y},
-                                {WM_Q_YAW_RATE, w.z},
-                                {WM_Q_ACCELERATION_X, f.x},
-                                {WM_Q_ACCELERATION_Y, f.y},
-                                {WM_Q_ACCELERATION_Z, f.z}});
+using make::imu;
+
+spatial_source begun() {
+  spatial_source out;
+  out.init(2.0, {0.05, 0.015});
+  return out;
 }
 
 // A pseudo-random number between -1 and 1.
@@ -330,8 +322,7 @@ TEST(test_what_a_stuck_axis_has_missed) {
   constexpr double kStep_s = 0.01, kRest_radps = 0.015;
   for (int axis = 0; axis < 3; axis++)
     for (const bool has_rates : {false, true}) {
-      spatial_source source;
-      source.init(2.0, {0.05, kRest_radps});
+      spatial_source source = begun();
       const spatial_twist log = {{0.4, 0, 0}, has_rates ? vec3{0.2, -0.3, 0.4} : vec3{0, 0, 0}};
       vec3 last{};
       double turn_rad2[3], since_s = -1.0, value = 0.0;
@@ -361,11 +352,9 @@ TEST(test_what_a_stuck_axis_has_missed) {
 
 // A turn that was missed evenly over a way bends it to the sides: a third of its square times the way's.
 TEST(test_a_missed_turn_bends_the_way) {
-  const wm_motion_params p = parameters();
-  const wm_wheels wheels = make::no_wheels();
   for (int axis = 0; axis < 3; axis++) {
-    spatial_motion motion;
-    motion.init(&p, &wheels, {});
+    motion_by_default by;
+    spatial_motion &motion = by.motion;
     const spatial_twist log = {{0.4, 0.2, 0.1}, {0.2, -0.3, 0.4}};
     vec3 last{};
     double before[3] = {}, after[3] = {}, turned[3] = {}, value = 0.0, since_s = 0.0;
@@ -400,11 +389,9 @@ TEST(test_a_missed_turn_bends_the_way) {
 // GIVEN a gyro that has fallen silent WHEN the log has no rates THEN each axis turns by 0.1 rad per sqrt(s) that
 // nothing measures; with the log's rates nothing is unmeasured.
 TEST(test_turns_that_nothing_measures) {
-  const wm_motion_params p = parameters();
-  const wm_wheels wheels = make::no_wheels();
   for (const bool has_rates : {false, true}) {
-    spatial_motion motion;
-    motion.init(&p, &wheels, {});
+    motion_by_default by;
+    spatial_motion &motion = by.motion;
     const spatial_twist log = {{0.5, 0, 0}, {0, 0, has_rates ? 0.01 : 0.0}};
     for (int i = 0; i <= 200; i++) {
       if (i % 10 == 0) motion.feed(twist6(0.01 * i, log));
@@ -421,8 +408,7 @@ TEST(test_turns_that_nothing_measures) {
 // turns steadily does not stand.
 TEST(test_a_body_stands_by_the_mean_of_its_log) {
   for (const bool turns : {false, true}) {
-    spatial_source source;
-    source.init(2.0, {0.05, 0.015});
+    spatial_source source = begun();
     for (int i = 0; i < 2000; i++) {
       const double jitter = (i / 10) % 2 ? 0.02 : -0.02;
       spatial_twist now = {{0.06 * ((i / 10) % 2 ? 1 : -1), 0, 0}, {0, turns ? 0.02 : jitter, turns ? 0.01 : -jitter}};
@@ -439,8 +425,7 @@ TEST(test_a_body_stands_by_the_mean_of_its_log) {
 // periods, until hold_max_s: the integral of the square of its age, by small steps.
 TEST(test_the_walk_of_a_held_velocity) {
   for (const double period_s : {0.1, 0.5}) {
-    spatial_source source;
-    source.init(2.0, {0.05, 0.015});
+    spatial_source source = begun();
     double t_s = 0.0;
     for (int i = 0; i <= 1000; i++) {
       t_s = 0.01 * i;
@@ -469,8 +454,7 @@ TEST(test_the_walk_of_a_held_velocity) {
 // The period of the twists is their mean one, with a gain of a sixteenth; after a silence longer than hold_max_s
 // neither a period nor a change of velocity is taken from it.
 TEST(test_the_period_and_the_change_of_twists) {
-  spatial_source source;
-  source.init(2.0, {0.05, 0.015});
+  spatial_source source = begun();
   double t_s = 0.0, period_s = 0.0;
   spatial_twist before{};
   for (int i = 0; i < 40; i++) {
@@ -497,8 +481,7 @@ TEST(test_which_values_are_fresh) {
                                WM_Q_ACCELERATION_X, WM_Q_ACCELERATION_Y, WM_Q_ACCELERATION_Z};
   for (int missing = 0; missing < 7; missing++)
     for (const double late_s : {0.24, 0.26}) {
-      spatial_source source;
-      source.init(2.0, {0.05, 0.015});
+      spatial_source source = begun();
       spatial_twist now{};
       for (int k = 0; k < 6; k++)
         if (k != missing) (void)source.take(make::quantities(0.0, {{axes[k], 0.1 * (k + 1)}}), &now);

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // stereo_ekf on a street: far tracks that drift, others that move by themselves, a camera that repeats a picture.
-#include "common/suite.h"
-
 #include "filters/stereo_ekf/picture_motion.hpp"
 #include "stereo_scene.hpp"
 
@@ -60,14 +58,7 @@ struct street {
       TEST_ASSERT_EQUAL(WM_OK, s.take(e));
     }
   }
-  void say(const vec3 &v, const vec3 &w) {
-    wm_event e = make::empty(s.t_s, WM_EVENT_TWIST6);
-    for (int k = 0; k < 3; k++) {
-      e.as.twist6.v_mps[k] = v[k];
-      e.as.twist6.w_radps[k] = w[k];
-    }
-    TEST_ASSERT_EQUAL(WM_OK, s.ekf->predict(s.state, &e));
-  }
+  void say(const vec3 &v, const vec3 &w) { s.tell(make::log6(s.t_s, v, w)); }
   // 20 s at 8 m/s, without a log from rest; the log is 1 % short and 2 degrees askew.
   void drive(bool pictures, bool log = true) {
     s.begin();
@@ -83,14 +74,6 @@ struct street {
       s.t_s += 0.1;
     }
     if (log) say({8, 0, 0}, {0, 0, 0});
-  }
-  wm_calibration_value calibrated(const char *name) const {
-    wm_calibration_value values[32];
-    const size_t count = s.ekf->calibration(s.state, values, 32);
-    for (size_t i = 0; i < count && i < 32; i++)
-      if (std::strcmp(values[i].name, name) == 0) return values[i];
-    TEST_FAIL_MESSAGE(name);
-    return {};
   }
 };
 
@@ -108,7 +91,7 @@ TEST(test_far_and_moving_tracks_improve_a_drive) {
     with += square(seen.s.place_error()) / drives;
     without += square(blind.s.place_error()) / drives;
     nees += seen.s.nees() / drives;
-    const wm_calibration_value scale = seen.calibrated("motion.velocity_scale");
+    const wm_calibration_value scale = seen.s.calibrated("motion.velocity_scale");
     TEST_ASSERT_DOUBLE_WITHIN(2 * scale.sigma, 1 / 0.99, scale.value);
     TEST_ASSERT_LESS_THAN_DOUBLE(2.0, seen.s.nees());
   }
@@ -144,7 +127,7 @@ TEST(test_a_scale_of_the_rates_is_found) {
     falsified.drive(true);
     exact += square(as_stated.s.place_error()) / drives;
     scaled += square(falsified.s.place_error()) / drives;
-    const wm_calibration_value scale = falsified.calibrated("motion.rate_scale");
+    const wm_calibration_value scale = falsified.s.calibrated("motion.rate_scale");
     TEST_ASSERT_DOUBLE_WITHIN(3 * scale.sigma, 1 / 1.05, scale.value);
     TEST_ASSERT_LESS_THAN_DOUBLE(0.015, scale.sigma);
   }

@@ -2,8 +2,6 @@
 // The own map of stereo_ekf: points that left the view are found again under another number by how they look, and the
 // map outlives a restart.
 #include <map>
-#include "common/suite.h"
-
 #include "stereo_scene.hpp"
 #include "waymark/keeper.h"
 

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // stereo_ekf under bad inputs: pauses, wrong matches, data that no sensor can mean.
-#include "common/suite.h"
 #include "filters/stereo_ekf/params.h"
 #include "stereo_scene.hpp"
 
@@ -49,10 +48,7 @@ TEST(test_a_wrong_match_is_refused_and_one_picture_is_enough) {
   }
   s.look();
   double px[4];
-  const wm_landmark *shown = nullptr;
-  for (const wm_landmark &l : s.points)
-    if (s.pixels(l, px)) shown = &l;
-  TEST_ASSERT_NOT_NULL(shown);
+  const wm_landmark *shown = &s.in_view();
   s.pixels(*shown, px);
   const wm_estimate before = s.estimate();
   wm_innovation records[WM_INNOVATIONS_PER_EVENT_MAX];
@@ -60,14 +56,8 @@ TEST(test_a_wrong_match_is_refused_and_one_picture_is_enough) {
   wm_event e = s.seen(*shown, px);
   TEST_ASSERT_EQUAL(WM_OK, s.take(e, records));
   for (int k = 0; k < 4; k++) TEST_ASSERT_EQUAL(WM_REJECTED_GATE, records[k].verdict);
-  TEST_ASSERT_EQUAL_MEMORY(
-      &before,
-      [&] {
-        static wm_estimate after;
-        after = s.estimate();
-        return &after;
-      }(),
-      sizeof before);
+  const wm_estimate after = s.estimate();
+  TEST_ASSERT_EQUAL_MEMORY(&before, &after, sizeof before);
   s.pixels(*shown, px);
   e = s.seen(*shown, px);
   e.as.stereo.right_px[0] = e.as.stereo.right_px[1] = kAbsent;
@@ -134,7 +124,7 @@ TEST(test_nonsense_in_pixels_is_refused) {
   s.begin();
   s.look();
   s.swim(0.1, {0, 0, 0}, {0, 0, 0});
-  std::vector<char> before(static_cast<char *>(s.state), static_cast<char *>(s.state) + s.bytes);
+  const std::vector<char> before = s.copy();
   const double bad[][4] = {{kAbsent, kAbsent, kAbsent, kAbsent},
                            {kAbsent, 1, 2, 3},
                            {1, 2, 3, kAbsent},
@@ -172,11 +162,7 @@ TEST(test_a_kidnapped_vehicle_is_found_and_keeps_its_calibration) {
       return lost;
     };
     TEST_ASSERT_FALSE(drive(400));
-    const auto scale = [&s] {
-      wm_calibration_value value;
-      TEST_ASSERT_EQUAL(1, s.ekf->calibration(s.state, &value, 1));
-      return value;
-    };
+    const auto scale = [&s] { return s.calibrated("motion.velocity_scale"); };
     TEST_ASSERT_DOUBLE_WITHIN(0.01, 1.0 / 1.1, scale().value);
     TEST_ASSERT_LESS_THAN_DOUBLE(0.01, s.estimate().lost_probability);
     const uint32_t resets = s.estimate().resets;
@@ -208,18 +194,13 @@ TEST(test_dead_reckoning_by_a_tilted_log_is_honest) {
     s.begin();
     for (int i = 0; i < 300; i++) {
       const vec3 v = {8, 0, 0}, w = {0, 0, i / 100 == 1 ? 0.15 : 0};
-      wm_event e = make::empty(s.t_s, WM_EVENT_TWIST6);
-      for (int k = 0; k < 3; k++) {
-        e.as.twist6.v_mps[k] = (mounted * v)[k] + 0.02 * s.noise();
-        e.as.twist6.w_radps[k] = (mounted * w)[k] + 0.003 * s.noise();
-      }
-      TEST_ASSERT_EQUAL(WM_OK, s.ekf->predict(s.state, &e));
+      const vec3 noise_v = {s.noise(), s.noise(), s.noise()}, noise_w = {s.noise(), s.noise(), s.noise()};
+      s.tell(make::log6(s.t_s, mounted * v + 0.02 * noise_v, mounted * w + 0.003 * noise_w));
       s.truth.p = s.truth.p + matrix_of(s.truth.q) * (0.1 * (mean_turn(0.1 * w) * v));
       s.truth.q = normalized(s.truth.q * turn_by(0.1 * w));
       s.t_s += 0.1;
     }
-    const wm_event last = make::empty(s.t_s, WM_EVENT_TWIST6);
-    TEST_ASSERT_EQUAL(WM_OK, s.ekf->predict(s.state, &last));
+    s.tell(make::log6(s.t_s, {0, 0, 0}));
     nees += s.nees() / drives;
   }
   TEST_ASSERT_LESS_THAN_DOUBLE(1.6, nees);
@@ -255,12 +236,8 @@ TEST(test_points_without_motion_are_enough) {
       nees += s.nees() / (drives * (steps - 20));
       error_m2 += square(s.place_error()) / (drives * (steps - 20));
     }
-    wm_calibration_value values[32];
-    const size_t count = s.ekf->calibration(s.state, values, 32);
-    for (size_t i = 0; i < count; i++) {
-      TEST_ASSERT_NOT_EQUAL(0, std::strcmp(values[i].name, "stereo.time_offset_s"));
-      TEST_ASSERT_NOT_EQUAL(0, std::strcmp(values[i].name, "motion.velocity_scale"));
-    }
+    for (const char *none : {"stereo.time_offset_s", "motion.velocity_scale"})
+      TEST_ASSERT_DOUBLE_IS_NAN(s.calibrated(none).value);
   }
   TEST_ASSERT_LESS_THAN_DOUBLE(0.02, std::sqrt(error_m2));
   TEST_ASSERT_LESS_THAN_DOUBLE(1.5, nees);

@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // An IMU in space that repeats its values: which axis is found stuck, how soon, and that no coarse sensor of a body
 // that stands is taken for one; what the filter makes of it until the values move again.
-#include "common/suite.h"
 #include "motion/spatial_source.hpp"
 #include "stereo_scene.hpp"
-#include "waymark/health.h"
 
 namespace {
 
@@ -30,21 +28,6 @@ imu_row live(int i, const vec3 &w = {0, 0, 0}) {
   return out;
 }
 
-wm_event event_of(double t_s, const imu_row &r) {
-  return make::quantities(t_s, {{WM_Q_ROLL_RATE, r.w.x},
-                                {WM_Q_PITCH_RATE, r.w.y},
-                                {WM_Q_YAW_RATE, r.w.z},
-                                {WM_Q_ACCELERATION_X, r.f.x},
-                                {WM_Q_ACCELERATION_Y, r.f.y},
-                                {WM_Q_ACCELERATION_Z, r.f.z}});
-}
-
-wm_event velocity_log(double t_s, const vec3 &v, const vec3 &w = {0, 0, 0}) {
-  wm_event e = make::empty(t_s, WM_EVENT_TWIST6);
-  e.as.twist6 = {{v.x, v.y, v.z}, {w.x, w.y, w.z}};
-  return e;
-}
-
 // The source alone: a log ten times a second and the IMU a hundred times.
 struct sensors {
   spatial_source source;
@@ -54,8 +37,9 @@ struct sensors {
   void go(double seconds, const vec3 &v, Row row, const vec3 &log_rates = {0, 0, 0}) {
     for (const int end = i + (int)std::lround(seconds / kStep_s); i < end; i++) {
       spatial_twist twist = {v, log_rates}, none = {};
-      if (i % 10 == 0) (void)source.take(velocity_log(kStep_s * i, v, log_rates), &twist);
-      (void)source.take(event_of(kStep_s * i, row(i)), &none);
+      if (i % 10 == 0) (void)source.take(make::log6(kStep_s * i, v, log_rates), &twist);
+      const imu_row r = row(i);
+      (void)source.take(make::imu(kStep_s * i, r.w, r.f), &none);
     }
   }
 };
@@ -152,17 +136,12 @@ struct vehicle : scene {
   template <class Row>
   void go(double seconds, Row row, const vec3 &log_rates = {0, 0, 0}) {
     for (const int end = i + (int)std::lround(seconds / kStep_s); i < end; i++) {
-      if (i % 10 == 0) take(velocity_log(kStep_s * i, {0.3, 0, 0}, log_rates));
-      take(event_of(kStep_s * i, row(i)));
+      if (i % 10 == 0) tell(make::log6(kStep_s * i, {0.3, 0, 0}, log_rates));
+      const imu_row r = row(i);
+      tell(make::imu(kStep_s * i, r.w, r.f));
     }
   }
-  void take(const wm_event &e) { TEST_ASSERT_EQUAL(WM_OK, ekf->predict(state, &e)); }
-  wm_estimate now() const {
-    wm_estimate out;
-    ekf->estimate(state, &out);
-    return out;
-  }
-  double sigma(int component) const { return std::sqrt(now().covariance[wm_cov_index(component, component)]); }
+  double sigma(int component) const { return std::sqrt(estimate().covariance[wm_cov_index(component, component)]); }
   int i = 0;
 };
 
@@ -187,14 +166,14 @@ TEST(test_a_stuck_gyro_yields_to_the_logs_rates) {
   const vec3 turn = {0, 0, 0.2};
   v.go(
       10, [&](int i) { return live(i, turn); }, turn);
-  const double before = v.now().heading_rad;
+  const double before = v.estimate().heading_rad;
   v.go(
       5,
       [&](int i) {
         return imu_row{{0.01, 0.01, 0.01}, live(i).f};
       },
       turn);
-  TEST_ASSERT_DOUBLE_WITHIN(3 * v.sigma(5), 1.0, wrap(v.now().heading_rad - before));
+  TEST_ASSERT_DOUBLE_WITHIN(3 * v.sigma(5), 1.0, wrap(v.estimate().heading_rad - before));
   TEST_ASSERT_LESS_THAN_DOUBLE(0.12, v.sigma(5));
 }
 
@@ -202,13 +181,7 @@ TEST(test_a_stuck_gyro_yields_to_the_logs_rates) {
 TEST(test_the_gyros_bias_comes_back_with_it) {
   vehicle v;
   v.go(10, [](int i) { return live(i); });
-  const auto bias_sigma = [&v] {
-    wm_calibration_value all[32];
-    const size_t n = v.ekf->calibration(v.state, all, 32);
-    for (size_t k = 0; k < n; k++)
-      if (std::strcmp(all[k].name, "motion.rate_bias_x_radps") == 0) return all[k].sigma;
-    return 0.0;
-  };
+  const auto bias_sigma = [&v] { return v.calibrated("motion.rate_bias_x_radps").sigma; };
   const double learnt = bias_sigma();
   TEST_ASSERT_LESS_THAN_DOUBLE(0.0045, learnt);
   v.go(5, [](int i) { return imu_row{live(999).w, live(i).f}; });
@@ -223,7 +196,7 @@ TEST(test_a_stuck_accelerometer_is_not_used) {
   v.go(10, [](int i) { return live(i); });
   v.go(10, [](int i) { return imu_row{live(i, {0.02, 0, 0}).w, live(999).f}; });
   TEST_ASSERT_EQUAL(WM_MOTION_HEALTH_ACCELEROMETER_STUCK, v.ekf->motion_health(v.state));
-  const mat3 R = matrix_of(quat_of(v.now().pose_map_base.q_xyzw));
+  const mat3 R = matrix_of(quat_of(v.estimate().pose_map_base.q_xyzw));
   TEST_ASSERT_DOUBLE_WITHIN(3 * v.sigma(3) + 0.01, 0.2, std::asin(R.m[2][1]));
   TEST_ASSERT_GREATER_THAN_DOUBLE(0.1, std::asin(R.m[2][1]));
 }
@@ -232,7 +205,7 @@ TEST(test_a_stuck_accelerometer_is_not_used) {
 TEST(test_a_silent_gyro_makes_the_turn_uncertain) {
   vehicle v;
   v.go(10, [](int i) { return live(i); });
-  for (const int end = v.i + 1000; v.i < end; v.i += 10) v.take(velocity_log(kStep_s * v.i, {0.3, 0, 0}));
+  for (const int end = v.i + 1000; v.i < end; v.i += 10) v.tell(make::log6(kStep_s * v.i, {0.3, 0, 0}));
   TEST_ASSERT_GREATER_THAN_DOUBLE(0.3, v.sigma(5));
 }
 
