@@ -1,18 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // A small drawn building, and a drive through it whose camera sees the joints of wall and floor: for tests of the
 // estimators that localize by edges.
-#ifndef WAYMARK_TESTS_EDGE_BUILDING_HPP
-#define WAYMARK_TESTS_EDGE_BUILDING_HPP
+#pragma once
 
-#include <cmath>
-#include <cstdlib>
-#include <cstring>
-#include <memory>
-#include <vector>
-
+#include "common/suite.h"
 #include "events.hpp"
 #include "math/arc.hpp"
-#include "unity.h"
 #include "waymark/estimator.h"
 #include "waymark/random.h"
 
@@ -42,26 +35,6 @@ inline bool inside(double x, double y) {
   return (x > 1 && x < 16 && y > 1 && y < 3) || (x > 3.5 && x < 6 && y > 1 && y < 11);
 }
 
-struct filter {
-  const wm_estimator *ops = edge_building::ops;
-  void *state;
-  size_t bytes;
-  filter() {
-    const char *why = "";
-    bytes = ops->state_bytes(params.data(), &setup, &why);
-    TEST_ASSERT_GREATER_THAN_MESSAGE(0, bytes, why);
-    state = aligned_alloc(64, (bytes + 63) / 64 * 64);
-    TEST_ASSERT_EQUAL(WM_OK, ops->init(state, params.data(), &setup));
-  }
-  ~filter() { free(state); }
-  filter(const filter &) = delete;
-  wm_estimate estimate() const {
-    wm_estimate e;
-    ops->estimate(state, &e);
-    return e;
-  }
-};
-
 // First wall along a ray, or a negative distance.
 inline double cast(double x, double y, double angle) {
   double best = -1;
@@ -75,7 +48,13 @@ inline double cast(double x, double y, double angle) {
   return best;
 }
 
+inline void without_a_start() { setup.start.p_m[0] = setup.start.p_m[1] = setup.start.heading_rad = NAN; }
+
+// A robot that begins when it is made.
 struct drive {
+  std::unique_ptr<void, void (*)(void *)> state{make::begun(*ops, params.data(), setup), std::free};
+  wm_innovation records[WM_INNOVATIONS_PER_EVENT_MAX];  // of the newest event
+  size_t count = 0;
   wm_pose2 truth{2, 2, 0};
   double t = 0;
   uint64_t draws = 0;
@@ -85,14 +64,46 @@ struct drive {
   bool silent = false;          // motion sensors say nothing
   double blocked_m = INFINITY;  // something stands across the way, so far before the camera
   int glass = 0;                // so many rays, from the right on, go on through the wall
+  drive() { TEST_ASSERT_NOT_NULL(state.get()); }
   double noise() { return wm_random_normal(7, 1, draws++); }
 
-  void scan(wm_event *e) {
-    *e = wm_event{};
-    e->kind = WM_EVENT_POINTS;
-    e->t_ns = wm_ns_from_seconds(t);
-    wm_points &p = e->as.points;
-    p.camera = 0;
+  wm_status tell(const wm_event &e) {
+    count = 0;
+    if (wm_event_is_motion(&e)) return ops->predict(state.get(), &e);
+    return ops->correct(state.get(), &e, records, WM_INNOVATIONS_PER_EVENT_MAX, &count);
+  }
+  void feed(const wm_event &e) { TEST_ASSERT_EQUAL(WM_OK, tell(e)); }
+  wm_estimate estimate() const {
+    wm_estimate e;
+    ops->estimate(state.get(), &e);
+    return e;
+  }
+  wm_state published_state() const { return static_cast<wm_state>(estimate().state); }
+  std::vector<wm_hypothesis> hypotheses() const {
+    std::vector<wm_hypothesis> out(200);
+    out.resize(ops->hypotheses(state.get(), out.data(), out.size()));
+    return out;
+  }
+  double calibrated(const char *name) const {
+    wm_calibration_value values[64];
+    const size_t n = ops->calibration(state.get(), values, 64);
+    for (size_t i = 0; i < n; i++)
+      if (std::strcmp(values[i].name, name) == 0) return values[i].value;
+    TEST_FAIL_MESSAGE(name);
+    return 0;
+  }
+  // Share of the edge points that lie on edges of the map.
+  double explained() const {
+    wm_counter counters[16];
+    const size_t n = ops->counters(state.get(), counters, 16);
+    for (size_t i = 0; i < n; i++)
+      if (counters[i].kind == WM_COUNTER_EXPLAINED_PERMILLE) return 1e-3 * (double)counters[i].count;
+    return NAN;
+  }
+
+  wm_event scan() {
+    wm_event e = make::empty(t, WM_EVENT_POINTS);
+    wm_points &p = e.as.points;
     const double eye_x = truth.x_m + std::cos(truth.heading_rad), eye_y = truth.y_m + std::sin(truth.heading_rad);
     for (int i = 0; i < 140; i++) {
       const double angle = -1.2 + 2.4 * i / 139, wall = cast(eye_x, eye_y, truth.heading_rad + angle);
@@ -107,68 +118,50 @@ struct drive {
       p.normal_rad[p.count] = p.sigma_m[p.count] = NAN;
       p.count++;
     }
+    return e;
   }
   // Seconds with this twist; the scan may be spoilt. Returns the largest error.
-  double go(filter &f, double seconds, double v, double w, bool nonsense = false) {
+  double go(double seconds, double v, double w, bool nonsense = false) {
     double worst = 0;
     for (int i = 0; i < (int)(seconds * 10 + 0.5); i++) {
-      wm_event e{};
-      e.kind = WM_EVENT_TWIST2;
-      e.t_ns = wm_ns_from_seconds(t);
-      e.as.twist2 = {v, w};
-      if (!silent) TEST_ASSERT_EQUAL(WM_OK, f.ops->predict(f.state, &e));
+      if (!silent) feed(make::twist(t, v, w));
       wm_event picture{};
       for (int k = 0; k < 10; k++) {
-        if (k == 10 - late) scan(&picture);
+        if (k == 10 - late) picture = scan();
         truth.heading_rad += 0.005 * w * 1.01;
         truth.x_m += 0.01 * v * 0.99 * std::cos(truth.heading_rad);
         truth.y_m += 0.01 * v * 0.99 * std::sin(truth.heading_rad);
         truth.heading_rad += 0.005 * w * 1.01;
       }
       t += 0.1;
-      if (late == 0) scan(&picture);
-      e = picture;
-      e.t_ns = wm_ns_from_seconds(t);
+      if (late == 0) picture = scan();
+      picture.t_ns = picture.arrival_ns = wm_ns_from_seconds(t);
       if (nonsense)
-        for (uint32_t k = 0; k < e.as.points.count; k++) {
-          e.as.points.x_m[k] = (float)(3 + 2 * noise());
-          e.as.points.y_m[k] = (float)(2 * noise());
+        for (uint32_t k = 0; k < picture.as.points.count; k++) {
+          picture.as.points.x_m[k] = (float)(3 + 2 * noise());
+          picture.as.points.y_m[k] = (float)(2 * noise());
         }
-      wm_innovation out[WM_INNOVATIONS_PER_EVENT_MAX];
-      size_t count = 0;
-      TEST_ASSERT_EQUAL(WM_OK, f.ops->correct(f.state, &e, out, WM_INNOVATIONS_PER_EVENT_MAX, &count));
-      const wm_estimate now = f.estimate();
+      feed(picture);
+      const wm_estimate now = estimate();
       TEST_ASSERT_TRUE(std::isfinite(now.pose_map_base.p_m[0]) && std::isfinite(now.covariance[0]));
       TEST_ASSERT_TRUE(now.covariance[0] > 0 && now.covariance[35] > 0);
-      const double error = error_of(f);
-      worst = std::fmax(worst, error);
+      worst = std::fmax(worst, error());
     }
     return worst;
   }
-  double error_of(const filter &f) const {
-    const wm_estimate now = f.estimate();
-    const double dx = now.pose_map_base.p_m[0] - truth.x_m, dy = now.pose_map_base.p_m[1] - truth.y_m;
-    return std::sqrt(dx * dx + dy * dy);
+  double error() const {
+    const wm_estimate now = estimate();
+    return std::hypot(now.pose_map_base.p_m[0] - truth.x_m, now.pose_map_base.p_m[1] - truth.y_m);
+  }
+  // Of the place: its error squared over the covariance, of two numbers.
+  double nees() const {
+    const wm_estimate e = estimate();
+    const double dx = e.pose_map_base.p_m[0] - truth.x_m, dy = e.pose_map_base.p_m[1] - truth.y_m;
+    const double xx = e.covariance[wm_cov_index(0, 0)], xy = e.covariance[wm_cov_index(0, 1)],
+                 yy = e.covariance[wm_cov_index(1, 1)];
+    return (yy * dx * dx - 2 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy);
   }
 };
-
-// Share of the edge points that lie on edges of the map.
-inline double explained_of(const filter &f) {
-  wm_counter counters[16];
-  const size_t count = f.ops->counters(f.state, counters, 16);
-  for (size_t i = 0; i < count; i++)
-    if (counters[i].kind == WM_COUNTER_EXPLAINED_PERMILLE) return 1e-3 * (double)counters[i].count;
-  return NAN;
-}
-
-inline double calibration_of(const filter &f, const char *name) {
-  wm_calibration_value values[64];
-  const size_t count = f.ops->calibration(f.state, values, 64);
-  for (size_t i = 0; i < count; i++)
-    if (std::strcmp(values[i].name, name) == 0) return values[i].value;
-  TEST_FAIL_MESSAGE(name);
-  return 0;
-}
 
 // Draws the building, for this estimator with the defaults of its parameters.
 inline void draw(const char *estimator) {
@@ -225,5 +218,3 @@ inline void thin_walls(double thickness_m) {
 }
 
 }  // namespace edge_building
-
-#endif

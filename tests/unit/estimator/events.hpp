@@ -172,7 +172,7 @@ inline void *begun(const wm_estimator &estimator, const void *params, const wm_s
   const char *why = nullptr;
   const size_t bytes = estimator.state_bytes(params, &setup, &why);
   if (bytes == 0) return nullptr;
-  void *state = aligned_alloc(16, (bytes + 15) / 16 * 16);
+  void *state = aligned_alloc(64, (bytes + 63) / 64 * 64);
   if (estimator.init(state, params, &setup) == WM_OK) return state;
   std::free(state);
   return nullptr;

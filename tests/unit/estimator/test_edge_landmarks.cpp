@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // edge_mcl with coded markers on the walls of a drawn building, and sightings of landmarks.
-#include "common/suite.h"
 #include "edge_building.hpp"
 
 namespace {
@@ -20,48 +19,38 @@ struct seen_result {
 };
 
 // All markers in view, or that one alone; `turned_rad`: by how much somebody turned them.
-seen_result look(filter &f, drive &d, int only = -1, double turned_rad = 0.0, double moved_m = 0.0) {
+seen_result look(drive &d, int only = -1, double turned_rad = 0.0, double moved_m = 0.0) {
   seen_result out;
   for (const wm_landmark &l : kMarkers) {
     if (only >= 0 && l.id != only) continue;
-    const double h = d.truth.heading_rad, c = std::cos(h), s = std::sin(h);
-    const double dx = l.p_m[0] + moved_m - d.truth.x_m - kAhead_m * c, dy = l.p_m[1] - d.truth.y_m - kAhead_m * s;
-    const double ahead = c * dx + s * dy, left = c * dy - s * dx;
-    if (std::hypot(dx, dy) > kFarthest_m || std::fabs(std::atan2(left, ahead)) > kAside_rad) continue;
+    const double h = d.truth.heading_rad;
+    const wm_pose2 eye = wm::compose(d.truth, {kAhead_m, 0, 0}),
+                   seen = wm::between(eye, {l.p_m[0] + moved_m, l.p_m[1], 0});
+    const double range = std::hypot(seen.x_m, seen.y_m);
+    if (range > kFarthest_m || std::fabs(std::atan2(seen.y_m, seen.x_m)) > kAside_rad) continue;
     wm_event e = make::empty(d.t, WM_EVENT_MARKER);
     wm_marker &m = e.as.marker;
-    m = {0, 1, l.id, {ahead, left, l.p_m[2] - kUp_m}, l.yaw_rad + turned_rad - h, {}, 0.0, NAN, NAN, NAN};
-    const double range = std::hypot(ahead, left);
+    m = {0, 1, l.id, {seen.x_m, seen.y_m, l.p_m[2] - kUp_m}, l.yaw_rad + turned_rad - h, {}, 0.0, NAN, NAN, NAN};
     for (int k = 0; k < 2; k++) m.p_m[k] += (k == 0 ? 0.01 : 0.005 * range) * d.noise();
     m.yaw_rad += 0.02 * d.noise();
-    wm_innovation records[4];
-    size_t count = 0;
-    TEST_ASSERT_EQUAL(WM_OK, f.ops->correct(f.state, &e, records, 4, &count));
-    TEST_ASSERT_GREATER_THAN(0, count);
+    d.feed(e);
+    TEST_ASSERT_GREATER_THAN(0, d.count);
     out.seen++;
-    out.fused += records[0].verdict == WM_FUSED;
-    out.rejected += records[0].verdict == WM_REJECTED_GATE;
+    out.fused += d.records[0].verdict == WM_FUSED;
+    out.rejected += d.records[0].verdict == WM_REJECTED_GATE;
   }
   return out;
 }
 
 // Drives on, and looks at the markers after each scan.
-seen_result go(filter &f, drive &d, double seconds, double v, double w) {
+seen_result go(drive &d, double seconds, double v, double w) {
   seen_result out;
   for (int i = 0; i < (int)(seconds * 10 + 0.5); i++) {
-    d.go(f, 0.1, v, w);
-    const seen_result now = look(f, d);
+    d.go(0.1, v, w);
+    const seen_result now = look(d);
     out.seen += now.seen, out.fused += now.fused, out.rejected += now.rejected;
   }
   return out;
-}
-
-double nees_of(const filter &f, const drive &d) {
-  const wm_estimate e = f.estimate();
-  const double dx = e.pose_map_base.p_m[0] - d.truth.x_m, dy = e.pose_map_base.p_m[1] - d.truth.y_m;
-  const double xx = e.covariance[wm_cov_index(0, 0)], xy = e.covariance[wm_cov_index(0, 1)],
-               yy = e.covariance[wm_cov_index(1, 1)];
-  return (yy * dx * dx - 2 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy);
 }
 
 // GIVEN a straight corridor, whose walls say nothing of the way along it, and wheels that are off by 1 % WHEN markers
@@ -69,20 +58,19 @@ double nees_of(const filter &f, const drive &d) {
 TEST(markers_tell_the_way_along_a_corridor) {
   double nees = 0, with = 0, without = 0;
   for (int seed = 0; seed < 8; seed++) {
-    filter f, blind;
     drive d, same;
     d.draws = same.draws = (uint64_t)seed * 100000;
     d.truth.x_m = same.truth.x_m = 2 + 0.05 * d.noise();
-    d.go(f, 3, 1.0, 0);
-    same.go(blind, 3, 1.0, 0);
-    const seen_result seen = go(f, d, 9, 1.0, 0);
-    same.go(blind, 9, 1.0, 0);
-    TEST_ASSERT_EQUAL(WM_STATE_TRACKING, f.estimate().state);
+    d.go(3, 1.0, 0);
+    same.go(3, 1.0, 0);
+    const seen_result seen = go(d, 9, 1.0, 0);
+    same.go(9, 1.0, 0);
+    TEST_ASSERT_EQUAL(WM_STATE_TRACKING, d.published_state());
     TEST_ASSERT_GREATER_THAN(60, seen.seen);
     TEST_ASSERT_GREATER_THAN(0.95 * seen.seen, seen.fused);
-    nees += nees_of(f, d) / 8;
-    with = std::fmax(with, d.error_of(f));
-    without = std::fmax(without, same.error_of(blind));
+    nees += d.nees() / 8;
+    with = std::fmax(with, d.error());
+    without = std::fmax(without, same.error());
   }
   TEST_ASSERT_LESS_THAN_DOUBLE(0.03, with);
   TEST_ASSERT_LESS_THAN_DOUBLE(without, with);
@@ -92,47 +80,44 @@ TEST(markers_tell_the_way_along_a_corridor) {
 // GIVEN no start WHEN one marker is in view THEN the pose is there within two seconds, and the scans confirm it; the
 // floor plan alone has not found it by then.
 TEST(one_marker_finds_the_pose) {
-  setup.start = {WM_TIME_NONE, {NAN, NAN, NAN}, {NAN, NAN, NAN, NAN}, NAN, NAN, NAN};
-  filter f, blind;
+  without_a_start();
   drive d, same;
   d.truth = same.truth = {12.5, 2.2, 0.4};
   for (int i = 0; i < 20; i++) {
-    d.go(f, 0.1, 0.1, 0);
-    look(f, d, 103);
-    same.go(blind, 0.1, 0.1, 0);
+    d.go(0.1, 0.1, 0);
+    look(d, 103);
+    same.go(0.1, 0.1, 0);
   }
-  TEST_ASSERT_LESS_THAN_DOUBLE(0.2, d.error_of(f));
-  TEST_ASSERT_GREATER_THAN_DOUBLE(0.2, same.error_of(blind));
-  go(f, d, 4, 0.2, 0);
-  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, f.estimate().state);
-  TEST_ASSERT_LESS_THAN_DOUBLE(0.1, d.error_of(f));
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.2, d.error());
+  TEST_ASSERT_GREATER_THAN_DOUBLE(0.2, same.error());
+  go(d, 4, 0.2, 0);
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, d.published_state());
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.1, d.error());
 }
 
 // GIVEN a tracked pose WHEN the robot is carried to the other corridor THEN two markers there find it within 6 s.
 TEST(a_robot_that_is_carried_off_is_found) {
-  filter f;
   drive d;
-  go(f, d, 4, 1.0, 0);
-  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, f.estimate().state);
+  go(d, 4, 1.0, 0);
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, d.published_state());
   d.truth = {4.7, 6.0, 1.5};
-  go(f, d, 6, 0.2, 0);
-  TEST_ASSERT_LESS_THAN_DOUBLE(0.2, d.error_of(f));
-  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, f.estimate().state);
+  go(d, 6, 0.2, 0);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.2, d.error());
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, d.published_state());
 }
 
 // GIVEN a tracked pose WHEN the one marker in view hangs 1 m beside its place THEN it is refused, and the pose stays.
 TEST(one_moved_marker_moves_no_robot) {
-  filter f;
   drive d;
-  go(f, d, 3, 1.0, 0);
+  go(d, 3, 1.0, 0);
   int seen = 0;
   for (int i = 0; i < 60; i++) {
-    d.go(f, 0.1, 0.1, 0);
-    const seen_result now = look(f, d, 101, 0.0, 1.0);
+    d.go(0.1, 0.1, 0);
+    const seen_result now = look(d, 101, 0.0, 1.0);
     TEST_ASSERT_EQUAL(0, now.fused);
     seen += now.seen;
-    TEST_ASSERT_EQUAL(WM_STATE_TRACKING, f.estimate().state);
-    TEST_ASSERT_LESS_THAN_DOUBLE(0.15, d.error_of(f));
+    TEST_ASSERT_EQUAL(WM_STATE_TRACKING, d.published_state());
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.15, d.error());
   }
   TEST_ASSERT_GREATER_THAN(40, seen);
 }
@@ -140,73 +125,56 @@ TEST(one_moved_marker_moves_no_robot) {
 // A bearing and a range of a landmark count like a marker's place; one that the map lacks is refused, and so is what is
 // no number.
 TEST(sightings_count_too) {
-  filter f;
   drive d;
-  d.go(f, 0.5, 0, 0);
+  d.go(0.5, 0, 0);
   const auto fuse = [&](int32_t id, double bearing, double range) {
-    const wm_event e = make::sighting(d.t, id, bearing, range);
-    wm_innovation records[4];
-    size_t count = 0;
-    const wm_status status = f.ops->correct(f.state, &e, records, 4, &count);
-    TEST_ASSERT_GREATER_THAN(0, count);
-    return std::pair{status, (wm_verdict)records[0].verdict};
+    const wm_status status = d.tell(make::sighting(d.t, id, bearing, range));
+    TEST_ASSERT_GREATER_THAN(0, d.count);
+    return std::pair{status, (wm_verdict)d.records[0].verdict};
   };
   const double dx = 5.0 - 2.2, dy = 0.9, up = 0.3;
-  const double before = f.estimate().covariance[wm_cov_index(0, 0)];
+  const double before = d.estimate().covariance[wm_cov_index(0, 0)];
   TEST_ASSERT_EQUAL(WM_FUSED, fuse(100, std::atan2(dy, dx), std::sqrt(dx * dx + dy * dy + up * up)).second);
-  TEST_ASSERT_LESS_THAN_DOUBLE(0.5 * before, f.estimate().covariance[wm_cov_index(0, 0)]);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.5 * before, d.estimate().covariance[wm_cov_index(0, 0)]);
   TEST_ASSERT_EQUAL(WM_REJECTED_UNKNOWN_ID, fuse(7, 0.1, 3.0).second);
   TEST_ASSERT_EQUAL(WM_NOT_FINITE, fuse(100, INFINITY, 3.0).first);
   setup.landmark_count = 0;
-  filter without;
-  const wm_event e = make::sighting(1.0, 100, 0.1, 3.0);
-  wm_innovation records[4];
-  size_t count = 0;
-  TEST_ASSERT_EQUAL(WM_OK, without.ops->correct(without.state, &e, records, 4, &count));
-  TEST_ASSERT_EQUAL(WM_REJECTED_UNKNOWN_ID, records[0].verdict);
+  drive without;
+  without.feed(make::sighting(1.0, 100, 0.1, 3.0));
+  TEST_ASSERT_EQUAL(WM_REJECTED_UNKNOWN_ID, without.records[0].verdict);
 }
 
 // GIVEN the same corridor WHEN a receiver gives positions, and a compass that is 2 degrees off headings THEN the place
 // along it is known to 3 cm; without a start the two find the pose, and the scans confirm it.
 TEST(positions_and_headings_count_beside_scans) {
   for (const bool is_known : {true, false}) {
-    if (!is_known) setup.start = {WM_TIME_NONE, {NAN, NAN, NAN}, {NAN, NAN, NAN, NAN}, NAN, NAN, NAN};
-    filter f;
+    if (!is_known) without_a_start();
     drive d;
     int fused = 0, heard = 0;
     for (int i = 0; i < 90; i++) {
-      d.go(f, 0.1, 1.0, 0);
-      wm_innovation records[4];
-      size_t count = 0;
-      const wm_event at = make::position(d.t, d.truth.x_m + 0.02 * d.noise(), d.truth.y_m + 0.02 * d.noise(), 0.02);
-      TEST_ASSERT_EQUAL(WM_OK, f.ops->correct(f.state, &at, records, 4, &count));
-      const wm_event towards = make::heading(d.t, d.truth.heading_rad + 0.035, 0.02);
-      count = 0;
-      TEST_ASSERT_EQUAL(WM_OK, f.ops->correct(f.state, &towards, records, 4, &count));
-      heard++, fused += records[0].verdict == WM_FUSED;
+      d.go(0.1, 1.0, 0);
+      d.feed(make::position(d.t, d.truth.x_m + 0.02 * d.noise(), d.truth.y_m + 0.02 * d.noise(), 0.02));
+      d.feed(make::heading(d.t, d.truth.heading_rad + 0.035, 0.02));
+      heard++, fused += d.records[0].verdict == WM_FUSED;
     }
-    TEST_ASSERT_EQUAL(WM_STATE_TRACKING, f.estimate().state);
-    TEST_ASSERT_LESS_THAN_DOUBLE(0.03, d.error_of(f));
-    TEST_ASSERT_LESS_THAN_DOUBLE(9.21, nees_of(f, d));
+    TEST_ASSERT_EQUAL(WM_STATE_TRACKING, d.published_state());
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.03, d.error());
+    TEST_ASSERT_LESS_THAN_DOUBLE(9.21, d.nees());
     TEST_ASSERT_GREATER_THAN((is_known ? 0.95 : 0.6) * heard, fused);
   }
 }
 
 // GIVEN a tracked pose WHEN the receiver jumps by 5 m THEN it is refused, and the pose stays.
 TEST(a_receiver_that_jumps_moves_no_robot) {
-  filter f;
   drive d;
   for (int i = 0; i < 60; i++) {
-    d.go(f, 0.1, 1.0, 0);
+    d.go(0.1, 1.0, 0);
     const double off_m = i < 30 ? 0.0 : 5.0;
-    const wm_event e = make::position(d.t, d.truth.x_m + off_m, d.truth.y_m, 0.02);
-    wm_innovation records[4];
-    size_t count = 0;
-    TEST_ASSERT_EQUAL(WM_OK, f.ops->correct(f.state, &e, records, 4, &count));
-    if (i >= 30) TEST_ASSERT_EQUAL(WM_REJECTED_GATE, records[0].verdict);
-    TEST_ASSERT_LESS_THAN_DOUBLE(0.1, d.error_of(f));
+    d.feed(make::position(d.t, d.truth.x_m + off_m, d.truth.y_m, 0.02));
+    if (i >= 30) TEST_ASSERT_EQUAL(WM_REJECTED_GATE, d.records[0].verdict);
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.1, d.error());
   }
-  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, f.estimate().state);
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, d.published_state());
 }
 
 }  // namespace

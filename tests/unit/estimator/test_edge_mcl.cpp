@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // edge_mcl in a small drawn building: tracking forwards and backwards, mending a camera's errors, being carried away,
 // starting anywhere, seeing nonsense.
-#include "common/suite.h"
 #include "edge_building.hpp"
 #include "filters/edge_mcl/hypotheses.hpp"
 #include "filters/edge_mcl/odometry_check.hpp"
@@ -12,51 +11,44 @@ namespace {
 using namespace edge_building;
 
 TEST(forwards_and_backwards_it_stays_on_the_way) {
-  filter f;
   drive d;
-  TEST_ASSERT_LESS_THAN_DOUBLE(0.05, d.go(f, 10, 1.0, 0.0));
-  TEST_ASSERT_LESS_THAN_DOUBLE(0.05, d.go(f, 9, -1.0, 0.0));
-  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, f.estimate().state);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.05, d.go(10, 1.0, 0.0));
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.05, d.go(9, -1.0, 0.0));
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, d.published_state());
 }
 
 // GIVEN a corridor, whose walls say nothing of the way along it WHEN the robot stands 4 cm further to the left than it
 // believes THEN the scan's innovation is that distance, with a variance that fits a robot that knows its place to 5 cm.
 TEST(a_scans_innovation_is_a_distance) {
-  filter f;
   drive d;
   d.truth = {2, 2.04, 0};
-  wm_event e{};
-  e.kind = WM_EVENT_TWIST2;
-  TEST_ASSERT_EQUAL(WM_OK, f.ops->predict(f.state, &e));
+  d.feed(make::twist(0, 0, 0));
   d.t = 0.1;
-  d.scan(&e);
-  wm_innovation out[WM_INNOVATIONS_PER_EVENT_MAX];
-  size_t count = 0;
-  TEST_ASSERT_EQUAL(WM_OK, f.ops->correct(f.state, &e, out, WM_INNOVATIONS_PER_EVENT_MAX, &count));
-  TEST_ASSERT_EQUAL(1, count);
-  TEST_ASSERT_EQUAL(WM_RESIDUAL_RANGE, out[0].residual);
-  TEST_ASSERT_EQUAL(WM_FUSED, out[0].verdict);
-  TEST_ASSERT_DOUBLE_WITHIN(0.015, 0.04, std::fabs(out[0].observed - out[0].expected));
-  const double sigma_m = std::sqrt(out[0].variance);
+  d.feed(d.scan());
+  TEST_ASSERT_EQUAL(1, d.count);
+  const wm_innovation &out = d.records[0];
+  TEST_ASSERT_EQUAL(WM_RESIDUAL_RANGE, out.residual);
+  TEST_ASSERT_EQUAL(WM_FUSED, out.verdict);
+  TEST_ASSERT_DOUBLE_WITHIN(0.015, 0.04, std::fabs(out.observed - out.expected));
+  const double sigma_m = std::sqrt(out.variance);
   TEST_ASSERT_GREATER_THAN_DOUBLE(0.005, sigma_m);
   TEST_ASSERT_LESS_THAN_DOUBLE(0.2, sigma_m);
-  const double nis = (out[0].observed - out[0].expected) * (out[0].observed - out[0].expected) / out[0].variance;
-  TEST_ASSERT_DOUBLE_WITHIN(1e-9 * nis, nis, out[0].nis);
+  const double nis = (out.observed - out.expected) * (out.observed - out.expected) / out.variance;
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9 * nis, nis, out.nis);
 }
 
 // GIVEN a robot that stands WHEN it sees the same for 5 s THEN it is hardly surer than at first, and surer once it
 // drives.
 TEST(seeing_the_same_again_makes_it_no_surer) {
-  filter f;
   drive d;
-  const auto variance = [&f] { return f.estimate().covariance[wm_cov_index(5, 5)]; };  // of the heading
-  d.go(f, 0.1, 0.0, 0.0);
+  const auto variance = [&d] { return d.estimate().covariance[wm_cov_index(5, 5)]; };  // of the heading
+  d.go(0.1, 0.0, 0.0);
   const double at_first = variance();
-  d.go(f, 5, 0.0, 0.0);
+  d.go(5, 0.0, 0.0);
   const double stood = variance();
   TEST_ASSERT_GREATER_THAN_DOUBLE(0.6 * at_first, stood);
   TEST_ASSERT_TRUE(stood <= at_first);
-  d.go(f, 5, 0.5, 0.0);
+  d.go(5, 0.5, 0.0);
   TEST_ASSERT_LESS_THAN_DOUBLE(0.4 * stood, variance());
 }
 
@@ -65,22 +57,14 @@ TEST(seeing_the_same_again_makes_it_no_surer) {
 TEST(the_first_scan_counts_for_the_time_since_the_motion_began) {
   const double start = 0.5;  // lost.explained: what is explained before anything is seen
   for (const bool moved : {true, false}) {
-    filter f;
     drive d;
     if (moved) {
-      wm_event e{};
-      e.kind = WM_EVENT_TWIST2;
-      e.as.twist2 = {1.0, 0.0};
-      TEST_ASSERT_EQUAL(WM_OK, f.ops->predict(f.state, &e));
+      d.feed(make::twist(0, 1.0, 0.0));
       d.truth.x_m += 1.0;
       d.t = 1.0;
     }
-    wm_event e{};
-    d.scan(&e);
-    wm_innovation out[WM_INNOVATIONS_PER_EVENT_MAX];
-    size_t count = 0;
-    TEST_ASSERT_EQUAL(WM_OK, f.ops->correct(f.state, &e, out, WM_INNOVATIONS_PER_EVENT_MAX, &count));
-    const double explained = explained_of(f);
+    d.feed(d.scan());
+    const double explained = d.explained();
     if (moved)
       TEST_ASSERT_GREATER_THAN_DOUBLE(0.8, explained);
     else
@@ -90,16 +74,11 @@ TEST(the_first_scan_counts_for_the_time_since_the_motion_began) {
 
 // GIVEN a scan WHEN it comes a second time, of the same moment THEN it says nothing more.
 TEST(the_same_scan_twice_says_no_more) {
-  filter f;
   drive d;
-  d.go(f, 1, 0.5, 0.0);
-  wm_event e{};
-  d.scan(&e);
-  wm_innovation out[WM_INNOVATIONS_PER_EVENT_MAX];
-  size_t count = 0;
-  const wm_estimate once = f.estimate();
-  TEST_ASSERT_EQUAL(WM_OK, f.ops->correct(f.state, &e, out, WM_INNOVATIONS_PER_EVENT_MAX, &count));
-  const wm_estimate twice = f.estimate();
+  d.go(1, 0.5, 0.0);
+  const wm_estimate once = d.estimate();
+  d.feed(d.scan());
+  const wm_estimate twice = d.estimate();
   for (int i = 0; i < 3; i++) TEST_ASSERT_DOUBLE_WITHIN(1e-9, once.pose_map_base.p_m[i], twice.pose_map_base.p_m[i]);
   const int own[] = {wm_cov_index(0, 0), wm_cov_index(1, 1), wm_cov_index(5, 5)};
   for (const int i : own) TEST_ASSERT_DOUBLE_WITHIN(1e-3 * once.covariance[i], once.covariance[i], twice.covariance[i]);
@@ -108,17 +87,14 @@ TEST(the_same_scan_twice_says_no_more) {
 // GIVEN a way whose places look alike in part WHEN the robot has driven some metres THEN the others are listed, each
 // apart from its own, hardly likely, and the pose is what it was.
 TEST(places_that_look_the_same_are_listed_beside_the_pose) {
-  filter f;
   drive d;
-  TEST_ASSERT_LESS_THAN_DOUBLE(0.05, d.go(f, 6, 1.0, 0.0));
-  wm_hypothesis all[200];
-  const size_t count = f.ops->hypotheses(f.state, all, 200);
-  TEST_ASSERT_GREATER_THAN(0, count);
-  TEST_ASSERT_LESS_OR_EQUAL(200, count);
-  TEST_ASSERT_EQUAL(count, f.ops->hypotheses(f.state, nullptr, 0));
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.05, d.go(6, 1.0, 0.0));
+  const std::vector<wm_hypothesis> all = d.hypotheses();
+  TEST_ASSERT_GREATER_THAN(0, all.size());
+  TEST_ASSERT_LESS_OR_EQUAL(200, all.size());
+  TEST_ASSERT_EQUAL(all.size(), ops->hypotheses(d.state.get(), nullptr, 0));
   double sum = 0;
-  for (size_t i = 0; i < count; i++) {
-    const wm_hypothesis &h = all[i];
+  for (const wm_hypothesis &h : all) {
     const double dx = h.x_m - d.truth.x_m, dy = h.y_m - d.truth.y_m;
     TEST_ASSERT_TRUE(std::sqrt(dx * dx + dy * dy) > 0.5 ||
                      std::fabs(wm::wrap(h.heading_rad - d.truth.heading_rad)) > 0.25);
@@ -137,12 +113,11 @@ TEST(places_that_look_the_same_are_listed_beside_the_pose) {
 TEST(a_corner_corrects_a_pose_that_was_open_along_the_corridor) {
   for (const double off_m : {-0.8, 0.8}) {
     setup.start = {WM_TIME_NONE, {13.5 + off_m, 1.95, 0}, {0, 0, 0, 1}, 0, 0.5, 0.05};
-    filter f;
     drive d;
     d.truth = {13.5, 1.95, 0};
-    d.go(f, 1.5, 0.5, 0.0);
-    TEST_ASSERT_LESS_THAN_DOUBLE(0.05, d.error_of(f));
-    TEST_ASSERT_EQUAL(WM_STATE_TRACKING, f.estimate().state);
+    d.go(1.5, 0.5, 0.0);
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.05, d.error());
+    TEST_ASSERT_EQUAL(WM_STATE_TRACKING, d.published_state());
     setUp();
   }
 }
@@ -150,31 +125,29 @@ TEST(a_corner_corrects_a_pose_that_was_open_along_the_corridor) {
 // The robot is told to go on at 1 m/s, nobody hears for 3 s that it has stopped after one: it says that it doesn't know
 // where it is, and finds itself again.
 TEST(motion_sensors_that_fall_silent_are_not_believed) {
-  filter f;
   drive d;
-  TEST_ASSERT_LESS_THAN_DOUBLE(0.1, d.go(f, 4, 1.0, 0.0));
-  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, f.estimate().state);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.1, d.go(4, 1.0, 0.0));
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, d.published_state());
   d.silent = true;
-  d.go(f, 1, 1.0, 0.0);
-  d.go(f, 2, 0.0, 0.0);
+  d.go(1, 1.0, 0.0);
+  d.go(2, 0.0, 0.0);
   d.silent = false;
-  d.go(f, 0.1, 0.5, 0.0);
-  const wm_estimate e = f.estimate();
+  d.go(0.1, 0.5, 0.0);
+  const wm_estimate e = d.estimate();
   TEST_ASSERT_EQUAL(WM_STATE_LOST, e.state);
-  TEST_ASSERT_GREATER_THAN_DOUBLE(d.error_of(f) * d.error_of(f), e.covariance[wm_cov_index(0, 0)]);
-  d.go(f, 6, 0.5, 0.0);
-  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, f.estimate().state);
-  TEST_ASSERT_LESS_THAN_DOUBLE(0.1, d.error_of(f));
+  TEST_ASSERT_GREATER_THAN_DOUBLE(d.error() * d.error(), e.covariance[wm_cov_index(0, 0)]);
+  d.go(6, 0.5, 0.0);
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, d.published_state());
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.1, d.error());
 }
 
 TEST(a_camera_that_looks_lower_than_believed_is_found_out) {
-  filter f;
   drive d;
   d.pitch_rad = 0.008;
-  d.go(f, 10, 1.0, 0.0);
-  d.go(f, 8, -1.0, 0.0);
-  TEST_ASSERT_DOUBLE_WITHIN(0.002, 0.008, std::fabs(calibration_of(f, "front.pitch_rad")));
-  TEST_ASSERT_LESS_THAN_DOUBLE(0.04, d.go(f, 8, 1.0, 0.0));
+  d.go(10, 1.0, 0.0);
+  d.go(8, -1.0, 0.0);
+  TEST_ASSERT_DOUBLE_WITHIN(0.002, 0.008, std::fabs(d.calibrated("front.pitch_rad")));
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.04, d.go(8, 1.0, 0.0));
 }
 
 // GIVEN walls of 14 cm between rooms, and a camera that looks so much lower that far points fall beyond the middle of a
@@ -182,11 +155,10 @@ TEST(a_camera_that_looks_lower_than_believed_is_found_out) {
 TEST(the_far_face_of_a_thin_wall_is_not_aligned_with) {
   for (const double pitch_rad : {-0.015, -0.01, 0.01}) {
     thin_walls(0.14);
-    filter f;
     drive d;
     d.pitch_rad = pitch_rad;
-    TEST_ASSERT_LESS_THAN_DOUBLE(0.05, d.go(f, 10, 1.0, 0.0));
-    TEST_ASSERT_DOUBLE_WITHIN(0.002, std::fabs(pitch_rad), std::fabs(calibration_of(f, "front.pitch_rad")));
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.05, d.go(10, 1.0, 0.0));
+    TEST_ASSERT_DOUBLE_WITHIN(0.002, std::fabs(pitch_rad), std::fabs(d.calibrated("front.pitch_rad")));
     setUp();
   }
 }
@@ -242,14 +214,13 @@ TEST(unmapped_cupboards_pull_no_confident_pose) {
       }
       edges[end + (size_t)shift] = 255;
     }
-    filter f;
     drive d;
-    d.go(f, 13, 0.9, 0.0);
-    const wm_estimate e = f.estimate();
+    d.go(13, 0.9, 0.0);
+    const wm_estimate e = d.estimate();
     const double sigma_m = std::sqrt(e.covariance[wm_cov_index(0, 0)]);
     if (cupboards_m > 0.0) {
-      TEST_ASSERT_LESS_THAN_DOUBLE(0.08, d.error_of(f));
-      TEST_ASSERT_LESS_THAN_DOUBLE(3.0 * sigma_m, d.error_of(f));
+      TEST_ASSERT_LESS_THAN_DOUBLE(0.08, d.error());
+      TEST_ASSERT_LESS_THAN_DOUBLE(3.0 * sigma_m, d.error());
     } else {
       TEST_ASSERT_LESS_THAN_DOUBLE(0.06, sigma_m);
     }
@@ -268,13 +239,12 @@ TEST(a_wall_that_was_drawn_elsewhere_pulls_no_confident_pose) {
     edges[at(right - off)] = 255;
     for (int up = right - off + 1; up <= right; up++) drivable[at(up)] = 255;
   }
-  filter f;
   drive d;
   double sum = 0.0;
   constexpr int kSteps = 230;
   for (int i = 0; i < kSteps; i++) {
-    d.go(f, 0.1, 0.5, 0.0);
-    const wm_estimate e = f.estimate();
+    d.go(0.1, 0.5, 0.0);
+    const wm_estimate e = d.estimate();
     const double off_m = e.pose_map_base.p_m[1] - d.truth.y_m;
     TEST_ASSERT_DOUBLE_WITHIN(0.25 * kOff_m, 0.0, off_m);
     sum += off_m * off_m / e.covariance[wm_cov_index(1, 1)];
@@ -289,16 +259,15 @@ TEST(a_wall_that_was_drawn_elsewhere_pulls_no_confident_pose) {
 TEST(late_pictures_and_skirtings_are_found_out) {
   reinterpret_cast<wm_edge_mcl_params *>(params.data())->wall_sigma_m = 0.0;
   for (const bool late : {true, false}) {
-    filter f;
     drive d;
     d.late = late ? 5 : 0;
     d.thick_m = late ? 0.0 : 0.02;
     for (int i = 0; i < 3; i++) {
-      d.go(f, 10, 1.0, 0.0);
-      d.go(f, 10, -1.0, 0.0);
+      d.go(10, 1.0, 0.0);
+      d.go(10, -1.0, 0.0);
     }
-    TEST_ASSERT_DOUBLE_WITHIN(0.015, late ? 0.05 : 0.0, calibration_of(f, "front.time_offset_s"));
-    TEST_ASSERT_DOUBLE_WITHIN(0.0015, late ? 0.0 : 0.0035, calibration_of(f, "edges.offset_m"));
+    TEST_ASSERT_DOUBLE_WITHIN(0.015, late ? 0.05 : 0.0, d.calibrated("front.time_offset_s"));
+    TEST_ASSERT_DOUBLE_WITHIN(0.0015, late ? 0.0 : 0.0035, d.calibrated("edges.offset_m"));
   }
 }
 
@@ -322,21 +291,20 @@ TEST(each_error_of_a_mounting_has_its_derivative) {
 }
 
 TEST(carried_away_it_says_so_and_finds_back) {
-  filter f;
   drive d;
-  d.go(f, 10, 1.0, 0.0);
-  d.go(f, 8, -1.0, 0.0);
+  d.go(10, 1.0, 0.0);
+  d.go(8, -1.0, 0.0);
   d.truth = {4.7, 3.5, 1.5707963267948966};
   bool lost = false;
   for (int i = 0; i < 50; i++) {
-    d.go(f, 0.1, 0.6, 0.0);
-    lost |= f.estimate().state != WM_STATE_TRACKING;
+    d.go(0.1, 0.6, 0.0);
+    lost |= d.published_state() != WM_STATE_TRACKING;
   }
   TEST_ASSERT_TRUE(lost);
-  d.go(f, 6, 0.4, 0.0);
-  d.go(f, 12, -0.5, 0.0);
-  TEST_ASSERT_LESS_THAN_DOUBLE(0.1, d.error_of(f));
-  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, f.estimate().state);
+  d.go(6, 0.4, 0.0);
+  d.go(12, -0.5, 0.0);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.1, d.error());
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, d.published_state());
 }
 
 // GIVEN a robot on its way WHEN something that the map doesn't have hides nearly all for 1.5 s THEN it is not taken for
@@ -346,61 +314,55 @@ TEST(carried_away_it_says_so_and_finds_back) {
 TEST(listed_hypotheses_are_part_of_the_probability_of_being_lost) {
   const wm_pose2 to[] = {{10.53, 2.02, 5.417}, {3.97, 4.89, 3.707}, {12.55, 2.39, 0.689}};
   for (const wm_pose2 &there : to) {
-    filter f;
     drive d;
-    d.go(f, 4, 1.0, 0.0);
+    d.go(4, 1.0, 0.0);
     d.truth = there;
     for (int i = 0; i < 60; i++) {
-      d.go(f, 0.1, i % 20 < 10 ? 0.8 : -0.8, 0.0);
-      wm_hypothesis all[200];
-      const size_t count = f.ops->hypotheses(f.state, all, 200);
+      d.go(0.1, i % 20 < 10 ? 0.8 : -0.8, 0.0);
       double sum = 0;
-      for (size_t k = 0; k < count; k++) sum += all[k].weight;
-      TEST_ASSERT_GREATER_THAN_DOUBLE(sum - 0.02, f.estimate().lost_probability);
+      for (const wm_hypothesis &h : d.hypotheses()) sum += h.weight;
+      TEST_ASSERT_GREATER_THAN_DOUBLE(sum - 0.02, d.estimate().lost_probability);
     }
   }
 }
 
 TEST(something_in_the_way_is_not_being_lost_but_sight_through_walls_is) {
-  filter f;
   drive d;
-  d.go(f, 8, 1.0, 0.0);
-  d.go(f, 8, -1.0, 0.0);
-  d.go(f, 4, 1.0, 0.0);
+  d.go(8, 1.0, 0.0);
+  d.go(8, -1.0, 0.0);
+  d.go(4, 1.0, 0.0);
   d.blocked_m = 0.5;
   for (int i = 0; i < 15; i++) {
-    d.go(f, 0.1, 1.0, 0.0);
-    TEST_ASSERT_EQUAL(WM_STATE_TRACKING, f.estimate().state);
+    d.go(0.1, 1.0, 0.0);
+    TEST_ASSERT_EQUAL(WM_STATE_TRACKING, d.published_state());
   }
   d.blocked_m = INFINITY;
-  d.go(f, 3, 1.0, 0.0);
-  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, f.estimate().state);
+  d.go(3, 1.0, 0.0);
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, d.published_state());
   d.glass = 110;
-  d.go(f, 1.5, 1.0, 0.0);
-  TEST_ASSERT_EQUAL(WM_STATE_LOST, f.estimate().state);
+  d.go(1.5, 1.0, 0.0);
+  TEST_ASSERT_EQUAL(WM_STATE_LOST, d.published_state());
 }
 
 // GIVEN a building where it sees through some of the walls all along THEN that says nothing.
 TEST(glass_walls_are_usual) {
-  filter f;
   drive d;
   d.glass = 30;
   for (int i = 0; i < 3; i++) {
-    d.go(f, 8, 1.0, 0.0);
-    d.go(f, 8, -1.0, 0.0);
-    TEST_ASSERT_LESS_THAN_DOUBLE(0.1, d.error_of(f));
-    TEST_ASSERT_LESS_THAN_DOUBLE(0.01, f.estimate().lost_probability);
+    d.go(8, 1.0, 0.0);
+    d.go(8, -1.0, 0.0);
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.1, d.error());
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.01, d.estimate().lost_probability);
   }
 }
 
 TEST(it_starts_without_being_told_where) {
-  setup.start.p_m[0] = setup.start.p_m[1] = setup.start.heading_rad = NAN;
-  filter f;
+  without_a_start();
   drive d;
-  TEST_ASSERT_EQUAL(WM_STATE_SEARCHING, f.estimate().state);
-  d.go(f, 12, 0.8, 0.0);
-  TEST_ASSERT_LESS_THAN_DOUBLE(0.1, d.error_of(f));
-  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, f.estimate().state);
+  TEST_ASSERT_EQUAL(WM_STATE_SEARCHING, d.published_state());
+  d.go(12, 0.8, 0.0);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.1, d.error());
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, d.published_state());
 }
 
 struct freed {
@@ -420,11 +382,10 @@ struct searching {
   explicit searching(double off = 0.0) {
     edge_map.init(map, map_memory.get());
     search.init(edge_map, field.get());
-    static wm_event e;
     static wm::floor_points scan;
     d.truth = {2, 2, 0};
     for (int k = 0; k < 16; k++, d.truth.x_m += 0.5, odom.x_m += 0.5) {
-      d.scan(&e);
+      const wm_event e = d.scan();
       scan.count = (int)e.as.points.count;
       for (int i = 0; i < scan.count; i++) {
         wm::floor_edge &p = scan.of[i];
@@ -490,17 +451,15 @@ TEST(weighing_places_spends_what_it_says) {
 }
 
 TEST(nonsense_makes_it_no_surer_and_never_breaks_it) {
-  filter f;
   drive d;
-  d.go(f, 3, 1.0, 0.0);
-  d.go(f, 5, 0.5, 0.0, true);
-  TEST_ASSERT_LESS_THAN_DOUBLE(0.5, d.error_of(f));
-  d.go(f, 4, 0.5, 0.0);
-  TEST_ASSERT_LESS_THAN_DOUBLE(0.1, d.error_of(f));
+  d.go(3, 1.0, 0.0);
+  d.go(5, 0.5, 0.0, true);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.5, d.error());
+  d.go(4, 0.5, 0.0);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.1, d.error());
 }
 
 TEST(what_it_can_not_work_with_is_said) {
-  const wm_estimator *ops = wm_estimator_find("edge_mcl");
   const char *why = nullptr;
   setup.map = nullptr;
   TEST_ASSERT_EQUAL(0, ops->state_bytes(params.data(), &setup, &why));

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // pf_edges in a small drawn building: the particle filter's step, its published moments, a start that is not known.
-#include "common/suite.h"
 #include "edge_building.hpp"
 #include "filters/pf_edges/params.h"
 
@@ -15,22 +14,20 @@ wm_pf_edges_params &own() { return *reinterpret_cast<wm_pf_edges_params *>(param
 TEST(forwards_and_backwards_it_stays_on_the_way) {
   for (const int weight : {PF_EDGES_PRODUCT, PF_EDGES_SUM}) {
     own().weight = weight;
-    filter f;
     drive d;
-    TEST_ASSERT_LESS_THAN_DOUBLE(0.2, d.go(f, 10, 1.0, 0.0));
-    TEST_ASSERT_LESS_THAN_DOUBLE(0.2, d.go(f, 9, -1.0, 0.0));
-    TEST_ASSERT_EQUAL(WM_STATE_TRACKING, f.estimate().state);
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.2, d.go(10, 1.0, 0.0));
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.2, d.go(9, -1.0, 0.0));
+    TEST_ASSERT_EQUAL(WM_STATE_TRACKING, d.published_state());
   }
 }
 
 // GIVEN a drive THEN the published pose and covariance are the particles' moments, the heading's on the circle, and the
 // weights sum up to 1.
 TEST(its_pose_is_its_particles_mean) {
-  filter f;
   drive d;
-  d.go(f, 8, 1.0, 0.0);
+  d.go(8, 1.0, 0.0);
   wm_particle all[kCount];
-  TEST_ASSERT_EQUAL(kCount, f.ops->particles(f.state, all, kCount));
+  TEST_ASSERT_EQUAL(kCount, ops->particles(d.state.get(), all, kCount));
   double weight = 0, x = 0, y = 0, sine = 0, cosine = 0, xx = 0, yy = 0;
   for (const wm_particle &p : all) {
     weight += p.weight;
@@ -44,7 +41,7 @@ TEST(its_pose_is_its_particles_mean) {
     yy += p.weight * (p.y_m - y) * (p.y_m - y);
   }
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1.0, weight);
-  const wm_estimate e = f.estimate();
+  const wm_estimate e = d.estimate();
   TEST_ASSERT_DOUBLE_WITHIN(1e-6, x, e.pose_map_base.p_m[0]);
   TEST_ASSERT_DOUBLE_WITHIN(1e-6, y, e.pose_map_base.p_m[1]);
   TEST_ASSERT_DOUBLE_WITHIN(1e-6, std::atan2(sine, cosine), e.heading_rad);
@@ -56,12 +53,12 @@ TEST(its_pose_is_its_particles_mean) {
 // GIVEN a start that is not known THEN the particles stand all over the drivable floor, and the state is searching;
 // GIVEN 5000 of them WHEN the robot drives THEN they come together.
 TEST(without_a_start_the_particles_stand_everywhere) {
-  setup.start.p_m[0] = setup.start.p_m[1] = setup.start.heading_rad = NAN;
+  without_a_start();
   own().particles = 5000;
-  filter f;
-  TEST_ASSERT_EQUAL(WM_STATE_SEARCHING, f.estimate().state);
+  drive d;
+  TEST_ASSERT_EQUAL(WM_STATE_SEARCHING, d.published_state());
   std::vector<wm_particle> all(5000);
-  f.ops->particles(f.state, all.data(), all.size());
+  ops->particles(d.state.get(), all.data(), all.size());
   int south = 0;
   for (const wm_particle &p : all) {
     TEST_ASSERT_TRUE(inside(p.x_m, p.y_m));
@@ -69,20 +66,18 @@ TEST(without_a_start_the_particles_stand_everywhere) {
   }
   // 30 m2 of the 30 + 2.5 * 8 m2 of floor lie below y = 3.
   TEST_ASSERT_DOUBLE_WITHIN(0.03, 30.0 / 50.0, south / 5000.0);
-  drive d;
-  d.go(f, 12, 0.8, 0.0);
-  d.go(f, 12, -0.8, 0.0);
-  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, f.estimate().state);
+  d.go(12, 0.8, 0.0);
+  d.go(12, -0.8, 0.0);
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, d.published_state());
 }
 
 // GIVEN a robot that stands THEN no motion noise moves its particles apart.
 TEST(at_rest_it_gets_no_less_sure) {
-  filter f;
   drive d;
-  d.go(f, 3, 0.5, 0.0);
-  const double before = f.estimate().covariance[0];
-  d.go(f, 3, 0.0, 0.0);
-  TEST_ASSERT_LESS_OR_EQUAL_DOUBLE(1.01 * before, f.estimate().covariance[0]);
+  d.go(3, 0.5, 0.0);
+  const double before = d.estimate().covariance[0];
+  d.go(3, 0.0, 0.0);
+  TEST_ASSERT_LESS_OR_EQUAL_DOUBLE(1.01 * before, d.estimate().covariance[0]);
 }
 
 TEST(a_missing_map_is_said) {
