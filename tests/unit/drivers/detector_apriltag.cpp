@@ -4,7 +4,7 @@
 #include <apriltag/apriltag.h>
 #include <apriltag/tag36h11.h>
 
-#include "common/suite.h"
+#include "common/eyes.hpp"
 #include "waymark/detectors.h"
 
 namespace {
@@ -12,10 +12,7 @@ namespace {
 constexpr int kWidth = 640, kHeight = 480, kTag = 23;
 constexpr double kSize_m = 0.2;
 
-const wm_detector *detector;
-std::vector<char> params;
-wm_rig rig;
-void *state;
+std::unique_ptr<wm::drawn::marker_eyes> eyes;
 std::vector<double> light;
 std::vector<uint8_t> grey;
 
@@ -38,7 +35,7 @@ double print_at(image_u8_t *tag, double u, double v) {
 void draw(const pose &p, double gamma, int id = kTag, int blurred = 2) {
   apriltag_family_t *family = tag36h11_create();
   image_u8_t *tag = apriltag_to_image(family, (uint32_t)id);
-  const wm_camera &c = rig.cameras[0];
+  const wm_camera &c = eyes->rig.cameras[0];
   light.assign(kWidth * kHeight, 0.0);
   for (int row = 0; row < kHeight; row++)
     for (int column = 0; column < kWidth; column++)
@@ -73,12 +70,7 @@ void draw(const pose &p, double gamma, int id = kTag, int blurred = 2) {
 
 void begin() {
   size_t count;
-  detector = wm_library_detectors(&count)[0];
-  params.assign(detector->params.bytes, 0);
-  wm_params_defaults(&detector->params, params.data());
-  wm_rig_init(&rig);
-  rig.camera_count = 1;
-  wm_camera &c = rig.cameras[0];
+  wm_camera c{};
   std::strcpy(c.name, "ceiling");
   c.model = WM_CAMERA_PINHOLE_RADTAN;
   c.width_px = kWidth;
@@ -87,30 +79,10 @@ void begin() {
   const double k[4] = {450, 452, 322.5, 237.0};
   std::memcpy(c.intrinsics, k, sizeof k);
   c.mounting.rpy_rad[1] = -1.5707963267948966;
-  std::strcpy(rig.marker_family, "tag36h11");
-  rig.marker_size_m = kSize_m;
-  static const int32_t cameras[1] = {0};
-  static wm_view view;
-  view = {&rig, cameras, nullptr, 0, nullptr, 0, nullptr, 0};
-  const char *why = "";
-  const size_t bytes = detector->state_bytes(params.data(), &view, &why);
-  TEST_ASSERT_GREATER_THAN_MESSAGE(0, bytes, why);
-  std::free(state);
-  state = std::aligned_alloc(64, (bytes + 63) / 64 * 64);
-  TEST_ASSERT_EQUAL(WM_OK, detector->init(state, params.data(), &view));
+  eyes = std::make_unique<wm::drawn::marker_eyes>(wm_library_detectors(&count)[0], c, "tag36h11", kSize_m);
 }
 
-size_t look(wm_event *out) {
-  wm_frame frame{};
-  frame.t_ns = 5;
-  frame.width_px = kWidth;
-  frame.height_px = kHeight;
-  frame.stride_bytes = kWidth;
-  frame.grey = grey.data();
-  size_t count = 9;
-  TEST_ASSERT_EQUAL(WM_OK, detector->detect(state, &frame, nullptr, out, 4, &count));
-  return count;
-}
+size_t look() { return eyes->look(grey, 5); }
 
 TEST(test_place_direction_and_distance_are_right_whatever_the_response) {
   for (double gamma : {1.0, 0.5})
@@ -118,12 +90,11 @@ TEST(test_place_direction_and_distance_are_right_whatever_the_response) {
       begin();
       const pose want = {2.26, 0.5, -0.3, yaw};
       draw(want, gamma);
-      wm_event seen[4];
-      for (int i = 0; i < 3; i++) TEST_ASSERT_EQUAL(1, look(seen));
-      const wm_marker &m = seen[0].as.marker;
-      TEST_ASSERT_EQUAL(WM_EVENT_MARKER, seen[0].kind);
+      for (int i = 0; i < 3; i++) TEST_ASSERT_EQUAL(1, look());
+      const wm_marker &m = eyes->events[0].as.marker;
+      TEST_ASSERT_EQUAL(WM_EVENT_MARKER, eyes->events[0].kind);
       TEST_ASSERT_EQUAL(kTag, m.id);
-      TEST_ASSERT_EQUAL_INT64(5, seen[0].t_ns);
+      TEST_ASSERT_EQUAL_INT64(5, eyes->events[0].t_ns);
       TEST_ASSERT_DOUBLE_WITHIN(0.007 * want.x, want.x, m.p_m[0]);  // outer edges alone: 0.02
       TEST_ASSERT_DOUBLE_WITHIN(0.004, want.y, m.p_m[1]);
       TEST_ASSERT_DOUBLE_WITHIN(0.004, want.z, m.p_m[2]);
@@ -135,12 +106,11 @@ TEST(test_place_direction_and_distance_are_right_whatever_the_response) {
 // mean of both would make each code another size: where which is, each picture tells.
 TEST(test_codes_are_as_far_as_they_are_whatever_lies_along_their_borders) {
   begin();
-  wm_event seen[4];
   for (int id : {77, 103, 175})
     for (double x : {1.3, 1.6, 2.0, 2.4}) {  // near ones teach how much white grows
       draw({x, 0.2, -0.1, 0.3}, 0.5, id, 1);
-      TEST_ASSERT_EQUAL(1, look(seen));
-      if (x == 2.4) TEST_ASSERT_DOUBLE_WITHIN(0.0012 * x, x, seen[0].as.marker.p_m[0]);  // with a mean: 0.002
+      TEST_ASSERT_EQUAL(1, look());
+      if (x == 2.4) TEST_ASSERT_DOUBLE_WITHIN(0.0012 * x, x, eyes->events[0].as.marker.p_m[0]);  // with a mean: 0.002
     }
 }
 
@@ -151,9 +121,8 @@ TEST(test_a_print_is_read_whose_corner_is_outside_of_the_picture) {
     const double distance_m = 2.0, half_diagonal_px = 450 * 0.70710678 * kSize_m / distance_m;
     const pose want = {distance_m, (322.5 - half_diagonal_px - corner_px) / 450 * distance_m, 0.1, 0.78539816};
     draw(want, 1.0);
-    wm_event seen[4];
-    TEST_ASSERT_EQUAL(1, look(seen));
-    const wm_marker &m = seen[0].as.marker;
+    TEST_ASSERT_EQUAL(1, look());
+    const wm_marker &m = eyes->events[0].as.marker;
     TEST_ASSERT_EQUAL(kTag, m.id);
     TEST_ASSERT_DOUBLE_WITHIN(0.03 * want.x, want.x, m.p_m[0]);
     TEST_ASSERT_DOUBLE_WITHIN(0.03, want.y, m.p_m[1]);
@@ -165,31 +134,20 @@ TEST(test_a_print_is_read_whose_corner_is_outside_of_the_picture) {
 TEST(test_an_empty_picture_and_one_of_another_size) {
   begin();
   grey.assign(kWidth * kHeight, 128);
-  wm_event seen[4];
-  TEST_ASSERT_EQUAL(0, look(seen));
-  wm_frame frame{};
-  frame.width_px = 32;
-  frame.height_px = 32;
-  frame.stride_bytes = 32;
-  frame.grey = grey.data();
+  TEST_ASSERT_EQUAL(0, look());
+  const wm_frame frame = wm::drawn::frame_of(grey, 32, 32, 0);
   size_t count = 9;
-  TEST_ASSERT_EQUAL(WM_BAD_DATA, detector->detect(state, &frame, nullptr, seen, 4, &count));
+  TEST_ASSERT_EQUAL(WM_BAD_DATA,
+                    eyes->detector->detect(eyes->state.get(), &frame, nullptr, eyes->events.data(), 4, &count));
   TEST_ASSERT_EQUAL(0, count);
 }
 
 TEST(test_what_it_lacks_is_said) {
   begin();
-  static const int32_t cameras[1] = {0};
-  const wm_view view = {&rig, cameras, nullptr, 0, nullptr, 0, nullptr, 0};
-  const char *why = "";
-  rig.marker_size_m = std::nan("");
-  TEST_ASSERT_EQUAL(0, detector->state_bytes(params.data(), &view, &why));
-  TEST_ASSERT_NOT_NULL(std::strstr(why, "size_m"));
-  std::strcpy(rig.marker_family, "mr");
-  TEST_ASSERT_EQUAL(0, detector->state_bytes(params.data(), &view, &why));
-  TEST_ASSERT_NOT_NULL(std::strstr(why, "family"));
+  eyes->rig.marker_size_m = std::nan("");
+  eyes->expect_refused(eyes->view, "size_m");
+  std::strcpy(eyes->rig.marker_family, "mr");
+  eyes->expect_refused(eyes->view, "family");
 }
 
 }  // namespace
-
-void suite_end() { std::free(state); }

@@ -3,6 +3,7 @@
 // recall at least 0.95 where a module has 3 px or more, no false identity.
 #include <algorithm>
 
+#include "common/eyes.hpp"
 #include "common/marker_views.hpp"
 #include "common/suite.h"
 #include "common/trials.h"
@@ -15,40 +16,7 @@ using namespace wm::views;
 
 uint64_t views = 500;
 
-// A detector on a camera.
-class Machine {
- public:
-  Machine(const wm_detector *detector, const char *family, const wm_camera &camera, double size_m)
-      : detector_(detector) {
-    wm_rig_init(&rig_);
-    rig_.camera_count = 1;
-    rig_.cameras[0] = camera;
-    std::strcpy(rig_.marker_family, family);
-    rig_.marker_size_m = size_m;
-    std::vector<char> params(detector->params.bytes);
-    wm_params_defaults(&detector->params, params.data());
-    const wm_view view = {&rig_, &index_, nullptr, 0, nullptr, 0, nullptr, 0};
-    const char *why = "";
-    const size_t bytes = detector->state_bytes(params.data(), &view, &why);
-    TEST_ASSERT_GREATER_THAN_MESSAGE(0, bytes, why);
-    state_.reset(std::aligned_alloc(64, (bytes + 63) / 64 * 64));
-    TEST_ASSERT_EQUAL(WM_OK, detector->init(state_.get(), params.data(), &view));
-  }
-  size_t look(const wm_frame &frame, wm_event *events, size_t capacity) {
-    size_t count = 0;
-    TEST_ASSERT_EQUAL(WM_OK, detector_->detect(state_.get(), &frame, nullptr, events, capacity, &count));
-    return count;
-  }
-
- private:
-  struct Freer {
-    void operator()(void *p) const { std::free(p); }
-  };
-  const wm_detector *detector_;
-  wm_rig rig_;
-  int32_t index_ = 0;
-  std::unique_ptr<void, Freer> state_;
-};
+using Machine = wm::drawn::marker_eyes;
 
 // A family of square markers; its print with the rim is 1 wide.
 class Family {
@@ -147,20 +115,19 @@ using Machines = std::vector<std::unique_ptr<Machine>>;
 Machines machines_of(const wm_detector *detector, const char *family, double part) {
   Machines out;
   for (uint64_t i = 0; i < 4; i++)
-    out.push_back(std::make_unique<Machine>(detector, family, draw_view(i, size_of(i)).camera, part * size_of(i)));
+    out.push_back(std::make_unique<Machine>(detector, draw_view(i, size_of(i)).camera, family, part * size_of(i)));
   return out;
 }
 
 TEST(mr_codes_are_found_and_none_is_false) {
   const Machines mr = machines_of(wm_detector_find("mr"), "mr", 1);
   Tally tally;
-  wm_event events[16];
   for (uint64_t i = 0; i < views; i++) {
     const View view = draw_view(i, size_of(i));
     const auto id = static_cast<uint32_t>(i * 37 % 587);
     const std::vector<uint8_t> print = take_picture(view, mr_ink(id));
-    const size_t count = mr[i % 4]->look(frame_of(print, view.camera), events, 16);
-    tally.take(view, view.scale_px * WM_MR_MODULE, static_cast<int32_t>(id), events, count);
+    const size_t count = mr[i % 4]->look(print);
+    tally.take(view, view.scale_px * WM_MR_MODULE, static_cast<int32_t>(id), mr[i % 4]->events.data(), count);
   }
   std::printf("%d views of 0.5 to 4 m, up to 60 degrees; prints 0.2 and 0.4 m wide; a module's smaller side:\n",
               static_cast<int>(views));
@@ -188,16 +155,15 @@ TEST(all_families_are_found) {
     const bool next_overlaps = std::strncmp(names[k], "aruco", 5) == 0;  // a dictionary is in the next larger one
     Tally tally;
     int foreign = 0;
-    wm_event events[16];
     for (uint64_t i = 0; i < (views + 4) / 5; i++) {
       const View view = draw_view(5 * i + k, size_of(5 * i + k));
       const uint32_t id = static_cast<uint32_t>(i * 37 + k) % family.count();
       const std::vector<uint8_t> picture = take_picture(view, family.ink(id));
-      const wm_frame frame = frame_of(picture, view.camera);
-      const size_t count = own[(5 * i + k) % 4]->look(frame, events, 16);
-      tally.take(view, view.scale_px / family.across(), static_cast<int32_t>(id), events, count);
-      if (!next_overlaps) foreign += static_cast<int>(others[(5 * i + k) % 4]->look(frame, events, 16));
-      foreign += static_cast<int>(mr[(5 * i + k) % 4]->look(frame, events, 16));
+      Machine &reader = *own[(5 * i + k) % 4];
+      const size_t count = reader.look(picture);
+      tally.take(view, view.scale_px / family.across(), static_cast<int32_t>(id), reader.events.data(), count);
+      if (!next_overlaps) foreign += static_cast<int>(others[(5 * i + k) % 4]->look(picture));
+      foreign += static_cast<int>(mr[(5 * i + k) % 4]->look(picture));
     }
     tally.print(names[k]);
     if (foreign) std::printf("%d in other families' pictures\n", foreign);

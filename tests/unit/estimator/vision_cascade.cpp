@@ -4,11 +4,10 @@
 #include <algorithm>
 #include <set>
 
+#include "common/eyes.hpp"
 #include "common/fisheye_rig.hpp"
-#include "common/suite.h"
 #include "vision/cascade/params.h"
 #include "waymark/cascade_file.h"
-#include "waymark/detector.h"
 #include "waymark/internal/sensors/bearing.hpp"
 #include "waymark/internal/vision/cascade/evaluate.hpp"
 #include "waymark/random.h"
@@ -26,9 +25,7 @@ wm_rig rig;
 wm_view view;
 wm_landmark landmark;
 wm_cascade cascade;
-wm_cascade_params params;
-const wm_detector *detector;
-wm_event events[64];
+std::unique_ptr<wm::drawn::eyes> machine;
 wm_error err;
 
 // A middle block that is brighter than all about it.
@@ -62,45 +59,24 @@ std::vector<uint8_t> draw(const wm::mounted_camera &camera, const std::vector<Sq
   return out;
 }
 
-struct Machine {
-  void *state = nullptr;
-  Machine() {
-    const char *why = "";
-    const size_t bytes = detector->state_bytes(&params, &view, &why);
-    TEST_ASSERT_GREATER_THAN_MESSAGE(0, bytes, why);
-    state = std::aligned_alloc(64, (bytes + 63) / 64 * 64);
-    std::memset(state, 0xA5, bytes);
-    TEST_ASSERT_EQUAL(WM_OK, detector->init(state, &params, &view));
-  }
-  ~Machine() { std::free(state); }
-  Machine(const Machine &) = delete;
-  Machine &operator=(const Machine &) = delete;
-
-  size_t look(const std::vector<uint8_t> &picture) const {
-    wm_frame frame{};
-    frame.t_ns = 1'000'000'000;
-    frame.width_px = frame.stride_bytes = kWidth;
-    frame.height_px = kHeight;
-    frame.grey = picture.data();
-    size_t count = 0;
-    TEST_ASSERT_EQUAL(WM_OK, detector->detect(state, &frame, nullptr, events, 64, &count));
-    return count;
-  }
-};
+size_t look(const std::vector<uint8_t> &picture) {
+  const wm_frame frame = wm::drawn::frame_of(picture, kWidth, kHeight, 1'000'000'000);
+  return machine->look(&frame);
+}
 
 TEST(squares_are_found) {
   wm::mounted_camera camera;
   TEST_ASSERT_NULL(wm::mounted_camera_init(&camera, rig.cameras[0]));
   const std::vector<Square> squares = {{1.3, 0.9, 4}, {0.7, 1.1, 6}, {0.2, 0.8, 3}};
   const std::vector<uint8_t> picture = draw(camera, squares);
-  const Machine machine;
-  const size_t count = machine.look(picture);
+  machine->begin(view);
+  const size_t count = look(picture);
   TEST_ASSERT_EQUAL(squares.size(), count);
   for (size_t i = 0; i < count; i++) {
-    const wm_sighting &s = events[i].as.sighting;
-    TEST_ASSERT_EQUAL(WM_EVENT_SIGHTING, events[i].kind);
+    const wm_sighting &s = machine->events[i].as.sighting;
+    TEST_ASSERT_EQUAL(WM_EVENT_SIGHTING, machine->events[i].kind);
     TEST_ASSERT_EQUAL(-1, s.landmark_id);
-    TEST_ASSERT_TRUE(i == 0 || events[i - 1].t_ns <= events[i].t_ns);
+    TEST_ASSERT_TRUE(i == 0 || machine->events[i - 1].t_ns <= machine->events[i].t_ns);
     int same = 0;
     for (const Square &q : squares) {
       const wm::vec3 base = {q.distance_m * std::cos(q.azimuth_rad), q.distance_m * std::sin(q.azimuth_rad), q.up_m};
@@ -113,24 +89,21 @@ TEST(squares_are_found) {
       TEST_ASSERT_DOUBLE_WITHIN(3 * s.elevation_sigma_rad, wm::sensor_elevation(camera, false, ray), s.elevation_rad);
       TEST_ASSERT_DOUBLE_WITHIN(3 * s.range_sigma_m, std::hypot(q.distance_m, q.up_m), s.range_m);
       const double t_s = 1 + 0.03 * (at.v - 149.5) / 299;
-      TEST_ASSERT_INT64_WITHIN(1'000'000, static_cast<int64_t>(1e9 * t_s), events[i].t_ns);
+      TEST_ASSERT_INT64_WITHIN(1'000'000, static_cast<int64_t>(1e9 * t_s), machine->events[i].t_ns);
     }
     TEST_ASSERT_EQUAL(1, same);
   }
-  TEST_ASSERT_EQUAL(0, machine.look(draw(camera, {})));
+  TEST_ASSERT_EQUAL(0, look(draw(camera, {})));
   // Below what the map has: not looked at.
-  TEST_ASSERT_EQUAL(0, machine.look(draw(camera, {{0.7, -1.5, 4}})));
+  TEST_ASSERT_EQUAL(0, look(draw(camera, {{0.7, -1.5, 4}})));
 }
 
 TEST(what_is_missing_is_told) {
-  const char *why = nullptr;
   view.cascade_count = 0;
-  TEST_ASSERT_EQUAL(0, detector->state_bytes(&params, &view, &why));
-  TEST_ASSERT_NOT_NULL(std::strstr(why, "classes"));
+  machine->expect_refused(view, "classes");
   view.cascade_count = 1;
   view.landmark_count = 0;
-  TEST_ASSERT_EQUAL(0, detector->state_bytes(&params, &view, &why));
-  TEST_ASSERT_NOT_NULL(std::strstr(why, "landmarks.csv"));
+  machine->expect_refused(view, "landmarks.csv");
 }
 
 #ifdef WM_HAS_OPENCV
@@ -265,7 +238,6 @@ void setUp() {
                             err.text);
   cascade.height_m = 3 * kSide_m;
   view = {&rig, &kCamera, &landmark, 1, nullptr, 0, &cascade, 1};
-  detector = wm_detector_find("cascade");
-  wm_params_defaults(&detector->params, &params);
+  machine = std::make_unique<wm::drawn::eyes>("cascade");
 }
 void tearDown() { wm_cascade_free(&cascade); }

@@ -3,9 +3,8 @@
 // that the edge that is looked for is found among them, with its normal.
 #include <functional>
 
+#include "common/eyes.hpp"
 #include "common/fisheye_rig.hpp"
-#include "common/suite.h"
-#include "waymark/detector.h"
 #include "waymark/internal/sensors/lens.hpp"
 #include "waymark/random.h"
 
@@ -16,24 +15,8 @@ constexpr double kWall_m = 3, kBoard_m = 0.08;
 
 wm_rig rig;
 wm::mounted_camera camera;
-std::vector<char> params;
-std::vector<uint8_t> state_memory, picture;
-wm_event events[2];
-
-void set(const char *key, double value) {
-  const wm_param_table &table = wm_detector_find("edges")->params;
-  for (size_t i = 0; i < table.count; i++) {
-    if (std::string(table.params[i].key) != key) continue;
-    char *field = params.data() + table.params[i].offset;
-    if (table.params[i].type == WM_PARAM_F64) {
-      *reinterpret_cast<double *>(field) = value;
-    } else {
-      *reinterpret_cast<int32_t *>(field) = static_cast<int32_t>(value);
-    }
-    return;
-  }
-  TEST_FAIL_MESSAGE(key);
-}
+std::vector<uint8_t> picture;
+std::unique_ptr<wm::drawn::eyes> edges;
 
 // A wall with a skirting board across the way, seen over a floor of this brightness, which mirrors a share of it.
 using Floor = std::function<double(double x, double y)>;
@@ -61,18 +44,11 @@ void draw(const Floor &floor, double mirror) {
 }
 
 const wm_points &look() {
-  const wm_detector *edges = wm_detector_find("edges");
   const int32_t front = 0;
-  const wm_view view = {&rig, &front, nullptr, 0, nullptr, 0, nullptr, 0};
-  const char *why = "";
-  state_memory.resize(edges->state_bytes(params.data(), &view, &why) + 64);
-  void *state = state_memory.data() + (64 - reinterpret_cast<uintptr_t>(state_memory.data()) % 64);
-  TEST_ASSERT_EQUAL(WM_OK, edges->init(state, params.data(), &view));
-  const wm_frame frame = {10, 20, 0, 0, 0, kWidth, kHeight, kWidth, picture.data()};
-  size_t count;
-  TEST_ASSERT_EQUAL(WM_OK, edges->detect(state, &frame, nullptr, events, 2, &count));
-  TEST_ASSERT_EQUAL(1, count);
-  return events[0].as.points;
+  edges->begin({&rig, &front, nullptr, 0, nullptr, 0, nullptr, 0});
+  const wm_frame frame = wm::drawn::frame_of(picture, kWidth, kHeight, 10);
+  TEST_ASSERT_EQUAL(1, edges->look(&frame));
+  return edges->events[0].as.points;
 }
 
 // At least this share lies at the wall, and these look straight away from the robot.
@@ -124,7 +100,7 @@ TEST(a_floor_that_mirrors) {
 // The paper's way finds the foot of the wall, but the board's upper edge as well.
 TEST(by_windows) {
   draw(plain_floor, 0);
-  set("mode", 1);
+  edges->set("mode", 1);
   const wm_points &p = look();
   uint32_t right = 0;
   for (uint32_t i = 0; i < p.count; i++) {
@@ -146,7 +122,5 @@ TEST(a_lone_point_is_left_out) {
 void setUp() {
   rig = wm::drawn::rig_of({wm::drawn::fisheye(kWidth, kHeight, 522, {{0.5, 0, 0.4}, {0, 22 * M_PI / 180, 0}})});
   TEST_ASSERT_NULL(wm::mounted_camera_init(&camera, rig.cameras[0]));
-  const wm_param_table &table = wm_detector_find("edges")->params;
-  params.assign(table.bytes + 1, 0);
-  wm_params_defaults(&table, params.data());
+  edges = std::make_unique<wm::drawn::eyes>("edges");
 }

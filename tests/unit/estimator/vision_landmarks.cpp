@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Known landmarks in drawn fisheye pictures: found where they are, with the sigma that they have; not found where they
 // are hidden, changed, dark or elsewhere, and why.
+#include "common/eyes.hpp"
 #include "common/fisheye_rig.hpp"
-#include "common/suite.h"
 #include "vision/landmarks/params.h"
-#include "waymark/detector.h"
 #include "waymark/internal/sensors/lens.hpp"
 #include "waymark/random.h"
 
@@ -21,8 +20,6 @@ wm_landmark landmark;
 std::vector<uint8_t> sign;
 wm_appearance appearance;
 wm_landmarks_params params;
-const wm_detector *detector;
-wm_event events[64];
 
 // A ring with a bar and a letter's stroke: no symmetry.
 double sign_at(double x, double y) {
@@ -120,30 +117,21 @@ wm_estimate pose_of(const Place &at, double sigma_m, double sigma_rad) {
   return e;
 }
 
-struct Eyes {
-  void *state;
-  Eyes() {
-    const char *why = "";
-    const size_t bytes = detector->state_bytes(&params, &view, &why);
-    TEST_ASSERT_GREATER_THAN_MESSAGE(0, bytes, why);
-    state = aligned_alloc(64, (bytes + 63) / 64 * 64);
-    std::memset(state, 0xA5, bytes);
-    TEST_ASSERT_EQUAL(WM_OK, detector->init(state, &params, &view));
+struct Eyes : wm::drawn::eyes {
+  Eyes() : eyes("landmarks") {
+    as<wm_landmarks_params>() = ::params;
+    begin(view);
   }
-  Eyes(const Eyes &) = delete;
-  Eyes &operator=(const Eyes &) = delete;
-  ~Eyes() { free(state); }
-  size_t look(const std::vector<uint8_t> &picture, const wm_estimate *prediction, wm_time_ns t_ns = 5000) const {
-    const wm_frame frame = {t_ns, t_ns + 1000, 0, 1, 0, kWidth, kHeight, kWidth, picture.data()};
-    size_t count = 0;
-    TEST_ASSERT_EQUAL(WM_OK, detector->detect(state, &frame, prediction, events, 64, &count));
-    return count;
+  size_t look(const std::vector<uint8_t> &picture, const wm_estimate *prediction, wm_time_ns t_ns = 5000) {
+    const wm_frame frame = wm::drawn::frame_of(picture, kWidth, kHeight, t_ns);
+    return eyes::look(&frame, prediction);
   }
-  wm_look why() const {
+  wm_looked_for looked_for() const {
     wm_looked_for one{};
-    TEST_ASSERT_EQUAL(1, detector->looked_for(state, &one, 1));
-    return static_cast<wm_look>(one.look);
+    TEST_ASSERT_EQUAL(1, detector->looked_for(state.get(), &one, 1));
+    return one;
   }
+  wm_look why() const { return static_cast<wm_look>(looked_for().look); }
 };
 
 // By the calibration's own geometry: the landmark in the camera's optical axes.
@@ -168,7 +156,7 @@ double true_elevation(const Place &at) {
 }
 
 TEST(found_where_it_is_with_the_sigma_that_it_has) {
-  const Eyes eyes;
+  Eyes eyes;
   double squares = 0, up_squares = 0, largest = 0;
   int count = 0;
   for (uint64_t i = 0; i < 24; i++) {
@@ -180,9 +168,9 @@ TEST(found_where_it_is_with_the_sigma_that_it_has) {
     scene.light = 0.7 + 0.25 * random(7);
     const wm_estimate guess = pose_of(believed, 0.05, 0.01);
     if (eyes.look(draw(at, scene), &guess) != 1) continue;
-    const wm_sighting &seen = events[0].as.sighting;
+    const wm_sighting &seen = eyes.events[0].as.sighting;
     TEST_ASSERT_EQUAL(7, seen.landmark_id);
-    TEST_ASSERT_EQUAL_INT64(5000, events[0].t_ns);
+    TEST_ASSERT_EQUAL_INT64(5000, eyes.events[0].t_ns);
     const double off = std::remainder(seen.bearing_rad - true_bearing(at), 2 * M_PI);
     squares += off * off / (seen.bearing_sigma_rad * seen.bearing_sigma_rad);
     const double up_off = seen.elevation_rad - true_elevation(at);
@@ -200,15 +188,15 @@ TEST(found_where_it_is_with_the_sigma_that_it_has) {
 
 TEST(a_landmark_without_sigma_is_found) {
   landmark.sigma_m = NAN;
-  const Eyes eyes;
+  Eyes eyes;
   const Place at = {1.5, 0.2, 0.1};
   const wm_estimate guess = pose_of(at, 0.05, 0.01);
   TEST_ASSERT_EQUAL(1, eyes.look(draw(at, {}), &guess));
-  TEST_ASSERT_GREATER_THAN_DOUBLE(0.0, events[0].as.sighting.bearing_sigma_rad);
+  TEST_ASSERT_GREATER_THAN_DOUBLE(0.0, eyes.events[0].as.sighting.bearing_sigma_rad);
 }
 
 TEST(what_is_not_there_is_not_found_and_said_why) {
-  const Eyes eyes;
+  Eyes eyes;
   const Place at = {1, 0.3, 0.1};
   const wm_estimate guess = pose_of(at, 0.03, 0.01);
   const auto why = [&](const Scene &scene) {
@@ -231,7 +219,7 @@ TEST(what_is_not_there_is_not_found_and_said_why) {
 }
 
 TEST(found_anywhere_without_a_pose) {
-  const Eyes eyes;
+  Eyes eyes;
   int found = 0;
   double largest = 0, squares = 0;
   for (uint64_t i = 0; i < 24; i++) {
@@ -241,7 +229,7 @@ TEST(found_anywhere_without_a_pose) {
     scene.seed = i + 1;
     scene.light = 0.8 + 0.2 * random(4);
     if (eyes.look(draw(at, scene), nullptr) == 0) continue;
-    const wm_sighting &seen = events[0].as.sighting;
+    const wm_sighting &seen = eyes.events[0].as.sighting;
     TEST_ASSERT_EQUAL(7, seen.landmark_id);
     const double off = std::remainder(seen.bearing_rad - true_bearing(at), 2 * M_PI);
     squares += off * off / (seen.bearing_sigma_rad * seen.bearing_sigma_rad);
@@ -262,7 +250,7 @@ TEST(found_anywhere_without_a_pose) {
 // How many of 8 pictures from there (12 m away) it is found in without a pose, each time where it is.
 int found_from_afar() {
   int found = 0;
-  const Eyes eyes;
+  Eyes eyes;
   for (uint64_t i = 0; i < 8; i++) {
     const auto random = [i](uint64_t k) { return 2 * wm_random_uniform(13, k, i) - 1; };
     const Place at = {-6 + 0.5 * random(1), 2 * random(2), 0.5 * random(3)};
@@ -270,7 +258,7 @@ int found_from_afar() {
     scene.seed = i + 1;
     if (eyes.look(draw(at, scene), nullptr) == 0) continue;
     found++;
-    const wm_sighting &seen = events[0].as.sighting;
+    const wm_sighting &seen = eyes.events[0].as.sighting;
     TEST_ASSERT_DOUBLE_WITHIN(4 * seen.bearing_sigma_rad, 0,
                               std::remainder(seen.bearing_rad - true_bearing(at), 2 * M_PI));
     if (i % 4 != 0) continue;
@@ -325,7 +313,7 @@ TEST(what_was_recognised_is_followed) {
   view.landmarks = all;
   view.appearances = looks;
   view.landmark_count = view.appearance_count = 12;
-  const Eyes eyes;
+  Eyes eyes;
   int followed = 0;
   wm_estimate moving = pose_of({0, 0, 0}, 1, 1);
   moving.state = WM_STATE_SEARCHING;
@@ -340,9 +328,9 @@ TEST(what_was_recognised_is_followed) {
     moving.t_ns = t_ns;
     const size_t count = eyes.look(draw(at, scene), &moving, t_ns);
     for (size_t k = 0; k < count; k++) {
-      if (events[k].as.sighting.landmark_id != 7) continue;
+      if (eyes.events[k].as.sighting.landmark_id != 7) continue;
       TEST_ASSERT_DOUBLE_WITHIN(0.002, 0,
-                                std::remainder(events[k].as.sighting.bearing_rad - true_bearing(at), 2 * M_PI));
+                                std::remainder(eyes.events[k].as.sighting.bearing_rad - true_bearing(at), 2 * M_PI));
       followed++;
     }
   }
@@ -351,7 +339,7 @@ TEST(what_was_recognised_is_followed) {
 
 // Nobody knows where the robot is, and its twist or stamp is nonsense: it is looked for from scratch.
 TEST(a_motion_that_is_no_number_misleads_nothing) {
-  const Eyes eyes;
+  Eyes eyes;
   const Place at = {2, 0.4, 0.2};
   const auto picture = draw(at, Scene{});
   const double nonsense[] = {0, NAN, INFINITY, 1e300, 0};
@@ -361,29 +349,26 @@ TEST(a_motion_that_is_no_number_misleads_nothing) {
     moving.v_mps[0] = moving.w_radps[2] = nonsense[i];
     moving.t_ns = i == 4 ? WM_TIME_NONE : 5000;
     TEST_ASSERT_EQUAL(1, eyes.look(picture, &moving, 5000 + i * 100 * WM_NS_PER_MS));
-    TEST_ASSERT_DOUBLE_WITHIN(0.002, true_bearing(at), events[0].as.sighting.bearing_rad);
+    TEST_ASSERT_DOUBLE_WITHIN(0.002, true_bearing(at), eyes.events[0].as.sighting.bearing_rad);
   }
 }
 
 // A pose that leads to nothing is doubted after a while.
 TEST(carried_off_it_is_found_where_it_is) {
-  const Eyes eyes;
+  Eyes eyes;
   const auto picture = draw({2, 0.4, 0.2}, Scene{});
   wm_estimate wrong = pose_of({1, -3, -0.6}, 0.03, 0.01);
   int looks = 0;
   for (wm_time_ns t_ns = 0; t_ns <= 600 * WM_NS_PER_MS; t_ns += 200 * WM_NS_PER_MS, looks++) {
     wrong.t_ns = t_ns;
-    const wm_frame frame = {t_ns, t_ns, 0, 1, 0, kWidth, kHeight, kWidth, picture.data()};
-    size_t count = 0;
-    TEST_ASSERT_EQUAL(WM_OK, detector->detect(eyes.state, &frame, &wrong, events, 64, &count));
-    TEST_ASSERT_EQUAL(t_ns > 500 * WM_NS_PER_MS ? 1 : 0, count);
+    TEST_ASSERT_EQUAL(t_ns > 500 * WM_NS_PER_MS ? 1 : 0, eyes.look(picture, &wrong, t_ns));
   }
   TEST_ASSERT_EQUAL(4, looks);
 }
 
 TEST(a_pose_that_says_nothing_guides_nowhere) {
   params.search_places = 0;
-  const Eyes eyes;
+  Eyes eyes;
   const Place at = {1, 0, 0};
   const auto picture = draw(at, Scene{});
   TEST_ASSERT_EQUAL(0, eyes.look(picture, nullptr));
@@ -405,33 +390,30 @@ TEST(a_pose_that_says_nothing_guides_nowhere) {
 }
 
 TEST(a_moving_robot_is_expected_where_it_was) {
-  const Eyes eyes;
+  Eyes eyes;
   const Place at = {1, 0, 0};
   wm_estimate guess = pose_of({1.3, 0, 0.06}, 0.02, 0.005);  // 0.1 s later, at 3 m/s and 0.6 rad/s
   guess.t_ns += 100000000;
   guess.v_mps[0] = 3;
   guess.w_radps[2] = 0.6;
   TEST_ASSERT_EQUAL(1, eyes.look(draw(at, Scene{}), &guess));
-  TEST_ASSERT_DOUBLE_WITHIN(0.001, true_bearing(at), events[0].as.sighting.bearing_rad);
+  TEST_ASSERT_DOUBLE_WITHIN(0.001, true_bearing(at), eyes.events[0].as.sighting.bearing_rad);
 }
 
 TEST(rows_have_their_own_times) {
   rig.cameras[0].readout_ns = 20000000;
-  const Eyes eyes;
+  Eyes eyes;
   const Place at = {1, 0, 0};
   const wm_estimate guess = pose_of(at, 0.02, 0.005);
   TEST_ASSERT_EQUAL(1, eyes.look(draw(at, Scene{}), &guess));
-  wm_looked_for one{};
-  detector->looked_for(eyes.state, &one, 1);
-  const double row = one.found_px[1] / (kHeight - 1) - 0.5;
-  TEST_ASSERT_INT64_WITHIN(2, 5000 + std::llround(row * 20e6), events[0].t_ns);
+  const double row = eyes.looked_for().found_px[1] / (kHeight - 1) - 0.5;
+  TEST_ASSERT_INT64_WITHIN(2, 5000 + std::llround(row * 20e6), eyes.events[0].t_ns);
 }
 
 TEST(pictures_of_another_maps_landmarks_are_refused) {
+  const Eyes eyes;
   landmark.id = 8;
-  const char *why = "";
-  TEST_ASSERT_EQUAL(0, detector->state_bytes(&params, &view, &why));
-  TEST_ASSERT_NOT_NULL(std::strstr(why, "are they of one map?"));
+  eyes.expect_refused(view, "are they of one map?");
 }
 
 }  // namespace
@@ -449,9 +431,4 @@ void setUp() {
   appearance = {7, kSignSide, kSignSide, sign.data(), kSize_m, kSize_m, -M_PI / 2 + 0.2};
   view = {&rig, &kCamera, &landmark, 1, &appearance, 1, nullptr, 0};
   wm_params_defaults(&wm_landmarks_params_table, &params);
-}
-
-int suite_begin(int, char **) {
-  detector = wm_detector_find("landmarks");
-  return SUITE_RUNS;
 }

@@ -4,10 +4,9 @@
 #include <algorithm>
 #include <map>
 
-#include "common/suite.h"
+#include "common/eyes.hpp"
 #include "vision/lines/line_tracks.hpp"
 #include "vision/lines/votes.hpp"
-#include "waymark/detector.h"
 #include "waymark/internal/sensors/lens.hpp"
 #include "waymark/random.h"
 
@@ -15,29 +14,12 @@ namespace {
 
 constexpr uint32_t kSide = 640;
 constexpr double kDeg = M_PI / 180, kBlur_px = 0.9;
-constexpr size_t kEvents = 256;
 constexpr int32_t kCamera = 0;
 
-const wm_detector *lines;
 wm_rig rig;
 wm_view view;
-std::vector<char> params, state_memory;
+std::unique_ptr<wm::drawn::eyes> lines;
 std::vector<uint8_t> picture(kSide *kSide);
-wm_event events[kEvents];
-
-void set(const char *key, double value) {
-  for (size_t i = 0; i < lines->params.count; i++) {
-    const wm_param &p = lines->params.params[i];
-    if (std::string(p.key) != key) continue;
-    char *field = params.data() + p.offset;
-    if (p.type == WM_PARAM_F64)
-      std::memcpy(field, &value, sizeof value);
-    else
-      *reinterpret_cast<int32_t *>(field) = static_cast<int32_t>(value);
-    return;
-  }
-  TEST_FAIL_MESSAGE(key);
-}
 
 wm_camera up_camera(double yaw_deg) {
   wm_camera c{};
@@ -51,24 +33,11 @@ wm_camera up_camera(double yaw_deg) {
   return c;
 }
 
-void start() {
-  const char *why = "";
-  const size_t bytes = lines->state_bytes(params.data(), &view, &why);
-  TEST_ASSERT_GREATER_THAN_MESSAGE(0, bytes, why);
-  state_memory.assign(bytes + 64, 0x5A);
-  void *state = state_memory.data();
-  size_t room = state_memory.size();
-  std::align(64, bytes, state, room);
-  TEST_ASSERT_EQUAL(WM_OK, lines->init(state, params.data(), &view));
-}
+void start() { lines->begin(view); }
 
 size_t look(wm_time_ns t_ns) {
-  void *state = state_memory.data();
-  size_t room = state_memory.size(), count = 0;
-  std::align(64, 64, state, room);
-  const wm_frame frame = {t_ns, t_ns, 0, 0, kCamera, kSide, kSide, kSide, picture.data()};
-  TEST_ASSERT_EQUAL(WM_OK, lines->detect(state, &frame, nullptr, events, kEvents, &count));
-  return count;
+  const wm_frame frame = wm::drawn::frame_of(picture, kSide, kSide, t_ns);
+  return lines->look(&frame);
 }
 
 // A round wall of stripes: the brightness changes at each of these azimuths (rising), seen in the camera's true pose.
@@ -133,8 +102,8 @@ double error_of(const stripes &wall, double azimuth, size_t *which) {
 }
 
 TEST(sub_pixel_and_honest) {
-  set("sigma_px", 0);
-  set("tilt_sigma_rad", 0);
+  lines->set("sigma_px", 0);
+  lines->set("tilt_sigma_rad", 0);
   double squares = 0, normalised = 0, sum = 0;
   int count = 0;
   for (uint64_t world = 0; world < 3; world++) {
@@ -150,7 +119,7 @@ TEST(sub_pixel_and_honest) {
       }
       TEST_ASSERT_GREATER_OR_EQUAL(35, seen);
       for (size_t i = 0; i < seen; i++) {
-        const wm_sighting &s = events[i].as.sighting;
+        const wm_sighting &s = lines->events[i].as.sighting;
         size_t which = 0;
         const double e = error_of(wall, s.bearing_rad + 0.0037 * static_cast<double>(k), &which);
         TEST_ASSERT_LESS_THAN_DOUBLE(0.3 * kDeg, std::fabs(e));
@@ -181,8 +150,8 @@ TEST(numbers_stay_through_turns) {
     if (k > 3) TEST_ASSERT_GREATER_OR_EQUAL(28, seen);
     for (size_t i = 0; i < seen; i++) {
       size_t which = 0;
-      (void)error_of(wall, events[i].as.sighting.bearing_rad + turn, &which);
-      const auto known = line_of.emplace(events[i].as.sighting.landmark_id, which);
+      (void)error_of(wall, lines->events[i].as.sighting.bearing_rad + turn, &which);
+      const auto known = line_of.emplace(lines->events[i].as.sighting.landmark_id, which);
       TEST_ASSERT_EQUAL(known.first->second, which);
     }
     turn += (k < 7 ? 1 : -1) * 5 * kDeg;
@@ -203,7 +172,7 @@ TEST(leaning_lines_tell_the_zenith) {
     const size_t seen = look(100'000'000 * static_cast<wm_time_ns>(k + 1));
     for (size_t i = 0; k > 4 && i < seen; i++) {
       size_t which = 0;
-      const double e = error_of(wall, events[i].as.sighting.bearing_rad, &which);
+      const double e = error_of(wall, lines->events[i].as.sighting.bearing_rad, &which);
       squares += e * e;
       count++;
     }
@@ -224,7 +193,7 @@ TEST(bearings_are_the_sensors_own) {
     for (size_t i = 0; i < seen; i++) {
       size_t which = 0;
       TEST_ASSERT_LESS_THAN_DOUBLE(0.1 * kDeg,
-                                   std::fabs(error_of(wall, events[i].as.sighting.bearing_rad + 30 * kDeg, &which)));
+                                   std::fabs(error_of(wall, lines->events[i].as.sighting.bearing_rad + 30 * kDeg, &which)));
     }
   }
 }
@@ -273,7 +242,7 @@ TEST(absurd_pictures_show_nothing) {
   for (size_t i = 0; i < picture.size(); i++) picture[i] = (i / 16 + i / kSide / 16) % 2 ? 255 : 0;
   for (int k = 0; k < 5; k++) {
     const size_t seen = look(t_ns += 100'000'000);
-    for (size_t i = 0; i < seen; i++) TEST_ASSERT_DOUBLE_IS_DETERMINATE(events[i].as.sighting.bearing_rad);
+    for (size_t i = 0; i < seen; i++) TEST_ASSERT_DOUBLE_IS_DETERMINATE(lines->events[i].as.sighting.bearing_rad);
   }
   // Upside down: what was the left is the right, as many lines as before, none at a wrong place twice.
   const stripes wall = make_stripes(24, 3);
@@ -289,7 +258,7 @@ TEST(identities_of_tracks_begin_anew) {
   static wm::line_tracks tracks;
   wm::radial_edge edges[3] = {};
   for (int i = 0; i < 3; i++) edges[i] = {-1.0 + i, 0.001, 0, 0.1, 60.0 + 50 * i, 200.0 - 50 * i, 0, 100, 1000};
-  const auto &wish = *reinterpret_cast<const wm_lines_params *>(params.data());
+  const auto &wish = lines->as<wm_lines_params>();
   constexpr int32_t kEnd = INT32_MAX / 16;
   tracks.clear();
   tracks.next_id = kEnd - 2;
@@ -305,25 +274,18 @@ TEST(identities_of_tracks_begin_anew) {
 }
 
 TEST(what_does_not_fit_is_told) {
-  const char *why = nullptr;
   rig.cameras[0].width_px = rig.cameras[0].height_px = 3;
-  TEST_ASSERT_EQUAL(0, lines->state_bytes(params.data(), &view, &why));
-  TEST_ASSERT_NOT_NULL(why);
+  lines->expect_refused(view, "");
   rig.cameras[0] = up_camera(0);
   rig.cameras[0].mounting.rpy_rad[1] = 90 * kDeg;  // looks at the floor with a narrow lens
   rig.cameras[0].intrinsics[0] = rig.cameras[0].intrinsics[1] = 2000;
-  why = nullptr;
-  TEST_ASSERT_EQUAL(0, lines->state_bytes(params.data(), &view, &why));
-  TEST_ASSERT_NOT_NULL(why);
+  lines->expect_refused(view, "");
 }
 
 }  // namespace
 
 void setUp() {
-  lines = wm_detector_find("lines");
-  TEST_ASSERT_NOT_NULL(lines);
-  params.assign(lines->params.bytes, 0);
-  wm_params_defaults(&lines->params, params.data());
+  lines = std::make_unique<wm::drawn::eyes>("lines");
   wm_rig_init(&rig);
   rig.camera_count = 1;
   rig.cameras[0] = up_camera(0);

@@ -2,9 +2,8 @@
 // Detector `mr` on drawn views: place and turn, and pictures that nobody means.
 #include <algorithm>
 
+#include "common/eyes.hpp"
 #include "common/marker_views.hpp"
-#include "common/suite.h"
-#include "waymark/detector.h"
 #include "waymark/marker_fit.h"
 #include "waymark/mr_code.h"
 #include "waymark/random.h"
@@ -13,34 +12,9 @@ namespace {
 
 using namespace wm::views;
 
-const wm_detector *mr;
-wm_event events[32];
-
-struct Machine {
-  wm_rig rig;
-  int32_t camera = 0;
-  std::unique_ptr<void, decltype(&std::free)> state{nullptr, &std::free};
-  explicit Machine(const wm_camera &c, double size_m = 0.27) {
-    wm_rig_init(&rig);
-    rig.camera_count = 1;
-    rig.cameras[0] = c;
-    std::strcpy(rig.marker_family, "mr");
-    rig.marker_size_m = size_m;
-    std::vector<char> params(mr->params.bytes);
-    wm_params_defaults(&mr->params, params.data());
-    const wm_view view = {&rig, &camera, nullptr, 0, nullptr, 0, nullptr, 0};
-    const char *why = "";
-    const size_t bytes = mr->state_bytes(params.data(), &view, &why);
-    TEST_ASSERT_GREATER_THAN_MESSAGE(0, bytes, why);
-    state.reset(std::aligned_alloc(64, (bytes + 63) / 64 * 64));
-    TEST_ASSERT_EQUAL(WM_OK, mr->init(state.get(), params.data(), &view));
-  }
-  size_t look(const std::vector<uint8_t> &grey) {
-    size_t count = 99;
-    const wm_frame frame = frame_of(grey, rig.cameras[0]);
-    TEST_ASSERT_EQUAL(WM_OK, mr->detect(state.get(), &frame, nullptr, events, 32, &count));
-    return count;
-  }
+struct Machine : wm::drawn::marker_eyes {
+  explicit Machine(const wm_camera &c, double size_m = 0.27)
+      : marker_eyes(wm_detector_find("mr"), c, "mr", size_m) {}
 };
 
 // The camera looks along its body's x axis, the print stands upright before it.
@@ -50,7 +24,7 @@ TEST(place_and_turn_are_right) {
     view.response = 0.6;  // white grows
     Machine machine(view.camera);
     for (int i = 0; i < 3; i++) TEST_ASSERT_EQUAL(1, machine.look(take_picture(view, mr_ink(9))));
-    const wm_marker &m = events[0].as.marker;
+    const wm_marker &m = machine.events[0].as.marker;
     TEST_ASSERT_EQUAL(9, m.id);
     TEST_ASSERT_DOUBLE_WITHIN(0.004, 1.5, m.p_m[0]);
     TEST_ASSERT_DOUBLE_WITHIN(0.001, -view.centre_m.x, m.p_m[1]);
@@ -114,7 +88,7 @@ TEST(nearly_face_on_the_turn_is_as_unsure_as_it_says) {
       view.centre_m.x = 0.02 + 0.004 * static_cast<double>(seed);
       Machine machine(view.camera, 0.2);
       if (machine.look(take_picture(view, mr_ink(9))) == 0) continue;
-      const wm_marker &m = events[0].as.marker;
+      const wm_marker &m = machine.events[0].as.marker;
       const auto off = [&](double yaw) { return std::fabs(std::remainder(yaw + M_PI / 2 + tilt, 2 * M_PI)); };
       const double error = m.poses == 2 ? std::min(off(m.yaw_rad), off(m.other_yaw_rad)) : off(m.yaw_rad);
       nees += error * error / (m.yaw_sigma_rad * m.yaw_sigma_rad);
@@ -138,9 +112,9 @@ TEST(a_marker_twice_in_a_picture_is_given_twice) {
     if (i % 640 >= 320) left[i] = right[i];
   Machine machine(view.camera);
   TEST_ASSERT_EQUAL(2, machine.look(left));
-  TEST_ASSERT_EQUAL(9, events[0].as.marker.id);
-  TEST_ASSERT_EQUAL(9, events[1].as.marker.id);
-  TEST_ASSERT_DOUBLE_WITHIN(0.02, 1.0, std::fabs(events[0].as.marker.p_m[1] - events[1].as.marker.p_m[1]));
+  TEST_ASSERT_EQUAL(9, machine.events[0].as.marker.id);
+  TEST_ASSERT_EQUAL(9, machine.events[1].as.marker.id);
+  TEST_ASSERT_DOUBLE_WITHIN(0.02, 1.0, std::fabs(machine.events[0].as.marker.p_m[1] - machine.events[1].as.marker.p_m[1]));
 }
 
 TEST(capacity_is_kept) {
@@ -149,7 +123,7 @@ TEST(capacity_is_kept) {
   const std::vector<uint8_t> grey = take_picture(view, mr_ink(3));
   const wm_frame frame = frame_of(grey, view.camera);
   size_t count = 99;
-  TEST_ASSERT_EQUAL(WM_OK, mr->detect(machine.state.get(), &frame, nullptr, events, 0, &count));
+  TEST_ASSERT_EQUAL(WM_OK, machine.detector->detect(machine.state.get(), &frame, nullptr, machine.events.data(), 0, &count));
   TEST_ASSERT_EQUAL(0, count);
 }
 
@@ -200,10 +174,8 @@ TEST(painted_modules_are_corrected_or_refused) {
     Machine machine(view.camera);
     const size_t count = machine.look(take_picture(view, [=](double x, double y) { return wm_mr_ink(modules, x, y); }));
     TEST_ASSERT_EQUAL(painted <= WM_MR_CORRECTED, count);
-    if (count) TEST_ASSERT_EQUAL(200, events[0].as.marker.id);
+    if (count) TEST_ASSERT_EQUAL(200, machine.events[0].as.marker.id);
   }
 }
 
 }  // namespace
-
-void setUp() { mr = wm_detector_find("mr"); }

@@ -4,12 +4,11 @@
 #include <map>
 #include <set>
 
-#include "common/suite.h"
+#include "common/eyes.hpp"
 #include "sea_floor.hpp"
 #include "vision/stereo/corners.hpp"
 #include "vision/stereo/patch.hpp"
 #include "vision/stereo/rectify.hpp"
-#include "waymark/detector.h"
 
 namespace {
 
@@ -132,42 +131,30 @@ TEST(most_points_decide_how_the_cameras_moved) {
 
 // ── the whole detector ──────────────────────────────────────────────────────────────────────────────────────────────
 
-struct machine {
+struct machine : wm::drawn::eyes {
   wm_rig rig;
   int32_t cameras[2] = {0, 1};
-  wm_view view;
-  wm_stereo_params params;
-  const wm_detector *detector = wm_detector_find("stereo");
-  void *state = nullptr;
-  wm::mounted_camera eyes[2];
-  wm_event events[256];
+  wm_view view{&rig, cameras, nullptr, 0, nullptr, 0, nullptr, 0};
+  wm::mounted_camera camera[2];
   size_t count = 0;
 
-  explicit machine(bool fisheye = false) {
+  explicit machine(bool fisheye = false) : eyes("stereo") {
     sea::make_rig(&rig, fisheye);
-    view = {&rig, cameras, nullptr, 0, nullptr, 0, nullptr, 0};
-    wm_params_defaults(&detector->params, &params);
-    const char *why = "";
-    const size_t bytes = detector->state_bytes(&params, &view, &why);
-    TEST_ASSERT_GREATER_THAN_MESSAGE(0, bytes, why);
-    state = std::aligned_alloc(64, (bytes + 63) / 64 * 64);
-    TEST_ASSERT_EQUAL(WM_OK, detector->init(state, &params, &view));
-    for (int i = 0; i < 2; i++) TEST_ASSERT_NULL(wm::mounted_camera_init(&eyes[i], rig.cameras[i]));
+    begin(view);
+    for (int i = 0; i < 2; i++) TEST_ASSERT_NULL(wm::mounted_camera_init(&camera[i], rig.cameras[i]));
   }
-  ~machine() { std::free(state); }
   machine(const machine &) = delete;
   machine &operator=(const machine &) = delete;
 
   void look(const std::vector<uint8_t> &left, const std::vector<uint8_t> &right, double t_s) {
     const auto t_ns = static_cast<wm_time_ns>(t_s * 1e9);
-    wm_frame frames[2] = {{t_ns, t_ns, 0, 0, 0, 640, 480, 640, left.data()},
-                          {t_ns, t_ns, 0, 0, 1, 640, 480, 640, right.data()}};
-    TEST_ASSERT_EQUAL(WM_OK, detector->detect(state, frames, nullptr, events, 256, &count));
+    const wm_frame frames[2] = {wm::drawn::frame_of(left, 640, 480, t_ns), wm::drawn::frame_of(right, 640, 480, t_ns, 1)};
+    count = eyes::look(frames);
   }
   void render(const sea::view_of_floor &seen, uint64_t number, std::vector<uint8_t> *left,
               std::vector<uint8_t> *right) {
-    sea::render(seen, eyes[0], 2 * number, left);
-    sea::render(seen, eyes[1], 2 * number + 1, right);
+    sea::render(seen, camera[0], 2 * number, left);
+    sea::render(seen, camera[1], 2 * number + 1, right);
   }
 };
 
@@ -175,8 +162,8 @@ const wm::pair_geometry kPair = {420, 420, 321, 238.5, 0.3};
 
 // Where the ray of a rectified pixel of the left camera meets the floor, in map.
 wm::vec3 on_floor(const machine &m, const wm::rigid &map_base, const double px[2]) {
-  const wm::mat3 R = map_base.R * m.eyes[0].R_base_optical;
-  const wm::vec3 eye = map_base * m.eyes[0].centre_m;
+  const wm::mat3 R = map_base.R * m.camera[0].R_base_optical;
+  const wm::vec3 eye = map_base * m.camera[0].centre_m;
   const wm::vec3 ray = R * wm::vec3{(px[0] - kPair.cu) / kPair.fu, (px[1] - kPair.cv) / kPair.fv, 1};
   return eye + (-eye.z / ray.z) * ray;
 }
@@ -217,8 +204,8 @@ course swim(machine *m, int pictures, double gain, const std::vector<sea::partic
       cells.insert(static_cast<int>(s.left_px[0] / 80) + 8 * static_cast<int>(s.left_px[1] / 80));
       const wm::vec3 place = on_floor(*m, seen.map_base, s.left_px);
       wm::pair_pixels exact;
-      const wm::vec3 in_camera = wm::transposed_times(seen.map_base.R * m->eyes[0].R_base_optical,
-                                                      place - seen.map_base * m->eyes[0].centre_m);
+      const wm::vec3 in_camera = wm::transposed_times(seen.map_base.R * m->camera[0].R_base_optical,
+                                                      place - seen.map_base * m->camera[0].centre_m);
       TEST_ASSERT_TRUE(wm::pixels_of(kPair, in_camera, &exact));
       out.disparity_off_px.push_back(std::fabs(exact.right_u - s.right_px[0]));
       out.row_off_px.push_back(std::fabs(s.left_px[1] - s.right_px[1]));
@@ -332,9 +319,7 @@ TEST(it_bears_a_camera_that_is_stuck_and_a_clock_that_runs_back) {
 TEST(a_pair_that_is_mounted_the_wrong_way_round_is_told) {
   machine m;
   std::swap(m.rig.cameras[0].mounting, m.rig.cameras[1].mounting);
-  const char *why = nullptr;
-  TEST_ASSERT_EQUAL(0, m.detector->state_bytes(&m.params, &m.view, &why));
-  TEST_ASSERT_NOT_NULL(std::strstr(why, "swapped"));
+  m.expect_refused(m.view, "swapped");
 }
 
 }  // namespace
