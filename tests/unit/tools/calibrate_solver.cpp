@@ -10,6 +10,7 @@
 #include "common/failure.h"
 #include "common/suite.h"
 #include "common/trials.h"
+#include "made.h"
 #include "waymark/random.h"
 
 using namespace wm::calibrate;
@@ -204,14 +205,10 @@ TEST(test_what_a_pair_lacks_is_said) {
   for (size_t &shot : others) shot += 100;
   const auto refused = [&](const char *text, const std::vector<std::vector<size_t>> &shots,
                            const std::vector<FloorBoard> &floor) {
-    try {
+    made::refused(text, [&] {
       (void)solve_rig(shots.size() > 1 ? std::vector<Calibration>{*c, *c} : std::vector<Calibration>{*c}, shots, kShape,
                       floor);
-    } catch (const wm::tools::Failure &problem) {
-      TEST_ASSERT_NOT_NULL_MESSAGE(std::strstr(problem.what(), text), problem.what());
-      return;
-    }
-    TEST_FAIL_MESSAGE(text);
+    });
   };
   refused("seen by both cameras at once in 0 pictures", {all_shots(*c), others}, {});
   refused("no whole board was found in a picture of this name", {all_shots(*c)}, {{"nowhere.jpg", 1, 0, 0}});

@@ -15,6 +15,7 @@ extern "C" {
 #include "common/suite.h"
 #include "import/decoder.h"
 #include "import/import.h"
+#include "made.h"
 #include "waymark/video.h"
 
 namespace {
@@ -148,12 +149,7 @@ wm::tools::ImportWish wish_to(const char *out) {
 }
 
 void refused(const wm::tools::ImportWish &wish, const char *text) {
-  try {
-    (void)wm::tools::import_video(wish);
-    TEST_FAIL_MESSAGE("was not refused");
-  } catch (const wm::tools::Failure &failure) {
-    TEST_ASSERT_NOT_NULL_MESSAGE(std::strstr(failure.what(), text), failure.what());
-  }
+  made::refused(text, [&] { (void)wm::tools::import_video(wish); });
 }
 
 TEST(the_containers_stamps_where_there_are_no_others) {

@@ -265,13 +265,9 @@ TEST(test_nmea2000_needs_no_dbc) {
 
 TEST(test_a_log_without_nmea2000_needs_its_dbc) {
   const made::Folder folder;
-  try {
-    (void)proposed("", log_of("18FEF100", "18F0090B", false), folder);
-    TEST_FAIL_MESSAGE("taken without a DBC");
-  } catch (const wm::tools::Failure &problem) {
-    TEST_ASSERT_NOT_NULL_MESSAGE(std::strstr(problem.what(), "needs the bus' DBC file: --dbc FILE"), problem.what());
-    TEST_ASSERT_NOT_NULL_MESSAGE(std::strstr(problem.what(), "none of the groups of NMEA 2000"), problem.what());
-  }
+  const std::string why = made::why_of([&] { (void)proposed("", log_of("18FEF100", "18F0090B", false), folder); });
+  for (const char *said : {"needs the bus' DBC file: --dbc FILE", "none of the groups of NMEA 2000"})
+    TEST_ASSERT_NOT_NULL_MESSAGE(std::strstr(why.c_str(), said), why.c_str());
 }
 
 }  // namespace

@@ -2,15 +2,33 @@
 // Small runs and recordings with known errors, made in a folder that goes away.
 #pragma once
 
-#include <cmath>
 #include <cstdarg>
-#include <cstdio>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <string>
+
+#include "common/failure.h"
+#include "common/suite.h"
 
 namespace made {
+
+// What a command's failure said; nothing where it did not fail.
+template <class Do>
+std::string why_of(const Do &done) {
+  try {
+    done();
+  } catch (const wm::tools::Failure &problem) {
+    return problem.what();
+  }
+  return {};
+}
+
+// Fails with a text that has this in it.
+template <class Do>
+void refused(const std::string &said, const Do &done) {
+  const std::string why = why_of(done);
+  TEST_ASSERT_NOT_EMPTY_MESSAGE(why.c_str(), ("was taken; should be refused by: " + said).c_str());
+  TEST_ASSERT_NOT_NULL_MESSAGE(std::strstr(why.c_str(), said.c_str()), why.c_str());
+}
 
 // A folder of its own under the system's temporary folder, removed at the end.
 class Folder {
@@ -25,6 +43,9 @@ class Folder {
   Folder &operator=(const Folder &) = delete;
 
   [[nodiscard]] const std::filesystem::path &path() const { return path_; }
+  void clear() const {
+    for (const auto &entry : std::filesystem::directory_iterator(path_)) std::filesystem::remove_all(entry);
+  }
   void write(const std::string &name, const std::string &text) const { std::ofstream(path_ / name) << text; }
 
  private:

@@ -54,12 +54,9 @@ TEST(test_a_folder_of_broken_files_is_refused) {
   const made::Folder folder;
   folder.write("a.jpg", "");
   folder.write("b.png", "");
-  try {
+  made::refused(": is empty", [&] {
     wm::tools::each_picture(folder.path(), "", 1, [](const auto &, const auto &) { return true; });
-    TEST_FAIL_MESSAGE("nothing was read, and nothing said");
-  } catch (const wm::tools::Failure &problem) {
-    TEST_ASSERT_NOT_NULL_MESSAGE(std::strstr(problem.what(), ": is empty"), problem.what());
-  }
+  });
 }
 
 #ifdef WM_HAS_CALIBRATE

@@ -7,8 +7,7 @@
 #include <fstream>
 #include <set>
 
-#include "common/suite.h"
-#include "simulate/film.h"
+#include "filmed.h"
 #include "simulate/write.h"
 #include "waymark/map.h"
 #include "waymark/recording.h"
@@ -25,21 +24,10 @@ void complain(void *, wm_note, const char *text) { TEST_FAIL_MESSAGE(text); }
 
 // A second of ours, in small pictures.
 void make(const std::string &world, std::initializer_list<const char *> cameras, int width, int height) {
-  Scenario scenario;
-  Film film;
+  Scenario scenario = shipped(world + "-easy");
+  shrink(scenario, cameras, width, height);
+  Film film = filmed(scenario, 1);
   wm_error err{};
-  const std::string path = std::string(std::getenv("WM_SOURCE_DIR")) + "/config/worlds/" + world + "-easy.yaml";
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, load_scenario(path, scenario, &err), err.text);
-  scenario.duration_s = 1.05;
-  scenario.pictures.samples = 1;
-  for (const char *name : cameras) {
-    PixelCamera camera;
-    camera.name = name;
-    camera.width = width;
-    camera.height = height;
-    scenario.pixel_cameras.push_back(camera);
-  }
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, prepare(scenario, 1, film, &err), err.text);
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, observe_pictures(film, &err), err.text);
   const std::string dir = ours.string();
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, write_sensors(film.scenario, film.recording, dir, &err), err.text);

@@ -8,9 +8,8 @@
 #include <map>
 #include <sstream>
 
-#include "common/suite.h"
+#include "filmed.h"
 #include "render/sensor.h"
-#include "simulate/film.h"
 #include "simulate/motion.h"
 
 using namespace wm::images;
@@ -221,10 +220,7 @@ double taken_s(const wm::sim::Film &film, size_t camera, const std::vector<std::
 }
 
 TEST(test_clock_and_losses_are_in_the_video) {
-  wm::sim::Scenario scenario;
-  wm_error err{};
-  const std::string path = std::string(std::getenv("WM_SOURCE_DIR")) + "/config/worlds/seabed-easy.yaml";
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm::sim::load_scenario(path, scenario, &err), err.text);
+  wm::sim::Scenario scenario = wm::sim::shipped("seabed-easy");
   scenario.duration_s = 40;
   scenario.pictures.samples = 1;
   scenario.errors.camera_mounting_rad = scenario.errors.camera_mounting_m = scenario.errors.camera_intrinsics = 0;
@@ -235,8 +231,8 @@ TEST(test_clock_and_losses_are_in_the_video) {
     camera.name = name, camera.width = 64, camera.height = 48, camera.rate_hz = 10;
     scenario.pixel_cameras.push_back(camera);
   }
-  wm::sim::Film film;
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm::sim::prepare(scenario, 6, film, &err), err.text);
+  const wm::sim::Film film = wm::sim::filmed(scenario, 6);
+  wm_error err{};
   const std::string dir = "render_statistics." + std::to_string(getpid());
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm::sim::write_pictures(film, dir, nullptr, &err), err.text);
 

@@ -6,21 +6,21 @@
 #include <fstream>
 #include <set>
 
-#include "common/suite.h"
+#include "filmed.h"
 #include "made.h"
 #include "simulate/angle.h"
-#include "simulate/film.h"
 
 using namespace wm::sim;
 
 namespace {
 
-std::string worlds() { return std::string(std::getenv("WM_SOURCE_DIR")) + "/config/worlds/"; }
-
 Plan building(const std::string &file, double resolution_m = 0) {
   Plan plan;
   wm_error err{};
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, load_building(worlds() + file, 2.5, resolution_m, plan, &err), err.text);
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK,
+                            load_building(std::string(std::getenv("WM_SOURCE_DIR")) + "/config/worlds/" + file, 2.5,
+                                          resolution_m, plan, &err),
+                            err.text);
   return plan;
 }
 
@@ -58,22 +58,17 @@ TEST(test_the_size_of_the_body) {
                "0.05, ticks_per_turn: 100, track_m: 0.3, wheelbase_m: 0.3, body: {front_m: 0.2, back_m: 0.15, width_m: "
                "0.35}}\nroute: {start: {x_m: 1, y_m: 2}, points: [[5.5, 2]]}\n");
   Scenario scenario;
-  Film film;
   wm_error err{};
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, load_scenario((folder.path() / "x.yaml").string(), scenario, &err), err.text);
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, prepare(scenario, 1, film, &err), err.text);
+  const Film film = filmed(scenario, 1);
   TEST_ASSERT_EQUAL_DOUBLE(0.2, film.world->footprint.front_m);
   TEST_ASSERT_EQUAL_DOUBLE(-0.15, film.world->footprint.back_m);
   TEST_ASSERT_EQUAL_DOUBLE(0.175, film.world->footprint.half_width_m);
 }
 
 TEST(test_shipped_scenarios_with_a_building_can_be_driven) {
-  for (const char *name : {"own-plan.yaml", "own-map.yaml"}) {
-    Scenario scenario;
-    Film film;
-    wm_error err{};
-    TEST_ASSERT_EQUAL_MESSAGE(WM_OK, load_scenario(worlds() + name, scenario, &err), err.text);
-    TEST_ASSERT_EQUAL_MESSAGE(WM_OK, prepare(scenario, 1, film, &err), err.text);
+  for (const char *name : {"own-plan", "own-map"}) {
+    const Film film = filmed(shipped(name), 1);
     TEST_ASSERT_GREATER_THAN_DOUBLE(15, film.recording.length_m);
     TEST_ASSERT_TRUE(film.world->map.has_value());
     const State start = film.recording.drive.at(0), end = film.recording.drive.at(1e9);
@@ -118,15 +113,13 @@ double to_wall_m(const Plan &plan, double x_m, double y_m) {
 // Without errors edge points lie on the plan's walls and tags where they hang; radio and RTK speak in their areas
 // alone.
 TEST(test_the_hospital_has_all_of_its_sources) {
-  Scenario scenario;
-  Film film;
-  wm_error err{};
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, load_scenario(worlds() + "hospital.yaml", scenario, &err), err.text);
+  Scenario scenario = shipped("hospital");
   TEST_ASSERT_TRUE(scenario.robot.differential);
   make_perfect(scenario);
   scenario.pictures.none = true;
   scenario.pixel_cameras[0].rate_hz = 2;
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, prepare(scenario, 1, film, &err), err.text);
+  Film film = filmed(scenario, 1);
+  wm_error err{};
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, observe_pictures(film, &err), err.text);
   const Recording &r = film.recording;
   const auto place_at = [&r](wm_time_ns t_ns) {

@@ -3,23 +3,17 @@
 // states.
 #include <algorithm>
 
-#include "common/suite.h"
-#include "simulate/simulate.h"
+#include "shipped.h"
 
 using namespace wm::sim;
 
 namespace {
 
 Recording driven(const Actuators &actuators) {
-  Scenario s;
-  wm_error err{};
-  const std::string path = std::string(std::getenv("WM_SOURCE_DIR")) + "/config/worlds/loops-commands.yaml";
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, load_scenario(path, s, &err), err.text);
+  Scenario s = shipped("loops-commands");
   TEST_ASSERT_TRUE(s.robot.commanded);
   s.robot.actuators = actuators;
-  Recording r;
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, simulate(s, 7, 100, r, &err), err.text);
-  return r;
+  return driven(s, 7, 100);
 }
 
 // Largest difference between the true twist and the drive's equation over the published commands.

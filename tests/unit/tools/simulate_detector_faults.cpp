@@ -3,9 +3,8 @@
 // are, and nothing else changed.
 #include <algorithm>
 
-#include "common/suite.h"
+#include "shipped.h"
 #include "simulate/angle.h"
-#include "simulate/simulate.h"
 
 using namespace wm::sim;
 
@@ -14,11 +13,8 @@ namespace {
 Scenario scenario;
 
 Recording make(const Faults &faults, uint64_t seed) {
-  wm_error err{};
-  Recording made;
   scenario.faults = faults;
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, simulate(scenario, seed, SIZE_MAX, made, &err), err.text);
-  return made;
+  return driven(scenario, seed);
 }
 
 void check_share(double wanted, double part, double all) {
@@ -110,8 +106,4 @@ TEST(test_a_mistake_is_told) {
 
 }  // namespace
 
-void setUp(void) {
-  wm_error err{};
-  const std::string path = std::string(std::getenv("WM_SOURCE_DIR")) + "/config/worlds/crossing-drawn.yaml";
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, load_scenario(path, scenario, &err), err.text);
-}
+void setUp(void) { load_shipped("crossing-drawn", scenario); }

@@ -7,10 +7,9 @@
 #include <filesystem>
 #include <map>
 
-#include "common/suite.h"
+#include "shipped.h"
 #include "simulate/angle.h"
 #include "simulate/motion.h"
-#include "simulate/simulate.h"
 #include "simulate/write.h"
 #include "waymark/recording.h"
 
@@ -24,15 +23,8 @@ constexpr double kDegree = kPi / 180;
 Scenario scenario;
 Recording made;
 
-void load(const char *name) {
-  wm_error err{};
-  const std::string path = std::string(std::getenv("WM_SOURCE_DIR")) + "/config/worlds/" + name + ".yaml";
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, load_scenario(path, scenario, &err), err.text);
-}
-void make(uint64_t seed) {
-  wm_error err{};
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, simulate(scenario, seed, SIZE_MAX, made, &err), err.text);
-}
+void load(const char *name) { load_shipped(name, scenario); }
+void make(uint64_t seed) { made = driven(scenario, seed); }
 double since_start(wm_time_ns t_ns) { return static_cast<double>(t_ns - made.clock_start_ns) * 1e-9; }
 
 Vector3d place(int32_t id) {
@@ -321,10 +313,7 @@ TEST(test_perfect_is_perfect) {
 
 TEST(test_a_landmark_less_changes_nothing_of_the_others) {
   load("loops-lines");
-  wm_error err{};
-  Recording all, ten;
-  TEST_ASSERT_EQUAL(WM_OK, simulate(scenario, 4, SIZE_MAX, all, &err));
-  TEST_ASSERT_EQUAL(WM_OK, simulate(scenario, 4, 10, ten, &err));
+  const Recording all = driven(scenario, 4), ten = driven(scenario, 4, 10);
   size_t next = 0;
   for (const Sighting &s : all.sightings) {
     if (s.id > 10) continue;

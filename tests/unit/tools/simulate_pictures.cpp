@@ -4,51 +4,20 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cmath>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 
 #include "common/trials.h"
-#include "simulate/film.h"
+#include "filmed.h"
 #include "simulate/write.h"
 #include "waymark/recording.h"
-
-extern "C" {
-#include "unity.h"
-void setUp(void);
-void tearDown(void);
-}
 
 using namespace wm::sim;
 
 namespace {
 
 std::string folder;
-
-Scenario load(const std::string &name) {
-  Scenario scenario;
-  wm_error err{};
-  const std::string path = std::string(std::getenv("WM_SOURCE_DIR")) + "/config/worlds/" + name + ".yaml";
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, load_scenario(path, scenario, &err), err.text);
-  return scenario;
-}
-
-// A few small pictures, coarse: what this is about is all around them.
-void shrink(Scenario &scenario, std::initializer_list<const char *> cameras, int width, int height) {
-  scenario.duration_s = 1.05;
-  scenario.pictures.samples = 1;
-  scenario.faults.frames_lost = 0;
-  for (const char *name : cameras) {
-    PixelCamera camera;
-    camera.name = name;
-    camera.width = width;
-    camera.height = height;
-    camera.rate_hz = 4;
-    scenario.pixel_cameras.push_back(camera);
-  }
-}
 
 std::string bytes_of(const std::string &path) {
   std::ifstream file(path, std::ios::binary);
@@ -72,15 +41,16 @@ std::string warnings;
 void note(void *, wm_note, const char *text) { warnings += std::string(text) + "\n"; }
 
 void check_world(const char *name, std::initializer_list<const char *> cameras, int width, int height) {
-  Scenario scenario = load(name);
+  Scenario scenario = shipped(name);
   shrink(scenario, cameras, width, height);
-  Film film;
-  wm_error err{};
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, prepare(scenario, 3, film, &err), err.text);
+  scenario.faults.frames_lost = 0;
+  for (PixelCamera &camera : scenario.pixel_cameras) camera.rate_hz = 4;
+  const Film film = filmed(scenario, 3);
   TEST_ASSERT_EQUAL(cameras.size(), film.cameras.size());
   write(film, folder + "/a");
 
   wm_recording *opened = nullptr;
+  wm_error err{};
   warnings.clear();
   const std::string a = folder + "/a";
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_recording_open(a.c_str(), nullptr, note, nullptr, &opened, &err), err.text);
@@ -91,9 +61,7 @@ void check_world(const char *name, std::initializer_list<const char *> cameras, 
   for (const World::Labels what : film.world->labels)
     TEST_ASSERT_GREATER_THAN_MESSAGE(1, lines_of(a + "/" + label_file(what)), label_file(what));
 
-  Film again;
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, prepare(scenario, 3, again, &err), err.text);
-  write(again, folder + "/b");
+  write(filmed(scenario, 3), folder + "/b");
   size_t files = 0;
   for (const auto &entry : std::filesystem::recursive_directory_iterator(a)) {
     if (!entry.is_regular_file()) continue;
@@ -104,20 +72,21 @@ void check_world(const char *name, std::initializer_list<const char *> cameras, 
   TEST_ASSERT_GREATER_THAN(5, files);
 }
 
-void test_corridor_is_a_recording() { check_world("corridor-easy", {"front"}, 160, 90); }
-void test_corridor_hard_is_a_recording() { check_world("corridor-hard", {"front"}, 160, 90); }
-void test_office_is_a_recording() { check_world("office-easy", {"ceiling"}, 160, 120); }
-void test_hall_is_a_recording() { check_world("hall-easy", {"omni"}, 120, 120); }
-void test_seabed_is_a_recording() { check_world("seabed-easy", {"left", "right"}, 160, 120); }
-void test_crossing_is_a_recording() { check_world("crossing-easy", {"left", "right"}, 160, 120); }
+TEST(test_a_corridor_is_a_recording) { check_world("corridor-easy", {"front"}, 160, 90); }
+TEST(test_a_seabed_is_a_recording) { check_world("seabed-easy", {"left", "right"}, 160, 120); }
+TEST(test_the_other_worlds_are_recordings) {
+  if (wm_trials(6, 2) != 6) TEST_IGNORE();
+  check_world("corridor-hard", {"front"}, 160, 90);
+  check_world("office-easy", {"ceiling"}, 160, 120);
+  check_world("hall-easy", {"omni"}, 120, 120);
+  check_world("crossing-easy", {"left", "right"}, 160, 120);
+}
 
 // Wheel speeds without sign, the gear and the yaw rate, added up.
-void test_perfect_sensors_follow_the_truth_also_backwards() {
-  Scenario scenario = load("corridor-easy");
+TEST(test_perfect_sensors_follow_the_truth_also_backwards) {
+  Scenario scenario = shipped("corridor-easy");
   make_perfect(scenario);
-  Film film;
-  wm_error err{};
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, prepare(scenario, 3, film, &err), err.text);
+  const Film film = filmed(scenario, 3);
   const Recording &r = film.recording;
   const State start = r.drive.at(0);
   double x = start.x_m, y = start.y_m, heading = start.heading_rad, speed = 0, rate = 0, backwards_m = 0, worst_m = 0;
@@ -144,12 +113,10 @@ void test_perfect_sensors_follow_the_truth_also_backwards() {
 }
 
 // Twists in the vehicle's axes, added up in space.
-void test_perfect_twists_follow_the_truth_under_water() {
-  Scenario scenario = load("seabed-easy");
+TEST(test_perfect_twists_follow_the_truth_under_water) {
+  Scenario scenario = shipped("seabed-easy");
   make_perfect(scenario);
-  Film film;
-  wm_error err{};
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, prepare(scenario, 3, film, &err), err.text);
+  const Film film = filmed(scenario, 3);
   const Recording &r = film.recording;
   TEST_ASSERT_EQUAL(r.truth6.size(), r.motion6.size());
   Eigen::Quaterniond q(r.truth6[0].q_xyzw[3], r.truth6[0].q_xyzw[0], r.truth6[0].q_xyzw[1], r.truth6[0].q_xyzw[2]);
@@ -171,14 +138,12 @@ void test_perfect_twists_follow_the_truth_under_water() {
 }
 
 // The wheels and the gyro go on as if nothing had happened; the truth jumps.
-void test_who_is_carried_does_not_feel_it() {
-  Scenario scenario = load("corridor-easy");
+TEST(test_who_is_carried_does_not_feel_it) {
+  Scenario scenario = shipped("corridor-easy");
   make_perfect(scenario);
   scenario.faults.kidnap_at_s = 20;
   scenario.faults.kidnap_forward_s = 15;
-  Film film;
-  wm_error err{};
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, prepare(scenario, 3, film, &err), err.text);
+  const Film film = filmed(scenario, 3);
   const Drive &drive = film.recording.drive;
   const State before = drive.at(19.9999), after = drive.at(20.0001);
   TEST_ASSERT_GREATER_THAN(3, static_cast<int>(std::hypot(after.x_m - before.x_m, after.y_m - before.y_m)));
@@ -189,16 +154,14 @@ void test_who_is_carried_does_not_feel_it() {
     if (f.id == message(Bus_message::wheel_speeds).id) TEST_ASSERT_LESS_THAN(3000, f.data[0] | f.data[1] << 8);
 }
 
-void test_drop_outs_and_clock_errors_are_in_the_stamps() {
-  Scenario scenario = load("corridor-easy");
+TEST(test_drop_outs_and_clock_errors_are_in_the_stamps) {
+  Scenario scenario = shipped("corridor-easy");
   make_perfect(scenario);
   scenario.duration_s = 20;
   scenario.faults.camera_dropout = {5, 7};
   scenario.faults.camera_clock_offset_s = 0.010;
   scenario.faults.camera_clock_drift = 1e-4;
-  Film film;
-  wm_error err{};
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, prepare(scenario, 3, film, &err), err.text);
+  const Film film = filmed(scenario, 3);
   const std::vector<FrameTime> times = frame_times(film, 0);
   TEST_ASSERT_EQUAL(180, times.size());
   for (size_t i = 0; i < times.size(); i++) {
@@ -212,8 +175,8 @@ void test_drop_outs_and_clock_errors_are_in_the_stamps() {
   }
 }
 
-void test_an_unknown_camera_is_told_with_the_ones_there_are() {
-  Scenario scenario = load("corridor-easy");
+TEST(test_an_unknown_camera_is_told_with_the_ones_there_are) {
+  Scenario scenario = shipped("corridor-easy");
   PixelCamera camera;
   camera.name = "rear";
   scenario.pixel_cameras = {camera};
@@ -230,21 +193,3 @@ void setUp(void) {
   std::filesystem::create_directories(folder);
 }
 void tearDown(void) { std::filesystem::remove_all(folder); }
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_corridor_is_a_recording);
-  RUN_TEST(test_seabed_is_a_recording);
-  if (wm_trials(6, 2) == 6) {
-    RUN_TEST(test_corridor_hard_is_a_recording);
-    RUN_TEST(test_office_is_a_recording);
-    RUN_TEST(test_hall_is_a_recording);
-    RUN_TEST(test_crossing_is_a_recording);
-  }
-  RUN_TEST(test_perfect_sensors_follow_the_truth_also_backwards);
-  RUN_TEST(test_perfect_twists_follow_the_truth_under_water);
-  RUN_TEST(test_who_is_carried_does_not_feel_it);
-  RUN_TEST(test_drop_outs_and_clock_errors_are_in_the_stamps);
-  RUN_TEST(test_an_unknown_camera_is_told_with_the_ones_there_are);
-  return UNITY_END();
-}

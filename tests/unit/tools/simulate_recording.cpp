@@ -7,9 +7,8 @@
 #include <fstream>
 #include <iterator>
 
-#include "common/suite.h"
+#include "shipped.h"
 #include "simulate/angle.h"
-#include "simulate/simulate.h"
 #include "simulate/write.h"
 #include "waymark/recording.h"
 
@@ -30,7 +29,7 @@ void count_warning(void *context, wm_note, const char *text) {
 void write_and_open(bool perfect) {
   wm_error err{};
   if (perfect) make_perfect(scenario);
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, simulate(scenario, 1, 3, made, &err), err.text);
+  made = driven(scenario, 1, 3);
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, write_recording(scenario, made, folder, &err), err.text);
   int warnings = 0;
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_recording_open(folder.c_str(), nullptr, count_warning, &warnings, &opened, &err),
@@ -193,9 +192,7 @@ TEST(test_the_same_seed_gives_the_same_bytes) {
   write_and_open(false);
   const std::string second = folder + "-again";
   wm_error err{};
-  Recording again;
-  TEST_ASSERT_EQUAL(WM_OK, simulate(scenario, 1, 3, again, &err));
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, write_recording(scenario, again, second, &err), err.text);
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, write_recording(scenario, driven(scenario, 1, 3), second, &err), err.text);
   size_t files = 0;
   for (const auto &entry : std::filesystem::directory_iterator(folder)) {
     const std::string bytes = bytes_of(entry.path());
@@ -209,17 +206,14 @@ TEST(test_the_same_seed_gives_the_same_bytes) {
 
 TEST(test_a_folder_that_cannot_be_made_is_named) {
   wm_error err{};
-  TEST_ASSERT_EQUAL(WM_OK, simulate(scenario, 1, 3, made, &err));
-  TEST_ASSERT_EQUAL(WM_IO, write_recording(scenario, made, "/proc/no/such", &err));
+  TEST_ASSERT_EQUAL(WM_IO, write_recording(scenario, driven(scenario, 1, 3), "/proc/no/such", &err));
   TEST_ASSERT_NOT_NULL_MESSAGE(std::strstr(err.text, "/proc/no/such"), err.text);
 }
 
 }  // namespace
 
 void setUp(void) {
-  wm_error err{};
-  const std::string path = std::string(std::getenv("WM_SOURCE_DIR")) + "/config/worlds/crossing.yaml";
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, load_scenario(path, scenario, &err), err.text);
+  load_shipped("crossing", scenario);
   folder = std::filesystem::temp_directory_path() / ("wm-simulate-" + std::to_string(getpid()));
   opened = nullptr;
 }

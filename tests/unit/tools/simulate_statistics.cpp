@@ -3,22 +3,18 @@
 // scenario; one seed always says the same; landmarks don't change what the wheels say.
 #include <map>
 
-#include "common/suite.h"
+#include "shipped.h"
 #include "simulate/angle.h"
 #include "simulate/bus.h"
-#include "simulate/simulate.h"
 
 using namespace wm::sim;
 
 namespace {
 
-Scenario crossing;
+const Scenario crossing = shipped("crossing");
 
 Recording simulated(const Scenario &scenario, uint64_t seed, size_t landmarks = 3) {
-  Recording r;
-  wm_error err{};
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, simulate(scenario, seed, landmarks, r, &err), err.text);
-  return r;
+  return driven(scenario, seed, landmarks);
 }
 
 bool same(const wm_can_frame &a, const wm_can_frame &b) {
@@ -224,9 +220,3 @@ TEST(test_dead_encoder_clock_offset_and_start_error) {
 }
 
 }  // namespace
-
-void setUp(void) {
-  wm_error err{};
-  const std::string path = std::string(std::getenv("WM_SOURCE_DIR")) + "/config/worlds/crossing.yaml";
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, load_scenario(path, crossing, &err), err.text);
-}

@@ -18,7 +18,9 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
-Figures judge(const made::Folder &run, const made::Folder &recording, const CompareOptions &options = {}) {
+const made::Folder run, recording;
+
+Figures judge(const CompareOptions &options = {}) {
   const Trajectory trajectory = load_trajectory(run.path());
   return pose_figures(compare(trajectory, load_truth(recording.path()), options), trajectory.has_covariance, false);
 }
@@ -29,8 +31,7 @@ void expect(const Figures &f, const char *key, double value, double within = 1e-
 }
 
 // 10 s along a line at `heading`, 1 m/s, truth at 10 Hz; the run at the same stamps, off by (along, left, turn).
-void straight(const made::Folder &run, const made::Folder &recording, double heading, double along, double left,
-              double turn, double sigma = 0.1) {
+void straight(double heading, double along, double left, double turn, double sigma = 0.1) {
   std::string truth = made::kTruthHeader;
   std::string poses = made::kPlanarHeader;
   for (int i = 0; i <= 100; ++i) {
@@ -60,10 +61,8 @@ TEST(test_an_ellipse_has_its_axes_and_direction) {
 }
 
 TEST(test_constant_offset_to_the_left) {
-  made::Folder run;
-  made::Folder recording;
-  straight(run, recording, 2.0, 0, 0.2, 0);
-  const Figures f = judge(run, recording);
+  straight(2.0, 0, 0.2, 0);
+  const Figures f = judge();
   expect(f, "distance_m", 10);
   expect(f, "duration_s", 10);
   expect(f, "poses", 101);
@@ -83,10 +82,8 @@ TEST(test_constant_offset_to_the_left) {
 }
 
 TEST(test_behind_and_turned_across_pi) {
-  made::Folder run;
-  made::Folder recording;
-  straight(run, recording, kPi - 0.01, -0.3, 0, 0.05);  // truth's heading and the run's on both sides of pi
-  const Figures f = judge(run, recording);
+  straight(kPi - 0.01, -0.3, 0, 0.05);  // truth's heading and the run's on both sides of pi
+  const Figures f = judge();
   expect(f, "longitudinal_mean_m", -0.3);
   expect(f, "longitudinal_mean_abs_m", 0.3);
   expect(f, "longitudinal_max_m", 0.3);
@@ -99,21 +96,17 @@ TEST(test_behind_and_turned_across_pi) {
 }
 
 TEST(test_nees_uses_the_whole_covariance) {
-  made::Folder run;
-  made::Folder recording;
   recording.write("truth.csv", made::kTruthHeader + ("0," + made::pose(0, 0, 0)) + "\n");
   // P = [2 1 0; 1 2 0; 0 0 1], truth minus estimate = (-1, -2, -0.5): 2 + 0.25.
   run.write("trajectory.csv", made::kPlanarHeader + ("0," + made::pose(1, 2, 0.5)) + ",2,1,2,0,0,1,tracking\n");
-  expect(judge(run, recording), "nees_mean", 2.25, 1e-9);
+  expect(judge(), "nees_mean", 2.25, 1e-9);
   // Position and heading correlated, P = [1 0 0.5; 0 1 0; 0.5 0 1], the same error: (1 + 0.25 - 0.5) / 0.75 + 4. With
   // one sign wrong it would be (1 + 0.25 + 0.5) / 0.75 + 4.
   run.write("trajectory.csv", made::kPlanarHeader + ("0," + made::pose(1, 2, 0.5)) + ",1,0,1,0.5,0,1,tracking\n");
-  expect(judge(run, recording), "nees_mean", 5, 1e-9);
+  expect(judge(), "nees_mean", 5, 1e-9);
 }
 
 TEST(test_interpolation_between_the_nearest_and_no_further) {
-  made::Folder run;
-  made::Folder recording;
   // The run has poses at 0.0, 0.4, 1.0 s (a gap of 0.6 s) and 1.2 s; it is where truth is at its own stamps.
   std::string poses = made::kPlanarHeader;
   for (const double t : {0.0, 0.4, 1.0, 1.2}) poses += stamp(t) + made::pose(t, 0, t) + ",1,0,1,0,0,1,tracking\n";
@@ -122,7 +115,7 @@ TEST(test_interpolation_between_the_nearest_and_no_further) {
   // Before the first; on a pose; inside; inside of the long gap; on; inside; after the last.
   for (const double t : {-0.1, 0.0, 0.3, 0.7, 1.0, 1.1, 1.3}) truth += stamp(t) + made::pose(t, 0, t) + "\n";
   recording.write("truth.csv", truth);
-  const Figures f = judge(run, recording);
+  const Figures f = judge();
   expect(f, "poses", 4);
   expect(f, "coverage", 4.0 / 7.0);
   expect(f, "position_max_m", 0, 1e-9);
@@ -130,28 +123,18 @@ TEST(test_interpolation_between_the_nearest_and_no_further) {
 }
 
 TEST(test_a_gap_of_half_a_second_is_allowed) {
-  made::Folder run;
-  made::Folder recording;
   recording.write("truth.csv", made::kTruthHeader + ("250000000," + made::pose(0, 0, 0)) + "\n");
   const auto two = [&](const char *second) {
     run.write("trajectory.csv", made::kPlanarHeader + ("0," + made::pose(-1, 0, 0)) + ",1,0,1,0,0,1,tracking\n" +
                                     second + "," + made::pose(1, 0, 0) + ",1,0,1,0,0,1,tracking\n");
   };
   two("500000000");
-  expect(judge(run, recording), "position_max_m", 0);
+  expect(judge(), "position_max_m", 0);
   two("500000001");
-  bool refused = false;
-  try {
-    judge(run, recording);
-  } catch (const Failure &) {
-    refused = true;
-  }
-  TEST_ASSERT_TRUE(refused);
+  made::refused("", [] { judge(); });
 }
 
 TEST(test_six_degrees_of_freedom) {
-  made::Folder run;
-  made::Folder recording;
   // Truth turned by 90 degrees about z; the estimate is R_true Exp(-r) with r = 0.2 rad about the body's x.
   const double h = std::sqrt(0.5);
   recording.write("truth.csv", made::kTruthHeader + format("0,1,2,3,0,0,%.15g,%.15g\n", h, h));
@@ -170,7 +153,7 @@ TEST(test_six_degrees_of_freedom) {
                                   format("0,1,2,3.5,%.15g,%.15g,%.15g,%.15g", -estimate.x(), -estimate.y(),
                                          -estimate.z(), -estimate.w()) +
                                   covariance + ",tracking\n");
-  const Figures f = judge(run, recording);
+  const Figures f = judge();
   expect(f, "position_rmse_m", 0.5);  // in z: it counts in space
   expect(f, "rotation_rmse_deg", 0.2 * 180 / kPi, 1e-7);
   expect(f, "heading_rmse_deg", 0, 1e-6);
@@ -180,24 +163,20 @@ TEST(test_six_degrees_of_freedom) {
 }
 
 TEST(test_height_does_not_count_in_the_plane) {
-  made::Folder run;
-  made::Folder recording;
   recording.write("truth.csv", std::string(made::kTruthHeader) + "0,0,0,7,0,0,0,1\n100000000,1,0,9,0,0,0,1\n");
   run.write("trajectory.csv", made::kPlanarHeader + ("0," + made::pose(0, 0, 0)) + ",1,0,1,0,0,1,tracking\n100000000," +
                                   made::pose(1, 0.1, 0) + ",1,0,1,0,0,1,tracking\n");
-  const Figures f = judge(run, recording);
+  const Figures f = judge();
   expect(f, "distance_m", 1);
   expect(f, "position_max_m", 0.1);
 }
 
 TEST(test_truth_without_orientation) {
-  made::Folder run;
-  made::Folder recording;
-  straight(run, recording, 0, 0, 0.2, 0);
+  straight(0, 0, 0.2, 0);
   std::string truth = made::kTruthHeader;
   for (int i = 0; i <= 100; ++i) truth += stamp(0.1 * i) + format("%g,0,0,,,,\n", 0.1 * i);
   recording.write("truth.csv", truth);
-  const Figures f = judge(run, recording);
+  const Figures f = judge();
   expect(f, "position_rmse_m", 0.2);
   expect(f, "anees_dof", 2);
   expect(f, "nees_mean", 4);
@@ -206,9 +185,7 @@ TEST(test_truth_without_orientation) {
 }
 
 TEST(test_truth_of_another_point_of_the_robot) {
-  made::Folder run;
-  made::Folder recording;
-  straight(run, recording, 0.7, 0, 0, 0);
+  straight(0.7, 0, 0, 0);
   // Truth's point is 1 m ahead of base_link and 0.5 m to its left.
   std::string truth = made::kTruthHeader;
   for (int i = 0; i <= 100; ++i) {
@@ -219,12 +196,12 @@ TEST(test_truth_of_another_point_of_the_robot) {
   recording.write("truth.csv", truth);
   CompareOptions options;
   options.truth_offset_m = {1, 0.5, 0};
-  expect(judge(run, recording, options), "position_max_m", 0, 1e-9);
-  expect(judge(run, recording), "position_rmse_m", std::sqrt(1.25), 1e-9);
+  expect(judge(options), "position_max_m", 0, 1e-9);
+  expect(judge(), "position_rmse_m", std::sqrt(1.25), 1e-9);
 }
 
 // Off by 1 m between the given seconds, else 0.
-void off_between(const made::Folder &run, const made::Folder &recording, double from, double to, double turn = 0) {
+void off_between(double from, double to, double turn = 0) {
   std::string truth = made::kTruthHeader;
   std::string poses = made::kPlanarHeader;
   for (int i = 0; i <= 100; ++i) {
@@ -237,35 +214,31 @@ void off_between(const made::Folder &run, const made::Folder &recording, double 
 }
 
 TEST(test_lost) {
-  made::Folder run;
-  made::Folder recording;
-  off_between(run, recording, 2, 4);  // 2 s is not longer than 2 s
-  expect(judge(run, recording), "lost_count", 0);
-  off_between(run, recording, 2, 4.1);
-  expect(judge(run, recording), "lost_count", 1);
-  expect(judge(run, recording), "lost_s", 2.1);
-  off_between(run, recording, 9.5, 10);  // at the end
-  expect(judge(run, recording), "lost_count", 1);
-  expect(judge(run, recording), "lost_s", 0.5);
-  off_between(run, recording, 3, 6, 16 * kPi / 180);
-  expect(judge(run, recording), "lost_count", 1);
-  off_between(run, recording, 3, 6, 14 * kPi / 180);
-  expect(judge(run, recording), "lost_count", 0);
+  off_between(2, 4);  // 2 s is not longer than 2 s
+  expect(judge(), "lost_count", 0);
+  off_between(2, 4.1);
+  expect(judge(), "lost_count", 1);
+  expect(judge(), "lost_s", 2.1);
+  off_between(9.5, 10);  // at the end
+  expect(judge(), "lost_count", 1);
+  expect(judge(), "lost_s", 0.5);
+  off_between(3, 6, 16 * kPi / 180);
+  expect(judge(), "lost_count", 1);
+  off_between(3, 6, 14 * kPi / 180);
+  expect(judge(), "lost_count", 0);
   // Standing still: no way, so no percentage of it.
-  TEST_ASSERT_TRUE(judge(run, recording).at("position_end_percent").is_null());
+  TEST_ASSERT_TRUE(judge().at("position_end_percent").is_null());
 }
 
 TEST(test_a_part_of_the_drive) {
-  made::Folder run;
-  made::Folder recording;
-  off_between(run, recording, 4, 5);
+  off_between(4, 5);
   CompareOptions options;
   options.from_s = 6;
-  expect(judge(run, recording, options), "position_max_m", 0);
-  expect(judge(run, recording, options), "poses", 41);
+  expect(judge(options), "position_max_m", 0);
+  expect(judge(options), "poses", 41);
   options.from_s = 4;
   options.to_s = 5;
-  expect(judge(run, recording, options), "position_mean_m", 1);
+  expect(judge(options), "position_mean_m", 1);
 }
 
 TEST(test_alignment_undoes_what_it_may_undo) {
@@ -302,10 +275,8 @@ TEST(test_alignment_keeps_nees) {
 }
 
 TEST(test_a_covariance_that_is_none_is_not_inside) {
-  made::Folder run;
-  made::Folder recording;
-  straight(run, recording, 0, 0, 0, 0, 0.0);  // sigma 0
-  const Figures f = judge(run, recording);
+  straight(0, 0, 0, 0, 0.0);  // sigma 0
+  const Figures f = judge();
   expect(f, "nees_inside_95", 0);
   expect(f, "covariances_not_positive", 101);
   TEST_ASSERT_TRUE(f.at("nees_mean").is_null());
@@ -375,15 +346,8 @@ TEST(test_statistics) {
 }
 
 void refuses(const std::string &trajectory, const std::string &said) {
-  made::Folder run;
   run.write("trajectory.csv", trajectory);
-  try {
-    load_trajectory(run.path());
-  } catch (const Failure &problem) {
-    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(problem.what(), said.c_str()), problem.what());
-    return;
-  }
-  TEST_FAIL_MESSAGE("not refused");
+  made::refused(said, [] { load_trajectory(run.path()); });
 }
 
 TEST(test_errors_say_where) {
@@ -399,11 +363,9 @@ TEST(test_errors_say_where) {
 }
 
 TEST(test_tum_serves_where_there_is_no_csv) {
-  made::Folder run;
-  made::Folder recording;
   recording.write("truth.csv", made::kTruthHeader + ("123456789," + made::pose(1, 2, 0)) + "\n");
   run.write("trajectory.tum", "# t x y z q\n0.123456789 1 2.25 0 0 0 0 1\n");
-  const Figures f = judge(run, recording);
+  const Figures f = judge();
   expect(f, "position_max_m", 0.25);
   TEST_ASSERT_TRUE(f.at("nees_mean").is_null());
   TEST_ASSERT_TRUE(f.at("nees_inside_95").is_null());
@@ -422,14 +384,14 @@ std::string sent(int64_t t_ms, double age_ms, double x, double odom_x, int reset
 
 // A speed that changes, so that a delay is no shift; a fifth of the positions is far off.
 TEST(test_the_delay_of_a_receiver) {
-  Trajectory run;
+  Trajectory driven;
   std::vector<Pose> gnss;
   const auto x_at = [](double t) { return 5 * t + 4 * std::sin(0.7 * t); };
   for (int i = 0; i <= 1000; ++i) {
     Pose p;
     p.t_ns = i * INT64_C(20'000'000);
     p.p_m.x() = x_at(0.02 * i);
-    run.poses.push_back(p);
+    driven.poses.push_back(p);
     if (i % 20 != 0 || i < 100) continue;
     p.oriented = false;
     p.p_m = {x_at(0.02 * i - 0.37), i % 100 == 0 ? 30.0 : 0.0, 0};
@@ -437,26 +399,19 @@ TEST(test_the_delay_of_a_receiver) {
   }
   CompareOptions options;
   options.against_gnss = true;
-  const GnssDelay found = find_gnss_delay(run, gnss, options);
+  const GnssDelay found = find_gnss_delay(driven, gnss, options);
   TEST_ASSERT_DOUBLE_WITHIN(0.0051, 0.37, found.delay_s);
   TEST_ASSERT_GREATER_THAN_DOUBLE(1, found.rms_before_m);
   TEST_ASSERT_LESS_THAN_DOUBLE(0.05, found.rms_m);
-  const Comparison after = compare(run, without_delay(gnss, found.delay_s), options);
+  const Comparison after = compare(driven, without_delay(gnss, found.delay_s), options);
   TEST_ASSERT_DOUBLE_WITHIN(0.05, 0, after.samples[1].error_m.x());
-  for (Pose &p : run.poses) p.p_m.setZero();
+  for (Pose &p : driven.poses) p.p_m.setZero();
   for (Pose &p : gnss) p.p_m = {1, 0, 0};
-  std::string why;
-  try {
-    (void)find_gnss_delay(run, gnss, options);
-  } catch (const Failure &failure) {
-    why = failure.what();
-  }
   TEST_ASSERT_EQUAL_STRING("--take-out-delay: the robot hardly moves: the receiver's delay is not observable",
-                           why.c_str());
+                           made::why_of([&] { (void)find_gnss_delay(driven, gnss, options); }).c_str());
 }
 
 TEST(test_published) {
-  made::Folder run;
   // 1 m/s at 50 Hz. At 200 ms map jumps by 0.5 m and says so; at 300 ms by 0.3 m and doesn't.
   std::string text = kPublishedHeader;
   for (int i = 0; i < 20; ++i) {
@@ -493,9 +448,7 @@ TEST(test_published) {
 }
 
 TEST(test_sightings_of_known_landmarks) {
-  made::Folder run;
-  made::Folder recording;
-  off_between(run, recording, 5, 10);  // right up to 4.9 s, 1 m off from 5 s
+  off_between(5, 10);  // right up to 4.9 s, 1 m off from 5 s
   const Comparison comparison = compare(load_trajectory(run.path()), load_truth(recording.path()), {});
   const std::vector<Landmark> known{{7, {0, 0, 0}, Eigen::Matrix2d::Zero(), NAN}};
   Figures f;
@@ -508,3 +461,5 @@ TEST(test_sightings_of_known_landmarks) {
 }
 
 }  // namespace
+
+void setUp(void) { run.clear(), recording.clear(); }

@@ -104,8 +104,13 @@ TEST(test_a_gap_is_a_gap) {
   TEST_ASSERT_TRUE(has(html, "M800 500"));
 }
 
+const made::Folder run, recording;
+
+std::string page_of() { return report_page(load_report_data(run.path(), recording.path())); }
+
 // A drive of 10 s with a sighting, a run of it, and everything that a run may write.
-void make(const made::Folder &run, const made::Folder &recording) {
+void make() {
+  run.clear(), recording.clear();
   std::string truth = made::kTruthHeader;
   std::string poses = made::kPlanarHeader;
   for (int i = 0; i <= 100; ++i) {
@@ -132,10 +137,8 @@ void make(const made::Folder &run, const made::Folder &recording) {
 }
 
 TEST(test_page_says_what_happened) {
-  made::Folder run;
-  made::Folder recording;
-  make(run, recording);
-  const std::string page = report_page(load_report_data(run.path(), recording.path()));
+  make();
+  const std::string page = page_of();
   for (const char *words :
        {"a &lt;made&gt; drive", "<em>10.0\u202fm</em>", "<em>5.0\u202fcm</em>", "It was LOST for <em>4", "Errors",
         "Bearing of sightings by eye", "1 too far from what was expected", "eye: yaw", "<b>4.601</b> ± 0.040",
@@ -150,11 +153,9 @@ TEST(test_page_says_what_happened) {
 }
 
 TEST(test_page_without_truth_and_without_recording) {
-  made::Folder run;
-  made::Folder recording;
-  make(run, recording);
+  make();
   std::filesystem::remove(recording.path() / "truth.csv");
-  const std::string page = report_page(load_report_data(run.path(), recording.path()));
+  const std::string page = page_of();
   TEST_ASSERT_TRUE(has(page, "There is no truth to compare it with"));
   TEST_ASSERT_TRUE(has(page, "Uncertainty"));
   TEST_ASSERT_FALSE(has(page, "Errors"));
@@ -171,25 +172,16 @@ TEST(test_page_without_truth_and_without_recording) {
 }
 
 TEST(test_odd_files_are_survived_or_refused_with_words) {
-  made::Folder run;
-  made::Folder recording;
-  make(run, recording);
+  make();
   run.write("health.json", R"({"sources":[1,2],"calibration":{"a":1}})");
   run.write("timing.json", R"({"predict":{"p50_us":null},"deadlines_missed":"many"})");
-  TEST_ASSERT_TRUE(has(report_page(load_report_data(run.path(), recording.path())), "Path"));
+  TEST_ASSERT_TRUE(has(page_of(), "Path"));
   run.write("health.json", "{");
-  try {
-    load_report_data(run.path(), recording.path());
-    TEST_FAIL_MESSAGE("broken JSON was taken");
-  } catch (const Failure &problem) {
-    TEST_ASSERT_TRUE(has(problem.what(), "health.json: is not JSON"));
-  }
+  made::refused("health.json: is not JSON", [] { load_report_data(run.path(), recording.path()); });
 }
 
 TEST(test_lines_of_sight_start_at_the_sensor) {
-  made::Folder run;
-  made::Folder recording;
-  make(run, recording);
+  make();
   const ReportData data = load_report_data(run.path(), recording.path());
   const Picture picture = draw_picture(data, true);
   TEST_ASSERT_TRUE(picture.sight_lines);
@@ -202,7 +194,6 @@ TEST(test_lines_of_sight_start_at_the_sensor) {
 }
 
 TEST(test_a_small_pgm_becomes_a_png) {
-  made::Folder recording;
   std::filesystem::create_directory(recording.path() / "map");
   recording.write("map/map.yaml", "image: m.pgm\nresolution: 0.5\norigin: [-1, -2, 0]\n");
   recording.write("map/m.pgm", std::string("P5\n# made\n3 2\n255\n") + std::string("\x00\xff\x7f\xff\x00\xff", 6));
@@ -213,16 +204,11 @@ TEST(test_a_small_pgm_becomes_a_png) {
   TEST_ASSERT_EQUAL(2, raster->height);
   TEST_ASSERT_TRUE(raster->png.starts_with("\x89PNG"));
   recording.write("map/m.pgm", "P5\n3 2\n255\nxx");
-  try {
-    load_raster(recording.path(), &notes);
-    TEST_FAIL_MESSAGE("a PGM cut short was taken");
-  } catch (const Failure &problem) {
-    TEST_ASSERT_TRUE(has(problem.what(), "cut short"));
-  }
+  made::refused("cut short", [&] { load_raster(recording.path(), &notes); });
 }
 
 // A run's event log with one point of camera 0, 0.5 m ahead and 0.5 m to the right, after 5 s.
-void log_a_point(const made::Folder &run) {
+void log_a_point() {
   const auto log = std::make_unique<wm_log_writer>();
   const auto config = std::make_unique<wm_config>();
   const auto assembly = std::make_unique<wm_assembly>();
@@ -257,10 +243,8 @@ std::string layer(const Set &set) {
 }
 
 TEST(test_edges_are_drawn_where_they_are_seen) {
-  made::Folder run;
-  made::Folder recording;
-  make(run, recording);
-  log_a_point(run);
+  make();
+  log_a_point();
   run.write("particles.csv", "t_ns,x_m,y_m,heading_rad,weight\n5000000000,4.5,0.25,0,1\n");
   // A camera that looks straight down from 1 m: its picture's top is ahead.
   recording.write("calibration.yaml",
@@ -308,15 +292,15 @@ TEST(test_edges_are_drawn_where_they_are_seen) {
 
   // Without edge points in the log the page is as it was.
   std::filesystem::remove(run.path() / "events.wmlog");
-  const std::string page = report_page(load_report_data(run.path(), recording.path()));
+  const std::string page = page_of();
   TEST_ASSERT_FALSE(has(page, "class=\"edges\"") || has(page, "class=\"cloud\""));
   // A log that is none is told, and costs nothing else.
   run.write("events.wmlog", "no log");
-  TEST_ASSERT_TRUE(has(report_page(load_report_data(run.path(), recording.path())), "Edges are not shown: "));
+  TEST_ASSERT_TRUE(has(page_of(), "Edges are not shown: "));
 }
 
 // Adds a camera with a picture at each of these times of the drive.
-void film(const made::Folder &recording, const std::vector<double> &times_s) {
+void film(const std::vector<double> &times_s) {
   std::filesystem::create_directories(recording.path() / "video/front");
   recording.write("motion.csv", "t_ns,v_mps,w_radps\n0,1,0\n");
   recording.write("calibration.yaml",
@@ -338,10 +322,8 @@ std::vector<double> every(double period_s, double from_s, double to_s) {
 
 // "0.1 0.4 ..." of the pictures that the report shows of the drive of 10 s, and what it says of them.
 void shows(const std::vector<double> &film_s, const std::string &times, const std::string &note) {
-  made::Folder run;
-  made::Folder recording;
-  make(run, recording);
-  film(recording, film_s);
+  make();
+  film(film_s);
   const ReportData data = load_report_data(run.path(), recording.path());
   std::string shown;
   for (const ReportFrame &frame : data.frames) shown += (shown.empty() ? "" : " ") + fixed(data.seconds(frame.t_ns), 1);
@@ -377,15 +359,13 @@ TEST(test_why_there_are_no_pictures_is_said) {
   // What else was filmed is left out: a replay of a part of a recording.
   shows(every(0.4, -4.8, 15), "1.2 3.6 6.4 8.8", "");
 
-  made::Folder run;
-  made::Folder recording;
-  make(run, recording);
-  film(recording, every(0.1, 0, 10));
+  make();
+  film(every(0.1, 0, 10));
   for (int i = 0; i <= 100; i++) recording.write(format("video/front/%06d.jpg", i), format("no JPEG %d", i));
-  const std::string page = report_page(load_report_data(run.path(), recording.path()));
+  const std::string page = page_of();
   TEST_ASSERT_TRUE(has(page, "No pictures of front: " + (recording.path() / "video/front: frame ").string()));
   std::filesystem::remove(recording.path() / "video/front.csv");
-  TEST_ASSERT_TRUE(has(report_page(load_report_data(run.path(), recording.path())), "front.csv: is not there"));
+  TEST_ASSERT_TRUE(has(page_of(), "front.csv: is not there"));
 }
 
 }  // namespace

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+// The worlds that are shipped, and drives through them.
+#pragma once
+
+#include "common/suite.h"
+#include "simulate/simulate.h"
+
+namespace wm::sim {
+
+inline void load_shipped(const std::string &name, Scenario &out) {
+  wm_error err{};
+  const std::string path = std::string(std::getenv("WM_SOURCE_DIR")) + "/config/worlds/" + name + ".yaml";
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, load_scenario(path, out, &err), err.text);
+}
+
+inline Scenario shipped(const std::string &name) {
+  Scenario out;
+  load_shipped(name, out);
+  return out;
+}
+
+inline Recording driven(const Scenario &scenario, uint64_t seed, size_t landmarks = SIZE_MAX) {
+  Recording out;
+  wm_error err{};
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, simulate(scenario, seed, landmarks, out, &err), err.text);
+  return out;
+}
+
+}  // namespace wm::sim
