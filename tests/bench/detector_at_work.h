@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A detector with its state, for benchmarks.
-#ifndef WAYMARK_BENCH_DETECTOR_AT_WORK_H
-#define WAYMARK_BENCH_DETECTOR_AT_WORK_H
+#pragma once
 
 #include <cstdint>
 #include <cstdlib>
@@ -56,5 +55,3 @@ inline wm_frame frame_of(const std::vector<uint8_t> &grey, uint32_t width_px, ui
 }
 
 }  // namespace bench
-
-#endif

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A map for benchmarks, of the paper's size: 4676 x 1372 pixels at 75 a metre; and a cloud that is weighed on it.
-#ifndef WAYMARK_BENCH_DRAWN_MAP_H
-#define WAYMARK_BENCH_DRAWN_MAP_H
+#pragma once
 
 #include <algorithm>
 #include <cmath>
@@ -92,5 +91,3 @@ class cloud_at_work {
 };
 
 }  // namespace bench
-
-#endif

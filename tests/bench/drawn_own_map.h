@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A full own map of random looks, and a search for the points of one picture in it.
-#ifndef WAYMARK_BENCH_DRAWN_OWN_MAP_H
-#define WAYMARK_BENCH_DRAWN_OWN_MAP_H
+#pragma once
 
 #include <memory>
 #include <vector>
@@ -51,5 +50,3 @@ class own_map_at_work {
 };
 
 }  // namespace bench
-
-#endif

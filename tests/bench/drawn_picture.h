@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Detectors on drawn pictures, for benchmarks: `edges` on a 1280x720 fisheye picture of a room (floor, board and wall;
 // the view of windows is at least 0.5 to 6 m ahead of the camera and 3 m to each side), `lines` on a hemispherical one.
-#ifndef WAYMARK_BENCH_DRAWN_PICTURE_H
-#define WAYMARK_BENCH_DRAWN_PICTURE_H
+#pragma once
 
 #include <cstdint>
 #include <vector>
@@ -98,5 +97,3 @@ class lines_at_work {
 };
 
 }  // namespace bench
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A robot on the map of drawn_map.h, whose corridors repeat themselves. Not told where it is, it searches, and keeps
 // searching, because many places look alike; told, it keeps a list of them.
-#ifndef WAYMARK_BENCH_DRAWN_SEARCH_H
-#define WAYMARK_BENCH_DRAWN_SEARCH_H
+#pragma once
 
 #include <cstring>
 #include <vector>
@@ -100,5 +99,3 @@ class search_at_work {
 };
 
 }  // namespace bench
-
-#endif

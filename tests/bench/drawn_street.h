@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A street for detector `landmarks`: a fisheye of 1280x720 and six known signs before it, from 3 to 14 m away.
-#ifndef WAYMARK_BENCH_DRAWN_STREET_H
-#define WAYMARK_BENCH_DRAWN_STREET_H
+#pragma once
 
 #include <algorithm>
 #include <cmath>
@@ -108,5 +107,3 @@ class street_at_work {
 };
 
 }  // namespace bench
-
-#endif

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // landmark_ekf on a circle of 3 m about the origin, for benchmarks: one of four landmarks is seen after each twist.
-#ifndef WAYMARK_BENCH_LANDMARK_DRIVE_H
-#define WAYMARK_BENCH_LANDMARK_DRIVE_H
+#pragma once
 
 #include <cmath>
 #include <cstdio>
@@ -141,5 +140,3 @@ class landmark_drive {
 };
 
 }  // namespace bench
-
-#endif

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A plain extended Kalman filter of a planar pose, written out as in a textbook [Thrun2005]: what the least costs, for
 // comparison. No gate, no calibration, no record, no check of its input.
-#ifndef WAYMARK_BENCH_PLAIN_EKF_H
-#define WAYMARK_BENCH_PLAIN_EKF_H
+#pragma once
 
 #include <cmath>
 
@@ -57,5 +56,3 @@ class plain_ekf {
 };
 
 }  // namespace bench
-
-#endif

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Clocks and medians of the benchmarks.
-#ifndef WAYMARK_BENCH_TIMING_H
-#define WAYMARK_BENCH_TIMING_H
+#pragma once
 
 #include <algorithm>
 #include <cstddef>
@@ -54,5 +53,3 @@ double median_us(int calls, Work work) {
 }
 
 }  // namespace bench
-
-#endif

@@ -2,6 +2,9 @@
 // A detector under test: its parameters by key, its state, what it tells of pictures.
 #pragma once
 
+#include <memory>
+#include <vector>
+
 #include "common/suite.h"
 #include "waymark/detector.h"
 #include "waymark/own_program.h"
@@ -48,8 +51,7 @@ struct eyes {
   }
   size_t look(const wm_frame *frames, const wm_estimate *prediction = nullptr) {
     size_t count = 99;
-    TEST_ASSERT_EQUAL(WM_OK,
-                      detector->detect(state.get(), frames, prediction, events.data(), events.size(), &count));
+    TEST_ASSERT_EQUAL(WM_OK, detector->detect(state.get(), frames, prediction, events.data(), events.size(), &count));
     return count;
   }
 };

@@ -10,10 +10,7 @@
 #include <cstring>
 #include <initializer_list>
 #include <limits>
-#include <memory>
-#include <string>
 #include <utility>
-#include <vector>
 #else
 #include <stdbool.h>
 #endif

@@ -60,6 +60,13 @@ struct lone {
     }
     return out;
   }
+  // One observation, of an estimate that is given with it.
+  wm_estimate see(const wm_event &e, wm_estimate out, const wm_innovation &record, bool has_record = true) {
+    out.t_ns = e.t_ns;
+    if (wm_monitor_take(&monitor, &e, &record, has_record)) wm_monitor_step(&monitor, &out, nullptr, 0);
+    wm_monitor_judge(&monitor, &out);
+    return out;
+  }
   wm_estimate drive(double seconds, wm_verdict verdict) {
     return observe(seconds, WM_EVENT_SIGHTING,
                    [&](int step, auto take) { take({record_of(verdict, step % 2 ? 0.8 : -0.8)}); });

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the monitor makes of the innovations of a source, against sums over all that was seen: its slots, the tests of
 // its windows, and when it fits. Random streams of every kind of residual and verdict.
+#include <vector>
+
 #include "common/suite.h"
 #include "lone_monitor.hpp"
 #include "waymark/random.h"

@@ -2,13 +2,9 @@
 #include "parameter_sweep.hpp"
 
 #include <algorithm>
-#include <cmath>
-#include <cstdio>
-#include <cstdlib>
-#include <cstring>
 #include <ctime>
-#include <memory>
 
+#include "common/suite.h"
 #include "common/trials.h"
 
 namespace parameters {
@@ -181,4 +177,29 @@ std::vector<std::string> sweep(const owner &of) {
   return wrong;
 }
 
+namespace {
+
+const owner *owner_under_test = nullptr;
+
+void every_parameter_has_an_effect() {
+  const std::vector<std::string> wrong = sweep(*owner_under_test);
+  TEST_ASSERT_GREATER_THAN(0, owner_under_test->table.count);
+  TEST_ASSERT_EQUAL_STRING("", wrong.empty() ? "" : wrong.front().c_str());
+}
+
+}  // namespace
+
+int test_all(const std::vector<owner> &owners, const char *only) {
+  UNITY_BEGIN();
+  for (const owner &of : owners) {
+    if (only && std::strcmp(only, of.name) != 0) continue;
+    owner_under_test = &of;
+    UnityDefaultTestRun(every_parameter_has_an_effect, of.name, __LINE__);
+  }
+  return UNITY_END();
+}
+
 }  // namespace parameters
+
+void setUp(void) {}
+void tearDown(void) {}

@@ -71,4 +71,7 @@ struct owner {
 // Moves every parameter of a table on its stages. Returns a text for each that is wrong, and prints them.
 std::vector<std::string> sweep(const owner &of);
 
+// A test of each table, or of the named one: each parameter has an effect. The program's exit code.
+int test_all(const std::vector<owner> &owners, const char *only);
+
 }  // namespace parameters

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Every parameter of every detector, moved from its default, changes the events of some small film or is refused with
 // the reason.
-#include <cstdlib>
-#include <cstring>
+
 #include <memory>
 
+#include "common/suite.h"
 #include "parameter_sweep.hpp"
 #include "pictures.hpp"
-#include "unity.h"
 
 namespace {
 
@@ -89,18 +88,7 @@ const scenario kScenarios[] = {
     {"cascade", "street", known_street, {}},
 };
 
-const parameters::owner *owner_under_test = nullptr;
-
-void every_parameter_has_an_effect() {
-  const std::vector<std::string> wrong = parameters::sweep(*owner_under_test);
-  TEST_ASSERT_GREATER_THAN(0, owner_under_test->table.count);
-  TEST_ASSERT_EQUAL_STRING("", wrong.empty() ? "" : wrong.front().c_str());
-}
-
 }  // namespace
-
-void setUp() {}
-void tearDown() {}
 
 int main(int argc, char **argv) {
   std::vector<std::unique_ptr<film>> films;
@@ -119,11 +107,5 @@ int main(int argc, char **argv) {
     }
     owners.push_back(std::move(owner));
   }
-  UNITY_BEGIN();
-  for (const parameters::owner &of : owners) {
-    if (argc > 1 && std::strcmp(argv[1], of.name) != 0) continue;
-    owner_under_test = &of;
-    UnityDefaultTestRun(every_parameter_has_an_effect, of.name, __LINE__);
-  }
-  return UNITY_END();
+  return parameters::test_all(owners, argc > 1 ? argv[1] : nullptr);
 }

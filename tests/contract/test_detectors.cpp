@@ -1,36 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // The detector contract (waymark/detector.h) over every registered detector.
-#include <cmath>
-#include <cstdlib>
-#include <cstring>
 #include <vector>
 
 #include "common/fisheye_rig.hpp"
-#include "unity.h"
+#include "common/no_heap.h"
+#include "common/suite.h"
 #include "vision/edges/params.h"
 #include "waymark/detector.h"
 #include "waymark/internal/sensors/lens.hpp"
 #include "waymark/random.h"
-
-namespace {
-bool trapped = false;
-int allocations = 0;
-}  // namespace
-
-extern "C" {
-void *__libc_malloc(size_t);
-void *__libc_calloc(size_t, size_t);
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-void *malloc(size_t n) {
-  allocations += trapped;
-  return __libc_malloc(n);
-}
-void *calloc(size_t n, size_t size) {
-  allocations += trapped;
-  return __libc_calloc(n, size);
-}
-#endif
-}
 
 namespace {
 

@@ -1,43 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // The estimator contract (waymark/estimator.h) over every registered estimator.
-#include <cmath>
-#include <cstdio>
-#include <cstdlib>
-#include <cstring>
-#include <limits>
 #include <vector>
 
+#include "common/no_heap.h"
+#include "common/suite.h"
 #include "common/trials.h"
-#include "unity.h"
+#include "unit/estimator/events.hpp"
 #include "waymark/estimator.h"
 #include "waymark/health.h"
 #include "waymark/random.h"
-
-// Any allocation while the trap is set fails the test: estimators have no heap.
-namespace {
-bool trapped = false;
-int allocations = 0;
-}  // namespace
-
-extern "C" {
-void *__libc_malloc(size_t);
-void *__libc_calloc(size_t, size_t);
-void *__libc_realloc(void *, size_t);
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-void *malloc(size_t n) {
-  allocations += trapped;
-  return __libc_malloc(n);
-}
-void *calloc(size_t n, size_t size) {
-  allocations += trapped;
-  return __libc_calloc(n, size);
-}
-void *realloc(void *p, size_t n) {
-  allocations += trapped;
-  return __libc_realloc(p, n);
-}
-#endif
-}
 
 namespace {
 
@@ -84,25 +55,12 @@ bool takes(unsigned kind) {
   return ((estimator->takes | WM_MOTION_EVENTS) & WM_EVENT_BIT(kind & 31)) != 0 && kind < 32;
 }
 
-wm_sighting sighting(uint16_t index, int32_t id, double bearing_rad, double range_m) {
-  wm_sighting s = wm_sighting_without_numbers();
-  s.sensor = index;
-  s.landmark_id = id;
-  s.bearing_rad = bearing_rad;
-  s.range_m = range_m;
-  return s;
-}
-
 // A drive of events of every kind, some of them nonsense for the pose: any order of kinds that time allows.
 wm_event event_at(uint64_t i, double t_s) {
   const double u = wm_random_uniform(1, 1, i), a = wm_random_normal(1, 2, i), b = wm_random_normal(1, 3, i);
-  wm_event e{};
-  e.t_ns = wm_ns_from_seconds(t_s);
-  if (u < 0.5) {
-    e.kind = WM_EVENT_TWIST2;
-    e.as.twist2 = {0.5 + 0.1 * a, 0.3 * sin(0.1 * t_s) + 0.1 * b};
-  } else if (u < 0.85 && (estimator->takes & WM_EVENT_BIT(WM_EVENT_POINTS))) {
-    e.kind = WM_EVENT_POINTS;
+  if (u < 0.5) return make::twist(t_s, 0.5 + 0.1 * a, 0.3 * sin(0.1 * t_s) + 0.1 * b);
+  if (u < 0.85 && (estimator->takes & WM_EVENT_BIT(WM_EVENT_POINTS))) {
+    wm_event e = make::empty(t_s, WM_EVENT_POINTS);
     e.as.points.count = (uint32_t)(i % 60);
     e.as.points.camera = i % 3 ? -1 : 0;
     for (uint32_t k = 0; k < e.as.points.count; k++) {
@@ -111,25 +69,13 @@ wm_event event_at(uint64_t i, double t_s) {
       e.as.points.normal_rad[k] = k % 5 ? NAN : (float)a;
       e.as.points.sigma_m[k] = k % 3 ? NAN : 0.02f;
     }
-  } else if (u < 0.85) {
-    e.kind = WM_EVENT_SIGHTING;
-    const wm_landmark &l = landmarks[i % 4];
-    e.as.sighting = sighting(0, l.id, 0.3 * a, u < 0.7 ? 4 + std::fabs(b) : kAbsent);
-  } else if (u < 0.93) {
-    e.kind = WM_EVENT_POSITION;
-    e.as.position = {{2 * a, 2 * b, NAN}, 3.0, NAN};
-  } else if (u < 0.97) {
-    e.kind = WM_EVENT_HEADING;
-    e.as.heading = {a, 0.5};
-  } else if (u < 0.99) {
-    e.kind = WM_EVENT_LOOKED;
-  } else {
-    e.kind = WM_EVENT_SET_POSE;
-    e.as.set_pose.pose_map_base = {{a, b, 0}, {0, 0, 0.6, 0.8}};
-    e.as.set_pose.sigma_xy_m = 0.3;
-    e.as.set_pose.sigma_heading_rad = 0.2;
+    return e;
   }
-  return e;
+  if (u < 0.85) return make::sighting(t_s, landmarks[i % 4].id, 0.3 * a, u < 0.7 ? 4 + std::fabs(b) : kAbsent);
+  if (u < 0.93) return make::position(t_s, 2 * a, 2 * b, 3.0);
+  if (u < 0.97) return make::heading(t_s, a, 0.5);
+  if (u < 0.99) return make::empty(t_s, WM_EVENT_LOOKED);
+  return make::set_pose(t_s, a, b, 2 * asin(0.6), 0.3, 0.2);
 }
 
 void assert_sound(const wm_estimate &e) {
@@ -225,85 +171,39 @@ void assert_refused(machine &a, const wm_event &e, wm_status want) {
 void test_nonsense_is_refused_with_a_status_and_changes_nothing(void) {
   machine a;
   for (uint64_t i = 0; i < 500; i++) a.take(event_at(i, 0.02 * (double)i));
-  const wm_time_ns t = a.estimate().t_ns + WM_NS_PER_S;
-  const double bad[] = {NAN, INFINITY, -INFINITY, 1e300};
-  for (double x : bad) {
+  const double t_s = 11.0;
+  const int32_t id = landmarks[0].id;
+  wm_event points = make::empty(t_s, WM_EVENT_POINTS);
+  points.as.points.count = 2;
+  points.as.points.camera = -1;
+  for (double x : {(double)NAN, (double)INFINITY, -(double)INFINITY, 1e300}) {
     const wm_status want = std::isfinite(x) ? WM_OUT_OF_RANGE : WM_NOT_FINITE;
-    wm_event e{};
-    e.t_ns = t;
-    e.kind = WM_EVENT_TWIST2;
-    e.as.twist2 = {x, 0};
-    assert_refused(a, e, want);
-    e.as.twist2 = {0, x};
-    assert_refused(a, e, want);
-    e.kind = WM_EVENT_QUANTITIES;
-    e.as.quantities = {};
-    e.as.quantities.count = 1;
-    for (uint8_t q = 0; q < WM_Q_COUNT; q++) {
-      e.as.quantities.id[0] = q;
-      e.as.quantities.value[0] = x;
+    for (uint8_t q = 0; q < WM_Q_COUNT; q++) assert_refused(a, make::quantities(t_s, {{(wm_quantity)q, x}}), want);
+    points.as.points.x_m[1] = (float)(std::isfinite(x) ? 1e30 : x);
+    for (const wm_event &e : {make::twist(t_s, x, 0), make::twist(t_s, 0, x), make::position(t_s, x, 0, 1),
+                              make::position(t_s, 0, x, 1), make::position(t_s, 0, 0, x), make::heading(t_s, x, 1),
+                              make::set_pose(t_s, x, 0, 0, 1, 1), make::set_pose(t_s, 0, 0, 0, x, 1), points})
       assert_refused(a, e, want);
-    }
-    e.kind = WM_EVENT_POSITION;
-    e.as.position = {{x, 0, NAN}, 1, NAN};
-    assert_refused(a, e, want);
-    e.as.position = {{0, x, NAN}, 1, NAN};
-    assert_refused(a, e, want);
-    e.as.position = {{0, 0, NAN}, x, NAN};
-    assert_refused(a, e, want);
-    e.kind = WM_EVENT_HEADING;
-    e.as.heading = {x, 1};
-    assert_refused(a, e, want);
-    e.kind = WM_EVENT_SET_POSE;
-    e.as.set_pose = {{{x, 0, 0}, {0, 0, 0, 1}}, 1, 1};
-    assert_refused(a, e, want);
-    e.as.set_pose = {{{0, 0, 0}, {0, 0, 0, 1}}, x, 1};
-    assert_refused(a, e, want);
-    e.kind = WM_EVENT_POINTS;
-    e.as.points = {};
-    e.as.points.count = 2;
-    e.as.points.camera = -1;
-    e.as.points.x_m[1] = (float)(std::isfinite(x) ? 1e30 : x);
-    assert_refused(a, e, want);
     if (std::isnan(x)) continue;
-    e.kind = WM_EVENT_SIGHTING;
-    e.as.sighting = sighting(0, landmarks[0].id, x, 1);
-    assert_refused(a, e, want);
-    e.as.sighting = sighting(0, landmarks[0].id, 0, x);
-    assert_refused(a, e, want);
+    assert_refused(a, make::sighting(t_s, id, x, 1), want);
+    assert_refused(a, make::sighting(t_s, id, 0, x), want);
   }
-  wm_event e{};
-  e.t_ns = t;
-  e.kind = WM_EVENT_SIGHTING;
-  e.as.sighting = sighting(0, landmarks[0].id, NAN, NAN);
-  assert_refused(a, e, WM_NOT_FINITE);
-  e.as.sighting = sighting(77, landmarks[0].id, 0, 1);
-  assert_refused(a, e, WM_OUT_OF_RANGE);
-  e.as.sighting = sighting(0, landmarks[0].id, 0, -1);
-  assert_refused(a, e, WM_OUT_OF_RANGE);
-  e.as.sighting = sighting(0, landmarks[0].id, 0, 1);
-  e.as.sighting.bearing_sigma_rad = -0.1;
-  assert_refused(a, e, WM_OUT_OF_RANGE);
-  e.kind = WM_EVENT_SET_POSE;
-  e.as.set_pose = {{{0, 0, 0}, {0, 0, 0, 0}}, 1, 1};
-  assert_refused(a, e, WM_OUT_OF_RANGE);
-  e.kind = WM_EVENT_QUANTITIES;
-  e.as.quantities = {};
-  e.as.quantities.count = 255;
-  assert_refused(a, e, WM_OUT_OF_RANGE);
-  e.as.quantities.count = 1;
-  e.as.quantities.id[0] = 200;
-  assert_refused(a, e, WM_OUT_OF_RANGE);
-  e.kind = WM_EVENT_POINTS;
-  e.as.points = {};
-  e.as.points.count = WM_POINTS_MAX + 1;
-  assert_refused(a, e, WM_OUT_OF_RANGE);
-  e.kind = WM_EVENT_TWIST2;
-  e.as.twist2 = {0, 0};
-  e.t_ns = INT64_MAX;
-  assert_refused(a, e, WM_OUT_OF_RANGE);
-  e.kind = 250;
-  assert_refused(a, e, WM_UNSUPPORTED);
+  assert_refused(a, make::sighting(t_s, id, NAN, NAN), WM_NOT_FINITE);
+  wm_event sigma = make::sighting(t_s, id, 0, 1), pose = make::set_pose(t_s, 0, 0, 0, 1, 1),
+           quantities = make::empty(t_s, WM_EVENT_QUANTITIES), unknown = quantities, late = make::twist(t_s, 0, 0);
+  sigma.as.sighting.bearing_sigma_rad = -0.1;
+  pose.as.set_pose.pose_map_base.q_xyzw[3] = 0;
+  quantities.as.quantities.count = 255;
+  unknown.as.quantities.count = 1;
+  unknown.as.quantities.id[0] = 200;
+  points = make::empty(t_s, WM_EVENT_POINTS);
+  points.as.points.count = WM_POINTS_MAX + 1;
+  late.t_ns = INT64_MAX;
+  for (const wm_event &e : {make::sighting(t_s, id, 0, 1, 77), make::sighting(t_s, id, 0, -1), sigma, pose, quantities,
+                            unknown, points, late})
+    assert_refused(a, e, WM_OUT_OF_RANGE);
+  late.kind = 250;
+  assert_refused(a, late, WM_UNSUPPORTED);
 }
 
 void test_time_never_runs_back(void) {
@@ -320,10 +220,8 @@ void test_set_pose_works_at_any_time(void) {
   uint32_t resets = a.estimate().resets;
   for (int k = 0; k < 20; k++) {
     for (uint64_t i = 0; i < 50; i++) a.take(event_at(i, 2.0 * k + 0.02 * (double)i));
-    wm_event e{};
+    wm_event e = make::set_pose(0, 10.0 * k, -3, 2 * asin(0.6), 0.3, 0.2);
     e.t_ns = a.estimate().t_ns + 1000;
-    e.kind = WM_EVENT_SET_POSE;
-    e.as.set_pose = {{{10.0 * k, -3, 0}, {0, 0, 0.6, 0.8}}, 0.3, 0.2};
     resets = a.estimate().resets;
     TEST_ASSERT_EQUAL(WM_OK, a.take(e));
     const wm_estimate out = a.estimate();
@@ -342,12 +240,8 @@ void test_a_day_without_drift_of_symmetry(void) {
   const uint64_t events = wm_trials(864000, 108000);  // in an emulator three hours, the third at rest
   for (uint64_t i = 0; i < events; i++) {
     const double t = 0.1 * (double)i;
-    wm_event e{};
-    e.t_ns = wm_ns_from_seconds(t);
-    e.kind = WM_EVENT_TWIST2;
     const bool rests = (i / 36000) % 3 == 2;
-    e.as.twist2 = {rests ? 0 : 0.4, rests ? 0 : 0.1};
-    TEST_ASSERT_EQUAL(WM_OK, a.take(e));
+    TEST_ASSERT_EQUAL(WM_OK, a.take(make::twist(t, rests ? 0 : 0.4, rests ? 0 : 0.1)));
     if (i % 50 == 7) {
       wm_event o = event_at(i, t);
       if (!wm_event_is_motion(&o) && takes(o.kind)) TEST_ASSERT_EQUAL(WM_OK, a.take(o));
@@ -405,13 +299,7 @@ void test_counters_are_typed(void) {
 // GIVEN a steady drive WHEN one sample says 138 m/s THEN it is counted, once.
 void test_motion_that_no_robot_can_do_is_counted(void) {
   machine a;
-  for (int i = 0; i < 200; i++) {
-    wm_event e{};
-    e.t_ns = wm_ns_from_seconds(0.02 * i);
-    e.kind = WM_EVENT_TWIST2;
-    e.as.twist2 = {i == 150 ? 138.0 : 0.5, 0.0};
-    (void)a.take(e);
-  }
+  for (int i = 0; i < 200; i++) (void)a.take(make::twist(0.02 * i, i == 150 ? 138.0 : 0.5, 0.0));
   wm_counter counters[WM_HEALTH_COUNTERS_MAX];
   const size_t count = estimator->counters(a.state, counters, WM_HEALTH_COUNTERS_MAX);
   for (size_t k = 0; k < count; k++)
@@ -426,13 +314,7 @@ void test_motion_that_no_robot_can_do_is_counted(void) {
 void test_sideways_motion_counts(void) {
   setup.start.sigma_xy_m = setup.start.sigma_heading_rad = 1e-3;
   machine a;
-  for (int i = 0; i <= 40; i++) {
-    wm_event e{};
-    e.t_ns = wm_ns_from_seconds(0.1 * i);
-    e.kind = WM_EVENT_TWIST6;
-    e.as.twist6 = {{0, 0.5, 0}, {0, 0, 0.25}};
-    TEST_ASSERT_EQUAL(WM_OK, a.take(e));
-  }
+  for (int i = 0; i <= 40; i++) TEST_ASSERT_EQUAL(WM_OK, a.take(make::twist6(0.1 * i, 0, 0.5, 0.25)));
   const wm_estimate out = a.estimate();
   TEST_ASSERT_DOUBLE_WITHIN(0.02, -2.0 * (1.0 - cos(1.0)), out.pose_map_base.p_m[0]);
   TEST_ASSERT_DOUBLE_WITHIN(0.02, 2.0 * sin(1.0), out.pose_map_base.p_m[1]);

@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // The life cycle of each estimator with the monitor of innovations (waymark/monitor.h), as a run has it: observations
 // that contradict the pose make it degraded and then lost, with a cause; good ones do neither.
+#include <memory>
+#include <string>
+#include <vector>
+
 #include "common/suite.h"
 #include "drives.hpp"
 #include "filters/core/calibration_list.hpp"
@@ -121,25 +125,16 @@ void check(const char *name, drives::scene &scene, const std::vector<parameters:
 using drives::motion;
 constexpr unsigned kSightings = drives::kBearings | drives::kRanges;
 
-TEST(landmark_ekf_is_degraded_then_lost) {
-  drives::scene scene(motion::ticks_and_gyro, kSightings, 0, kEnd_s);
-  check("landmark_ekf", scene);
-}
-TEST(slam_is_degraded_then_lost) {
-  drives::scene scene(motion::ticks_and_gyro, kSightings, drives::kNoMap, kEnd_s);
-  check("slam", scene);
-}
-TEST(edge_mcl_is_degraded_then_lost) {
-  drives::scene scene(motion::ticks_and_gyro, drives::kPoints, 0, kEnd_s);
-  check("edge_mcl", scene);
-}
-TEST(pf_edges_is_degraded_then_lost) {
-  drives::scene scene(motion::ticks_and_gyro, drives::kPoints, 0, kEnd_s);
-  check("pf_edges", scene, {{"particles", 500}});
-}
-TEST(stereo_ekf_is_degraded_then_lost) {
-  drives::dive scene(0, kEnd_s);
-  check("stereo_ekf", scene);
+TEST(each_estimator_is_degraded_then_lost) {
+  drives::scene sightings(motion::ticks_and_gyro, kSightings, 0, kEnd_s),
+      mapless(motion::ticks_and_gyro, kSightings, drives::kNoMap, kEnd_s),
+      points(motion::ticks_and_gyro, drives::kPoints, 0, kEnd_s);
+  drives::dive dive(0, kEnd_s);
+  check("landmark_ekf", sightings);
+  check("slam", mapless);
+  check("edge_mcl", points);
+  check("pf_edges", points, {{"particles", 500}});
+  check("stereo_ekf", dive);
 }
 
 void turn_to_the_right(wm_event *e) {
@@ -156,48 +151,50 @@ TEST(a_turn_with_the_wrong_sign_is_named) {
 
 // ── causes, one at a time, by the monitor alone ─────────────────────────────────────────────────────────────────────
 
+// A car's turns: ten seconds straight and a turn by 90 degrees, in turns to the left and to the right.
+double turn_at(double t_s) { return std::fmod(t_s, 15.0) < 10.0 ? 0.0 : std::fmod(t_s, 45.0) < 30.0 ? 0.314 : -0.314; }
+
+// What the filter makes of a position; it may take a contradiction for a lasting error of them.
+wm_innovation fused_position(double variance) {
+  wm_innovation out = record_of(WM_FUSED, 0.0);
+  out.landmark_id = -1;
+  out.residual = WM_RESIDUAL_X;
+  out.variance = variance;
+  return out;
+}
+
 struct plane {
-  double x_m, y_m, heading_rad;
+  double x_m = 0.0, y_m = 0.0, heading_rad = 0.0;
   void move(double v_mps, double w_radps) {  // for 0.1 s
     heading_rad += w_radps * 0.1;
     x_m += v_mps * std::cos(heading_rad) * 0.1;
     y_m += v_mps * std::sin(heading_rad) * 0.1;
   }
+  // An estimate that is here and moves so.
+  wm_estimate estimate(const lone &robot, double heading, double v_mps, double w_radps) const {
+    wm_estimate out = robot.estimate;
+    out.pose_map_base.p_m[0] = x_m;
+    out.pose_map_base.p_m[1] = y_m;
+    out.heading_rad = heading;
+    out.v_mps[0] = v_mps;
+    out.w_radps[2] = w_radps;
+    return out;
+  }
 };
 
-// A car with a receiver: ten seconds of driving straight and a turn by 90 degrees, in turns to the left and to the
-// right. `side` -1: the positions are mirrored. One comes at each `every`th of ten steps a second.
+// A car with a receiver. `side` -1: the positions are mirrored. One comes at each `every`th of ten steps a second.
 wm_estimate drive_by_positions(double seconds, double side, double v_mps, int every = 1) {
   lone robot(false);
-  double x_m = 0.0, y_m = 0.0, heading_rad = 0.0;
+  plane way;
   wm_estimate out{};
   for (int step = 0; 0.1 * step < seconds; step++) {
-    const double t_s = 0.1 * step;
-    const double w_radps = std::fmod(t_s, 15.0) < 10.0 ? 0.0 : std::fmod(t_s, 45.0) < 30.0 ? 0.314 : -0.314;
+    const double t_s = 0.1 * step, w_radps = turn_at(t_s);
     wm_event e{};
     e.kind = step % every == 0 ? WM_EVENT_POSITION : WM_EVENT_TWIST2;
     e.t_ns = wm_ns_from_seconds(t_s);
-    e.as.position.p_m[0] = x_m + 5.0 * std::sin(7.0 * t_s);
-    e.as.position.p_m[1] = side * y_m + 5.0 * std::cos(11.0 * t_s);
-    e.as.position.sigma_xy_m = 5.0;
-    out = robot.estimate;
-    out.t_ns = e.t_ns;
-    out.pose_map_base.p_m[0] = x_m;
-    out.pose_map_base.p_m[1] = y_m;
-    out.heading_rad = heading_rad;
-    out.v_mps[0] = v_mps;
-    out.w_radps[2] = w_radps;
-    wm_innovation record{};  // the filter takes the contradiction for a lasting error of the positions
-    record.landmark_id = -1;
-    record.residual = WM_RESIDUAL_X;
-    record.verdict = WM_FUSED;
-    record.variance = 100.0;
-    if (wm_monitor_take(&robot.monitor, &e, &record, step % every == 0))
-      wm_monitor_step(&robot.monitor, &out, nullptr, 0);
-    wm_monitor_judge(&robot.monitor, &out);
-    heading_rad += w_radps * 0.1;
-    x_m += v_mps * std::cos(heading_rad) * 0.1;
-    y_m += v_mps * std::sin(heading_rad) * 0.1;
+    e.as.position = {{way.x_m + 5.0 * std::sin(7.0 * t_s), side * way.y_m + 5.0 * std::cos(11.0 * t_s), 0.0}, 5.0, 0.0};
+    out = robot.see(e, way.estimate(robot, way.heading_rad, v_mps, w_radps), fused_position(100.0), step % every == 0);
+    way.move(v_mps, w_radps);
   }
   return out;
 }
@@ -214,30 +211,15 @@ TEST(positions_that_turn_to_the_other_side_are_degraded) {
 // way to the right, and the mirror image fits better.
 TEST(a_sign_that_is_proven_stays) {
   lone robot(false);
-  plane way{}, place{};
-  wm_estimate out{};
+  plane way, place;
   for (int step = 0; step < 1100; step++) {
     const double t_s = 0.1 * step, v_mps = 10.0;
-    const double turn = std::fmod(t_s, 15.0) < 10.0 ? 0.0 : std::fmod(t_s, 45.0) < 30.0 ? 0.314 : -0.314;
-    const double w_radps = t_s < 60.0 ? turn : 0.006, true_w_radps = t_s < 60.0 ? turn : -0.006;
+    const double w_radps = t_s < 60.0 ? turn_at(t_s) : 0.006, true_w_radps = t_s < 60.0 ? turn_at(t_s) : -0.006;
     wm_event e{};
     e.kind = WM_EVENT_POSITION;
     e.t_ns = wm_ns_from_seconds(t_s);
     e.as.position = {{place.x_m, place.y_m, NAN}, 0.05, NAN};
-    out = robot.estimate;
-    out.t_ns = e.t_ns;
-    out.pose_map_base.p_m[0] = place.x_m;
-    out.pose_map_base.p_m[1] = place.y_m;
-    out.heading_rad = way.heading_rad;
-    out.v_mps[0] = v_mps;
-    out.w_radps[2] = w_radps;
-    wm_innovation record{};
-    record.landmark_id = -1;
-    record.residual = WM_RESIDUAL_X;
-    record.verdict = WM_FUSED;
-    record.variance = 1.0;
-    if (wm_monitor_take(&robot.monitor, &e, &record, true)) wm_monitor_step(&robot.monitor, &out, nullptr, 0);
-    wm_monitor_judge(&robot.monitor, &out);
+    const wm_estimate out = robot.see(e, place.estimate(robot, way.heading_rad, v_mps, w_radps), fused_position(1.0));
     TEST_ASSERT_EQUAL_MESSAGE(WM_STATE_TRACKING, out.state, std::to_string(t_s).c_str());
     way.move(v_mps, w_radps);
     place.move(v_mps, true_w_radps);
@@ -315,6 +297,12 @@ uint8_t state_with(const wm_setup &setup, const scale_value &scale, int position
   return state_with(setup, alarms_about(setup, scale), position);
 }
 
+wm_setup with_motion(const parameters::values &motion) {
+  wm_setup out{};
+  out.motion = static_cast<const wm_motion_params *>(static_cast<const void *>(motion.data()));
+  return out;
+}
+
 // Each kind of alarm; lengths count where no map decides (below). A localizer that is not followed does no harm.
 TEST(each_alarm_is_degraded) {
   const wm_setup setup{};
@@ -327,8 +315,7 @@ TEST(each_alarm_is_degraded) {
 // course that the robot does not drive.
 TEST(values_far_from_what_is_stated_are_degraded) {
   const parameters::values motion(wm_motion_params_table, {{"states.left_scale_sigma", 0.02}});
-  wm_setup setup{};
-  setup.motion = static_cast<const wm_motion_params *>(static_cast<const void *>(motion.data()));
+  wm_setup setup = with_motion(motion);
   TEST_ASSERT_EQUAL(WM_STATE_TRACKING, state_with(setup, scale_value{WM_LEFT_SCALE, 1.05, 0.003}));
   TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, scale_value{WM_LEFT_SCALE, 1.25, 0.003}));
   TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, std::vector<wm_alarm>{{WM_ALARM_LASTING_ERROR, 0, 5.0}}));
@@ -338,14 +325,16 @@ TEST(values_far_from_what_is_stated_are_degraded) {
 // own does not.
 TEST(lengths_that_contradict_each_other_are_degraded) {
   const parameters::values motion(wm_motion_params_table, {});
-  wm_setup setup{};
-  setup.motion = static_cast<const wm_motion_params *>(static_cast<const void *>(motion.data()));
-  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, state_with(setup, scale_value{WM_SPEED_SCALE, 1.16, 0.005}));
-  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, state_with(setup, scale_value{WM_SPEED_SCALE, 1.19, 0.06}));
-  TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, scale_value{WM_SPEED_SCALE, 1.19, 0.005}));
-  TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, scale_value{WM_SPEED_SCALE, 0.81, 0.005}));
-  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, state_with(setup, scale_value{WM_SPEED_SCALE, 1.19, 0.005}, WM_FUSED));
-  TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, state_with(setup, scale_value{WM_SPEED_SCALE, 1.19, 0.005}, WM_REJECTED_GATE));
+  wm_setup setup = with_motion(motion);
+  const struct {
+    double value, sigma;
+    int position;
+    wm_state state;
+  } rows[] = {{1.16, 0.005, -1, WM_STATE_TRACKING},       {1.19, 0.06, -1, WM_STATE_TRACKING},
+              {1.19, 0.005, -1, WM_STATE_DEGRADED},       {0.81, 0.005, -1, WM_STATE_DEGRADED},
+              {1.19, 0.005, WM_FUSED, WM_STATE_TRACKING}, {1.19, 0.005, WM_REJECTED_GATE, WM_STATE_DEGRADED}};
+  for (const auto &row : rows)
+    TEST_ASSERT_EQUAL(row.state, state_with(setup, scale_value{WM_SPEED_SCALE, row.value, row.sigma}, row.position));
   const wm_landmark post{};
   setup.landmarks = &post;
   setup.landmark_count = 1;
@@ -365,8 +354,7 @@ TEST(a_scale_of_ranges_is_held_against_the_sensors_prior) {
 // A track and a gyro's scale are no lengths.
 TEST(scales_of_turns_are_no_standards_of_length) {
   const parameters::values motion(wm_motion_params_table, {});
-  wm_setup setup{};
-  setup.motion = static_cast<const wm_motion_params *>(static_cast<const void *>(motion.data()));
+  wm_setup setup = with_motion(motion);
   for (const int term : {WM_TRACK_SCALE, WM_YAW_RATE_SCALE})
     TEST_ASSERT_EQUAL(WM_STATE_TRACKING, state_with(setup, scale_value{term, 1.7, 0.01}));
 }
@@ -400,17 +388,11 @@ wm_estimate drive_by_landmarks(const double off[4], wm_verdict of_last) {
       wm_event e{};
       e.kind = WM_EVENT_SIGHTING;
       e.t_ns = t_ns;
-      wm_innovation record{};
+      wm_innovation record =
+          record_of(k == 3 ? of_last : WM_FUSED, off[k] + ((t_ns / (100 * WM_NS_PER_MS) + k) % 2 ? 0.8 : -0.8));
       record.t_ns = t_ns;
       record.landmark_id = k;
-      record.residual = WM_RESIDUAL_RANGE;
-      record.verdict = static_cast<uint8_t>(k == 3 ? of_last : WM_FUSED);
-      record.observed = 0.1 * (off[k] + ((t_ns / (100 * WM_NS_PER_MS) + k) % 2 ? 0.8 : -0.8));
-      record.variance = 0.01;
-      out = robot.estimate;
-      out.t_ns = t_ns;
-      if (wm_monitor_take(&robot.monitor, &e, &record, 1)) wm_monitor_step(&robot.monitor, &out, nullptr, 0);
-      wm_monitor_judge(&robot.monitor, &out);
+      out = robot.see(e, robot.estimate, record);
     }
   }
   return out;

@@ -5,16 +5,13 @@
 // calibration states, where a state that nothing uses would show.
 //
 // An estimator without stages of its own below is run on those of all.
-#include <cstdio>
-#include <cstdlib>
-#include <cstring>
 #include <deque>
 #include <memory>
 #include <string>
 
+#include "common/suite.h"
 #include "drives.hpp"
 #include "parameter_sweep.hpp"
-#include "unity.h"
 
 namespace {
 
@@ -504,18 +501,7 @@ std::vector<stage> stages_of(const wm_estimator &of, const whole_table &tables,
   return out;
 }
 
-const parameters::owner *owner_under_test = nullptr;
-
-void every_parameter_has_an_effect() {
-  const std::vector<std::string> wrong = parameters::sweep(*owner_under_test);
-  TEST_ASSERT_GREATER_THAN(0, owner_under_test->table.count);
-  TEST_ASSERT_EQUAL_STRING("", wrong.empty() ? "" : wrong.front().c_str());
-}
-
 }  // namespace
-
-void setUp() {}
-void tearDown() {}
 
 int main(int argc, char **argv) {
   std::vector<std::unique_ptr<drives::scene>> scenes;
@@ -533,11 +519,5 @@ int main(int argc, char **argv) {
     };
     owners.push_back({of.name, tables.back().table(), stages_of(of, tables.back(), &scenes), reads});
   }
-  UNITY_BEGIN();
-  for (const parameters::owner &of : owners) {
-    if (argc > 1 && std::strcmp(argv[1], of.name) != 0) continue;
-    owner_under_test = &of;
-    UnityDefaultTestRun(every_parameter_has_an_effect, of.name, __LINE__);
-  }
-  return UNITY_END();
+  return parameters::test_all(owners, argc > 1 ? argv[1] : nullptr);
 }

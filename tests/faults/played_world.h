@@ -9,8 +9,7 @@
 //                 its end
 //   devices       lines "DEVICE STREAM": "can0 can:can2", "/dev/video0 camera:front"; without a line an interface has
 //                 the frames recorded by its name, else those of the first; a device has the first camera
-#ifndef WM_PLAYED_WORLD_H
-#define WM_PLAYED_WORLD_H
+#pragma once
 
 #include "waymark/play.h"
 
@@ -37,5 +36,3 @@ int played_fault(wm_fault_kind kind, const char *of);
 wm_time_ns played_now_ns(void);
 // Until `when_ns`, but not longer than `wait_ms`. 1: it is `when_ns`.
 int played_sleep(wm_time_ns when_ns, int wait_ms);
-
-#endif

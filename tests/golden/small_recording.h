@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A small recording, made by the test that needs it: a robot drives an eight among landmarks and sees them with one
 // sensor. How late its frames arrive, and when the sensor is silent, is the caller's choice.
-#ifndef WAYMARK_TESTS_SMALL_RECORDING_H
-#define WAYMARK_TESTS_SMALL_RECORDING_H
+#pragma once
 
 #include <stddef.h>
 
@@ -32,5 +31,3 @@ void replay_into(const char *recording, const char *config_text, const char *run
 char *read_all(const char *path, size_t *length);
 // Fails the test where FOLDER/`a`/`file` and FOLDER/`b`/`file` differ in a byte, or are empty.
 void assert_same_file(const char *a, const char *b, const char *file);
-
-#endif

@@ -2,18 +2,19 @@
 // The simulated crossing through files, replay and the shipped configurations: perfect sensors lead to the truth, the
 // numbers of one drive are pinned, lateness changes nothing, faults do no lasting harm.
 #include <unistd.h>
+#include <string>
 
 #include <filesystem>
 #include <fstream>
 #include <functional>
 #include <iterator>
 
+#include "common/suite.h"
 #include "simulate/angle.h"
 #include "simulate/simulate.h"
 #include "simulate/write.h"
 
 extern "C" {
-#include "common/suite.h"
 #include "replay/replay.h"
 }
 

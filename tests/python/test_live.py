@@ -5,7 +5,6 @@
     test_live.py BIN_DIR       Skipped (77) without the right to a network namespace, without lcm-gen or foxglove-sdk."""
 
 import asyncio
-import importlib.util
 import json
 import os
 import pathlib
@@ -19,26 +18,9 @@ import time
 import unittest
 from socket import create_server
 
-INSIDE = "WAYMARK_TEST_INSIDE"
+from in_a_network import begin
 
-
-def missing():
-    """The reason why it can't run here; None."""
-    if importlib.util.find_spec("foxglove") is None or importlib.util.find_spec("websockets") is None:
-        return "no foxglove-sdk or websockets in .cache/venv (tests/judges/setup.sh)"
-    if not shutil.which("lcm-gen"):
-        return "no lcm-gen"
-    if not shutil.which("ip") or subprocess.run(["unshare", "-n", "true"], capture_output=True, check=False).returncode:
-        return "no right to a network namespace"
-    return None
-
-
-if INSIDE not in os.environ:
-    why = missing()
-    if why:
-        print(f"skipped: {why}")
-        sys.exit(77)
-    sys.exit(subprocess.run(["unshare", "-n", sys.executable, *sys.argv], env={**os.environ, INSIDE: "1"}, check=False).returncode)
+begin("foxglove", "websockets")
 
 from common import BIN, ROOT  # noqa: E402
 

@@ -5,7 +5,6 @@ against node-mavlink where it is there (mavlink_judge.mjs).
 
     test_mavlink.py BIN_DIR       Skipped (77) without the right to a network namespace, without pymavlink, lcm or lcm-gen."""
 
-import importlib.util
 import json
 import math
 import os
@@ -21,27 +20,9 @@ import time
 import types
 import unittest
 
-INSIDE = "WAYMARK_TEST_INSIDE"
+from in_a_network import begin
 
-
-def missing():
-    """The reason why it can't run here; None."""
-    for name in ("pymavlink", "lcm", "serial"):
-        if importlib.util.find_spec(name) is None:
-            return f"no {name} in .cache/venv (tests/judges/setup.sh)"
-    if not shutil.which("lcm-gen"):
-        return "no lcm-gen"
-    if not shutil.which("ip") or subprocess.run(["unshare", "-n", "true"], capture_output=True, check=False).returncode:
-        return "no right to a network namespace"
-    return None
-
-
-if INSIDE not in os.environ:
-    why = missing()
-    if why:
-        print(f"skipped: {why}")
-        sys.exit(77)
-    sys.exit(subprocess.run(["unshare", "-n", sys.executable, *sys.argv], env={**os.environ, INSIDE: "1"}, check=False).returncode)
+begin("pymavlink", "lcm", "serial")
 
 from common import BIN, ROOT  # noqa: E402
 

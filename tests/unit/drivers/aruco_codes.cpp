@@ -3,6 +3,7 @@
 // made by it, too: aruco_codes write > drivers/detectors/aruco_codes.c.
 #ifdef WM_HAS_ARUCO
 #include <opencv2/aruco.hpp>
+#include <string>
 #endif
 
 #include <algorithm>

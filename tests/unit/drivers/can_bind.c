@@ -7,6 +7,8 @@
 
 static fixture f;
 
+void tearDown(void) { close_it(&f); }
+
 #define CAR                                                 \
   "BO_ 256 M: 8 X\n SG_ A : 0|8@1+ (1,0) [0|0] \"m/s\" X\n" \
   " SG_ B : 8|8@1- (1,0) [0|0] \"m/s\" X\n"                 \
@@ -48,7 +50,6 @@ TEST(one_raw_value_is_one_gear) {
   open_one(&f, CAR, b);
   TEST_ASSERT_EQUAL_DOUBLE(1, value_of(&f, "can0 100#0000030000000000"));
   TEST_ASSERT_EQUAL_DOUBLE(-1, value_of(&f, "can0 100#0000040000000000"));
-  close_it(&f);
 }
 
 // A refusal lists the names of its own signal: none of the one that was refused before.
@@ -80,7 +81,6 @@ TEST(sums_keep_signs_and_units) {
   TEST_ASSERT_EQUAL_DOUBLE(10 + 0.5 * (7 - 2), value_of(&f, "can0 100#07FE000000000000"));
   TEST_ASSERT_EQUAL(WM_AGAIN, feed(&f, "can0 101#0700000000000000"));  // the other message of that signal's name
   TEST_ASSERT_EQUAL_UINT64(1, f.counts.ignored);
-  close_it(&f);
 }
 
 #define RANGED(signal) "BO_ 256 M: 8 X\n SG_ A : " signal " \"m/s\" X\n"
@@ -93,18 +93,14 @@ TEST(outermost_values_are_no_measurement) {
   TEST_ASSERT_EQUAL_DOUBLE(-32767, value_of(&f, "can0 100#0180000000000000"));
   TEST_ASSERT_EQUAL_DOUBLE(32766, value_of(&f, "can0 100#FE7F000000000000"));
   TEST_ASSERT_EQUAL_DOUBLE(1, value_of(&f, "can0 100#0100000000000000"));
-  close_it(&f);
   open_one(&f, RANGED("0|16@1- (1,0) [-32768|32767]"), binding(WM_Q_VEHICLE_SPEED, "M", "A"));
   TEST_ASSERT_EQUAL_DOUBLE(-32768, value_of(&f, "can0 100#0080000000000000"));
   TEST_ASSERT_EQUAL_DOUBLE(32767, value_of(&f, "can0 100#FF7F000000000000"));
-  close_it(&f);
   open_one(&f, RANGED("0|16@1+ (1,0) [0|60000]"), binding(WM_Q_VEHICLE_SPEED, "M", "A"));
   TEST_ASSERT_EQUAL(WM_BAD_DATA, feed(&f, "can0 100#FFFF000000000000"));
   TEST_ASSERT_EQUAL_DOUBLE(65534, value_of(&f, "can0 100#FEFF000000000000"));
-  close_it(&f);
   open_one(&f, RANGED("0|16@1+ (1,0) [0|0]"), binding(WM_Q_VEHICLE_SPEED, "M", "A"));  // no range
   TEST_ASSERT_EQUAL_DOUBLE(65535, value_of(&f, "can0 100#FFFF000000000000"));
-  close_it(&f);
 }
 
 TEST(a_dbc_from_a_file) {

@@ -6,7 +6,13 @@
 static wm_dbc *dbc;
 static wm_error err;
 
+void tearDown(void) {
+  wm_dbc_free(dbc);
+  dbc = NULL;
+}
+
 static void load(const char *source) {
+  tearDown();
   err.text[0] = '\0';
   wm_status status = wm_dbc_parse(source, strlen(source), "car.dbc", &dbc, &err);
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, status, err.text);
@@ -69,7 +75,6 @@ TEST(odd_but_right) {
   TEST_ASSERT_EQUAL(SIGNAL_SIGNED, temperature->bits.kind);
   const dbc_signal *renamed = signal_of(0x18FEBF00, 1, "SHORT_NAME");
   TEST_ASSERT_TRUE(text_is(renamed->long_name, "A_NAME_OF_MORE_THAN_THIRTY_TWO_LETTERS"));
-  wm_dbc_free(dbc);
 }
 
 // With CR alone as line end, and with LF alone: the same content, in the same lines.
@@ -85,7 +90,6 @@ TEST(line_ends_of_other_editors) {
     TEST_ASSERT_EQUAL_size_t(2, dbc->message_count);
     TEST_ASSERT_EQUAL_size_t(3, dbc->signal_count);
     TEST_ASSERT_EQUAL(11, signal_of(291, 0, "SPEED")->line);
-    wm_dbc_free(dbc);
   }
 }
 
@@ -93,32 +97,26 @@ TEST(line_ends_of_other_editors) {
 TEST(long_names_of_no_message) {
   load("BO_ 0 M: 8 X\nBA_ \"SystemMessageLongSymbol\" BO_ \"WITHOUT_A_NUMBER\";\n");
   TEST_ASSERT_EQUAL_size_t(0, wm_dbc_find(dbc, dbc_key(0, 0))->long_name.length);
-  wm_dbc_free(dbc);
   load("BO_ 1 M: 8 X\nBA_ \"SystemMessageLongSymbol\" BO_ 4294967297 \"2_TO_THE_32_AND_1\";\n");
   TEST_ASSERT_EQUAL_size_t(0, wm_dbc_find(dbc, dbc_key(1, 0))->long_name.length);
-  wm_dbc_free(dbc);
 }
 
 // A list of new symbols without a name, before the first message.
 TEST(a_message_right_behind_an_empty_list) {
   load("NS_ :\nBO_ 291 WHEELS: 8 ESP\n SG_ SPEED : 0|16@1+ (1,0) [0|0] \"\" X\n");
   TEST_ASSERT_NOT_NULL(wm_dbc_find(dbc, dbc_key(291, 0)));
-  wm_dbc_free(dbc);
 }
 
 TEST(nothing_in_it) {
   load("");
   TEST_ASSERT_EQUAL_size_t(0, dbc->message_count);
-  wm_dbc_free(dbc);
   load("VERSION \"\"\n\nBO_ 1 EMPTY: 0");
   TEST_ASSERT_EQUAL_size_t(1, dbc->message_count);
-  wm_dbc_free(dbc);
 }
 
 TEST(overlapping_signals_are_makers_wish) {
   load("BO_ 1 M: 2 X\n SG_ A : 0|16@1+ (1,0) [0|0] \"\" X\n SG_ B : 4|8@1+ (1,0) [0|0] \"\" X\n");
   TEST_ASSERT_EQUAL_size_t(2, dbc->signal_count);
-  wm_dbc_free(dbc);
 }
 
 // A factor is one whole number that a double holds.
@@ -141,7 +139,6 @@ TEST(names_that_are_stated_twice) {
   TEST_ASSERT_EQUAL_UINT(2, a->value_count);
   TEST_ASSERT_EQUAL_INT64(7, dbc->values[a->first_value].raw);
   TEST_ASSERT_EQUAL_INT64(8, dbc->values[a->first_value + 1].raw);
-  wm_dbc_free(dbc);
 }
 
 TEST(multiplexers_in_a_ring) {
@@ -150,7 +147,6 @@ TEST(multiplexers_in_a_ring) {
       "SG_MUL_VAL_ 1 A B 1-1;\nSG_MUL_VAL_ 1 B A 1-1;\n");
   uint32_t above[DBC_SELECTORS_MAX];
   TEST_ASSERT_EQUAL(-1, wm_dbc_selectors(dbc, signal_of(1, 0, "A"), above));
-  wm_dbc_free(dbc);
 }
 
 TEST(not_text) {
@@ -167,6 +163,7 @@ TEST(not_text) {
 TEST(every_prefix) {
   size_t whole = strlen(kOdd);
   for (size_t n = 0; n <= whole; n++) {
+    tearDown();
     char *part = malloc(n + 1);
     memcpy(part, kOdd, n);
     wm_status status = wm_dbc_parse(part, n, "car.dbc", &dbc, &err);
@@ -174,7 +171,6 @@ TEST(every_prefix) {
     TEST_ASSERT_TRUE(status == WM_OK || status == WM_BAD_CONFIG);
     TEST_ASSERT_EQUAL(status == WM_OK, dbc != NULL);
     if (status != WM_OK) TEST_ASSERT_EQUAL(0, strncmp(err.text, "car.dbc:", 8));
-    wm_dbc_free(dbc);
   }
 }
 

@@ -8,15 +8,15 @@
 
 static fixture f;
 
+void tearDown(void) { close_it(&f); }
+
 // ── units ───────────────────────────────────────────────────────────────────────────────────────────────────────────
 
 static double si_of(int quantity, const char *unit) {
   char dbc[256];
   (void)snprintf(dbc, sizeof dbc, "BO_ 291 M: 8 X\n SG_ S : 0|16@1- (0.5,1) [0|0] \"%s\" X\n", unit);
   open_one(&f, dbc, binding(quantity, "M", "S"));
-  double one = value_of(&f, "can0 123#1200");  // 18 * 0.5 + 1 = 10
-  close_it(&f);
-  return one / 10.0;
+  return value_of(&f, "can0 123#1200") / 10.0;  // 18 * 0.5 + 1 = 10
 }
 
 #define SPELLED_MOST 16
@@ -71,7 +71,6 @@ TEST(unit_scale_and_offset_of_the_binding) {
   open_one(&f, "BO_ 291 M: 2 X\n SG_ S : 7|16@0- (0.1,0) [0|0] \"\" X\n", b);
   TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0.25 - 90.0 * PI / 180, value_of(&f, "can0 123#0384"));
   TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0.25 + 90.0 * PI / 180, value_of(&f, "can0 123#FC7C"));
-  close_it(&f);
 }
 
 TEST(sum_of_signals) {
@@ -83,7 +82,6 @@ TEST(sum_of_signals) {
            " SG_ FINE : 39|4@0- (0.1,0) [0|0] \"deg\" X\n",
            b);
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, (3.0 - 0.7) * PI / 180, value_of(&f, "can0 025#0002000090000000"));
-  close_it(&f);
 }
 
 TEST(floats) {
@@ -95,10 +93,8 @@ TEST(floats) {
   TEST_ASSERT_EQUAL(WM_BAD_DATA, feed(&f, "can0 123#0000C07F00000000"));  // NaN
   TEST_ASSERT_EQUAL(WM_BAD_DATA, feed(&f, "can0 123#0000807F00000000"));  // infinity
   TEST_ASSERT_EQUAL_UINT64(2, f.counts.not_finite);
-  close_it(&f);
   open_one(&f, dbc, binding(WM_Q_VEHICLE_SPEED, "M", "D"));
   TEST_ASSERT_EQUAL_DOUBLE(-2.5, value_of(&f, "can0 123#C004000000000000"));
-  close_it(&f);
 }
 
 // ── gears ───────────────────────────────────────────────────────────────────────────────────────────────────────────
@@ -116,7 +112,6 @@ TEST(gears_by_names) {
   TEST_ASSERT_EQUAL(WM_BAD_DATA, feed(&f, "can0 3BC#003F000000000000"));  // SNA
   TEST_ASSERT_EQUAL(WM_BAD_DATA, feed(&f, "can0 3BC#0002000000000000"));  // a value without a name
   TEST_ASSERT_EQUAL_UINT64(2, f.counts.not_finite);
-  close_it(&f);
 }
 
 TEST(gears_by_makers_words) {
@@ -140,7 +135,6 @@ TEST(gears_by_makers_words) {
     (void)snprintf(dbc, sizeof dbc, GEAR_DBC "VAL_ 956 GEAR 5 \"%s\" ;\n", rows[i].name);
     open_one(&f, dbc, binding(WM_Q_GEAR, "G", "GEAR"));
     TEST_ASSERT_EQUAL_DOUBLE(rows[i].direction, value_of(&f, "can0 3BC#0005000000000000"));
-    close_it(&f);
   }
 }
 
@@ -154,7 +148,6 @@ TEST(gears_by_values) {
   open_one(&f, "BO_ 956 G: 8 X\n SG_ GEAR : 0|4@1- (1,0) [-1|1] \"\" X\nVAL_ 956 GEAR 4 \"R\" ;\n", b);
   TEST_ASSERT_EQUAL_DOUBLE(1, value_of(&f, "can0 3BC#04"));  // the binding's word counts, not VAL_'s
   TEST_ASSERT_EQUAL_DOUBLE(-1, value_of(&f, "can0 3BC#0F"));
-  close_it(&f);
 }
 
 // ── multiplexing ────────────────────────────────────────────────────────────────────────────────────────────────────
@@ -169,7 +162,6 @@ TEST(only_when_the_multiplexer_fits) {
   TEST_ASSERT_EQUAL_UINT64(1, f.counts.ignored);
   TEST_ASSERT_EQUAL(WM_BAD_DATA, feed(&f, "can0 123#03"));
   TEST_ASSERT_EQUAL_UINT64(1, f.counts.malformed);
-  close_it(&f);
 }
 
 TEST(multiplexers_above_each_other) {
@@ -183,7 +175,6 @@ TEST(multiplexers_above_each_other) {
   TEST_ASSERT_EQUAL(WM_AGAIN, feed(&f, "can0 00000001#020809"));
   TEST_ASSERT_EQUAL(WM_AGAIN, feed(&f, "can0 00000001#010109"));
   TEST_ASSERT_EQUAL(WM_AGAIN, feed(&f, "can0 001#020109"));  // 11 bits: another message
-  close_it(&f);
 }
 
 // ── ticks ───────────────────────────────────────────────────────────────────────────────────────────────────────────
@@ -193,7 +184,6 @@ static void ticks_of(const char *bits, const char *const *frames, const double *
   (void)snprintf(dbc, sizeof dbc, "BO_ 257 W: 8 X\n SG_ T : %s (1,0) [0|0] \"\" X\n", bits);
   open_one(&f, dbc, binding(WM_Q_WHEEL_TICKS_LEFT, "W", "T"));
   for (size_t i = 0; i < count; i++) TEST_ASSERT_EQUAL_DOUBLE_MESSAGE(want[i], value_of(&f, frames[i]), frames[i]);
-  close_it(&f);
 }
 
 TEST(ticks_wrap) {
@@ -223,7 +213,6 @@ TEST(ticks_grow_without_end) {
     last = value_of(&f, text);
   }
   TEST_ASSERT_EQUAL_DOUBLE(2.0 * 2999 * 100 + 5, last);
-  close_it(&f);
 }
 
 // 16 bits, after 10 s at `per_s` a silence, then a frame that is `moved` ticks on. How far the value moved; NaN:
@@ -242,7 +231,6 @@ static double moved_in_silence(int per_s, double silence_s, long moved) {
   const unsigned raw = (unsigned)(10L * per_s + moved) & 0xFFFF;
   (void)snprintf(text, sizeof text, "c 101#%02X%02X", raw & 0xFF, raw >> 8);
   TEST_ASSERT_EQUAL(WM_OK, feed_at(&f, 10.0 + silence_s, text));
-  close_it(&f);
   return f.got.doubt & WM_DOUBT_COUNTS_WRAPPED ? (double)NAN : f.got.value[0] - last;
 }
 
@@ -287,7 +275,6 @@ TEST(lost_by_the_counter) {
   TEST_ASSERT_EQUAL(0, f.got.lost_before);
   TEST_ASSERT_EQUAL(WM_OK, count(10));  // 247 missing
   TEST_ASSERT_EQUAL_UINT64(250, f.counts.lost);
-  close_it(&f);
 }
 
 // Frames that overtook each other in a bridge are missing until they come.
@@ -304,7 +291,6 @@ TEST(late_by_the_counter) {
   TEST_ASSERT_EQUAL(WM_OK, count(22));  // 21 is missing, and doesn't come
   for (unsigned i = 23; i < 23 + 512; i++) TEST_ASSERT_EQUAL(WM_OK, count(i & 0xFF));
   TEST_ASSERT_EQUAL_UINT64(1, f.counts.lost);
-  close_it(&f);
 
   open_counted("COUNTER : 16|4@1+ (1,0) [0|14] \"\"");  // a short cycle: each second pair is swapped, for long
   for (unsigned i = 0; i < 30; i++) TEST_ASSERT_EQUAL(WM_OK, count(i % 15));
@@ -313,7 +299,6 @@ TEST(late_by_the_counter) {
   TEST_ASSERT_EQUAL_UINT64(0, f.counts.lost);
   TEST_ASSERT_EQUAL(WM_OK, count(7));  // after 14: 0 to 6 are missing
   TEST_ASSERT_EQUAL_UINT64(7, f.counts.lost);
-  close_it(&f);
 }
 
 TEST(frozen_counter) {
@@ -329,7 +314,6 @@ TEST(frozen_counter) {
   TEST_ASSERT_EQUAL(WM_OK, count(4));
   TEST_ASSERT_EQUAL(0, f.got.doubt);
   TEST_ASSERT_EQUAL_UINT64(0, f.counts.lost);
-  close_it(&f);
 }
 
 // AUTOSAR E2E profile 1 counts 0 to 14, others 1 to 15.
@@ -337,22 +321,18 @@ TEST(counters_that_leave_a_value_out) {
   open_counted("COUNTER : 16|4@1+ (1,0) [0|14] \"\"");
   for (unsigned i = 0; i < 60; i++) TEST_ASSERT_EQUAL(WM_OK, count(i % 15));
   TEST_ASSERT_EQUAL_UINT64(0, f.counts.lost);
-  close_it(&f);
   open_counted("COUNTER : 16|4@1+ (1,0) [0|14] \"\"");
   for (unsigned i = 0; i < 60; i++) TEST_ASSERT_EQUAL(WM_OK, count(i % 15 + 1));
   TEST_ASSERT_EQUAL_UINT64(0, f.counts.lost);
-  close_it(&f);
 }
 
 TEST(what_only_looks_like_a_counter) {
   open_counted("ERROR_COUNT : 16|8@1+ (1,0) [0|255] \"\"");  // never steps: no proof, no doubt
   for (unsigned i = 0; i < 50; i++) TEST_ASSERT_EQUAL(WM_OK, count(i / 10));
   TEST_ASSERT_EQUAL_UINT64(0, f.counts.lost + f.counts.frozen);
-  close_it(&f);
   open_counted("WHEEL_CNT_LEFT : 16|8@1+ (1,0) [0|255] \"\"");  // counts the way
   for (unsigned i = 0; i < 50; i++) TEST_ASSERT_EQUAL(WM_OK, count(i < 20 ? i : 20));
   TEST_ASSERT_EQUAL_UINT64(0, f.counts.frozen);
-  close_it(&f);
 }
 
 // A signal that is bound is none, whichever part of a sum it is: it may do what it wants.
@@ -367,7 +347,6 @@ TEST(a_bound_signal_is_no_counter) {
              b);
     for (unsigned i = 0; i < 60; i++) (void)count((i < 40 ? i : 40 + 7 * i) & 0xFF);
     TEST_ASSERT_EQUAL_UINT64(0, f.counts.lost + f.counts.frozen);
-    close_it(&f);
   }
 }
 
@@ -379,7 +358,6 @@ TEST(one_quantity_alone) {
                   1) != WM_OK)
       continue;
     TEST_ASSERT_EQUAL_HEX32(UINT32_C(1) << quantity, wm_can_decoder_quantities(f.decoder));
-    close_it(&f);
   }
 }
 
@@ -397,7 +375,6 @@ TEST(no_value) {
   TEST_ASSERT_EQUAL_DOUBLE(3, value_of(&f, "c 101#2C01"));
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 300,
                             value_of(&f, "c 101#3075"));  // outside of the range: makers' ranges are wrong too often
-  close_it(&f);
   open_one(&f,
            "BO_ 257 W: 3 X\n SG_ V : 0|16@1- (0.01,0) [0|0] \"m/s\" X\n"
            "VAL_ 257 V -2 \"Error\" -32768 \"Invalid\" -32769 \"SNA\";\n",
@@ -405,7 +382,6 @@ TEST(no_value) {
   TEST_ASSERT_EQUAL(WM_BAD_DATA, feed(&f, "c 101#FEFF"));
   TEST_ASSERT_EQUAL(WM_BAD_DATA, feed(&f, "c 101#0080"));
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 327.67, value_of(&f, "c 101#FF7F"));  // -32769 has more bits
-  close_it(&f);
 }
 
 TEST(what_is_not_decoded) {
@@ -423,7 +399,6 @@ TEST(what_is_not_decoded) {
   TEST_ASSERT_EQUAL_STRING("can1: W (id 101, 1 bytes): the frame is shorter than the signals that are bound",
                            f.err.text);
   TEST_ASSERT_EQUAL_DOUBLE(1, value_of(&f, "can1 101#0100"));
-  close_it(&f);
 }
 
 TEST(several_quantities_and_ids) {
@@ -451,5 +426,4 @@ TEST(several_quantities_and_ids) {
   TEST_ASSERT_EQUAL(2, wm_can_decoder_matches(f.decoder, matches, 0));
   TEST_ASSERT_EQUAL_HEX32(1u << WM_Q_WHEEL_TICKS_LEFT | 1u << WM_Q_WHEEL_TICKS_RIGHT | 1u << WM_Q_YAW_RATE,
                           wm_can_decoder_quantities(f.decoder));
-  close_it(&f);
 }

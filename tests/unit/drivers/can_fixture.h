@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A DBC text, bindings and frames in a line each, for the tests of the decoder.
-#ifndef WM_TEST_CAN_FIXTURE_H
-#define WM_TEST_CAN_FIXTURE_H
+#pragma once
 
 #include <stdio.h>
 #include <string.h>
@@ -25,7 +24,14 @@ static inline wm_can_binding binding(int quantity, const char *message, const ch
   return b;
 }
 
+static inline void close_it(fixture *f) {
+  wm_can_decoder_free(f->decoder);
+  f->decoder = NULL;
+}
+
+// Closes what was open before.
 static inline wm_status open_with(fixture *f, const char *dbc, const wm_can_binding *bindings, size_t count) {
+  close_it(f);
   memset(f, 0, sizeof *f);
   wm_status status = wm_dbc_parse(dbc, strlen(dbc), "car.dbc", &f->dbc, &f->err);
   if (status == WM_OK) status = wm_can_decoder_make(f->dbc, bindings, count, &f->decoder, &f->err);
@@ -37,11 +43,6 @@ static inline wm_status open_with(fixture *f, const char *dbc, const wm_can_bind
 static inline void open_one(fixture *f, const char *dbc, wm_can_binding b) {
   wm_status status = open_with(f, dbc, &b, 1);
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, status, f->err.text);
-}
-
-static inline void close_it(fixture *f) {
-  wm_can_decoder_free(f->decoder);
-  f->decoder = NULL;
 }
 
 // `text` as in candump: "can0 123#0102".
@@ -61,5 +62,3 @@ static inline double value_of(fixture *f, const char *text) {
   TEST_ASSERT_EQUAL(1, f->got.count);
   return f->got.value[0];
 }
-
-#endif

@@ -81,7 +81,6 @@ TEST(j1939_is_matched_by_its_pgn) {
     TEST_ASSERT_EQUAL_MESSAGE(row->is_taken, feed_all(&row->frame, 1), row->about);
     // 0x039A / 256 km/h
     if (row->is_taken) TEST_ASSERT_DOUBLE_WITHIN(1e-12, 922 / 256.0 / 3.6, f.got.value[0]);
-    close_it(&f);
   }
 }
 
@@ -126,7 +125,6 @@ TEST(a_message_on_two_buses) {
   TEST_ASSERT_EQUAL(2, feed_all(frames, 3));
   (void)wm_can_decoder_senders(f.decoder, survey, text, sizeof text);
   TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "Taken is 100 on can1; for another one write `bus:`"), text);
-  close_it(&f);
   open_speed("BO_ 256 CCVS1: 8 X\n" SPEED, "can0");
   TEST_ASSERT_EQUAL(1, feed_all(frames, 3));
   TEST_ASSERT_EQUAL(0, wm_can_decoder_senders(f.decoder, survey, text, sizeof text));
@@ -175,7 +173,6 @@ TEST(a_message_that_never_comes_is_named_with_what_came) {
     (void)feed_all(row->frames, count);
     TEST_ASSERT_EQUAL_size_t(strlen(row->says), wm_can_decoder_missing(f.decoder, survey, text, sizeof text));
     TEST_ASSERT_EQUAL_STRING(row->says, text);
-    close_it(&f);
   }
 }
 
@@ -203,7 +200,6 @@ TEST(floats_without_their_type) {
       TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, rows[i].says), text);
     else
       TEST_ASSERT_EQUAL_STRING("", text);
-    close_it(&f);
   }
 }
 

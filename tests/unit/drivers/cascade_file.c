@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Cascades in OpenCV's format: what a file says, and what is said when it is wrong.
-#include "common/suite.h"
 #include "waymark/cascade_file.h"
+#include "common/suite.h"
 
 #define HEAD                                                                                                       \
   "<?xml version=\"1.0\"?>\n<!-- < one > -->\n<opencv_storage>\n<cascade type_id=\"opencv-cascade-classifier\">\n" \

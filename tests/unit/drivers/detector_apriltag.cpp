@@ -3,6 +3,7 @@
 // white which a camera's response makes doesn't change the distance.
 #include <apriltag/apriltag.h>
 #include <apriltag/tag36h11.h>
+#include <vector>
 
 #include "common/eyes.hpp"
 #include "waymark/detectors.h"

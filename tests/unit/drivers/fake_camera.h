@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A camera that does what a test says, on a clock that only waiting moves.
-#ifndef WM_TEST_FAKE_CAMERA_H
-#define WM_TEST_FAKE_CAMERA_H
+#pragma once
 
 #include "camera_io.h"
 
@@ -41,5 +40,3 @@ typedef struct fake_camera {
 
 extern const camera_io kFakeCamera;
 void fake_camera_init(fake_camera *self, const fake_step *steps);
-
-#endif

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A CAN interface that does what a test says, on a clock that only waiting moves.
-#ifndef WM_TEST_FAKE_CAN_H
-#define WM_TEST_FAKE_CAN_H
+#pragma once
 
 #include "can_io.h"
 
@@ -33,5 +32,3 @@ void fake_can_init(fake_can *self, fake_step *steps);
 // A frame of id 100 with two bytes of a speed in it, stamped by the kernel.
 can_received fake_frame(wm_time_ns at_ns, uint16_t speed);
 can_received fake_error_frame(wm_time_ns at_ns, uint32_t id, uint8_t controller);
-
-#endif

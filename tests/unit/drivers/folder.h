@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A temporary folder with files of the test's making.
-#ifndef WM_TEST_FOLDER_H
-#define WM_TEST_FOLDER_H
+#pragma once
 
 #include <stddef.h>
 
@@ -12,5 +11,3 @@ void folder_write(const char *file, const char *text);
 void folder_write_bytes(const char *file, const char *bytes, size_t length);
 const char *folder_path(const char *file);  // holds until the next call
 void folder_remove(void);
-
-#endif

@@ -2,6 +2,7 @@
 // Coded markers of all families found and read in rendered views: mr_views [VIEWS]. Prints a table and holds the bars:
 // recall at least 0.95 where a module has 3 px or more, no false identity.
 #include <algorithm>
+#include <memory>
 
 #include "common/eyes.hpp"
 #include "common/marker_views.hpp"

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Small videos of the test's making, in memory.
-#ifndef WM_TEST_VIDEO_FILES_H
-#define WM_TEST_VIDEO_FILES_H
+#pragma once
 
 #include <stddef.h>
 #include <stdint.h>
@@ -26,5 +25,3 @@ void avi_chunk(bytes *self, const char *id, const void *data, size_t size);
 // Matroska with a track of this codec; then blocks.
 void mkv_head(bytes *self, const char *codec, uint32_t width, uint32_t height);
 void mkv_block(bytes *self, int track, const void *data, size_t size);
-
-#endif

@@ -3,6 +3,9 @@
 // estimators that localize by edges.
 #pragma once
 
+#include <memory>
+#include <vector>
+
 #include "common/suite.h"
 #include "events.hpp"
 #include "math/arc.hpp"

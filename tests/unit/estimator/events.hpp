@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Short ways to say an event in the estimator's tests.
-#ifndef WAYMARK_TESTS_ESTIMATOR_EVENTS_HPP
-#define WAYMARK_TESTS_ESTIMATOR_EVENTS_HPP
+#pragma once
 
 #include <cmath>
 #include <cstdlib>
@@ -185,5 +184,3 @@ inline wm_status feed(const wm_estimator &estimator, void *state, const wm_event
 }
 
 }  // namespace make
-
-#endif

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Pictures of a flat sea floor with a grain, by rays: what a camera of any model sees from any place, exactly known.
-#ifndef WAYMARK_TESTS_SEA_FLOOR_HPP
-#define WAYMARK_TESTS_SEA_FLOOR_HPP
+#pragma once
 
 #include <cmath>
 #include <vector>
@@ -126,5 +125,3 @@ inline wm::rigid swim(double t_s) {
 }
 
 }  // namespace sea
-
-#endif

@@ -2,6 +2,8 @@
 // A scene for tests of stereo_ekf through the contract: points on all sides of a vehicle, exact truth, every attitude.
 #pragma once
 
+#include <vector>
+
 #include "common/suite.h"
 #include "math/eigen.hpp"
 #include "motion/motion_params.h"
@@ -97,8 +99,8 @@ struct scene {
     std::memcpy(&motion[offsetof(wm_motion_params, model)], &model, sizeof model);
   }
   void without_a_start() {
-    setup.start = {
-        WM_TIME_NONE, {kAbsent, kAbsent, kAbsent}, {kAbsent, kAbsent, kAbsent, kAbsent}, kAbsent, kAbsent, kAbsent};
+    setup.start = {WM_TIME_NONE, {kAbsent, kAbsent, kAbsent}, {kAbsent, kAbsent, kAbsent, kAbsent}, kAbsent, kAbsent,
+                   kAbsent};
   }
   void begin() {
     setup.motion = reinterpret_cast<const wm_motion_params *>(motion.data());

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Places that look as the tracked one: a building of two rooms of the same shape, the second turned by half.
+#include <vector>
+
 #include "common/suite.h"
 #include "filters/edge_mcl/hypotheses.hpp"
 #include "math/arc.hpp"

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Bounds of a pose for a stated risk, against probabilities by numeric integration.
+#include <vector>
+
 #include "common/suite.h"
 #include "filters/core/evidence.hpp"
 #include "waymark/bounds.h"

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A sensor's time offset beside what repeats it: the lag of commands, and the steps of coarse counts.
+#include <vector>
+
 #include "world.hpp"
 
 namespace {

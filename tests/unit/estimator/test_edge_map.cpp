@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The map of edges against brute force, and the kernel that looks it up against its scalar twin.
+#include <vector>
+
 #include "common/suite.h"
 #include "maps/likelihood.hpp"
 #include "waymark/random.h"

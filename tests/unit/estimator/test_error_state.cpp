@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // The error state against the whole matrix: each operation on states of which some are empty, with blocks that begin at
 // odd states, too. And its kernels against their scalar twins, bit by bit, with wide vectors and without.
+#include <memory>
+#include <vector>
+
 #include "state/error_state.hpp"
 
 #include "common/suite.h"

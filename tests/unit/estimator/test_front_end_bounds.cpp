@@ -2,6 +2,8 @@
 // The motion front end's bounds and choices, gone through as tables: the limit of every quantity, which part of the
 // motion a refused sensor leaves open, which source gives the speed, the steering's table, how far off the plane is
 // off, which samples follow others.
+#include <vector>
+
 #include "motion/event_time.hpp"
 #include "motion/plausibility.hpp"
 #include "motion_fixture.hpp"
@@ -184,8 +186,7 @@ TEST(test_a_refusal_counts_from_the_last_good_sample) {
     params.noise_speed_mps = params.noise_speed_rel = 0.0;
     for (int i = 0; i <= 10; i++) speed_and_gyro(0.1 * i, 2.0, 0.0);
     const double before = way_var;
-    for (int i = 11; i <= 13; i++)
-      speed_and_gyro(0.1 * i, refused ? 120.0 : 2.0, 0.0);
+    for (int i = 11; i <= 13; i++) speed_and_gyro(0.1 * i, refused ? 120.0 : 2.0, 0.0);
     // The first refusal is known at its stamp, 0.1 s after the good one; until 0.3 s the noise is open.
     const double expected = 225.0 / 12.0 * (std::pow(0.3, 4) - std::pow(0.1, 4)) + 4.0 * 0.2;
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, refused ? expected : 0.0, way_var - before);

@@ -2,6 +2,7 @@
 // SLAM's core against the textbook: the half matrix and its kernels, prediction, correction, landmarks that come and
 // go, and what the invariant form promises. The reference keeps the whole matrix and knows nothing of sparsity.
 #include <new>
+#include <vector>
 
 #include "common/suite.h"
 #include "events.hpp"

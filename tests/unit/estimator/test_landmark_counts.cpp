@@ -4,6 +4,7 @@
 // sensor agree with its prior (first_sightings).
 #include <algorithm>
 #include <map>
+#include <vector>
 
 #include "common/suite.h"
 #include "events.hpp"

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The motion's noise term by term against its formulas: each parameter alone, of each model, in motion and at rest,
 // refused, doubtful and overdue. And what the kind of a motion's source settles: its states, their priors, its noise.
+#include <string>
+
 #include "common/suite.h"
 #include "events.hpp"
 #include "motion/front_end.hpp"

@@ -36,7 +36,6 @@ void assert_pose(double x, double y, double heading, wm_pose2 p) {
 }
 
 TEST(test_half_a_circle_by_twists) {
-  start(make::no_wheels());
   for (int i = 0; i <= 100; i++) feed(make::twist(0.01 * i, 1.0, M_PI));
   assert_pose(0.0, 2.0 / M_PI, M_PI, pose_at(1.0));
   assert_pose(1.0 / M_PI, 1.0 / M_PI, M_PI / 2, pose_at(0.5));  // looked up
@@ -45,7 +44,6 @@ TEST(test_half_a_circle_by_twists) {
 }
 
 TEST(test_extrapolates_with_the_held_twist_but_not_for_ever) {
-  start(make::no_wheels());
   feed(make::twist(0, 1.0, 0.0));
   feed(make::twist(1, 1.0, 0.0));
   assert_pose(1.5, 0, 0, pose_at(1.5));
@@ -79,7 +77,6 @@ TEST(test_an_estimate_without_a_time_is_carried_nowhere) {
 // Each pose of the last second is the one that was the newest at its time, at the stamps of the twists and between
 // them, though each twist is another one; so are its twist and its noise.
 TEST(test_poses_of_the_past_are_what_they_were) {
-  start(make::no_wheels());
   wm_odom_point was[201], between[201];
   for (int i = 0; i <= 200; i++) {
     feed(make::twist6(0.01 * i, 1.0 + 0.3 * sin(i), 0.2 * cos(2 * i), 1.5 * sin(0.7 * i)));
@@ -110,7 +107,6 @@ TEST(test_poses_of_the_past_are_what_they_were) {
 // Of a fast bus a second is remembered, too: a point each 4 ms, and the newest event. Each point is found from its own
 // time on.
 TEST(test_a_second_of_a_fast_bus_is_remembered) {
-  start(make::no_wheels());
   wm_pose2 was{};
   for (int i = 0; i <= 400; i++) {
     feed(make::twist(0.001 * i, 1.0 + 0.5 * sin(i), 2.0 * cos(0.6 * i)));
@@ -163,7 +159,6 @@ wm_estimate somewhere(double t_s) {
 // GIVEN no motion data WHEN a pose is carried on THEN it goes by its own velocity, which walks; a pose of the future
 // goes back by it, and is no less sure than it was. Odom stays.
 TEST(test_a_pose_is_carried_by_its_own_velocity) {
-  start(make::no_wheels());
   params.model = WM_MOTION_CONSTANT_VELOCITY;
   TEST_ASSERT_EQUAL(WM_OK, wm_odometry_init(odom, &params, &wheels));
   wm_estimate fused = somewhere(1.0);
@@ -194,7 +189,6 @@ TEST(test_a_pose_is_carried_by_its_own_velocity) {
 // GIVEN twists of a base that drives sideways WHEN a pose is carried between, at and behind them THEN mean, covariance
 // and twist are those of the motion's accumulated noise at both ends.
 TEST(test_a_carried_pose_has_the_noise_between_its_times) {
-  start(make::no_wheels());
   params.noise_hold_mps2 = params.noise_hold_radps2 = 0.0;
   TEST_ASSERT_EQUAL(WM_OK, wm_odometry_init(odom, &params, &wheels));
   for (int i = 0; i <= 100; i++) feed(make::twist6(0.01 * i, 0.8, i < 50 ? 0.3 : 0.1, 0.9));
@@ -222,7 +216,6 @@ TEST(test_a_carried_pose_has_the_noise_between_its_times) {
 }
 
 TEST(test_a_time_too_old_or_before_any_motion_is_not_found) {
-  start(make::no_wheels());
   wm_odom_point p;
   TEST_ASSERT_EQUAL(WM_NOT_FOUND, wm_odometry_at(odom, 0, &p));
   for (int i = 0; i <= 1000; i++) feed(make::twist(0.01 * i, 1.0, 0.0));
@@ -236,7 +229,6 @@ TEST(test_a_time_too_old_or_before_any_motion_is_not_found) {
 }
 
 TEST(test_calibration_holds_from_now_on_and_nothing_jumps) {
-  start(make::no_wheels());
   for (int i = 0; i <= 100; i++) feed(make::twist(0.01 * i, 1.0, 0.0));
   wm_motion_calibration c = {1.1, 1, -0.1, 1, 1, 1, 0, 0, 0};
   wm_odometry_calibrate(odom, &c);
@@ -247,7 +239,6 @@ TEST(test_calibration_holds_from_now_on_and_nothing_jumps) {
 
 // An estimator took the twists as commands for a while, and then as measured: these have no response.
 TEST(test_twists_are_commands_as_long_as_the_estimator_takes_them_so) {
-  start(make::no_wheels());
   for (int i = 0; i <= 100; i++) feed(make::twist(0.01 * i, 0.0, 0.0));
   wm_motion_calibration c = {1, 1, 0, 1, 1, 1, 0, 0, 0.1};
   wm_odometry_calibrate(odom, &c);
@@ -259,7 +250,6 @@ TEST(test_twists_are_commands_as_long_as_the_estimator_takes_them_so) {
 
 // The carried covariance against the spread of many noisy drives, and the carried mean against the drive itself.
 TEST(test_carry_moves_mean_and_covariance) {
-  start(make::no_wheels());
   for (int i = 0; i <= 60; i++) feed(make::twist(0.01 * i, 2.0, 0.8));
   wm_estimate fused{}, now;
   fused.t_ns = make::at(0.1);
@@ -311,7 +301,6 @@ TEST(test_carry_moves_mean_and_covariance) {
 // A bus that is silent for a minute: what the robot may have driven since the fused pose, 0.25 s ago, is added to it;
 // not what it may have driven in a quarter of a second more of the whole silence, 11.6 m.
 TEST(test_unknown_motion_begins_at_the_fused_pose) {
-  start(make::no_wheels());
   for (int i = 0; i <= 100; i++) feed(make::twist(0.01 * i, 1.5, 0.0));
   for (double sigma_m : {0.01, 2.0}) {
     wm_estimate fused{}, now;
@@ -358,7 +347,10 @@ TEST(test_a_copy_continues_identically) {
 
 }  // namespace
 
-void setUp(void) { odom = (wm_odometry *)malloc(wm_odometry_bytes()); }
+void setUp(void) {
+  odom = (wm_odometry *)malloc(wm_odometry_bytes());
+  start(make::no_wheels());
+}
 void tearDown(void) { free(odom); }
 
 // In space the newest fused pose goes on by the twists that came since; roll and pitch stay what they are.
@@ -408,7 +400,6 @@ wm_estimate carried_in_space(double from_s, double to_s) {
 
 // Of twists that come in time each second of a carried pose adds the white noise of the speed and of the turn rate.
 TEST(test_in_space_a_carried_pose_has_the_noise_of_its_twists) {
-  start(make::no_wheels());
   for (int i = 0; i <= 10; i++) feed_six(0.1 * i, 1.0, 0.0);
   const wm_estimate out = carried_in_space(0.5, 1.0);
   const double place_m2 = 0.5 * params.noise_speed_mps * params.noise_speed_mps,
@@ -421,7 +412,6 @@ TEST(test_in_space_a_carried_pose_has_the_noise_of_its_twists) {
 
 // GIVEN twists in space WHEN they stop THEN the last one holds for hold_max_s, more and more unsure, and no longer.
 TEST(test_a_twist_in_space_does_not_hold_for_ever) {
-  start(make::no_wheels());
   for (int i = 0; i <= 10; i++) feed_six(0.1 * i, 1.0, 0.0);
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.7, carried_in_space(0.5, 1.2).pose_map_base.p_m[0]);
   const wm_estimate out = carried_in_space(0.5, 60.0);
@@ -433,7 +423,6 @@ TEST(test_a_twist_in_space_does_not_hold_for_ever) {
 // GIVEN twists in space that are silent WHEN an observation corrects the pose meanwhile THEN what is added to it until
 // the next one depends on the time since it, not on that since the begin of the silence.
 TEST(test_in_space_a_silence_adds_by_the_time_since_the_correction) {
-  start(make::no_wheels());
   for (int i = 0; i <= 10; i++) feed_six(0.1 * i, 1.0, 0.0);
   const double after_s[] = {4.0, 10.0, 61.0, 601.0};
   double grown_m2[4];
@@ -445,7 +434,6 @@ TEST(test_in_space_a_silence_adds_by_the_time_since_the_correction) {
 
 // GIVEN 1 m/s in space WHEN 138 m/s come for 0.2 s THEN the speed holds.
 TEST(test_a_twist_in_space_that_nothing_reaches_is_refused) {
-  start(make::no_wheels());
   for (int i = 0; i <= 100; i++) feed_six(0.02 * i, i > 50 && i <= 60 ? 138.0 : 1.0, 0.0);
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1.5, carried_in_space(0.5, 2.0).pose_map_base.p_m[0]);
 }

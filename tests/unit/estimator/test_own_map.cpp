@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The own map's parts: places in a triangle and their derivatives, points that look alike, agreement by chance, the
 // ring of key frames.
+#include <vector>
+
 #include "common/suite.h"
 #include "filters/stereo_ekf/map_search.hpp"
 #include "waymark/random.h"

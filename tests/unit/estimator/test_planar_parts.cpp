@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Parts of the planar filter one by one: poses given from outside, covariances that are inflated and mixed, limits of
 // states, rates without the steps of counts, states that come and go with the motion's kind, updates that are refused.
+#include <memory>
+
 #include "common/suite.h"
 #include "events.hpp"
 #include "filters/planar/past_pose.hpp"

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the defaults leave open: calibration states with priors by the kind of the motion and by the sensor's own sigma,
 // which keep these priors where the data cannot observe them.
+#include <string>
+#include <vector>
+
 #include "filters/core/sensor_slots.hpp"
 #include "motion/motion_kind.hpp"
 #include "motion/step.hpp"

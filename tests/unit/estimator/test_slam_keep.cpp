@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // A map that outlives a restart (waymark/keeper.h): kept with its joint covariance, taken up, refused where it is
 // wrong.
+#include <vector>
+
 #include "slam_room.hpp"
 #include "waymark/keeper.h"
 

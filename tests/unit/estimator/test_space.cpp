@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Rotations, kernels on a triangle, and the filter core in space against slow and plain references.
+#include <memory>
+
 #include "common/suite.h"
 #include "filters/relocalize/pose_consensus.hpp"
 #include "filters/stereo_ekf/space_filter.hpp"
@@ -328,9 +330,9 @@ TEST(test_a_block_with_too_many_columns_is_refused) {
 }
 
 // A scene turned and moved as a whole looks the same: no update may make the filter surer of such a motion. Nor of how
-// the camera is mounted, or when it looks, from pictures alone: the vehicle's pose makes up for either. With points that
-// are seen again and again and move by many corrections, these variances must stay what they were.
-TEST(test_what_pictures_alone_cannot_tell) {
+// the camera is mounted, or when it looks, from pictures alone: the vehicle's pose makes up for either. With points
+// that are seen again and again and move by many corrections, these variances must stay what they were.
+TEST(test_what_cannot_be_seen_is_not_learnt) {
   const auto nothing = static_cast<head_state>(-1);
   for (const head_state which : {nothing, kCameraRotation, kTimeOffset}) {
     const double sigma = which == kCameraRotation ? 0.02 : 0.05;

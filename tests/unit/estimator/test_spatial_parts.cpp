@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Motion in space, part by part: each axis' own plausibility, how long a twist holds and what is assumed then, the pose
 // some time ago, the noise of a step on each axis, and what a gyro that sticks has missed.
+#include <vector>
+
 #include "common/suite.h"
 #include "motion/spatial.hpp"
 #include "space_events.hpp"

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // stereo_ekf: focal lengths and the principal point of the pair as states.
+#include <vector>
+
 #include "stereo_scene.hpp"
 
 using namespace wm;

@@ -2,6 +2,7 @@
 // The own map of stereo_ekf: points that left the view are found again under another number by how they look, and the
 // map outlives a restart.
 #include <map>
+#include <vector>
 #include "stereo_scene.hpp"
 #include "waymark/keeper.h"
 

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Wide vectors and plain ones give the same bits: elementary functions of four at once, the particles' look-ups, and
 // edge_mcl and pf_edges whole, state by state.
+#include <memory>
+#include <vector>
+
 #include "waymark/vectors.h"
 
 #include "common/suite.h"

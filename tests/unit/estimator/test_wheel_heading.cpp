@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The heading by the wheels' counts beside that of the gyro: each finds the other's errors, a slip is not believed.
+#include <memory>
+#include <string>
+
 #include "common/suite.h"
 #include "events.hpp"
 #include "filters/planar/planar_filter.hpp"

@@ -3,6 +3,8 @@
 // that the tool writes are read again; windows are judged as OpenCV's CascadeClassifier judges them.
 #include <algorithm>
 #include <set>
+#include <string>
+#include <vector>
 
 #include "common/eyes.hpp"
 #include "common/fisheye_rig.hpp"

@@ -2,6 +2,7 @@
 // What makes false edges on a floor: lamps' reflections, joints of tiles, the mirror image of a skirting board; and
 // that the edge that is looked for is found among them, with its normal.
 #include <functional>
+#include <vector>
 
 #include "common/eyes.hpp"
 #include "common/fisheye_rig.hpp"

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The fast Hough transform against the sums it stands for, and its vectors against its scalar twin.
+#include <memory>
+
 #include "common/suite.h"
 #include "vision/edges_hough/hough.hpp"
 #include "waymark/random.h"

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Known landmarks in drawn fisheye pictures: found where they are, with the sigma that they have; not found where they
 // are hidden, changed, dark or elsewhere, and why.
+#include <vector>
+
 #include "common/eyes.hpp"
 #include "common/fisheye_rig.hpp"
 #include "vision/landmarks/params.h"

@@ -3,6 +3,8 @@
 // sigma that keeps its word; followed through turns; and what pictures that no camera takes make of it.
 #include <algorithm>
 #include <map>
+#include <memory>
+#include <vector>
 
 #include "common/eyes.hpp"
 #include "vision/lines/line_tracks.hpp"
@@ -192,8 +194,8 @@ TEST(bearings_are_the_sensors_own) {
     const size_t seen = look(100'000'000 * (k + 1));
     for (size_t i = 0; i < seen; i++) {
       size_t which = 0;
-      TEST_ASSERT_LESS_THAN_DOUBLE(0.1 * kDeg,
-                                   std::fabs(error_of(wall, lines->events[i].as.sighting.bearing_rad + 30 * kDeg, &which)));
+      TEST_ASSERT_LESS_THAN_DOUBLE(
+          0.1 * kDeg, std::fabs(error_of(wall, lines->events[i].as.sighting.bearing_rad + 30 * kDeg, &which)));
     }
   }
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Detector `mr` on drawn views: place and turn, and pictures that nobody means.
 #include <algorithm>
+#include <memory>
 
 #include "common/eyes.hpp"
 #include "common/marker_views.hpp"
@@ -13,8 +14,7 @@ namespace {
 using namespace wm::views;
 
 struct Machine : wm::drawn::marker_eyes {
-  explicit Machine(const wm_camera &c, double size_m = 0.27)
-      : marker_eyes(wm_detector_find("mr"), c, "mr", size_m) {}
+  explicit Machine(const wm_camera &c, double size_m = 0.27) : marker_eyes(wm_detector_find("mr"), c, "mr", size_m) {}
 };
 
 // The camera looks along its body's x axis, the print stands upright before it.
@@ -114,7 +114,8 @@ TEST(a_marker_twice_in_a_picture_is_given_twice) {
   TEST_ASSERT_EQUAL(2, machine.look(left));
   TEST_ASSERT_EQUAL(9, machine.events[0].as.marker.id);
   TEST_ASSERT_EQUAL(9, machine.events[1].as.marker.id);
-  TEST_ASSERT_DOUBLE_WITHIN(0.02, 1.0, std::fabs(machine.events[0].as.marker.p_m[1] - machine.events[1].as.marker.p_m[1]));
+  TEST_ASSERT_DOUBLE_WITHIN(0.02, 1.0,
+                            std::fabs(machine.events[0].as.marker.p_m[1] - machine.events[1].as.marker.p_m[1]));
 }
 
 TEST(capacity_is_kept) {
@@ -123,7 +124,8 @@ TEST(capacity_is_kept) {
   const std::vector<uint8_t> grey = take_picture(view, mr_ink(3));
   const wm_frame frame = frame_of(grey, view.camera);
   size_t count = 99;
-  TEST_ASSERT_EQUAL(WM_OK, machine.detector->detect(machine.state.get(), &frame, nullptr, machine.events.data(), 0, &count));
+  TEST_ASSERT_EQUAL(WM_OK,
+                    machine.detector->detect(machine.state.get(), &frame, nullptr, machine.events.data(), 0, &count));
   TEST_ASSERT_EQUAL(0, count);
 }
 

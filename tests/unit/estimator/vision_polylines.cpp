@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Pieces joined to polylines as the paper does: straight ones, bends, corners, branches, gaps; and a drawn arc of a
 // wall.
+#include <memory>
+#include <vector>
+
 #include "vision/edges_hough/polylines.hpp"
 
 #include "common/suite.h"

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // A robot in the plane with its estimator through the contract: what it is started with, what it sees from where it
-// truly is, and what the estimator says. One for all tests of estimators in the plane; drives and faults are each test's.
+// truly is, and what the estimator says. One for all tests of estimators in the plane; drives and faults are each
+// test's.
 #pragma once
+
+#include <vector>
 
 #include "common/suite.h"
 #include "events.hpp"
@@ -23,7 +26,18 @@ inline wm_landmark_ekf_params ekf_params;
 inline wm_sensor sensor;
 inline wm_landmark landmarks[kLandmarksMax];
 inline wm_setup setup;
-inline std::unique_ptr<void, void (*)(void *)> state(nullptr, std::free);
+// What the estimator remembers.
+struct remembered {
+  void *at = nullptr;
+  ~remembered() { std::free(at); }
+  void *get() const { return at; }
+  explicit operator bool() const { return at != nullptr; }
+  void reset(void *other = nullptr) {
+    std::free(at);
+    at = other;
+  }
+};
+inline remembered state;
 inline wm_innovation records[WM_INNOVATIONS_PER_EVENT_MAX];  // of the newest event
 inline size_t count;
 inline wm_random noise;
@@ -153,15 +167,15 @@ inline std::vector<wm_calibration_value> calibration() {
   return out;
 }
 // NaN: not listed.
-inline wm_calibration_value calibrated(const std::string &name) {
+inline wm_calibration_value calibrated(const char *name) {
   for (const wm_calibration_value &v : calibration())
-    if (name == v.name) return v;
+    if (std::strcmp(name, v.name) == 0) return v;
   wm_calibration_value none{};
   none.value = none.sigma = kAbsent;
   return none;
 }
-inline double value_of(const std::string &name) { return calibrated(name).value; }
-inline double sigma_of(const std::string &name) { return calibrated(name).sigma; }
+inline double value_of(const char *name) { return calibrated(name).value; }
+inline double sigma_of(const char *name) { return calibrated(name).sigma; }
 // Count -1: not listed.
 inline wm_counter counter(wm_counter_kind kind) {
   wm_counter counters[WM_HEALTH_COUNTERS_MAX];

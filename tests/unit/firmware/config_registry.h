@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#ifndef WM_TEST_CONFIG_REGISTRY_H
-#define WM_TEST_CONFIG_REGISTRY_H
+#pragma once
 
 #include "waymark/estimator.h"
 
@@ -13,5 +12,3 @@ typedef struct registry_params {
   double yaw_sigma_rad;
   int32_t slots, on, model;
 } registry_params;
-
-#endif

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A small event log in memory, written by our writer.
-#ifndef WAYMARK_TESTS_LOG_FIXTURE_H
-#define WAYMARK_TESTS_LOG_FIXTURE_H
+#pragma once
 
 #include <math.h>
 #include <stdio.h>
@@ -90,5 +89,3 @@ static inline uint8_t *fixture_log(uint32_t events, uint64_t gap_after, size_t *
   (void)unlink(path);
   return bytes;
 }
-
-#endif

@@ -8,11 +8,21 @@ static wm_health health;
 static wm_findings found;
 static wm_said said;
 static char log_text[4000];
+static drive_evidence evidence;
+static wm_config config;
+static wm_assembly assembly;
 
 void setUp(void) {
   memset(&health, 0, sizeof health);
   memset(&found, 0, sizeof found);
   memset(&said, 0, sizeof said);
+  memset(&evidence, 0, sizeof evidence);
+  memset(&config, 0, sizeof config);
+  memset(&assembly, 0, sizeof assembly);
+  assembly.config = &config;
+  assembly.source_count = 1;
+  assembly.setup.start.p_m[0] = (double)NAN;
+  (void)snprintf(assembly.sources[0].name, sizeof assembly.sources[0].name, "eye");
   log_text[0] = '\0';
   health.state = WM_STATE_TRACKING;
   health.source_count = 1;
@@ -25,6 +35,8 @@ void setUp(void) {
   s->lateness_p99_ns = 20 * WM_NS_PER_MS;
   s->lateness_worst_ns = 30 * WM_NS_PER_MS;
 }
+
+static void judge(uint64_t messages) { evidence_judge(&evidence, &assembly, &health, messages, &found); }
 
 #define EYE (&health.sources[0])
 static void late(void) { EYE->late = 5; }
@@ -108,17 +120,10 @@ TEST(each_broken_health_makes_its_finding_alone) {
 
 // A thousand updates of this residual, 10 m, each this many of its sigmas (0.1 m) off and the mean of them, too.
 static void drive_of(int residual, double sigmas, double mean_sigmas, wm_verdict verdict) {
-  static drive_evidence evidence;
-  static wm_config config;
   static double positions[32];
   wm_params_defaults(&wm_position_params_table, positions);
   config.positions = (void *)positions;
-  static wm_assembly assembly;
   memset(&evidence, 0, sizeof evidence);
-  assembly.config = &config;
-  assembly.source_count = 1;
-  assembly.setup.start.p_m[0] = (double)NAN;
-  (void)snprintf(assembly.sources[0].name, sizeof assembly.sources[0].name, "eye");
   for (int i = 0; i < 1000; i++) {
     const wm_innovation in = {.residual = (uint8_t)residual,
                               .expected = 10,
@@ -128,7 +133,7 @@ static void drive_of(int residual, double sigmas, double mean_sigmas, wm_verdict
                               .verdict = (uint8_t)verdict};
     evidence_put(&evidence, WM_OUTPUT_INNOVATION, &in);
   }
-  evidence_judge(&evidence, &assembly, &health, 0, &found);
+  judge(0);
 }
 
 static void drive_with_mean(double sigmas, double mean_sigmas, wm_verdict verdict) {
@@ -173,22 +178,15 @@ TEST(positions_are_judged_by_what_was_stated) {
 
 // A hundred messages of a drive in this state and for this reason.
 static void drive_in(wm_state state, wm_cause cause, int source, uint64_t fused) {
-  static drive_evidence evidence;
-  static wm_config config;
-  static wm_assembly assembly;
   static const wm_estimator kSeeing = {.takes = WM_EVENT_BIT(WM_EVENT_SIGHTING)};
   wm_published message = {.now = {.state = (uint8_t)state, .cause = (uint8_t)cause, .cause_source = (int8_t)source}};
   memset(&evidence, 0, sizeof evidence);
   memset(&found, 0, sizeof found);
   config.estimator = &kSeeing;
-  assembly.config = &config;
-  assembly.source_count = 1;
   assembly.sources[0].kinds = WM_EVENT_BIT(WM_EVENT_SIGHTING);
-  assembly.setup.start.p_m[0] = (double)NAN;
-  (void)snprintf(assembly.sources[0].name, sizeof assembly.sources[0].name, "eye");
   evidence.fused = fused;
   for (int i = 0; i < 100; i++) evidence_put(&evidence, WM_OUTPUT_PUBLISHED, &message);
-  evidence_judge(&evidence, &assembly, &health, 100, &found);
+  judge(100);
 }
 
 TEST(the_cause_of_a_lost_or_degraded_drive_is_named) {
@@ -253,16 +251,12 @@ TEST(motion_that_no_robot_can_do_is_found) {
     wm_severity severity;
   } kCases[] = {{19, 0, 0}, {100, 1, WM_SEVERITY_NOTE}, {253, 1, WM_SEVERITY_BAD}};
   for (size_t i = 0; i < sizeof kCases / sizeof kCases[0]; i++) {
-    static drive_evidence evidence;
-    static wm_config config;
-    static wm_assembly assembly = {.source_count = 1, .sources[0].kinds = WM_EVENT_BIT(WM_EVENT_TWIST2)};
-    assembly.config = &config;
-    assembly.setup.start.p_m[0] = (double)NAN;
     setUp();
+    assembly.sources[0].kinds = WM_EVENT_BIT(WM_EVENT_TWIST2);
     EYE->received = 10000;
     counter(WM_COUNTER_MOTION_OUTLIERS);
     health.counters[0].count = kCases[i].count;
-    evidence_judge(&evidence, &assembly, &health, 0, &found);
+    judge(0);
     TEST_ASSERT_EQUAL(kCases[i].findings, found.count);
     if (found.count > 0) TEST_ASSERT_EQUAL(kCases[i].severity, found.at[0].severity);
   }
@@ -283,18 +277,15 @@ TEST(no_lateness_is_advised_that_no_transport_has) {
 
 // A start that is given is not asked for.
 TEST(a_start_that_is_given_is_not_asked_for) {
-  static drive_evidence evidence;
-  static wm_config config;
-  static wm_assembly assembly;
-  assembly.config = &config;
-  evidence_judge(&evidence, &assembly, &health, 100, &found);  // at (0, 0), heading 0
+  assembly.source_count = 0;
+  assembly.setup.start.p_m[0] = 0;
+  judge(100);  // at (0, 0), heading 0
   TEST_ASSERT_TRUE(wm_findings_has(&found, WM_FOUND_POSE_NOT_FOUND, "drive"));
   TEST_ASSERT_NULL_MESSAGE(strstr(found.at[0].fix, "give x_m"), found.at[0].fix);
 }
 
 // An hour without a datum, which a replay skips, is no time without a pose.
 TEST(a_silence_that_is_skipped_is_not_due) {
-  static drive_evidence evidence;
   for (int i = 0; i <= 200; i++) {
     const wm_event event = {.t_ns = i * 100 * WM_NS_PER_MS + (i > 100 ? 3600 * WM_NS_PER_S : 0)};
     evidence_put(&evidence, WM_OUTPUT_EVENT, &event);
@@ -304,10 +295,8 @@ TEST(a_silence_that_is_skipped_is_not_due) {
 
 // A scale within 1.8 is a note, unless the estimator has an alarm about it: also one behind the first values.
 TEST(a_scale_with_an_alarm_is_bad) {
-  static drive_evidence evidence;
-  static wm_config config;
   static const wm_estimator kAny = {.name = "landmark_ekf"};
-  const wm_assembly assembly = {.config = &config, .setup.start.p_m[0] = (double)NAN};
+  assembly.source_count = 0;
   config.estimator = &kAny;
   for (int i = 0; i < 4; i++) {
     memset(&health, 0, sizeof health);
@@ -319,7 +308,7 @@ TEST(a_scale_with_an_alarm_is_bad) {
         (wm_calibration_value){.name = "motion.left_scale", .value = 1.25, .sigma = 0.003};
     health.alarm_count = 1;
     health.alarms[0] = (wm_alarm){i % 2 ? WM_ALARM_STATED : WM_ALARM_NOISE, (int32_t)at, 1.25};
-    evidence_judge(&evidence, &assembly, &health, 0, &found);
+    judge(0);
     TEST_ASSERT_EQUAL(1, found.count);
     TEST_ASSERT_EQUAL(WM_FOUND_CALIBRATION_OFF, found.at[0].id);
     TEST_ASSERT_EQUAL(i % 2 ? WM_SEVERITY_BAD : WM_SEVERITY_NOTE, found.at[0].severity);
@@ -331,8 +320,6 @@ TEST(a_map_that_is_named_and_not_read_is_found) {
   static const char *const kUses[] = {"none", "extend", NULL};
   static const wm_param kMap = {.key = "landmarks.map", .type = WM_PARAM_ENUM, .names = kUses};
   static const wm_estimator kMapping = {.name = "slam", .params = {&kMap, 1, sizeof(int32_t), NULL}};
-  static drive_evidence evidence;
-  static wm_config config;
   const struct {
     const char *named;
     int32_t use;
@@ -340,12 +327,12 @@ TEST(a_map_that_is_named_and_not_read_is_found) {
   } kCases[] = {{"hall.csv", 0, 1}, {"hall.csv", 1, 0}, {"", 0, 0}};
   for (size_t i = 0; i < sizeof kCases / sizeof kCases[0]; i++) {
     int32_t use = kCases[i].use;
-    wm_assembly assembly = {.config = &config, .setup.start.p_m[0] = (double)NAN};
+    assembly.source_count = 0;
     memset(&found, 0, sizeof found);
     config.estimator = &kMapping;
     config.estimator_params = &use;
     (void)snprintf(config.overrides.landmarks, sizeof config.overrides.landmarks, "%s", kCases[i].named);
-    evidence_judge(&evidence, &assembly, &health, 0, &found);
+    judge(0);
     TEST_ASSERT_EQUAL(kCases[i].findings, found.count);
     TEST_ASSERT_EQUAL(kCases[i].findings, wm_findings_has(&found, WM_FOUND_DATA_UNUSED, "landmarks"));
   }
@@ -398,7 +385,6 @@ TEST(every_kind_has_its_words) {
 
 // A receiver's sigma of 30 m: the density of a position that fits is below that of an outlier over 50 m.
 static double score_of(double off_m) {
-  static drive_evidence evidence;
   memset(&evidence, 0, sizeof evidence);
   const wm_innovation in = {
       .residual = WM_RESIDUAL_X, .verdict = WM_FUSED, .landmark_id = -1, .observed = off_m, .variance = 900};

@@ -25,10 +25,14 @@ static void put(void *context, wm_output_kind kind, const void *record, size_t b
   strncat(said, word, sizeof said - strlen(said) - 1);
 }
 
+static void begin(const wm_estimator *estimator, void (*to)(void *, wm_output_kind, const void *, size_t)) {
+  wm_fuser_init(&fuser, estimator, &state, wm_driving_choose(WM_EVENT_BIT(WM_EVENT_TWIST2), 0), (wm_output){to, NULL});
+}
+
 void setUp(void) {
   said[0] = '\0';
   (void)tiny_init(&state, NULL, NULL);
-  wm_fuser_init(&fuser, &kTiny, &state, wm_driving_choose(WM_EVENT_BIT(WM_EVENT_TWIST2), 0), (wm_output){put, NULL});
+  begin(&kTiny, put);
 }
 
 static void twist(wm_time_ns ms, double v) {
@@ -131,7 +135,7 @@ TEST(health_holds_no_more_values_than_it_has_room_for) {
   generous.calibration = many_values;
   generous.counters = many_counters;
   generous.alarms = many_alarms;
-  wm_fuser_init(&fuser, &generous, &state, wm_driving_choose(WM_EVENT_BIT(WM_EVENT_TWIST2), 0), (wm_output){put, NULL});
+  begin(&generous, put);
   twist(10, 1);
   wm_fuser_health(&fuser, &health);
   TEST_ASSERT_EQUAL(WM_HEALTH_CALIBRATION_MAX, health.calibration_count);
@@ -158,7 +162,7 @@ TEST(health_has_what_the_estimate_has) {
   static wm_health health;
   wm_estimator doubting = kTiny;
   doubting.estimate = doubtful;
-  wm_fuser_init(&fuser, &doubting, &state, wm_driving_choose(WM_EVENT_BIT(WM_EVENT_TWIST2), 0), (wm_output){put, NULL});
+  begin(&doubting, put);
   twist(10, 1);
   wm_fuser_health(&fuser, &health);
   TEST_ASSERT_EQUAL(WM_STATE_LOST, health.state);
@@ -222,7 +226,7 @@ static wm_bound bound_after(wm_time_ns until_ms) {
   watched.correct = fits;
   watched.hypotheses = other_places;
   setUp();
-  wm_fuser_init(&fuser, &watched, &state, wm_driving_choose(WM_EVENT_BIT(WM_EVENT_TWIST2), 0), (wm_output){put, NULL});
+  begin(&watched, put);
   wm_fuser_watch(&fuser, &(wm_setup){0}, 1u << 1);
   for (wm_time_ns ms = 0; ms < until_ms; ms += 100) {
     twist(ms, 0);
@@ -301,8 +305,7 @@ TEST(clouds_are_written_once_a_second) {
   wm_estimator clouds = kTiny;
   clouds.correct = take_points;
   clouds.particles = some_particles;
-  wm_fuser_init(&fuser, &clouds, &state, wm_driving_choose(WM_EVENT_BIT(WM_EVENT_TWIST2), 0),
-                (wm_output){put_cloud, NULL});
+  begin(&clouds, put_cloud);
   particle_count = 3;
   points(0);
   points(999);
@@ -324,16 +327,14 @@ TEST(hypotheses_come_in_sets) {
   clouds.correct = take_points;
   clouds.particles = some_particles;
   clouds.hypotheses = some_hypotheses;
-  wm_fuser_init(&fuser, &clouds, &state, wm_driving_choose(WM_EVENT_BIT(WM_EVENT_TWIST2), 0),
-                (wm_output){put_cloud, NULL});
+  begin(&clouds, put_cloud);
   particle_count = 0;
   const size_t most = sizeof fuser.listed / sizeof fuser.listed[0];
   hypothesis_count = WM_HYPOTHESES_MAX + 50, hypotheses_seen = 0;
   points(0);
   TEST_ASSERT_EQUAL_STRING("C0:0/0 H0:100 H0:50 ", said);
   said[0] = '\0';
-  wm_fuser_init(&fuser, &clouds, &state, wm_driving_choose(WM_EVENT_BIT(WM_EVENT_TWIST2), 0),
-                (wm_output){put_cloud, NULL});
+  begin(&clouds, put_cloud);
   hypothesis_count = most + 100, hypotheses_seen = 0;
   points(0);
   char expected[4096] = "C0:0/0 ";

@@ -114,6 +114,11 @@ static void expect(wm_status status) {
   TEST_ASSERT_EQUAL_MESSAGE(status, got, source->counts.first_problem);
 }
 
+static void now(const char *members, wm_status status) {
+  report(utc_ns(), members);
+  expect(status);
+}
+
 static void expect_state(unsigned state, const char *note) {
   TEST_ASSERT_EQUAL_MESSAGE(state, source->counts.device, source->counts.device_note);
   TEST_ASSERT_NOT_NULL_MESSAGE(strstr(source->counts.device_note, note), source->counts.device_note);
@@ -129,8 +134,7 @@ TEST(a_position_is_in_the_map) {
   begin_connected();
   say("{\"class\":\"VERSION\",\"release\":\"3.22\"}\r\n{\"class\":\"DEVICES\",\"devices\":[{\"class\":\"DEVICE\"}]}"
       "\r\n");
-  report(utc_ns(), FIX);
-  expect(WM_OK);
+  now(FIX, WM_OK);
   TEST_ASSERT_EQUAL(WM_EVENT_POSITION, event.kind);
   TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0, event.as.position.p_m[0]);
   TEST_ASSERT_DOUBLE_WITHIN(0.01, 11.12, event.as.position.p_m[1]);
@@ -157,8 +161,7 @@ TEST(sigmas_follow_the_fix) {
   config.accuracy_scale = 2;
   begin_connected();
   for (size_t i = 0; i < sizeof kFixes / sizeof kFixes[0]; i++) {
-    report(utc_ns(), kFixes[i].members);
-    expect(WM_OK);
+    now(kFixes[i].members, WM_OK);
     TEST_ASSERT_DOUBLE_WITHIN(1e-12, kFixes[i].sigma_m, event.as.position.sigma_xy_m);
     TEST_ASSERT_DOUBLE_IS_NAN(event.as.position.p_m[2]);
     TEST_ASSERT_DOUBLE_IS_NAN(event.as.position.sigma_z_m);
@@ -177,15 +180,12 @@ static void deviations(const char *lat_m) {
 TEST(a_receivers_deviations_are_of_its_fix) {
   config.accuracy_scale = 0.2;  // of gpsd's estimates alone
   begin_connected();
-  report(utc_ns(), "\"mode\":3,\"status\":3," PLACE);
-  expect(WM_OK);
+  now("\"mode\":3,\"status\":3," PLACE, WM_OK);
   deviations("0.02");
-  report(utc_ns(), "\"mode\":3,\"status\":3," PLACE);
-  expect(WM_OK);
+  now("\"mode\":3,\"status\":3," PLACE, WM_OK);
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.02, event.as.position.sigma_xy_m);
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.03, event.as.position.sigma_z_m);
-  report(utc_ns(), "\"mode\":3,\"status\":1,\"lat\":48,\"lon\":11");
-  expect(WM_OK);
+  now("\"mode\":3,\"status\":1,\"lat\":48,\"lon\":11", WM_OK);
   TEST_ASSERT_EQUAL_DOUBLE(5, event.as.position.sigma_xy_m);
 }
 
@@ -193,13 +193,10 @@ TEST(a_receivers_deviations_are_of_its_fix) {
 TEST(deviations_before_the_first_fix_are_of_it) {
   begin_connected();
   deviations("0.02");
-  report(utc_ns(), "\"mode\":3,\"status\":3," PLACE);
-  expect(WM_OK);
+  now("\"mode\":3,\"status\":3," PLACE, WM_OK);
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.02, event.as.position.sigma_xy_m);
-  report(utc_ns(), "\"mode\":0");
-  expect(WM_AGAIN);
-  report(utc_ns(), "\"mode\":3,\"status\":1,\"lat\":48,\"lon\":11");
-  expect(WM_OK);
+  now("\"mode\":0", WM_AGAIN);
+  now("\"mode\":3,\"status\":1,\"lat\":48,\"lon\":11", WM_OK);
   TEST_ASSERT_EQUAL_DOUBLE(5, event.as.position.sigma_xy_m);
 }
 
@@ -208,8 +205,7 @@ TEST(a_course_is_a_heading) {
   begin_connected();
   report(utc_ns(), FIX ",\"speed\":0.5,\"track\":90");  // too slow
   expect(WM_AGAIN);
-  report(utc_ns(), FIX ",\"speed\":2,\"track\":90");
-  expect(WM_OK);
+  now(FIX ",\"speed\":2,\"track\":90", WM_OK);
   TEST_ASSERT_EQUAL(WM_EVENT_HEADING, event.kind);
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0, event.as.heading.heading_rad);
   TEST_ASSERT_DOUBLE_WITHIN(1e-3, 0.05, event.as.heading.sigma_rad);
@@ -241,8 +237,7 @@ TEST(the_course_is_the_antennas) {
 TEST(antennas_give_a_heading) {
   config.from = WM_GPSD_ANTENNAS;
   begin_connected();
-  report(utc_ns(), FIX ",\"speed\":2,\"track\":90");
-  expect(WM_AGAIN);
+  now(FIX ",\"speed\":2,\"track\":90", WM_AGAIN);
   say("{\"class\":\"ATT\",\"heading\":180.0}\r\n");
   expect(WM_OK);
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, -M_PI_2, event.as.heading.heading_rad);
@@ -258,10 +253,8 @@ TEST(without_a_fix_nothing_is_fused) {
                                       "\"mode\":3,\"lat\":1e400,\"lon\":0"};
   begin_connected();
   for (size_t i = 0; i < sizeof kNone / sizeof kNone[0]; i++) {
-    report(utc_ns(), FIX);
-    expect(WM_OK);
-    report(utc_ns(), kNone[i]);
-    expect(WM_AGAIN);
+    now(FIX, WM_OK);
+    now(kNone[i], WM_AGAIN);
     expect_state(WM_DEVICE_DOWN, "no fix");
   }
   TEST_ASSERT_EQUAL_UINT64(6, source->counts.ignored);
@@ -270,13 +263,10 @@ TEST(without_a_fix_nothing_is_fused) {
 // A receiver for time sends its stored place with status 7, and again without a status.
 TEST(a_stored_place_is_no_fix) {
   begin_connected();
-  report(utc_ns(), "\"mode\":3,\"status\":7," PLACE);
-  expect(WM_AGAIN);
+  now("\"mode\":3,\"status\":7," PLACE, WM_AGAIN);
   expect_state(WM_DEVICE_DOWN, "a stored place");
-  report(utc_ns(), "\"mode\":3," PLACE);
-  expect(WM_AGAIN);
-  report(utc_ns(), FIX);
-  expect(WM_OK);
+  now("\"mode\":3," PLACE, WM_AGAIN);
+  now(FIX, WM_OK);
 }
 
 TEST(reports_of_one_epoch_are_one_row) {
@@ -287,8 +277,7 @@ TEST(reports_of_one_epoch_are_one_row) {
   report(t_ns, FIX ",\"speed\":1");
   expect(WM_AGAIN);
   TEST_ASSERT_EQUAL_UINT64(1, source->counts.ignored);
-  report(utc_ns(), FIX);
-  expect(WM_OK);
+  now(FIX, WM_OK);
 }
 
 TEST(rubbish_is_counted) {
@@ -312,8 +301,7 @@ TEST(rubbish_is_counted) {
 
 TEST(an_accuracy_that_cannot_be_is_refused) {
   begin_connected();
-  report(utc_ns(), "\"mode\":3,\"lat\":48,\"lon\":11,\"eph\":1e9");
-  expect(WM_AGAIN);
+  now("\"mode\":3,\"lat\":48,\"lon\":11,\"eph\":1e9", WM_AGAIN);
   TEST_ASSERT_EQUAL_UINT64(1, source->counts.not_finite);
 }
 
@@ -367,28 +355,24 @@ TEST(absent_and_back) {
   expect_state(WM_DEVICE_ABSENT, "no gpsd answers at 127.0.0.1:");
   listen_again();
   welcome();
-  report(utc_ns(), FIX);
-  expect(WM_OK);
+  now(FIX, WM_OK);
   hang_up();
   wait_for(WM_DEVICE_ABSENT);
   listen_again();
   welcome();
-  report(utc_ns(), FIX);
-  expect(WM_OK);
+  now(FIX, WM_OK);
   expect_state(WM_DEVICE_WORKS, "fix");
 }
 
 TEST(unplugged_silent_and_back) {
   begin_connected();
-  report(utc_ns(), FIX);
-  expect(WM_OK);
+  now(FIX, WM_OK);
   wait_for(WM_DEVICE_STALLED);
   expect_state(WM_DEVICE_STALLED, "is its receiver plugged in?");
   say("{\"class\":\"DEVICE\",\"path\":\"/dev/ttyACM0\",\"activated\":0}\r\n");
   expect(WM_AGAIN);
   expect_state(WM_DEVICE_DOWN, "its receiver was unplugged");
-  report(utc_ns(), FIX);
-  expect(WM_OK);
+  now(FIX, WM_OK);
   expect_state(WM_DEVICE_WORKS, "fix");
   say("{\"class\":\"ERROR\",\"message\":\"no such device\"}\r\n");
   expect(WM_AGAIN);

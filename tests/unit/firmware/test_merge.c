@@ -9,8 +9,6 @@ static _Alignas(64) uint8_t memory[1 << 21];
 static wm_merge *merge;
 static uint32_t next_seq;
 
-void setUp(void) { next_seq = 0; }
-
 static const wm_merge_source kMotion = {.rank = 0, .is_motion = 1, .in_order = 1, .lateness_max_ns = 150 * MS};
 static const wm_merge_source kCamera = {.rank = 1, .in_order = 1, .lateness_max_ns = 150 * MS};
 
@@ -19,6 +17,11 @@ static void open_merge(const wm_merge_source *sources, size_t count) {
   TEST_ASSERT_LESS_OR_EQUAL(sizeof memory, wm_merge_bytes(count, QUEUE, slot));
   memset(memory, 0xA5, sizeof memory);  // it may hold anything
   merge = wm_merge_init(memory, sources, count, QUEUE, slot, 300 * MS);
+}
+
+void setUp(void) {
+  next_seq = 0;
+  open_merge((wm_merge_source[]){kMotion, kCamera}, 2);
 }
 
 static wm_merge_verdict arrive(int source, wm_time_ns t_ns, wm_time_ns arrival_ns) {
@@ -46,7 +49,6 @@ static const char *final_ms(void) {
 }
 
 TEST(nothing_is_handed_out_before_the_others_have_spoken_past_it) {
-  open_merge((wm_merge_source[]){kMotion, kCamera}, 2);
   arrive(0, 0, 0);
   arrive(0, 10 * MS, 10 * MS);
   TEST_ASSERT_EQUAL_STRING("", final_ms());
@@ -76,7 +78,6 @@ TEST(newest_first_and_distinct_stamps_are_counted) {
 }
 
 TEST(p99_of_the_lateness) {
-  open_merge((wm_merge_source[]){kMotion, kCamera}, 2);
   for (int i = 0; i < 99; i++) arrive(1, i * 10 * MS, i * 10 * MS + 5 * MS);
   arrive(1, 990 * MS, 1040 * MS);
   TEST_ASSERT_EQUAL_INT64(6 * MS, wm_merge_lateness_p99(merge, 1));  // 99 of 100 are below
@@ -105,7 +106,6 @@ TEST(motion_comes_first_then_the_rank_then_the_file) {
   TEST_ASSERT_EQUAL_STRING("5/2 5/1 5/0 5/0", final_ms());
 }
 
-// The number of an event within its source has 32 bits: at 1 kHz it wraps after 50 days.
 // Two cameras of one rank whose rows have the same stamps and numbers, the one or the other first.
 TEST(of_equal_ranks_the_lower_source_comes_first) {
   for (int first = 1; first <= 2; first++) {
@@ -121,8 +121,8 @@ TEST(of_equal_ranks_the_lower_source_comes_first) {
   }
 }
 
+// The number of an event within its source has 32 bits: at 1 kHz it wraps after 50 days.
 TEST(the_numbers_of_events_wrap) {
-  open_merge((wm_merge_source[]){kMotion, kCamera}, 2);
   next_seq = UINT32_MAX - 3;
   for (int i = 0; i < 4; i++) TEST_ASSERT_EQUAL(WM_MERGE_TAKEN, arrive(i % 2, (10 + i) * MS, (10 + i) * MS));
   TEST_ASSERT_EQUAL_UINT32(0, next_seq);
@@ -133,7 +133,6 @@ TEST(the_numbers_of_events_wrap) {
 
 // Events with one stamp stay as they were numbered, also where their numbers wrap between them.
 TEST(events_of_one_stamp_keep_their_order_where_numbers_wrap) {
-  open_merge((wm_merge_source[]){kMotion, kCamera}, 2);
   next_seq = UINT32_MAX - 2;
   for (int i = 0; i < 6; i++) TEST_ASSERT_EQUAL(WM_MERGE_TAKEN, arrive(1, 10 * MS, 10 * MS));
   wm_merge_flush(merge);
@@ -146,7 +145,6 @@ TEST(events_of_one_stamp_keep_their_order_where_numbers_wrap) {
 }
 
 TEST(a_silent_source_costs_its_lateness_and_its_first_datum_after_that_is_fused) {
-  open_merge((wm_merge_source[]){kMotion, kCamera}, 2);
   for (int i = 0; i <= 100; i++) arrive(0, i * 10 * MS, i * 10 * MS);
   TEST_ASSERT_EQUAL_INT64(850 * MS, wm_merge_watermark(merge));  // now - 150 ms
   (void)final_ms();
@@ -158,7 +156,6 @@ TEST(a_silent_source_costs_its_lateness_and_its_first_datum_after_that_is_fused)
 }
 
 TEST(what_is_late_is_counted_and_dropped) {
-  open_merge((wm_merge_source[]){kMotion, kCamera}, 2);
   for (int i = 0; i <= 100; i++) arrive(0, i * 10 * MS, i * 10 * MS);
   TEST_ASSERT_EQUAL(WM_MERGE_LATE, arrive(1, 849 * MS, 1000 * MS));
   TEST_ASSERT_EQUAL(WM_MERGE_TAKEN, arrive(1, 850 * MS, 1000 * MS));  // exactly lateness_max is in time
@@ -274,7 +271,6 @@ TEST(stamps_from_the_future_and_absurd_ones_are_refused) {
 }
 
 TEST(a_source_that_fell_silent_is_stale_against_its_own_rate) {
-  open_merge((wm_merge_source[]){kMotion, kCamera}, 2);
   for (int i = 0; i <= 100; i++) arrive(0, i * 10 * MS, i * 10 * MS);
   TEST_ASSERT_EQUAL(0, wm_merge_is_stale(merge, 0, 1900 * MS));
   TEST_ASSERT_EQUAL(1, wm_merge_is_stale(merge, 0, 2001 * MS));
@@ -283,7 +279,6 @@ TEST(a_source_that_fell_silent_is_stale_against_its_own_rate) {
 
 // A source without any datum is silent since the run's clock began, whatever time that is.
 TEST(a_source_without_data_is_silent_since_the_start) {
-  open_merge((wm_merge_source[]){kMotion, kCamera}, 2);
   TEST_ASSERT_EQUAL_INT64(0, wm_merge_silent_ns(merge, 1, 3600 * WM_NS_PER_S));  // no clock yet
   for (int i = 0; i < 10; i++) arrive(0, 3600 * WM_NS_PER_S + i * 10 * MS, 3600 * WM_NS_PER_S + i * 10 * MS);
   TEST_ASSERT_EQUAL_INT64(900 * MS, wm_merge_silent_ns(merge, 1, 3600 * WM_NS_PER_S + 900 * MS));

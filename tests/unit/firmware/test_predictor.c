@@ -10,6 +10,7 @@ static const wm_motion_calibration kNeutral = {{1, 1, 0, 1, 1, 1, 0, 0, 0}};
 static wm_predictor predictor;
 static wm_odometry *odometry;
 static wm_motion_params *motion;
+static wm_published p;
 
 void setUp(void) {
   wm_wheels wheels;
@@ -27,6 +28,9 @@ void tearDown(void) {
   free(motion);
 }
 
+// Makes `p` what is published at this time.
+static int publish(wm_time_ns ms) { return wm_predictor_publish(&predictor, ms * MS, &p); }
+
 static void move(wm_time_ns ms, double v, double w) {
   wm_event e = {.t_ns = ms * MS, .arrival_ns = ms * MS, .kind = WM_EVENT_TWIST2};
   e.as.twist2 = (wm_twist2){v, w};
@@ -41,11 +45,10 @@ static void fuse(wm_time_ns ms, double x, double y, double heading, uint32_t res
 }
 
 TEST(it_carries_the_fused_pose_to_now) {
-  wm_published p;
   TEST_ASSERT_EQUAL(0, wm_predictor_publish(&predictor, 0, &p));  // nothing known yet
   for (int ms = 0; ms <= 200; ms += 10) move(ms, 1, 0);
   fuse(100, 5, 2, M_PI / 2, 0);
-  TEST_ASSERT_EQUAL(1, wm_predictor_publish(&predictor, 220 * MS, &p));
+  TEST_ASSERT_EQUAL(1, publish(220));
   TEST_ASSERT_EQUAL_INT64(220 * MS, p.now.t_ns);
   TEST_ASSERT_EQUAL_INT64(100 * MS, p.fused_until_ns);
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 5, p.now.pose_map_base.p_m[0]);
@@ -58,7 +61,6 @@ TEST(it_carries_the_fused_pose_to_now) {
 // A speed that comes 100 ms later than a gyro's rates, as over a slow bus, holds from when it comes; a row of its own
 // past is refused.
 TEST(data_that_are_later_than_another_sensor_s_count) {
-  wm_published p;
   for (int ms = 0; ms <= 1000; ms += 10) {
     wm_event gyro = {.t_ns = ms * MS, .arrival_ns = ms * MS, .kind = WM_EVENT_QUANTITIES, .source = 1};
     gyro.as.quantities = (wm_quantities){.count = 1, .id = {WM_Q_YAW_RATE}, .value = {0.5}};
@@ -67,25 +69,23 @@ TEST(data_that_are_later_than_another_sensor_s_count) {
   }
   TEST_ASSERT_EQUAL_UINT64(0, predictor.odometry_refused);
   fuse(900, 0, 0, 0, 0);
-  TEST_ASSERT_EQUAL(1, wm_predictor_publish(&predictor, 1000 * MS, &p));
+  TEST_ASSERT_EQUAL(1, publish(1000));
   TEST_ASSERT_DOUBLE_WITHIN(0.002, 0.1, p.now.pose_map_base.p_m[0]);
   move(400, 5, 0);
   TEST_ASSERT_EQUAL_UINT64(1, predictor.odometry_refused);
 }
 
 TEST(stamps_rise_strictly) {
-  wm_published p;
   move(0, 1, 0);
   fuse(0, 0, 0, 0, 0);
-  TEST_ASSERT_EQUAL(1, wm_predictor_publish(&predictor, 20 * MS, &p));
-  TEST_ASSERT_EQUAL(0, wm_predictor_publish(&predictor, 20 * MS, &p));
-  TEST_ASSERT_EQUAL(0, wm_predictor_publish(&predictor, 10 * MS, &p));
-  TEST_ASSERT_EQUAL(1, wm_predictor_publish(&predictor, 21 * MS, &p));
+  TEST_ASSERT_EQUAL(1, publish(20));
+  TEST_ASSERT_EQUAL(0, publish(20));
+  TEST_ASSERT_EQUAL(0, publish(10));
+  TEST_ASSERT_EQUAL(1, publish(21));
 }
 
 // The map is turned against odom: a fast drive along a curve is no jump, and a jump has its true size.
 TEST(odom_is_turned_into_the_map) {
-  wm_published p;
   const double turns[] = {0.4, 2.0, -1.2, M_PI};
   for (size_t i = 0; i < sizeof turns / sizeof turns[0]; i++) {
     tearDown();
@@ -93,13 +93,13 @@ TEST(odom_is_turned_into_the_map) {
     for (int ms = 0; ms <= 400; ms += 10) move(ms, 10, 1.5);
     fuse(0, 5, -3, turns[i], 0);
     for (int ms = 20; ms <= 400; ms += 20) {
-      TEST_ASSERT_EQUAL(1, wm_predictor_publish(&predictor, ms * MS, &p));
+      TEST_ASSERT_EQUAL(1, publish(ms));
       TEST_ASSERT_EQUAL_HEX32(0, p.status_flags & WM_PUB_JUMPED);
     }
     TEST_ASSERT_EQUAL_UINT32(0, p.jumps);
     const wm_pose3 at = p.now.pose_map_base;
     fuse(400, at.p_m[0] + 0.3, at.p_m[1] - 0.4, p.now.heading_rad, 0);
-    TEST_ASSERT_EQUAL(1, wm_predictor_publish(&predictor, 410 * MS, &p));
+    TEST_ASSERT_EQUAL(1, publish(410));
     TEST_ASSERT_EQUAL_UINT32(1, p.jumps);
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.5, p.last_jump_m);
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0, p.last_jump_rad);
@@ -122,27 +122,26 @@ TEST(a_jump_is_measured_by_the_estimators_own_algebra) {
 }
 
 TEST(a_move_of_map_against_odom_is_announced_once) {
-  wm_published p;
   for (int ms = 0; ms <= 100; ms += 10) move(ms, 1, 0.5);
   fuse(50, 0, 0, 0.3, 0);
-  TEST_ASSERT_EQUAL(1, wm_predictor_publish(&predictor, 100 * MS, &p));
+  TEST_ASSERT_EQUAL(1, publish(100));
   TEST_ASSERT_EQUAL_UINT32(0, p.jumps);  // the first message is no jump
   fuse(51, 0.001, 0, 0.3005, 0);
-  TEST_ASSERT_EQUAL(1, wm_predictor_publish(&predictor, 120 * MS, &p));
+  TEST_ASSERT_EQUAL(1, publish(120));
   TEST_ASSERT_EQUAL_UINT32(0, p.jumps);  // driving and small corrections are none
   wm_pose2 odom_before = p.pose_odom_base;
   fuse(52, 0.5, 0, 0.3, 0);
-  TEST_ASSERT_EQUAL(1, wm_predictor_publish(&predictor, 140 * MS, &p));
+  TEST_ASSERT_EQUAL(1, publish(140));
   TEST_ASSERT_EQUAL_UINT32(1, p.jumps);
   TEST_ASSERT_TRUE(p.status_flags & WM_PUB_JUMPED);
   TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.5, p.last_jump_m);
   TEST_ASSERT_DOUBLE_WITHIN(2e-3, 0.0, p.last_jump_rad);
   TEST_ASSERT_DOUBLE_WITHIN(0.03, odom_before.x_m, p.pose_odom_base.x_m);  // odom goes on as it was
-  TEST_ASSERT_EQUAL(1, wm_predictor_publish(&predictor, 160 * MS, &p));
+  TEST_ASSERT_EQUAL(1, publish(160));
   TEST_ASSERT_EQUAL_UINT32(1, p.jumps);
   TEST_ASSERT_FALSE(p.status_flags & WM_PUB_JUMPED);
   fuse(53, 0.5, 0, 0.4, 0);  // a turn is one, too
-  TEST_ASSERT_EQUAL(1, wm_predictor_publish(&predictor, 180 * MS, &p));
+  TEST_ASSERT_EQUAL(1, publish(180));
   TEST_ASSERT_EQUAL_UINT32(2, p.jumps);
   TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.1, p.last_jump_rad);
 }
@@ -157,15 +156,14 @@ TEST(a_move_as_large_as_the_bounds_is_no_jump) {
     uint32_t jumps;
   } rows[] = {{0.125, 0.0, 0}, {0.0, 0.0625, 0}, {0.1251, 0.0, 1}, {0.0, 0.0626, 1}, {0.0, -0.0626, 1}};
   for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
-    wm_published p;
     tearDown();
     setUp();
     wm_predictor_init(&predictor, &params, odometry);
     move(0, 0, 0);
     fuse(0, 0, 0, 0, 0);
-    TEST_ASSERT_EQUAL(1, wm_predictor_publish(&predictor, 20 * MS, &p));
+    TEST_ASSERT_EQUAL(1, publish(20));
     fuse(1, rows[i].x_m, 0, rows[i].heading_rad, 0);
-    TEST_ASSERT_EQUAL(1, wm_predictor_publish(&predictor, 40 * MS, &p));
+    TEST_ASSERT_EQUAL(1, publish(40));
     TEST_ASSERT_EQUAL_UINT32(rows[i].jumps, p.jumps);
   }
 }
@@ -184,36 +182,33 @@ TEST(a_message_overwrites_all_of_its_memory) {
 }
 
 TEST(a_pose_set_anew_is_announced_however_small_the_move) {
-  wm_published p;
   move(0, 0, 0);
   fuse(0, 1, 1, 0, 1);
-  TEST_ASSERT_EQUAL(1, wm_predictor_publish(&predictor, 20 * MS, &p));
+  TEST_ASSERT_EQUAL(1, publish(20));
   fuse(1, 1, 1, 0, 2);
-  TEST_ASSERT_EQUAL(1, wm_predictor_publish(&predictor, 40 * MS, &p));
+  TEST_ASSERT_EQUAL(1, publish(40));
   TEST_ASSERT_EQUAL_UINT32(1, p.jumps);
 }
 
 TEST(counts_of_resets_and_jumps_wrap) {
-  wm_published p;
   move(0, 0, 0);
   fuse(0, 1, 1, 0, UINT32_MAX);
-  TEST_ASSERT_EQUAL(1, wm_predictor_publish(&predictor, 20 * MS, &p));
+  TEST_ASSERT_EQUAL(1, publish(20));
   predictor.jumps = UINT32_MAX;
   fuse(1, 1, 1, 0, UINT32_MAX);
-  TEST_ASSERT_EQUAL(1, wm_predictor_publish(&predictor, 40 * MS, &p));
+  TEST_ASSERT_EQUAL(1, publish(40));
   TEST_ASSERT_EQUAL_HEX32(0, p.status_flags & WM_PUB_JUMPED);
   fuse(2, 1, 1, 0, 0);  // one reset more
-  TEST_ASSERT_EQUAL(1, wm_predictor_publish(&predictor, 60 * MS, &p));
+  TEST_ASSERT_EQUAL(1, publish(60));
   TEST_ASSERT_EQUAL_HEX32(WM_PUB_JUMPED, p.status_flags & WM_PUB_JUMPED);
   TEST_ASSERT_EQUAL_UINT32(0, p.jumps);
 }
 
 TEST(pictures_are_told_the_pose_or_the_motion_alone) {
-  wm_published p;
   wm_estimate e;
   TEST_ASSERT_EQUAL(0, wm_predictor_expect(&predictor, 0, &e));
   for (int ms = 0; ms <= 100; ms += 10) move(ms, 1, 0.5);
-  TEST_ASSERT_EQUAL(0, wm_predictor_publish(&predictor, 110 * MS, &p));
+  TEST_ASSERT_EQUAL(0, publish(110));
   TEST_ASSERT_EQUAL(1, wm_predictor_expect(&predictor, 110 * MS, &e));
   TEST_ASSERT_EQUAL(WM_STATE_SEARCHING, e.state);
   TEST_ASSERT_EQUAL_INT64(110 * MS, e.t_ns);
@@ -221,30 +216,28 @@ TEST(pictures_are_told_the_pose_or_the_motion_alone) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.5, e.w_radps[2]);
   fuse(50, 3, 4, 0.3, 0);
   TEST_ASSERT_EQUAL(1, wm_predictor_expect(&predictor, 120 * MS, &e));
-  TEST_ASSERT_EQUAL(1, wm_predictor_publish(&predictor, 120 * MS, &p));
+  TEST_ASSERT_EQUAL(1, publish(120));
   TEST_ASSERT_EQUAL_MEMORY(&p.now, &e, sizeof e);
 }
 
 TEST(old_motion_and_old_fusion_are_said) {
-  wm_published p;
   move(0, 0, 0);
   fuse(0, 1, 1, 0, 0);
-  TEST_ASSERT_EQUAL(1, wm_predictor_publish(&predictor, 150 * MS, &p));
+  TEST_ASSERT_EQUAL(1, publish(150));
   TEST_ASSERT_EQUAL_UINT32(0, p.status_flags);
-  TEST_ASSERT_EQUAL(1, wm_predictor_publish(&predictor, 250 * MS, &p));
+  TEST_ASSERT_EQUAL(1, publish(250));
   TEST_ASSERT_EQUAL_UINT32(WM_PUB_MOTION_STALE, p.status_flags);
-  TEST_ASSERT_EQUAL(1, wm_predictor_publish(&predictor, 300 * MS, &p));  // as old as it may be
+  TEST_ASSERT_EQUAL(1, publish(300));  // as old as it may be
   TEST_ASSERT_EQUAL_UINT32(WM_PUB_MOTION_STALE, p.status_flags);
-  TEST_ASSERT_EQUAL(1, wm_predictor_publish(&predictor, 350 * MS, &p));
+  TEST_ASSERT_EQUAL(1, publish(350));
   TEST_ASSERT_EQUAL_UINT32(WM_PUB_MOTION_STALE | WM_PUB_FUSION_STALE, p.status_flags);
 }
 
 TEST(without_a_pose_nothing_is_said) {
-  wm_published p;
   move(0, 0, 0);
   wm_estimate e = {.t_ns = 0, .state = WM_STATE_SEARCHING};
   wm_predictor_fused(&predictor, &e, &kNeutral);
-  TEST_ASSERT_EQUAL(0, wm_predictor_publish(&predictor, 20 * MS, &p));
+  TEST_ASSERT_EQUAL(0, publish(20));
   fuse(0, NAN, 1, 0, 0);
-  TEST_ASSERT_EQUAL(0, wm_predictor_publish(&predictor, 40 * MS, &p));
+  TEST_ASSERT_EQUAL(0, publish(40));
 }

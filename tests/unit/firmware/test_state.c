@@ -12,6 +12,7 @@
 
 static char folder[64], path[128];
 static wm_error err;
+static wm_config slam;
 static wm_motion_params *motion;  // defaults: noise.hold_mps2 1, noise.hold_radps2 0.5, hold_max_s 2
 
 void setUp(void) {
@@ -23,6 +24,7 @@ void setUp(void) {
   (void)snprintf(path, sizeof path, "%s/pose.yaml", folder);
 }
 void tearDown(void) {
+  wm_config_free(&slam);
   free(motion);
   (void)unlink(path);
   (void)rmdir(folder);  // fails the next test's count where something else was left there
@@ -37,14 +39,20 @@ static wm_estimate tracking(double x_m, double sigma_m) {
   return e;
 }
 
+static wm_saved_pose saved;
+static wm_start start;
+
+// Saves a pose and reads it again.
+static void save(const wm_estimate *e, double utc_s) {
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_saved_pose_write(path, e, utc_s, &err), err.text);
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_saved_pose_read(path, &saved, &err), err.text);
+}
+
 TEST(a_pose_is_there_again) {
   wm_estimate e = tracking(12.25, 0.3);
-  wm_saved_pose saved;
-  wm_start start;
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_saved_pose_write(path, &e, 1000, &err), err.text);
+  save(&e, 1000);
   e.pose_map_base.p_m[0] = 13.5;
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_saved_pose_write(path, &e, 2000, &err), err.text);
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_saved_pose_read(path, &saved, &err), err.text);
+  save(&e, 2000);
   TEST_ASSERT_EQUAL_DOUBLE(13.5, saved.start.p_m[0]);
   TEST_ASSERT_EQUAL_DOUBLE(2000, saved.utc_s);
   TEST_ASSERT_DOUBLE_WITHIN(1e-8, M_PI / 2, saved.start.heading_rad);
@@ -62,10 +70,7 @@ TEST(a_pose_that_was_moving_goes_on) {
   wm_estimate e = tracking(10, 0.3);
   e.v_mps[0] = 2;
   e.w_radps[2] = M_PI / 4;
-  wm_saved_pose saved;
-  wm_start start;
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_saved_pose_write(path, &e, 1000, &err), err.text);
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_saved_pose_read(path, &saved, &err), err.text);
+  save(&e, 1000);
   TEST_ASSERT_TRUE(wm_saved_pose_start(&saved, 1000.5, 600, 0.4, 0, motion, &start));
   double half = M_PI / 16;  // of the turn
   TEST_ASSERT_DOUBLE_WITHIN(1e-4, 10 + 1 * cos(M_PI / 2 + half), start.p_m[0]);
@@ -84,10 +89,7 @@ TEST(a_pose_that_was_moving_goes_on) {
 TEST(a_turn_that_began_after_the_save_is_within_sigma) {
   wm_estimate e = tracking(10, 0.01);
   e.v_mps[0] = 0.3;
-  wm_saved_pose saved;
-  wm_start start;
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_saved_pose_write(path, &e, 1000, &err), err.text);
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_saved_pose_read(path, &saved, &err), err.text);
+  save(&e, 1000);
   TEST_ASSERT_TRUE(wm_saved_pose_start(&saved, 1001.2, 600, 0, 0, motion, &start));
   TEST_ASSERT_DOUBLE_WITHIN(1e-3, sqrt(0.01 * 0.01 + 0.36 * 0.36), start.sigma_heading_rad);
   TEST_ASSERT_DOUBLE_WITHIN(1e-3, sqrt(0.01 * 0.01 + 0.36 * 0.36 + 0.72 * 0.72), start.sigma_xy_m);
@@ -101,23 +103,19 @@ TEST(a_turn_that_began_after_the_save_is_within_sigma) {
 // A run that lost its pose does not leave the one from before, with a sigma of then: the next run searches.
 TEST(a_lost_pose_replaces_the_one_before) {
   wm_estimate e = tracking(12.25, 0.3);
-  wm_saved_pose saved;
-  wm_start start;
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_saved_pose_write(path, &e, 1000, &err), err.text);
+  save(&e, 1000);
   for (int vague = 0; vague < 2; vague++) {
     e = tracking(13, vague ? 60 : 8);
     if (!vague) e.state = WM_STATE_LOST;
     TEST_ASSERT_TRUE(wm_saved_pose_is_one(&e));
-    TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_saved_pose_write(path, &e, 1001, &err), err.text);
-    TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_saved_pose_read(path, &saved, &err), err.text);
+    save(&e, 1001);
     TEST_ASSERT_TRUE(saved.is_lost);
     TEST_ASSERT_FALSE(wm_saved_pose_start(&saved, 1002, 600, 0, 0, motion, &start));
   }
   e = tracking(14, 8);
   e.covariance[wm_cov_index(5, 5)] = 1.6 * 1.6;
   e.w_radps[2] = 1.0;
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_saved_pose_write(path, &e, 1002, &err), err.text);
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_saved_pose_read(path, &saved, &err), err.text);
+  save(&e, 1002);
   TEST_ASSERT_TRUE(wm_saved_pose_start(&saved, 1004, 600, 0, 0, motion, &start));
   TEST_ASSERT_DOUBLE_WITHIN(1e-3, sqrt(64 + 4), start.sigma_xy_m);           // 2 s later
   TEST_ASSERT_DOUBLE_WITHIN(0.01, M_PI / sqrt(3), start.sigma_heading_rad);  // any heading
@@ -144,7 +142,6 @@ static void put(const char *text) {
 }
 
 TEST(a_file_that_is_none_is_refused_with_its_line) {
-  wm_saved_pose saved;
   TEST_ASSERT_EQUAL(WM_NOT_FOUND, wm_saved_pose_read(path, &saved, &err));
   const char *const wrong[] = {"",
                                "hello",
@@ -225,12 +222,12 @@ TEST(growth_that_is_seen_while_reckoning_counts) {
 
 // ── the saved map ───────────────────────────────────────────────────────────────────────────────────────────────────
 
-static wm_config slam;
 static wm_sensor eye = {.name = "eye", .bearing_sigma_rad = 0.01, .range_sigma_m = 0.03};
 static uint8_t image[1 << 14];
 
 static wm_setup setup_of_slam(const char *parameters) {
   char text[300];
+  wm_config_free(&slam);
   int n = snprintf(text, sizeof text, "format: waymark-config/1\nestimator: slam\n%s", parameters);
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_config_parse(text, (size_t)n, "slam.yaml", &slam, &err), err.text);
   wm_setup setup = {.motion = slam.motion, .sightings = slam.sightings, .sensors = &eye, .sensor_count = 1};
@@ -295,7 +292,6 @@ TEST(a_map_is_there_again_and_a_damaged_one_is_refused) {
   whole[6] = '2';
   write_file(whole, length);
   refused_as(&setup, "another version");
-  wm_config_free(&slam);
 }
 
 TEST(a_map_of_another_configuration_or_robot_is_refused) {
@@ -306,18 +302,14 @@ TEST(a_map_of_another_configuration_or_robot_is_refused) {
   eye.mounting.xyz_m[0] = 0.1;
   refused_as(&setup, "another calibration");
   eye.mounting.xyz_m[0] = 0;
-  wm_config_free(&slam);
   setup = setup_of_slam("publish: {rate_hz: 20}\n");  // of the runtime: the map is the same
   wm_saved_map map;
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_saved_map_read(path, &slam, &setup, &map, &err), err.text);
   free(map.image);
-  wm_config_free(&slam);
   setup = setup_of_slam("slam: {landmarks: {confirm_seen: 7}}\n");
   refused_as(&setup, "another configuration");
-  wm_config_free(&slam);
   setup = setup_of_slam("motion: {noise: {speed_mps: 0.33}}\n");
   refused_as(&setup, "another configuration");
-  wm_config_free(&slam);
 }
 
 // What is wrong inside is found though the sum is right.
@@ -329,7 +321,6 @@ TEST(a_map_with_nan_is_refused) {
   memcpy(image + bytes - sizeof nan, &nan, sizeof nan);
   TEST_ASSERT_EQUAL(WM_OK, wm_saved_map_write(path, &of, 1, image, bytes, &err));
   refused_as(&setup, "not finite");
-  wm_config_free(&slam);
 }
 
 // Who may write into the folder may lay links there, which a program with more rights must not follow.
@@ -342,7 +333,7 @@ TEST(links_are_not_followed) {
   fclose(f);
   TEST_ASSERT_EQUAL(0, symlink(other, beside));
   wm_estimate e = tracking(1, 0.1);
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_saved_pose_write(path, &e, 1000, &err), err.text);
+  save(&e, 1000);
   char text[16] = {0};
   f = fopen(other, "r");
   TEST_ASSERT_NOT_NULL(fgets(text, sizeof text, f));

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // An estimator that can be understood at a glance, for tests of what stands around one: it integrates twists, adds half
 // of a bearing to its y, rejects bearings above 1 and refuses time that runs back.
-#ifndef WAYMARK_TESTS_TINY_ESTIMATOR_H
-#define WAYMARK_TESTS_TINY_ESTIMATOR_H
+#pragma once
 
 #include <math.h>
 #include <string.h>
@@ -89,5 +88,3 @@ static const wm_estimator kTiny = {.name = "tiny",
                                    .correct = tiny_correct,
                                    .estimate = tiny_estimate,
                                    .motion = tiny_motion};
-
-#endif

@@ -14,6 +14,15 @@
 
 static uint8_t bytes[WM_LCM_MESSAGE_MAX];
 
+// What is read of a message of sightings, and why not.
+static wm_sighting seen[WM_LCM_OBSERVATIONS_MAX];
+static size_t seen_count;
+static const char *read_sightings(size_t length) {
+  char sensor[WM_NAME_MAX];
+  wm_time_ns t_ns;
+  return wm_lcm_read_sightings(bytes, length, sensor, &t_ns, seen, &seen_count);
+}
+
 TEST(a_pose_arrives_whole) {
   wm_published p = {.made_ns = 11,
                     .fused_until_ns = 7,
@@ -75,106 +84,61 @@ TEST(health_arrives_with_its_sources) {
   TEST_ASSERT_EQUAL_INT64(9, m.lines_lost);
 }
 
-TEST(the_largest_health_fits) {
-  static wm_health h;
-  h = (wm_health){.source_count = WM_HEALTH_SOURCES_MAX,
-                  .calibration_count = WM_HEALTH_CALIBRATION_MAX,
-                  .counter_count = WM_HEALTH_COUNTERS_MAX};
-  size_t length = wm_lcm_health(&h, bytes, sizeof bytes);
-  static wm_health read;
-  TEST_ASSERT_GREATER_THAN(0, length);
-  TEST_ASSERT_NULL(wm_lcm_read_health(bytes, length, &read));
-  TEST_ASSERT_EQUAL(WM_HEALTH_COUNTERS_MAX, read.counter_count);
-}
-
-TEST(names_from_a_stranger_cannot_write_to_a_terminal) {
-  static wm_health h, read;
-  h = (wm_health){.source_count = 2};
-  strcpy(h.sources[0].name,
-         "EVIL\x1b]0;owned\a\xc2\x9b"
-         "31m");
-  strcpy(h.sources[1].name, "caméra");
-  const size_t length = wm_lcm_health(&h, bytes, sizeof bytes);
-  TEST_ASSERT_NULL(wm_lcm_read_health(bytes, length, &read));
-  TEST_ASSERT_EQUAL_STRING("EVIL?]0;owned???31m", read.sources[0].name);
-  TEST_ASSERT_EQUAL_STRING("caméra", read.sources[1].name);
-}
-
 // Senders from before NaN stood for every absent number have elevations with a sigma of 0.
 TEST(a_sighting_with_an_elevation_sigma_of_zero_has_no_elevation) {
   waymark_observations_t m = {.t_ns = 1, .count = 2, .elevation_sigma_rad = {0, 0.5}};
   strcpy((char *)m.sensor, "front");
-  const int length = waymark_observations_t_encode(bytes, 0, sizeof bytes, &m);
-  char sensor[WM_NAME_MAX];
-  wm_time_ns t_ns;
-  static wm_sighting read[WM_LCM_OBSERVATIONS_MAX];
-  size_t count;
   m.range_m[0] = m.range_m[1] = 1;
-  TEST_ASSERT_EQUAL(length, waymark_observations_t_encode(bytes, 0, sizeof bytes, &m));
-  TEST_ASSERT_NULL(wm_lcm_read_sightings(bytes, (size_t)length, sensor, &t_ns, read, &count));
-  TEST_ASSERT_EQUAL(2, count);
-  TEST_ASSERT_DOUBLE_IS_NAN(read[0].elevation_sigma_rad);
-  TEST_ASSERT_TRUE(!wm_sighting_has_elevation(&read[0]));
-  TEST_ASSERT_TRUE(wm_sighting_has_elevation(&read[1]));
+  TEST_ASSERT_NULL(read_sightings((size_t)waymark_observations_t_encode(bytes, 0, sizeof bytes, &m)));
+  TEST_ASSERT_EQUAL(2, seen_count);
+  TEST_ASSERT_DOUBLE_IS_NAN(seen[0].elevation_sigma_rad);
+  TEST_ASSERT_TRUE(!wm_sighting_has_elevation(&seen[0]));
+  TEST_ASSERT_TRUE(wm_sighting_has_elevation(&seen[1]));
 }
 
 // So many sightings as a message has room for, and no count beyond it.
 TEST(counts_of_sightings_beyond_the_room_are_refused) {
-  char sensor[WM_NAME_MAX];
-  wm_time_ns t_ns;
-  static wm_sighting read[WM_LCM_OBSERVATIONS_MAX];
   static waymark_observations_t m;
   m.t_ns = 1;
   for (int i = 0; i < WM_LCM_OBSERVATIONS_MAX; i++) m.range_m[i] = 1;
   const int32_t counts[] = {0, WM_LCM_OBSERVATIONS_MAX, -1, WM_LCM_OBSERVATIONS_MAX + 1, INT32_MIN, INT32_MAX};
   for (size_t i = 0; i < sizeof counts / sizeof counts[0]; i++) {
-    size_t count = 99;
+    seen_count = 99;
     m.count = counts[i];
-    const int length = waymark_observations_t_encode(bytes, 0, sizeof bytes, &m);
-    const char *why = wm_lcm_read_sightings(bytes, (size_t)length, sensor, &t_ns, read, &count);
+    const char *why = read_sightings((size_t)waymark_observations_t_encode(bytes, 0, sizeof bytes, &m));
     TEST_ASSERT_EQUAL_STRING(i < 2 ? NULL : "count is not in 0 to 64", why);
-    TEST_ASSERT_EQUAL_size_t(i < 2 ? (size_t)counts[i] : 0, count);
+    TEST_ASSERT_EQUAL_size_t(i < 2 ? (size_t)counts[i] : 0, seen_count);
   }
 }
 
 // As a sender makes it whose name is not padded, or whose lists are short; and another type.
 TEST(short_sightings_are_called_short) {
-  char sensor[WM_NAME_MAX];
-  wm_time_ns t_ns;
-  size_t count = 99;
-  static wm_sighting read[WM_LCM_OBSERVATIONS_MAX];
   static const waymark_observations_t kNone;
-  const int length = waymark_observations_t_encode(bytes, 0, sizeof bytes, &kNone);
-  const char *why = wm_lcm_read_sightings(bytes, (size_t)length - 27, sensor, &t_ns, read, &count);
+  const size_t length = (size_t)waymark_observations_t_encode(bytes, 0, sizeof bytes, &kNone);
+  seen_count = 99;
   TEST_ASSERT_EQUAL_STRING(
       "is shorter than observations_t of this version: the name has 32 bytes, padded with zeros, and each list 64 "
       "numbers",
-      why);
-  TEST_ASSERT_EQUAL_size_t(0, count);
+      read_sightings(length - 27));
+  TEST_ASSERT_EQUAL_size_t(0, seen_count);
   bytes[0] ^= 1;
-  TEST_ASSERT_EQUAL_STRING("is not an observations_t of this version",
-                           wm_lcm_read_sightings(bytes, (size_t)length, sensor, &t_ns, read, &count));
-  TEST_ASSERT_EQUAL_STRING("is not an observations_t of this version",
-                           wm_lcm_read_sightings(bytes, 0, sensor, &t_ns, read, &count));
+  TEST_ASSERT_EQUAL_STRING("is not an observations_t of this version", read_sightings(length));
+  TEST_ASSERT_EQUAL_STRING("is not an observations_t of this version", read_sightings(0));
 }
 
 // By the table: what travels arrives, the rest is absent.
 TEST(each_number_of_a_sighting_arrives) {
   wm_event sent = {.t_ns = 1, .kind = WM_EVENT_SIGHTING, .as.sighting = {.landmark_id = 7}};
-  wm_sighting *given = &sent.as.sighting, read[WM_LCM_OBSERVATIONS_MAX];
+  wm_sighting *given = &sent.as.sighting;
   double step = 0;
 #define SET(member, need, least, most, limits, since, zero_until, message) \
   given->member = 0.5 * (fmax(least, -1) + fmin(most, 2)) + (step += 0.01);
   WM_SIGHTING_NUMBERS(SET)
-  const size_t length = wm_lcm_observations("front", &sent, 1, bytes, sizeof bytes);
-  char sensor[WM_NAME_MAX];
-  wm_time_ns t_ns;
-  size_t count;
-  TEST_ASSERT_NULL(wm_lcm_read_sightings(bytes, length, sensor, &t_ns, read, &count));
-  TEST_ASSERT_EQUAL(1, count);
-  TEST_ASSERT_EQUAL(7, read[0].landmark_id);
-#define IN_MESSAGE(member) TEST_ASSERT_EQUAL_DOUBLE_MESSAGE(given->member, read[0].member, #member);
-#define NOT_IN_MESSAGE(member) TEST_ASSERT_TRUE_MESSAGE(isnan(read[0].member), #member);
+  TEST_ASSERT_NULL(read_sightings(wm_lcm_observations("front", &sent, 1, bytes, sizeof bytes)));
+  TEST_ASSERT_EQUAL(1, seen_count);
+  TEST_ASSERT_EQUAL(7, seen[0].landmark_id);
+#define IN_MESSAGE(member) TEST_ASSERT_EQUAL_DOUBLE_MESSAGE(given->member, seen[0].member, #member);
+#define NOT_IN_MESSAGE(member) TEST_ASSERT_TRUE_MESSAGE(isnan(seen[0].member), #member);
 #define COMPARE(member, need, least, most, limits, since, zero_until, message) message(member)
   WM_SIGHTING_NUMBERS(COMPARE)
 }

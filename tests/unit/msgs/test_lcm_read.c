@@ -224,13 +224,14 @@ TEST(sigmas_of_a_pose_have_limits) {
   TEST_ASSERT_NOT_NULL(set_pose_with(1, NAN));
 }
 
+static char sensor[WM_NAME_MAX];
+static wm_time_ns read_ns;
+static wm_sighting seen[WM_LCM_OBSERVATIONS_MAX];
+static size_t seen_count;
+
 static const char *read_one(const wm_event *sent) {
-  char sensor[WM_NAME_MAX];
-  wm_time_ns t_ns;
-  wm_sighting read[WM_LCM_OBSERVATIONS_MAX];
-  size_t count;
-  return wm_lcm_read_sightings(bytes, wm_lcm_observations("front", sent, 1, bytes, sizeof bytes), sensor, &t_ns, read,
-                               &count);
+  return wm_lcm_read_sightings(bytes, wm_lcm_observations("laser", sent, 1, bytes, sizeof bytes), sensor, &read_ns,
+                               seen, &seen_count);
 }
 
 // By the table: each number is taken at its limits, and refused one step beyond.
@@ -257,22 +258,17 @@ TEST(identities_of_sightings) {
   wm_event sent = {.t_ns = 9, .kind = WM_EVENT_SIGHTING};
   sent.as.sighting = wm_sighting_without_numbers();
   sent.as.sighting.bearing_rad = 0.5;
-  char sensor[WM_NAME_MAX];
-  wm_time_ns t_ns = 0;
-  wm_sighting read[WM_LCM_OBSERVATIONS_MAX];
-  size_t count = 0;
   for (int id = -2; id < 2; id++) {
     sent.as.sighting.landmark_id = id;
-    const size_t length = wm_lcm_observations("laser", &sent, 1, bytes, sizeof bytes);
-    const char *why = wm_lcm_read_sightings(bytes, length, sensor, &t_ns, read, &count);
+    const char *why = read_one(&sent);
     if (id == -2) {
       TEST_ASSERT_EQUAL_STRING("landmark_id is below -1", why);
       continue;
     }
     TEST_ASSERT_NULL(why);
-    TEST_ASSERT_EQUAL(1, count);
-    TEST_ASSERT_EQUAL(id, read[0].landmark_id);
-    TEST_ASSERT_EQUAL_INT64(9, t_ns);
+    TEST_ASSERT_EQUAL(1, seen_count);
+    TEST_ASSERT_EQUAL(id, seen[0].landmark_id);
+    TEST_ASSERT_EQUAL_INT64(9, read_ns);
     TEST_ASSERT_EQUAL_STRING("laser", sensor);
   }
 }
@@ -308,9 +304,6 @@ TEST(no_message_is_not_read) {
   static char name[WM_HEALTH_NAME_MAX], reason[WM_HEALTH_REASON_MAX];
   static wm_event event;
   static wm_stream_row row;
-  static wm_sighting seen[WM_LCM_OBSERVATIONS_MAX];
-  size_t count;
-  wm_time_ns t_ns;
   for (size_t length = 0; length < 100; length += 8) {
     TEST_ASSERT_NOT_NULL(wm_lcm_read_pose(NULL, length, &p));
     TEST_ASSERT_NOT_NULL(wm_lcm_read_bound(NULL, length, &bound));
@@ -319,7 +312,7 @@ TEST(no_message_is_not_read) {
     TEST_ASSERT_NOT_NULL(wm_lcm_read_refused(NULL, length, name, reason));
     TEST_ASSERT_NOT_NULL(wm_lcm_read_set_pose(NULL, length, &event));
     TEST_ASSERT_NOT_NULL(wm_lcm_read_reset(NULL, length, &event));
-    TEST_ASSERT_NOT_NULL(wm_lcm_read_sightings(NULL, length, name, &t_ns, seen, &count));
+    TEST_ASSERT_NOT_NULL(wm_lcm_read_sightings(NULL, length, name, &read_ns, seen, &seen_count));
     TEST_ASSERT_NOT_NULL(wm_lcm_read_row("motion", NULL, length, &row));
   }
   TEST_ASSERT_NOT_NULL(wm_lcm_read_row(NULL, bytes, 8, &row));

@@ -2,6 +2,7 @@
 // `waymark calibrate camera` on rendered pictures of a board through lenses that are known: 200 degrees of fisheye,
 // and a plain lens; boards that are half out of the picture; and pictures without a board.
 #include <algorithm>
+#include <memory>
 
 #include "calibrate/bundle.h"
 #include "calibrate/corners.h"

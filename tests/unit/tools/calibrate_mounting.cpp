@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // calibrate mounting: a drive through a drawn building with a camera that sits otherwise than believed, looks later
 // than it says, on wheels and a gyro that are off: all of it is found, within what is said of its sigmas.
+#include <vector>
+
 #include "calibrate/mounting.h"
 
 #include "common/failure.h"

@@ -2,6 +2,9 @@
 // stereo_ekf's own map over many simulated drives of two rounds: loops are closed, restarted it is found anywhere,
 // carried off it is found, and never in a wrong place without stating so. usage: consistency_map DRIVES STARTS.
 #include <algorithm>
+#include <memory>
+#include <string>
+#include <vector>
 
 #include "common/suite.h"
 #include "common/trials.h"

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // `waymark import`: a compressed video in MP4, made here, against what the robot's reader then reads of it.
 #include <unistd.h>
+#include <memory>
 
 #include <fstream>
 

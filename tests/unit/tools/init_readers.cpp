@@ -3,6 +3,7 @@
 // at random either a message that names the file, or a configuration that the runtime accepts.
 // `wm_errors_init --markdown` prints the table for docs/errors.md; without arguments this is a test of it.
 #include <filesystem>
+#include <memory>
 
 #include "common/failure.h"
 #include "common/suite.h"

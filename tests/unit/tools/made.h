@@ -5,6 +5,7 @@
 #include <cstdarg>
 #include <filesystem>
 #include <fstream>
+#include <string>
 
 #include "common/failure.h"
 #include "common/suite.h"

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the trials over many drives are judged by: views that differ, and a run's figures.
+#include <vector>
+
 #include "common/suite.h"
 #include "montecarlo/reliability.h"
 #include "montecarlo/trial.h"

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The trials by landmarks, a few drives: each trial changes the drive as its name states, and is judged by it.
 #include <set>
+#include <string>
 
 #include "common/suite.h"
 #include "montecarlo/landmark_trials.h"

@@ -3,6 +3,7 @@
 // their centroids, long edges by the place where the brightness steps, for every camera model, standing, in motion with
 // exposure, and with rolling shutter.
 #include <algorithm>
+#include <vector>
 
 #include "common/suite.h"
 #include "render/render.h"

@@ -2,6 +2,8 @@
 // The worlds that are shipped, and drives through them.
 #pragma once
 
+#include <string>
+
 #include "common/suite.h"
 #include "simulate/simulate.h"
 

@@ -2,6 +2,7 @@
 // Detectors that err and maps that are old, on top of the same drive without: so many as asked for, marked as what they
 // are, and nothing else changed.
 #include <algorithm>
+#include <string>
 
 #include "shipped.h"
 #include "simulate/angle.h"

@@ -4,6 +4,7 @@
 // dead encoder, a slip, a robot that is carried away. And: hard doubles easy.
 #include <Eigen/Dense>
 #include <algorithm>
+#include <vector>
 
 #include "shipped.h"
 #include "simulate/angle.h"

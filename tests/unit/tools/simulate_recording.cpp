@@ -2,6 +2,7 @@
 // The recording that the simulator writes is opened by drivers/recording, and what is read says what was true: frames,
 // signs, units, stamps and arrivals from one end to the other.
 #include <unistd.h>
+#include <vector>
 
 #include <filesystem>
 #include <fstream>

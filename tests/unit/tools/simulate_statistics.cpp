@@ -2,6 +2,7 @@
 // What a recording's sensors say, measured back against its truth: noise, biases, outliers and latency are those of the
 // scenario; one seed always says the same; landmarks don't change what the wheels say.
 #include <map>
+#include <vector>
 
 #include "shipped.h"
 #include "simulate/angle.h"

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The report: what it says in words, that it draws no peak away, that it is one page with nothing beside it.
+#include <memory>
+
 #include "common/failure.h"
 #include "common/suite.h"
 #include "made.h"

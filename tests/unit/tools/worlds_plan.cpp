@@ -2,6 +2,7 @@
 // Plans, ways and maps: the corridors that a seed draws can be driven, are connected, and are what their map says.
 #include <algorithm>
 #include <filesystem>
+#include <string>
 
 #include "common/suite.h"
 #include "common/trials.h"

@@ -3,8 +3,12 @@
 // another seed or level another world. Pictures here have no noise.
 #include <algorithm>
 #include <map>
+#include <memory>
 #include <sstream>
+#include <string>
+#include <vector>
 
+#include "common/suite.h"
 #include "common/trials.h"
 #include "render/render.h"
 #include "simulate/route.h"
@@ -13,8 +17,6 @@
 extern "C" {
 #include <apriltag/apriltag.h>
 #include <apriltag/tag36h11.h>
-
-#include "common/suite.h"
 }
 
 using namespace wm::sim;

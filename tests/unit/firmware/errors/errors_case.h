@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // One bad input and the message that it gives. docs/errors.md is made from the same table that the test runs.
-#ifndef WM_TEST_ERRORS_CASE_H
-#define WM_TEST_ERRORS_CASE_H
+#pragma once
 
 typedef enum error_kind {
   ERROR_CONFIG,     // `input` follows a good head of a configuration (unless it begins with "format")
@@ -18,5 +17,3 @@ typedef struct error_case {
 } error_case;
 
 extern const error_case kErrorCases[];  // ends with a case without name
-
-#endif
