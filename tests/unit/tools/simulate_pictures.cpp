@@ -41,6 +41,7 @@ std::string warnings;
 void note(void *, wm_note, const char *text) { warnings += std::string(text) + "\n"; }
 
 void check_world(const char *name, std::initializer_list<const char *> cameras, int width, int height) {
+  tearDown(), setUp();  // an empty folder
   Scenario scenario = shipped(name);
   shrink(scenario, cameras, width, height);
   scenario.faults.frames_lost = 0;
