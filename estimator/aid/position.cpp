@@ -58,22 +58,13 @@ double position_aid::lasting_error(const planar_motion &filter) const {
 }
 
 // Where the delay is uncertain, its derivatives are those of the chord over two sigmas: a robot that may have stood
-// then, or driven, has neither's derivative [Julier1997]. Before the first motion datum the robot is taken to have
-// moved as it does by that one: taken to have stood, its first positions would be exact, and determine a delay that
-// cannot be separated from the place of the antenna.
+// then, or driven, has neither's derivative [Julier1997].
 void position_aid::widen_delay(const planar_motion &filter, view *at) const {
   past_pose &past = at->past;
   at->bend_m[0] = at->bend_m[1] = 0.0;
   if (time_ < 0) return;
   const double sigma_s = std::sqrt(filter.variance(time_)), age_s = filter.value(time_);
-  const wm_time_ns now = filter.now_ns();
   if (sigma_s < kLinearDelay_s) return;
-  if (!filter.is_path_known(now - wm_ns_from_seconds(age_s + sigma_s))) {
-    motion_twist ahead{};
-    (void)filter.path(now, now + 1, &ahead);
-    put_age(filter.steady(ahead), sincos(past.pose.heading_rad), past.age_by);
-    return;
-  }
   const wm_pose2 earlier = pose_before(filter, age_s + sigma_s).pose, later = pose_before(filter, age_s - sigma_s).pose;
   past.age_by[0] = (earlier.x_m - later.x_m) / (2.0 * sigma_s);
   past.age_by[1] = (earlier.y_m - later.y_m) / (2.0 * sigma_s);
@@ -92,11 +83,6 @@ position_aid::view position_aid::look(const wm_position &p, planar_motion *filte
   out.off_m[0] = h.cos * out.arm_m[0] - h.sin * out.arm_m[1];
   out.off_m[1] = h.sin * out.arm_m[0] + h.cos * out.arm_m[1];
   return out;
-}
-
-void position_aid::heading_corrected(double by_rad, planar_motion *filter) const {
-  filter->turn_errors(kX, by_rad);
-  filter->turn_errors(error_, by_rad);
 }
 
 // Derivatives of the antenna's x (axis 0) or y; returns what is expected there.

@@ -62,10 +62,6 @@ class position_aid {
   // x and y. `record`: what is known of them.
   void put_rows(const wm_position &p, const view &at, const planar_motion &filter, const wm_innovation &record,
                 residual rows[2]) const;
-  // The rows' update corrected the heading. All that moves the robot or its antenna in base_link's axes turned with it.
-  // So the errors of places turn, too: the error is the left-invariant one [Barrau2017]. Else each position would be
-  // seen from another direction, and the jitter of a vague heading would make a delay known that nothing shows.
-  void heading_corrected(double by_rad, planar_motion *filter) const;
   observation observe(const wm_position &p, const view &at, const planar_motion &filter) const;
   double lasting_error(const planar_motion &filter) const;  // over its sigma; 0 where it is no state
 

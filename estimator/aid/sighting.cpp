@@ -316,7 +316,7 @@ void sighting_aid::add_errors(const view &at, const lent_slots &lent, const row_
 // `r` has its noise and its source; of.expected: by pose and sensor.
 void sighting_aid::put_row(const view &at, const lent_slots &lent, const row_of &of, const wm_innovation &record,
                            const planar_filter &filter, residual *r) const {
-  r->row.count = r->row.missing = 0;
+  r->row.count = r->row.missing = 0, r->row.delay = -1;
   r->record.expected = 0.0;
   add_errors(at, lent, of, filter, r);
   const double total = of.expected + r->record.expected, difference = of.observed - total;

@@ -116,7 +116,10 @@ class motion_front_end {
   int model() const { return model_; }
   motion_kind kind() const;
   // The next input of any kind is overdue at that time.
-  bool reaches(wm_time_ns t_ns, const wm_motion_calibration &c) const { return history_.reaches(t_ns - lag_of(c)); }
+  // Since when the path is known; WM_TIME_NONE: no motion has come.
+  wm_time_ns known_since_ns(const wm_motion_calibration &c) const {
+    return history_.empty() ? WM_TIME_NONE : history_.oldest_ns() + lag_of(c);
+  }
   bool is_overdue(wm_time_ns t_ns) const { return model_ != WM_MOTION_CONSTANT_VELOCITY && history_.is_overdue(t_ns); }
   // Sigmas of the speed and the turn rate of one period by the counts' steps; 0 where no counts drive.
   void count_noise(double *speed_mps, double *turn_rate_radps) const;

@@ -102,10 +102,8 @@ class motion_history {
     return count_ > 0 && wm_seconds_between(newest().t_ns, t_ns) > due_s(count_, oldest);
   }
 
-  // Whether the motion is known back to t_ns.
-  bool reaches(wm_time_ns t_ns) const {
-    return count_ > 0 && at(count_ > kCapacity ? count_ - kCapacity : 0).t_ns <= t_ns;
-  }
+  // Since when the motion is known; there is an input.
+  wm_time_ns oldest_ns() const { return at(count_ > kCapacity ? count_ - kCapacity : 0).t_ns; }
   // Calls visit(segment) for the segments of [from_ns, to_ns] in order of time. Before the oldest input the motion is
   // unknown.
   template <class Visit>

@@ -60,6 +60,12 @@ struct motion_twist : planar_twist {
     u_by[count] = u_by_term;
     w_by[count++] = w_by_term;
   }
+  // The terms alone: the same events must give the same bytes.
+  void take(const motion_twist &from) {
+    static_cast<planar_twist &>(*this) = from;
+    count = missing = 0;
+    for (int k = 0; k < from.count; k++) add(from.index[k], from.v_by[k], from.w_by[k], from.u_by[k]);
+  }
 };
 
 // Car: [Stepanov2017], V and Phi; differential drive by ticks: [FengND]. `drive`: of commands alone.

@@ -268,6 +268,7 @@ innovation error_state::prepare(const sparse_row *rows, const double *innovation
   innovation out;
   out.generation_ = generation_;
   out.rows = count;
+  out.delay = rows[0].delay;
   out.of_ = filled();
   for (int k = 0; k < count; k++) project(rows[k], out.of_, vector(k));
   bool complete = true;

@@ -27,6 +27,7 @@ class innovation {
   double s[kRows][kRows];  // covariance of the innovation, lower triangle: H P H' + diag(noise)
   double nis = 1e300;      // 1e300 where the covariance is not positive definite, or a row lacks entries
   double determinant = 0;  // of it; 0 there
+  int delay = -1;          // the state of the observation's delay; -1: none
   double density() const;  // of the innovation, normal with this covariance
   // Behind error_state::solve(): what the rows before it leave of a row's innovation, and that one's variance.
   double left[kRows], left_variance[kRows];

@@ -10,7 +10,8 @@ struct sparse_row {
   const int *index;  // states
   const double *by;  // derivatives
   int count;
-  int missing;  // entries that had no room: a row with missing entries must not be fused (WM_REJECTED_NUMERIC)
+  int missing = 0;  // entries that had no room: a row with missing entries must not be fused (WM_REJECTED_NUMERIC)
+  int delay = -1;   // the state of how much older the observation is than its stamp; -1: none
 };
 
 // `kCapacity` entries: the filter derives it from its table of states and asserts it. An entry beyond it is counted in
@@ -18,7 +19,7 @@ struct sparse_row {
 template <int kCapacity>
 struct jacobian_row {
   static constexpr int kMax = kCapacity;
-  int count = 0, missing = 0;
+  int count = 0, missing = 0, delay = -1;
   int index[kCapacity];
   double by[kCapacity];
 
@@ -36,9 +37,10 @@ struct jacobian_row {
   template <int kOther>
   void add(const jacobian_row<kOther> &other, double factor) {
     missing += other.missing;
+    if (other.delay >= 0) delay = other.delay;
     for (int i = 0; i < other.count; i++) add(other.index[i], factor * other.by[i]);
   }
-  operator sparse_row() const { return {index, by, count, missing}; }
+  operator sparse_row() const { return {index, by, count, missing, delay}; }
 };
 
 }  // namespace wm

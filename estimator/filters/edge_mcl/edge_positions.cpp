@@ -22,9 +22,7 @@ wm_status edge_mcl::take_position(const wm_event &event, record_list records) {
   if (is_found_by(positions_.observe(p, at, filter_))) return reject(records, record, WM_REJECTED_SEARCHING);
   residual rows[2];
   positions_.put_rows(p, at, filter_, record, rows);
-  const double heading_rad = filter_.value(kHeading);
   fuse_given(rows, 2, kPositionKey, square(kClutterPlace_m), records);
-  positions_.heading_corrected(filter_.value(kHeading) - heading_rad, &filter_);
   return WM_OK;
 }
 
@@ -42,9 +40,7 @@ wm_status edge_mcl::take_heading(const wm_event &event, record_list records) {
   if (!positions_.is_awake()) positions_.wake(&filter_);
   if (is_found_by(positions_.observe(h, filter_))) return reject(records, r.record, WM_REJECTED_SEARCHING);
   positions_.put_row(h, filter_, &r);
-  const double heading_rad = filter_.value(kHeading);
   fuse_given(&r, 1, kHeadingKey, kTwoPi, records);
-  positions_.heading_corrected(filter_.value(kHeading) - heading_rad, &filter_);
   return WM_OK;
 }
 

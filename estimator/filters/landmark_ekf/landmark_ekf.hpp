@@ -45,7 +45,6 @@ class landmark_ekf {
   static_assert(kMaxCalibration + 3 + noise_adaption::kFactors + 2 <= 2 * WM_HEALTH_CALIBRATION_MAX);
 
   wm_status fuse_landmark(const wm_event &event, record_list records);
-  double fuse_given(residual *rows, int count, double clutter_volume, record_list records);
   wm_status fuse_position(const wm_event &event, record_list records);
   wm_status fuse_heading(const wm_event &event, record_list records);
   wm_status fuse_localized(const wm_event &event, record_list records);

@@ -6,14 +6,6 @@
 
 namespace wm {
 
-// Of a position or a heading.
-double landmark_ekf::fuse_given(residual *rows, int count, double clutter_volume, record_list records) {
-  const double heading_rad = filter_.value(kHeading);
-  const double log_bayes = fuse(rows, count, clutter_volume, true, records);
-  positions_.heading_corrected(filter_.value(kHeading) - heading_rad, &filter_);
-  return log_bayes;
-}
-
 wm_status landmark_ekf::fuse_position(const wm_event &event, record_list records) {
   const wm_position &p = event.as.position;
   wm_innovation record = record_of(event, WM_RESIDUAL_X);
@@ -36,7 +28,7 @@ wm_status landmark_ekf::fuse_position(const wm_event &event, record_list records
   }
   residual rows[2];
   positions_.put_rows(p, at, filter_, record, rows);
-  note(event.t_ns, kPositionKey, fuse_given(rows, 2, square(kClutterPlace_m), records));
+  note(event.t_ns, kPositionKey, fuse(rows, 2, square(kClutterPlace_m), true, records));
   return WM_OK;
 }
 
@@ -57,7 +49,7 @@ wm_status landmark_ekf::fuse_heading(const wm_event &event, record_list records)
     return reject(records, r.record, WM_REJECTED_SEARCHING);
   }
   positions_.put_row(h, filter_, &r);
-  note(event.t_ns, kHeadingKey, fuse_given(&r, 1, kTwoPi, records));
+  note(event.t_ns, kHeadingKey, fuse(&r, 1, kTwoPi, true, records));
   return WM_OK;
 }
 

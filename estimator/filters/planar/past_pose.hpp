@@ -58,7 +58,7 @@ past_pose pose_before(const Filter &filter, double age_s) {
   } else if (then > now) {
     out.step = filter.path(now, then, &there);
   } else {
-    filter.path(now - 1, now, &there);
+    static_cast<planar_twist &>(there) = filter.twist_now();
   }
   const wm_pose2 present = filter.pose();
   out.pose = compose(present, out.step);
@@ -87,6 +87,7 @@ void add_past_pose(Row *row, const double by[3], const past_pose &past, int time
   row->add(kHeading, by_heading);
   row->add(past.track_slot, by_heading * past.rounding_by);
   row->add(time_offset_slot, product(by, past.age_by));
+  row->delay = time_offset_slot;
   if (past.lag_slot >= 0) row->add(past.lag_slot, product(by, past.lag_by));
   row->add(past.stamp_slot, product(by, past.stamp_by));
 }

@@ -4,7 +4,15 @@
 #include <cmath>
 #include <utility>
 
+#include "filters/planar/past_pose.hpp"
+
 namespace wm {
+namespace {
+
+// Share of a state's variance: what a correction turns below it counts nothing, even a thousand times.
+constexpr double kTurned = 1e-7;
+
+}  // namespace
 
 int planar_filter::count_motion_states(const wm_motion_states &states, int model) {
   int count = count_velocity_states(model);
@@ -66,9 +74,64 @@ bool planar_filter::update(innovation &&i, const sparse_row *rows, const update_
   if (!state_.solve(&i, options.added_noise, moving)) return false;
   adapt(i, rows, options);
   keep_limits(i);
+  const delayed delay = delay_of(i);
   add_step();
   state_.correct(std::move(i), moving);
+  turn_delay(delay);
   return true;
+}
+
+// A velocity that is a state walks so much that a delay shows nowhere.
+planar_filter::delayed planar_filter::delay_of(const innovation &of) {
+  delayed out{has_velocity() ? -1 : of.delay, {}, {}};
+  if (out.state < 0) return out;
+  const double *step = state_.step(), heading = value(kHeading), turn = step[kHeading];
+  planar_twist after = twist_;
+  for (int k = 0; k < twist_.count; k++)
+    if (const int state = motion_state_[twist_.index[k]]; state >= 0) {
+      after.v += twist_.v_by[k] * step[state];
+      after.u += twist_.u_by[k] * step[state];
+      after.w += twist_.w_by[k] * step[state];
+    }
+  const double moved_m2ps2 =
+      square(after.v - twist_.v) + square(after.u - twist_.u) + square(turn) * (square(twist_.v) + square(twist_.u));
+  const double place_m2 = variance(kX) < variance(kY) ? variance(kX) : variance(kY), own = variance(out.state);
+  if (own * moved_m2ps2 < kTurned * place_m2 && own * square(after.w - twist_.w) < kTurned * variance(kHeading))
+    return {-1, {}, {}};
+  put_age(twist_, sincos(heading), out.by);
+  put_age(after, sincos(heading + turn), out.after);
+  return out;
+}
+
+void planar_filter::turn_delay(const delayed &d) {
+  if (d.state < 0) return;
+  turn_delay(d, kX, kPoseStates);
+  if (correlated_ >= 0) turn_delay(d, correlated_, 2);
+}
+
+// What these states have in common with the delay, the lag given, is a share of the derivatives: others determine them,
+// too. With the lag they have in common what the prediction turns.
+void planar_filter::turn_delay(const delayed &d, int first, int count) {
+  const int lag = motion_state_[kLag];
+  const double by_lag = lag >= 0 && variance(lag) > 0.0 ? covariance(lag, d.state) / variance(lag) : 0.0;
+  const double own = variance(d.state) - (by_lag == 0.0 ? 0.0 : by_lag * covariance(lag, d.state));
+  double common = 0.0, all = 0.0;
+  for (int i = 0; i < count; i++) {
+    const double with = covariance(first + i, d.state) - (by_lag == 0.0 ? 0.0 : by_lag * covariance(first + i, lag));
+    common -= with * d.by[i];
+    all += square(d.by[i]);
+  }
+  if (!(common > 0.0)) return;
+  const double share = common < all * own ? common / (all * own) : 1.0;
+  planar_row rows[kPoseStates];
+  double values[kPoseStates];
+  for (int i = 0; i < count; i++) {
+    rows[i].add(first + i, 1.0);
+    rows[i].add(d.state, share * (d.by[i] - d.after[i]));
+    rows[i].add(lag, -by_lag * share * (d.by[i] - d.after[i]));
+    values[i] = value(first + i);
+  }
+  assign(first, count, rows, nullptr, 0, values);
 }
 
 void planar_filter::put_adapted(const sparse_row &row, double by[noise_adaption::kBlock]) const {

@@ -71,6 +71,17 @@ class planar_filter : public planar_motion {
 
  private:
   void adapt(const innovation &i, const sparse_row *rows, const update_options &options);
+  // At one twist, a delay and a shift of the pose along that twist are the same: this direction of the state is not
+  // observed. A correction changes the twist, by its scale, its bias and the heading, and so the direction. With it
+  // turns what the pose and the lasting error of positions have in common with the delay. Else each correction would
+  // see the delay from another side, and noise would make it known [Huang2010].
+  struct delayed {
+    int state;                                   // of the delay; -1: none
+    double by[kPoseStates], after[kPoseStates];  // derivatives of the pose by it before the update's step, and after
+  };
+  delayed delay_of(const innovation &of);  // between the update's solution and its step
+  void turn_delay(const delayed &d);
+  void turn_delay(const delayed &d, int first, int count);
 
   int correlated_, unused_;  // no padding; -1: none
   wheel_heading wheels_;

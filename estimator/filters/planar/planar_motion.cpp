@@ -96,6 +96,17 @@ wm_pose2 planar_motion::path(wm_time_ns from_ns, wm_time_ns to_ns, motion_twist 
   }
   wm_pose2 sum{};
   bool first = true;
+  const wm_time_ns known_ns = front_.known_since_ns(calibration_);
+  if (known_ns != WM_TIME_NONE && from_ns < known_ns) {
+    const wm_time_ns until_ns = to_ns < known_ns ? to_ns : known_ns;
+    *twist = front_.twist_at(known_ns, calibration_);
+    const planar_twist held = steady(*twist);
+    const double dt = wm_seconds_between(from_ns, until_ns);
+    const arc a = make_arc(held.v * dt, held.u * dt, held.w * dt);
+    sum = {a.x_m, a.y_m, a.turn_rad};
+    first = false;
+    from_ns = until_ns;
+  }
   front_.walk(from_ns, to_ns, calibration_,
               [&](const motion_segment &segment, const motion_twist &t, const motion_noise &) {
                 if (first) *twist = t;
@@ -106,6 +117,11 @@ wm_pose2 planar_motion::path(wm_time_ns from_ns, wm_time_ns to_ns, motion_twist 
   // A command's segment changes from its beginning to its end; its twist is the mean.
   if (first || front_.kind() == kKindCommands) *twist = front_.twist_at(from_ns, calibration_);
   return sum;
+}
+
+void planar_motion::begin_at(wm_time_ns t_ns) {
+  front_.set_now(t_ns);
+  twist_.take(front_.twist_at(t_ns, calibration_));
 }
 
 bool planar_motion::is_turn(const motion_twist &twist, const motion_noise &noise, double dt_s) const {
@@ -125,10 +141,9 @@ void planar_motion::take_step(const motion_segment &segment, const motion_twist 
   odom_ = compose(odom_, step.body);
   travelled_m_ += speed_of(twist) * segment.dt_s;
   turned_rad_ += std::fabs(step.turn_rad);
-  if (has_velocity())
-    twist_ = velocity_at(heading_rad_);
-  else
-    twist_ = segment.input.command ? segment.end : twist;
+  twist_.take(twist);
+  if (has_velocity()) static_cast<planar_twist &>(twist_) = velocity_at(heading_rad_);
+  if (segment.input.command) static_cast<planar_twist &>(twist_) = segment.end;
   heading_rad_ += step.turn_rad;
   twist_heading_rad_ = heading_end_rad;
   double v_sigma, w_sigma;
@@ -174,23 +189,6 @@ void planar_motion::forget(int state, double value, double variance) {
 
 void planar_motion::inflate_pose(double xy_m2, double heading_rad2) {
   for (int i = 0; i < kPoseStates; i++) state_.add_variance(i, i == kHeading ? heading_rad2 : xy_m2);
-}
-
-// A rotation as three shears, since each state is assigned from the others as they are.
-void planar_motion::turn_errors(int first, double by_rad) {
-  if (first < 0 || by_rad == 0.0) return;
-  const sin_cos half = sincos(0.5 * by_rad);
-  const double along = half.sin / half.cos, across = 2.0 * half.sin * half.cos, noise = 0.0;
-  const auto shear = [&](int state, int other, double by) {
-    planar_row row;
-    row.add(state, 1.0);
-    row.add(other, by);
-    const double unchanged = value(state);
-    assign(state, 1, &row, &noise, 1, &unchanged);
-  };
-  shear(first, first + 1, -along);
-  shear(first + 1, first, across);
-  shear(first, first + 1, -along);
 }
 
 void planar_motion::put_pose(const wm_pose2 &pose, const double covariance[3][3]) {

@@ -50,12 +50,11 @@ class planar_motion {
   wm_status check_time(wm_time_ns t_ns) const { return check_event_time(t_ns, start_ns_, now_ns()); }
 
   // Motion from `from_ns` to `to_ns` (which may be later or earlier than now), as seen from its beginning; *twist is
-  // that at `from_ns`.
+  // that at `from_ns`. Before the first motion datum the robot is taken to have moved as it does by that one.
   wm_pose2 path(wm_time_ns from_ns, wm_time_ns to_ns, motion_twist *twist) const;
-  // Whether the path is known back to t_ns; before, the robot would seem to stand.
-  bool is_path_known(wm_time_ns t_ns) const { return has_velocity() || front_.reaches(t_ns, calibration_); }
 
-  const planar_twist &twist() const { return twist_; }             // now, by the motion until now
+  const planar_twist &twist() const { return twist_; }  // now, by the motion until now
+  planar_twist twist_now() const { return has_velocity() ? velocity_at(heading_rad_) : twist(); }  // as corrected
   double twist_heading_rad() const { return twist_heading_rad_; }  // of its end, before later corrections
   const wm_motion_calibration &calibration() const { return calibration_; }
   uint32_t motion_health() const { return front_.health(); }
@@ -111,8 +110,6 @@ class planar_motion {
   }
   // Adds variances of x and y, and of the heading, as noise of the motion does.
   void inflate_pose(double xy_m2, double heading_rad2);
-  // Turns the errors of a vector in map's axes (two states from `first` on; below 0: none), not their values.
-  void turn_errors(int first, double by_rad);
   // A value of the calibration that the configuration states is wrong, and not known as well yet as it was stated.
   bool is_stated_wrongly(int state) const { return stated_.is_wrong(state, variance(state)); }
   // Fills time, mean, covariance and twist.
@@ -187,7 +184,7 @@ class planar_motion {
   template <class Walked>
   void predict_to(wm_time_ns t_ns, Walked walked) {
     front_.set_position_variance(variance(kX) + variance(kY));
-    if (now_ns() == WM_TIME_NONE) front_.set_now(t_ns);
+    if (now_ns() == WM_TIME_NONE) begin_at(t_ns);
     check_stated();
     if (now_ns() < start_ns_) {  // the start pose is later: until then only the inputs that hold are kept
       front_.advance(t_ns < start_ns_ ? t_ns : start_ns_, calibration_,
@@ -219,6 +216,7 @@ class planar_motion {
         walked(s.state, s.walk * dt);
       }
   }
+  void begin_at(wm_time_ns t_ns);
   void propagate(const motion_segment &piece, const motion_twist &twist, const motion_noise &noise);
   // The lag has become a state while the robot moves. The pose has been ahead by the lag since the robot stood.
   void begin_lag();
@@ -262,7 +260,7 @@ class planar_motion {
   wm_time_ns start_ns_;
   wm_pose2 odom_;
   double travelled_m_, turned_rad_;
-  planar_twist twist_;        // of the last segment
+  motion_twist twist_;        // of the last segment
   double twist_heading_rad_;  // at its end, as it was predicted
   steady_rate steady_[2];     // of its v and w
   noise_adaption noise_;

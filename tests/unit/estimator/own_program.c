@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // A program with a filter in itself: the installed headers alone, no configuration file, no number filled in that is
 // not known.
-#include "common/suite.h"
 #include "waymark/own_program.h"
+#include "common/suite.h"
 
 TEST(parameters_by_key) {
   const wm_estimator *ekf = wm_estimator_find("landmark_ekf");

@@ -89,7 +89,7 @@ inline void drive(double seconds, bool range = true) {
           const bool other = in_turn && step % 20 == 10;
           const double roll = other ? 0.0 : leans[0], pitch = other ? 0.0 : leans[1], up = other ? z - 1.0 : z;
           e.as.marker = marker(10 + i, x - pitch * up, y + roll * up, up - roll * y + pitch * x,
-                                  wm::wrap(0.5 * i + turned[i] - truth.heading_rad + gauss(0.01)));
+                               wm::wrap(0.5 * i + turned[i] - truth.heading_rad + gauss(0.01)));
           e.as.marker.sensor = other;
           if (two_poses) {  // the wrong one first, turned to the other side of the line of sight
             wm_marker &m = e.as.marker;

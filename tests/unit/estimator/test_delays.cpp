@@ -19,6 +19,14 @@ wm_calibration_value found(const char *name) {
   return out;
 }
 
+void look(double t, const wm_pose2 &p, uint64_t seed, uint64_t k) {
+  for (uint64_t i = 0; i < 3; i++) {
+    const auto [bearing, range] = view_of(landmarks[i].p_m[0], landmarks[i].p_m[1], p);
+    feed(make::sighting(t, landmarks[i].id, wm::wrap(bearing + kBearing_rad * wm_random_normal(seed, 1, 3 * k + i)),
+                        range + kRange_m * wm_random_normal(seed, 2, 3 * k + i)));
+  }
+}
+
 // The true drive of 120 s; commands change each two seconds, and the drive obeys them `lag_s` later with a first-order
 // response of 0.15 s. Sightings of all landmarks five times a second are `offset_s` older than their stamps.
 class Robot {
@@ -47,22 +55,14 @@ class Robot {
                                             {WM_Q_WHEEL_TICKS_RIGHT, std::floor(right[at] / tick_m)}})
                      : make::twist(t, speed(t), rate(t)));
       const double seen_s = t + 0.013 - offset_s_;
-      if (k % 5 == 0 && seen_s >= 0) look(t + 0.013, poses[static_cast<size_t>(seen_s / kStep_s)], k);
+      if (k % 5 == 0 && seen_s >= 0)
+        look(t + 0.013, poses[static_cast<size_t>(seen_s / kStep_s)], 1, static_cast<uint64_t>(k));
     }
   }
 
  private:
   static double speed(double t) { return t < 2 ? 0 : 0.4 + 0.2 * (static_cast<int>(t / 4) % 2); }
   static double rate(double t) { return t < 2 ? 0 : 0.4 * (static_cast<int>(t / 2) % 4) - 0.5; }
-  static void look(double t, const wm_pose2 &p, int k) {
-    for (uint64_t i = 0; i < 3; i++) {
-      const auto at = static_cast<uint64_t>(k) * 3 + i;
-      const auto [bearing, range] = view_of(landmarks[i].p_m[0], landmarks[i].p_m[1], p);
-      feed(make::sighting(t, landmarks[i].id, wm::wrap(bearing + kBearing_rad * wm_random_normal(1, 1, at)),
-                          range + kRange_m * wm_random_normal(1, 2, at)));
-    }
-  }
-
   double lag_s_, offset_s_;
 };
 
@@ -89,38 +89,76 @@ TEST(test_a_lag_and_a_time_offset_are_observed_as_a_sum) {
     }
 }
 
-// A receiver's positions at 100 Hz from a start that is not given. Each moves the vague heading, and this jitter must
-// not make anything known: squared errors by their variances, which have the mean 1, over 12 drives of 20 s.
-TEST(test_the_jitter_of_a_vague_heading_makes_nothing_known) {
-  const double white_m = 0.01;
+// Squared errors by their variances, which have the mean 1, over 12 drives of `seconds` with 100 observations a second:
+// of sightings, or of a receiver's positions.
+struct normalised {
+  double heading, place, delay;
+};
+enum class source { sightings, positions };
+normalised at_100_hz(source seen, double sigma_m, double sigma_rad, int seconds) {
   wm_rig rig = {};
   rig.antenna_m[0] = 0.8, rig.antenna_m[1] = -0.5;
   setup.rig = &rig;
-  start_at({NAN, NAN, NAN}, NAN, NAN);
-  double of_heading = 0, of_place = 0;
+  normalised out = {};
   for (uint64_t drive = 0; drive < 12; drive++) {
-    begin_with();
     const double base = 0.3 + 0.03 * static_cast<double>(drive), phase = static_cast<double>(drive);
     wm_pose2 p = {1, -2, wm::wrap(0.7 * phase)}, before = p;
-    for (uint64_t k = 0; k < 2000; k++) {
+    const auto off = [drive](uint64_t of, double sigma) { return sigma * wm_random_normal(drive, 3, of); };
+    start_at({p.x_m + off(0, sigma_m), p.y_m + off(1, sigma_m), wm::wrap(p.heading_rad + off(2, sigma_rad))}, sigma_m,
+             sigma_rad);  // NaN: not given
+    begin_with();
+    for (uint64_t k = 0; k < 100 * static_cast<uint64_t>(seconds); k++) {
       const double t = 0.01 * static_cast<double>(k), v = base + 0.1 * std::sin(0.8 * t),
                    w = 0.5 * std::sin(0.4 * t + phase);
       const double c = std::cos(p.heading_rad), s = std::sin(p.heading_rad);
       feed(make::twist(t, v, w));
-      feed(make::position(
-          t, p.x_m + c * rig.antenna_m[0] - s * rig.antenna_m[1] + white_m * wm_random_normal(drive, 1, k),
-          p.y_m + s * rig.antenna_m[0] + c * rig.antenna_m[1] + white_m * wm_random_normal(drive, 2, k), 0.02));
+      if (seen == source::positions)
+        feed(make::position(
+            t, p.x_m + c * rig.antenna_m[0] - s * rig.antenna_m[1] + 0.01 * wm_random_normal(drive, 1, k),
+            p.y_m + s * rig.antenna_m[0] + c * rig.antenna_m[1] + 0.01 * wm_random_normal(drive, 2, k), 0.02));
+      else
+        look(t, p, drive, k);
       const wm::arc a = wm::make_arc(0.01 * v, 0.01 * w);
       before = p;
       p = wm::compose(p, {a.x_m, a.y_m, a.turn_rad});
     }
-    const wm_estimate out = estimate();
-    of_heading += wm::square(turned_from(before)) / out.covariance[35] / 12;
-    of_place += wm::square(out.pose_map_base.p_m[0] - before.x_m) / out.covariance[0] / 24;
-    of_place += wm::square(out.pose_map_base.p_m[1] - before.y_m) / out.covariance[7] / 24;
+    const wm_estimate now = estimate();
+    const wm_calibration_value delay = found(seen == source::positions ? "gnss.time_offset_s" : "camera.time_offset_s");
+    out.heading += wm::square(turned_from(before)) / now.covariance[35] / 12;
+    out.place += wm::square(now.pose_map_base.p_m[0] - before.x_m) / now.covariance[0] / 24;
+    out.place += wm::square(now.pose_map_base.p_m[1] - before.y_m) / now.covariance[7] / 24;
+    out.delay += wm::square(delay.value / delay.sigma) / 12;
   }
-  TEST_ASSERT_LESS_THAN_DOUBLE(2.0, of_heading);
-  TEST_ASSERT_LESS_THAN_DOUBLE(0.3, of_place);
+  std::printf("%s, start %.2g m, %d s: heading %.2f place %.2f delay %.2f\n",
+              seen == source::positions ? "positions" : "sightings", sigma_m, seconds, out.heading, out.place,
+              out.delay);
+  return out;
+}
+
+// Each observation corrects the heading and what the motion's calibration makes of the twist. This jitter must not make
+// a delay known, nor by it the pose.
+TEST(test_the_jitter_of_corrections_makes_no_delay_known) {
+  const struct {
+    source seen;
+    double sigma_m, sigma_rad;
+    int seconds;
+  } rows[] = {{source::positions, kAbsent, kAbsent, 3},  {source::positions, kAbsent, kAbsent, 10},
+              {source::positions, kAbsent, kAbsent, 20}, {source::sightings, kAbsent, kAbsent, 10},
+              {source::sightings, 0.3, 0.3, 2},          {source::sightings, 0.3, 0.3, 10}};
+  for (const auto &row : rows) {
+    const normalised out = at_100_hz(row.seen, row.sigma_m, row.sigma_rad, row.seconds);
+    TEST_ASSERT_LESS_THAN_DOUBLE(1.5, out.heading);
+    TEST_ASSERT_LESS_THAN_DOUBLE(1.5, out.delay);
+    TEST_ASSERT_LESS_THAN_DOUBLE(1.0, out.place);
+  }
+}
+
+// The robot drives from the first datum on, and the delay, which may be half a second, reaches back to before it.
+TEST(test_a_delay_that_reaches_back_to_before_the_first_datum) {
+  make::exact_motion(&motion);
+  const normalised out = at_100_hz(source::positions, 0.3, 0.02, 10);
+  TEST_ASSERT_LESS_THAN_DOUBLE(1.5, out.heading);
+  TEST_ASSERT_LESS_THAN_DOUBLE(1.5, out.delay);
 }
 
 // No lag is below 0: what the sum has below it is the offset's.

@@ -343,9 +343,8 @@ TEST(test_a_start_of_which_something_is_unknown_is_found) {
     bool has_place;
     unsigned sees;
     double for_s, off_m, off_rad;
-  } rows[] = {{true, kBearings, 5, 0.15, 0.05},
-              {false, kBearings | kRanges, 6, 0.1, 0.05},
-              {false, kPositions, 30, 0.4, 0.2}};
+  } rows[] = {
+      {true, kBearings, 5, 0.15, 0.05}, {false, kBearings | kRanges, 6, 0.1, 0.05}, {false, kPositions, 30, 0.4, 0.2}};
   for (const auto &row : rows) {
     setUp();
     if (row.has_place)

@@ -55,8 +55,7 @@ void drive(double for_s, int seen, sees how = sees::right) {
     TEST_ASSERT_GREATER_OR_EQUAL_DOUBLE(0.0, p);
     TEST_ASSERT_LESS_OR_EQUAL_DOUBLE(1.0, p);
     const bool tracks = e.state == WM_STATE_TRACKING || e.state == WM_STATE_DEAD_RECKONING;
-    if (tracks && p < 0.5 && now_s > judged_from_s)
-      TEST_ASSERT_LESS_THAN_DOUBLE(0.3 + 5.0 * sigma(), off());
+    if (tracks && p < 0.5 && now_s > judged_from_s) TEST_ASSERT_LESS_THAN_DOUBLE(0.3 + 5.0 * sigma(), off());
   }
 }
 

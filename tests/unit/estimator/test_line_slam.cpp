@@ -107,8 +107,7 @@ outcome drive(double seconds, int lies_of_ten) {
     for (int k = 0; step % 5 == 0 && !dark && k < kLines; k++) {
       const int i = (k + shuffle * (step / 5)) % kLines;
       const double beside = epoch > 0 && i % 2 == 0 ? moved_m : 0.0;
-      say(t_s, 10 + i + 100 * epoch,
-          view_of(place[i][0] + beside, place[i][1]).bearing_rad + gauss(kSigma) + error[i]);
+      say(t_s, 10 + i + 100 * epoch, view_of(place[i][0] + beside, place[i][1]).bearing_rad + gauss(kSigma) + error[i]);
       // So many lies that they are their share of all.
       for (int twice = 0; twice < 2; twice++)
         if (uniform(0, 2) < lies_of_ten / (10.0 - lies_of_ten)) lie(t_s, static_cast<int>(uniform(0, 1000)));

@@ -16,7 +16,7 @@ wm_slam_params slam_params;
 struct robot {
   wm_localizer_params localizer = make::defaults_of<wm_localizer_params>(wm_localizer_params_table);
   double speed_factor = 1;  // of the speed that it measures
-  double drift_m = 0;                  // of the localizer's frame in a step
+  double drift_m = 0;       // of the localizer's frame in a step
   bool sees = true, is_stuck = false;
   int every = 1, step = 0;  // landmarks are seen in one step of so many
   wm_pose2 frame{};         // of the localizer, in map

@@ -457,7 +457,7 @@ TEST(test_noise_of_counts) {
 TEST(test_a_wrong_count_is_refused) {
   for (bool has_gyro : {false, true}) {
     start(make::two_wheels());
-      double before = 0.0;
+    double before = 0.0;
     for (int i = 0; i <= 50; i++) {
       if (has_gyro) gyro(0.02 * i - 1e-3, 0.0);
       if (i == 40) before = way_var;

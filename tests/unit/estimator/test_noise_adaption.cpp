@@ -50,7 +50,9 @@ double share_inside(uint64_t seed, const stated &by, bool has_landmarks, double 
     make::sightings.correlated_slots = 10;
     make::sightings.correlated_bearing_rad = make::sightings.correlated_range_m = -1.0;
   }
-  put_on_map({{5, 0}, {5.6569, 5.6569}, {0, 5}, {-5.6569, 5.6569}, {-5, 0}, {-5.6569, -5.6569}, {0, -5}, {5.6569, -5.6569}}, 0);
+  put_on_map(
+      {{5, 0}, {5.6569, 5.6569}, {0, 5}, {-5.6569, 5.6569}, {-5, 0}, {-5.6569, -5.6569}, {0, -5}, {5.6569, -5.6569}},
+      0);
   double offset_rad[kLandmarks], offset_m[kLandmarks];
   for (int i = 0; i < kLandmarks; i++) {
     offset_rad[i] = lasting ? gauss(kBearing_rad) : 0.0;

@@ -141,7 +141,7 @@ TEST(test_each_error_of_the_mounting_is_found) {
       make_room();
       coded = of_markers;
       params.map = WM_SLAM_MAP_FROZEN;
-  put_yaws_on_map();
+      put_yaws_on_map();
       sensor.mounting.xyz_m[0] -= c.x_m;
       sensor.mounting.xyz_m[1] -= c.y_m;
       sensor.mounting.rpy_rad[2] -= c.yaw_rad;

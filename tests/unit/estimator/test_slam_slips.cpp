@@ -46,9 +46,7 @@ bool is_on_map(int32_t id) {
 }
 
 // A landmark that the camera does not see, for as long as a burst takes.
-bool is_in_view(int i) {
-  return std::fabs(view_of(place[i][0], place[i][1]).bearing_rad) < 0.8;
-}
+bool is_in_view(int i) { return std::fabs(view_of(place[i][0], place[i][1]).bearing_rad) < 0.8; }
 
 }  // namespace
 

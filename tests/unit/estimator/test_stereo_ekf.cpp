@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // stereo_ekf through the contract: a made scene, exact truth, every attitude.
 #include <algorithm>
-#include <vector>
 #include <memory>
+#include <vector>
 
 #include "filters/stereo_ekf/params.h"
 #include "stereo_scene.hpp"

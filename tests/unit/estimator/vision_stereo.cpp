@@ -148,7 +148,8 @@ struct machine : wm::drawn::eyes {
 
   void look(const std::vector<uint8_t> &left, const std::vector<uint8_t> &right, double t_s) {
     const auto t_ns = static_cast<wm_time_ns>(t_s * 1e9);
-    const wm_frame frames[2] = {wm::drawn::frame_of(left, 640, 480, t_ns), wm::drawn::frame_of(right, 640, 480, t_ns, 1)};
+    const wm_frame frames[2] = {wm::drawn::frame_of(left, 640, 480, t_ns),
+                                wm::drawn::frame_of(right, 640, 480, t_ns, 1)};
     count = eyes::look(frames);
   }
   void render(const sea::view_of_floor &seen, uint64_t number, std::vector<uint8_t> *left,
