@@ -31,6 +31,7 @@ wm_verdict update(planar_filter *filter, innovation &&prepared, const residual *
   const int count = prepared.rows;
   sparse_row rows[planar_filter::kRows];
   planar_filter::update_options options;
+  options.turns_errors = r->is_position;
   options.kept_from = kPoseStates;
   options.kept_to = policy.holds || (g.soft && policy.doubtful) ? policy.held_to : kPoseStates;
   for (int i = 0; i < count; i++) {

@@ -108,6 +108,7 @@ void position_aid::put_rows(const wm_position &p, const view &at, const planar_m
   for (int k = 0; k < 2; k++) {
     residual &r = rows[k];
     r.row = {};
+    r.is_position = true;
     const double expected = put_row(k, at, filter, &r.row) + at.bend_m[k];
     r.record = record;
     r.record.residual = k == 0 ? WM_RESIDUAL_X : WM_RESIDUAL_Y;
@@ -131,6 +132,7 @@ observation position_aid::observe(const wm_position &p, const view &at, const pl
 
 void position_aid::put_row(const wm_heading &h, const planar_motion &filter, residual *r) const {
   r->row = {};
+  r->is_position = true;
   r->source = {};
   r->row.add(kHeading, 1.0);
   r->row.add(heading_bias_, 1.0);

@@ -14,6 +14,7 @@ struct residual {
   double innovation, noise;  // observed - expected; variance of the observation
   wm_innovation record;
   noise_adaption::source source;  // what the noise adapts to
+  bool is_position = false;       // or a heading: the error of the pose is the left-invariant one [Barrau2017]
 };
 
 }  // namespace wm

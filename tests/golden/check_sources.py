@@ -275,7 +275,7 @@ FAULTS = [
     ("commands beside a gyro", {"motion.csv": commands(), "imu.csv": imu()}, ("note", "data-unused", "imu"), "the gyro is not used", "twist: measured"),
     ("nobody takes the edge points", {**both(), "points.csv": "t_ns,x_m,y_m\n" + "".join(f"{ns(k / 10)},2.0,0.1\n" for k in range(600)), "config.yaml": "format: waymark-config/1\nestimator: slam\n"}, ("bad", "data-unused", "points"), "these do: edge_mcl", "use: false"),
     ("a map that is 6 % too large", sighted(1.06), ("bad", "map-implausible", "map"), "% too large", "x_m, y_m and z_m times 0.9"),
-    ("an antenna that is elsewhere", {"motion.csv": motion(), "gnss.csv": gnss(sigma=0.01, stated=0.02), "heading.csv": headings(), "calibration.yaml": "gnss: {mounting: {xyz_m: [0, 0.6, 1]}}\n", "config.yaml": "format: waymark-config/1\nestimator: landmark_ekf\n"}, ("bad", "calibration-off", "calibration"), "0.6 was expected", "gnss.mounting"),
+    ("an antenna that is elsewhere", {"motion.csv": motion(), "gnss.csv": gnss(sigma=0.01, stated=0.02), "heading.csv": headings(), "calibration.yaml": "gnss: {mounting: {xyz_m: [0, 0.6, 1]}}\n", "config.yaml": "format: waymark-config/1\nestimator: landmark_ekf\n"}, ("note", "calibration-off", "calibration"), "0.6 was expected", "gnss.mounting"),
     ("no sighting is fused", sighted(1, ", max_range_m: 0.5"), ("bad", "value-implausible", "sightings:eye"), "not used", "max_range_m"),
     ("positions of ten times their sigma", {"motion.csv": motion(), "gnss.csv": gnss(sigma=0.01, stated=2.0), "config.yaml": "format: waymark-config/1\nestimator: landmark_ekf\n"}, ("bad", "noise-too-large", "gnss"), "of what is stated", "real sigma"),
 ]

@@ -74,11 +74,41 @@ bool planar_filter::update(innovation &&i, const sparse_row *rows, const update_
   if (!state_.solve(&i, options.added_noise, moving)) return false;
   adapt(i, rows, options);
   keep_limits(i);
-  const delayed delay = delay_of(i);
+  delayed delay = delay_of(i);
+  const double turn = options.turns_errors ? state_.step()[kHeading] : 0.0;
   add_step();
   state_.correct(std::move(i), moving);
+  if (turn != 0.0) {
+    turn_errors(kX, turn);
+    turn_errors(correlated_, turn);
+    delay.turn(turn);
+  }
   turn_delay(delay);
   return true;
+}
+
+// A rotation as three shears, since each state is assigned from the others as they are.
+void planar_filter::turn_errors(int first, double by_rad) {
+  if (first < 0) return;
+  const sin_cos half = sincos(0.5 * by_rad);
+  const double along = half.sin / half.cos, across = 2.0 * half.sin * half.cos, noise = 0.0;
+  const auto shear = [&](int state, int other, double by) {
+    planar_row row;
+    row.add(state, 1.0);
+    row.add(other, by);
+    const double unchanged = value(state);
+    assign(state, 1, &row, &noise, 1, &unchanged);
+  };
+  shear(first, first + 1, -along);
+  shear(first + 1, first, across);
+  shear(first, first + 1, -along);
+}
+
+void planar_filter::delayed::turn(double by_rad) {
+  const sin_cos h = sincos(by_rad);
+  const double x = by[0], y = by[1];
+  by[0] = h.cos * x - h.sin * y;
+  by[1] = h.sin * x + h.cos * y;
 }
 
 // A velocity that is a state walks so much that a delay shows nowhere.

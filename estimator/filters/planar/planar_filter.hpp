@@ -45,6 +45,9 @@ class planar_filter : public planar_motion {
     // The states from `kept_from` up to `kept_to` keep their values: they are considered, not corrected [Schmidt1966].
     int kept_from = 0, kept_to = 0;
     noise_adaption::source source[kRows] = {};  // what the noise adapts to
+    // With the heading turn the errors of places, whose axes are then the robot's. Else each position would be seen
+    // from another direction, and the jitter of a vague heading would make known what nothing shows.
+    bool turns_errors = false;
   };
   // False: the innovation is stale, or its covariance not positive definite and finite, and nothing changed.
   [[nodiscard]] bool update(innovation &&i, const sparse_row *rows, const update_options &options);
@@ -78,8 +81,10 @@ class planar_filter : public planar_motion {
   struct delayed {
     int state;                                   // of the delay; -1: none
     double by[kPoseStates], after[kPoseStates];  // derivatives of the pose by it before the update's step, and after
+    void turn(double by_rad);                    // the errors turned
   };
-  delayed delay_of(const innovation &of);  // between the update's solution and its step
+  delayed delay_of(const innovation &of);      // between the update's solution and its step
+  void turn_errors(int first, double by_rad);  // of a vector on map's axes, two states from `first` on; not its value
   void turn_delay(const delayed &d);
   void turn_delay(const delayed &d, int first, int count);
 
