@@ -46,6 +46,15 @@ void tearDown(void) {
   TEST_ASSERT_EQUAL(0, system(command));
 }
 
+// A path in the folder, until the next call but one.
+static const char *at(const char *name) {
+  static char paths[2][160];
+  static int which;
+  char *path = paths[which ^= 1];
+  (void)snprintf(path, sizeof paths[0], "%s/%s", folder, name);
+  return path;
+}
+
 static void open_box(void) { black_box_open(&box, folder, 10, 2, &assembly, hear, NULL); }
 
 // Ten events and a pose a second.
@@ -65,23 +74,19 @@ static void drive(int seconds, wm_state state) {
 
 static size_t files(const char *pattern) {
   glob_t found;
-  char path[128];
-  (void)snprintf(path, sizeof path, "%s/%s", folder, pattern);
-  size_t count = glob(path, 0, NULL, &found) == 0 ? found.gl_pathc : 0;
+  size_t count = glob(at(pattern), 0, NULL, &found) == 0 ? found.gl_pathc : 0;
   globfree(&found);
   return count;
 }
 
 // Events of a log, and where it begins.
 static int events_of(const char *name, double *begins_x_m) {
-  char path[128];
   wm_error err;
   wm_log_reader *log;
   static wm_event event;
   uint64_t missing = 0;
   int cut = 0, count = 0;
-  (void)snprintf(path, sizeof path, "%s/%s", folder, name);
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_log_open(path, &log, &err), name);
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_log_open(at(name), &log, &err), name);
   *begins_x_m = wm_log_reader_head(log)->start.p_m[0];
   while (wm_log_next(log, &event, &missing, &cut, &err) == WM_OK) count++;
   wm_log_reader_close(log);
@@ -111,11 +116,9 @@ TEST(a_loss_is_kept_with_what_was_before_and_after) {
 }
 
 static void expect_kept(const char *name, const char *map, double begins_x_m) {
-  char path[128];
   wm_error err;
   wm_log_reader *log;
-  (void)snprintf(path, sizeof path, "%s/%s", folder, name);
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_log_open(path, &log, &err), name);
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_log_open(at(name), &log, &err), name);
   const wm_log_head *head = wm_log_reader_head(log);
   TEST_ASSERT_EQUAL(strlen(map), head->kept_bytes);
   TEST_ASSERT_EQUAL_MEMORY(map, head->kept, strlen(map));
@@ -201,13 +204,11 @@ TEST(the_oldest_go) {
 }
 
 static void die(double at_s) {
-  char path[128];
   open_box();
   drive(2, WM_STATE_TRACKING);
   (void)fclose(box.log.file);
-  (void)snprintf(path, sizeof path, "%s/now.wmlog", folder);
   const struct timespec when[2] = {{.tv_sec = (time_t)at_s}, {.tv_sec = (time_t)at_s}};
-  TEST_ASSERT_EQUAL(0, utimensat(AT_FDCWD, path, when, 0));
+  TEST_ASSERT_EQUAL(0, utimensat(AT_FDCWD, at("now.wmlog"), when, 0));
 }
 
 // GIVEN an old incident WHEN a run dies again and again THEN the incident stays, with the loop's first and newest
@@ -230,10 +231,7 @@ TEST(a_crash_loop_evicts_no_old_incident) {
 }
 
 TEST(a_link_in_its_folder_is_not_followed) {
-  char path[128], other[128];
-  (void)snprintf(path, sizeof path, "%s/now.wmlog", folder);
-  (void)snprintf(other, sizeof other, "%s/other", folder);
-  TEST_ASSERT_EQUAL(0, symlink(other, path));
+  TEST_ASSERT_EQUAL(0, symlink(at("other"), at("now.wmlog")));
   open_box();
   drive(1, WM_STATE_TRACKING);
   black_box_close(&box);
@@ -241,14 +239,17 @@ TEST(a_link_in_its_folder_is_not_followed) {
   TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, "symbolic link"), said);
 }
 
-// WHEN there is an incident of this number THEN the next two have the next numbers, and all stay.
-static void numbers_follow(uint64_t number) {
-  char name[64], path[128];
-  (void)snprintf(name, sizeof name, "lost-%" PRIu64 "-now.wmlog", number);
-  (void)snprintf(path, sizeof path, "%s/%s", folder, name);
-  FILE *f = fopen(path, "w");
+static void touch(const char *name) {
+  FILE *f = fopen(at(name), "w");
   TEST_ASSERT_NOT_NULL(f);
   (void)fclose(f);
+}
+
+// WHEN there is an incident of this number THEN the next two have the next numbers, and all stay.
+static void numbers_follow(uint64_t number) {
+  char name[64];
+  (void)snprintf(name, sizeof name, "lost-%" PRIu64 "-now.wmlog", number);
+  touch(name);
   for (int i = 0; i < 2; i++) {
     open_box();
     drive(5, WM_STATE_TRACKING);
@@ -267,11 +268,7 @@ TEST(numbers_go_on_beyond_32_bits) { numbers_follow(UINT32_MAX); }
 
 // A number that is none of a black box does not end its counting.
 TEST(a_number_without_end_is_no_number) {
-  char path[128];
-  (void)snprintf(path, sizeof path, "%s/lost-99999999999999999999-now.wmlog", folder);
-  FILE *f = fopen(path, "w");
-  TEST_ASSERT_NOT_NULL(f);
-  (void)fclose(f);
+  touch("lost-99999999999999999999-now.wmlog");
   numbers_follow(20041);
 }
 
@@ -335,10 +332,8 @@ static void see(int seconds) {
 }
 
 static int lines_of(const char *name) {
-  char path[128];
   int lines = 0;
-  (void)snprintf(path, sizeof path, "%s/%s", folder, name);
-  FILE *f = fopen(path, "r");
+  FILE *f = fopen(at(name), "r");
   if (!f) return -1;
   for (int c; (c = fgetc(f)) != EOF;) lines += c == '\n';
   (void)fclose(f);
