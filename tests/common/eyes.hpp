@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A detector under test: its parameters by key, its state, what it tells of pictures.
+// A detector under test: its parameters by key, its state, what it finds in pictures.
 #pragma once
 
 #include <memory>

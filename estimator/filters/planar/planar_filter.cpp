@@ -9,7 +9,7 @@
 namespace wm {
 namespace {
 
-// Share of a state's variance: what a correction turns below it counts nothing, even a thousand times.
+// Share of a state's variance. A correction that changes less is left out: a thousand of them are 1e-4 of it.
 constexpr double kTurned = 1e-7;
 
 }  // namespace
@@ -111,7 +111,7 @@ void planar_filter::delayed::turn(double by_rad) {
   by[1] = h.sin * x + h.cos * y;
 }
 
-// A velocity that is a state walks so much that a delay shows nowhere.
+// Where the velocity is a state, its random walk hides a delay: nothing turns.
 planar_filter::delayed planar_filter::delay_of(const innovation &of) {
   delayed out{has_velocity() ? -1 : of.delay, {}, {}};
   if (out.state < 0) return out;
@@ -139,8 +139,9 @@ void planar_filter::turn_delay(const delayed &d) {
   if (correlated_ >= 0) turn_delay(d, correlated_, 2);
 }
 
-// What these states have in common with the delay, the lag given, is a share of the derivatives: others determine them,
-// too. With the lag they have in common what the prediction turns.
+// The states' regression on the delay, with the lag given, is a share of the derivatives `by`: other observations
+// determine the states, too. The share stays, and the derivatives become `after`. The regression on the lag is the
+// prediction's.
 void planar_filter::turn_delay(const delayed &d, int first, int count) {
   const int lag = motion_state_[kLag];
   const double by_lag = lag >= 0 && variance(lag) > 0.0 ? covariance(lag, d.state) / variance(lag) : 0.0;

@@ -45,8 +45,8 @@ class planar_filter : public planar_motion {
     // The states from `kept_from` up to `kept_to` keep their values: they are considered, not corrected [Schmidt1966].
     int kept_from = 0, kept_to = 0;
     noise_adaption::source source[kRows] = {};  // what the noise adapts to
-    // With the heading turn the errors of places, whose axes are then the robot's. Else each position would be seen
-    // from another direction, and the jitter of a vague heading would make known what nothing shows.
+    // The errors of places turn with the heading, as they do on the robot's axes. Else each position is linearised
+    // about another heading, and the noise of a vague heading adds information that no observation has.
     bool turns_errors = false;
   };
   // False: the innovation is stale, or its covariance not positive definite and finite, and nothing changed.
@@ -74,10 +74,10 @@ class planar_filter : public planar_motion {
 
  private:
   void adapt(const innovation &i, const sparse_row *rows, const update_options &options);
-  // At one twist, a delay and a shift of the pose along that twist are the same: this direction of the state is not
-  // observed. A correction changes the twist, by its scale, its bias and the heading, and so the direction. With it
-  // turns what the pose and the lasting error of positions have in common with the delay. Else each correction would
-  // see the delay from another side, and noise would make it known [Huang2010].
+  // At a constant twist, a delay and a shift of the pose along the twist give the same observations: this direction of
+  // the state is not observable. A correction changes the twist (scale, bias, heading), and so the direction. So the
+  // correlation of the pose, and of the lasting error of positions, with the delay turns with each correction. Else
+  // noise adds information on the delay [Huang2010].
   struct delayed {
     int state;                                   // of the delay; -1: none
     double by[kPoseStates], after[kPoseStates];  // derivatives of the pose by it before the update's step, and after

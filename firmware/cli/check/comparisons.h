@@ -9,7 +9,8 @@
 #include "findings/findings.h"
 #include "fusion/assembly.h"
 
-// Whether a finding of fact says that this channel's clock or counter is broken: it is no witness then.
+// Whether a finding of fact says that this channel's clock or counter is broken, so that no other channel is compared
+// with it.
 int comparisons_is_broken(const channel *c, const wm_assembly *assembly, const wm_findings *found);
 // Findings about the sensors that contradict the others.
 void comparisons_judge(const channels *self, const wm_assembly *assembly, wm_findings *out);

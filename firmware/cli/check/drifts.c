@@ -10,9 +10,9 @@
 #define WINDOWS_MOST 2400  // ten minutes of a drive tell a clock
 #define WINDOWS_MIN 40
 #define BLOCKS 20
-#define WEIGHT_MIN 0.1  // of the mean block's: a block that hardly turns tells no delay
+#define WEIGHT_MIN 0.1  // of the mean block's: a block with hardly a turn has no delay
 // By how much a lag differs from turn to turn, before the blocks say so: a period of a slow sensor. As good as so many
-// blocks: few turns alone hardly tell their scatter.
+// blocks: the scatter of a few turns is hardly known.
 #define LAG_S 0.05
 #define LAG_BLOCKS 8
 #define CHANCE_SIGMAS 3.9  // of a normal distribution: one of 10,000 by chance

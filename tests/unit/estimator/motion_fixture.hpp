@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A motion front end whose segments are integrated: pose and variances of the way, the turn and the side. Short ways to
-// say what a robot with counters, a speed and a gyro tells.
+// put the data of a robot with counters, a speed and a gyro.
 #pragma once
 
 #include "common/suite.h"

@@ -386,7 +386,7 @@ TEST(test_what_cannot_be_seen_is_not_learnt) {
         TEST_ASSERT_TRUE(m.filter->fuse(rows, {1e9, 1e9}).fused);
       }
       m.filter->settle();
-      const double walk = which == nothing ? 1e-6 : 1;  // else the motion says next to nothing
+      const double walk = which == nothing ? 1e-6 : 1;  // else the motion has nearly no weight
       m.filter->propagate({0.1, v, w, {walk, walk, walk}, {walk, walk, walk}});
     }
     if (which == nothing)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A robot in the plane with its estimator through the contract: what it is started with, what it sees from where it
-// truly is, and what the estimator says. One for all tests of estimators in the plane; drives and faults are each
+// A robot in the plane with its estimator through the contract: what it is started with, what it sees from its
+// true pose, and the output of the estimator. One for all tests of estimators in the plane; drives and faults are each
 // test's.
 #pragma once
 
@@ -98,7 +98,7 @@ inline void begin() {
   TEST_ASSERT_NOT_NULL(state.get());
 }
 
-// ---- what it is told ----
+// ---- its input ----
 
 inline wm_status tell(const wm_event &e) {
   count = 0;
@@ -134,7 +134,7 @@ inline view view_of(double x_m, double y_m, const wm_pose2 &eye) {
 }
 inline view view_of(double x_m, double y_m) { return view_of(x_m, y_m, truth); }
 
-// ---- what it says ----
+// ---- its output ----
 
 inline wm_estimate estimate() {
   wm_estimate e;
