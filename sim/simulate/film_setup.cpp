@@ -195,7 +195,7 @@ wm_status prepare(const Scenario &scenario, uint64_t seed, Film &out, wm_error *
   request.markers_on_walls = scenario.world.markers_on_walls;
   request.markers = scenario.world.markers;
   request.rounds = scenario.world.rounds;
-  request.seed = seed;
+  request.seed = scenario.world.seed ? scenario.world.seed : seed;
   if (!scenario.route.legs.empty()) request.route = scenario.route;
   request.footprint = scenario.robot.body;
   request.landmarks = scenario.landmarks;

@@ -33,9 +33,9 @@ void read_landmarks(Reader &r, const wm_yaml_node &list, Scenario &out) {
 }
 
 void read_world(Reader &r, const wm_yaml_node &world, Scenario &out) {
-  static const char *const known[] = {"landmarks", "kind",  "variant",   "markers_on_walls", "scatter",
-                                      "map",       "plan",  "ceiling_m", "resolution_m",     "markers",
-                                      "rounds",    "tag_m", nullptr};
+  static const char *const known[] = {"landmarks", "kind",      "variant",      "markers_on_walls", "scatter", "map",
+                                      "plan",      "ceiling_m", "resolution_m", "markers",          "rounds",  "tag_m",
+                                      "seed",      nullptr};
   static const char *const maps[] = {"all", "listed", "none", nullptr};
   static const char *const kinds[] = {"features", "crossing", "corridor", "office", "hall", "seabed", nullptr};
   static const char *const variants[] = {"easy", "hard", nullptr};
@@ -50,6 +50,9 @@ void read_world(Reader &r, const wm_yaml_node &world, Scenario &out) {
   out.world.markers = static_cast<Markers>(family);
   out.world.hard = variant == 1;
   if (kind > 0) out.world.kind = kinds[kind];
+  int64_t seed = 0;
+  r.integer(world, "seed", 0, INT64_MAX, seed);
+  out.world.seed = static_cast<uint64_t>(seed);
   r.number(world, "rounds", 0.1, 20, 1, out.world.rounds);
   if (const wm_yaml_node rounds = r.child(world, "rounds", false);
       r.ok() && out.world.kind != "seabed" && wm_yaml_there(&rounds))

@@ -104,6 +104,7 @@ struct WorldKind {
   std::string kind;  // crossing, corridor, office, hall, seabed; empty: features only
   bool hard = false;
   bool markers_on_walls = false;    // office
+  uint64_t seed = 0;                // of the world and the way through it; 0: the drive's
   double rounds = 1.05;             // seabed: of the vehicle's way
   Markers markers = Markers::tags;  // office
   std::string plan;         // corridor, office, hall: the file of a building of one's own; empty: drawn by the seed
