@@ -66,6 +66,21 @@ static wm_status read_calibration(wm_site *self, wm_error *err) {
   return status;
 }
 
+// The floor's origin. A robot whose calibration.yaml has another one would mix two frames.
+static wm_status take_origin(wm_site *self, wm_error *err) {
+  static const double kSame[3] = {1e-6, 1e-6, 0.1};  // degrees (0.1 m), m: below any receiver's error
+  double *own = self->calibration.gnss_origin;
+  for (int i = 0; i < 3 && self->files.has_origin && isfinite(own[i]); i++)
+    if (fabs(own[i] - self->files.origin[i]) > kSame[i])
+      return wm_fail(err, WM_BAD_CONFIG,
+                     "%s: gnss.origin of calibration.yaml is [%.7f, %.7f, %.2f], the floor's is [%.7f, %.7f, %.2f]; "
+                     "leave one of them out",
+                     self->name, own[0], own[1], own[2], self->files.origin[0], self->files.origin[1],
+                     self->files.origin[2]);
+  if (self->files.has_origin) memcpy(own, self->files.origin, sizeof self->files.origin);
+  return WM_OK;
+}
+
 static wm_status read_landmarks(wm_site *self, wm_error *err) {
   char path[WM_PATH_MAX];
   int there;
@@ -124,6 +139,7 @@ wm_status wm_site_open(const char *dir, const wm_recording_overrides *files, wm_
   if (files) self->files = *files;
   wm_start_init(&self->start);
   wm_status status = read_calibration(self, err);
+  if (status == WM_OK) status = take_origin(self, err);
   if (status == WM_OK) status = read_landmarks(self, err);
   if (status == WM_OK) status = find_map(self, err);
   if (status != WM_OK) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "config/config.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -203,6 +204,31 @@ static wm_status read_files(const wm_yaml_node *root, int must_be_there, wm_conf
   return status;
 }
 
+// The floor's files where the configuration names none itself.
+static wm_status take_floor(const wm_yaml_node *site, const char *key, const char *of_floor, char file[WM_PATH_MAX],
+                            wm_error *err) {
+  if (of_floor[0] && file[0])
+    return wm_yaml_fail(site, err, "the floor has %s of its own (%s); leave the key '%s' out", key, of_floor, key);
+  if (of_floor[0]) (void)snprintf(file, WM_PATH_MAX, "%s", of_floor);
+  return WM_OK;
+}
+
+static wm_status read_site(const wm_yaml_node *root, wm_config *out, wm_error *err) {
+  char path[WM_PATH_MAX];
+  wm_error why = {0};
+  wm_yaml_node site = wm_yaml_get(root, "site");
+  if (!wm_yaml_there(&site)) return WM_OK;
+  wm_status status = config_path(&site, out->path, path, err);
+  if (status == WM_OK && wm_floor_choose(path, &out->floor, &why) != WM_OK)
+    return wm_yaml_fail(&site, err, "%s", why.text);
+  const wm_floor *floor = &out->floor.floor;
+  if (status == WM_OK) status = take_floor(&site, "landmarks", floor->landmarks, out->overrides.landmarks, err);
+  if (status == WM_OK) status = take_floor(&site, "map", floor->map, out->overrides.map, err);
+  out->overrides.has_origin = isfinite(floor->origin[0]);
+  memcpy(out->overrides.origin, floor->origin, sizeof out->overrides.origin);
+  return status;
+}
+
 static wm_status read_start(const wm_yaml_node *root, wm_config *out, wm_error *err) {
   wm_start_init(&out->initial_pose);
   wm_yaml_node pose = wm_yaml_get(root, "initial_pose");
@@ -267,6 +293,7 @@ static wm_status read_all(const wm_yaml_node *root, int files_must_be_there, int
   if (status == WM_OK) status = config_read_sources(root, out, err);
   if (status == WM_OK) status = config_read_vision(root, files_must_be_there, out, err);
   if (status == WM_OK) status = read_files(root, files_must_be_there, out, err);
+  if (status == WM_OK && files_must_be_there) status = read_site(root, out, err);
   if (status == WM_OK) status = config_read_devices(root, out, err);
   if (status == WM_OK) status = read_texts(root, out, err);
   return status == WM_OK ? read_start(root, out, err) : status;

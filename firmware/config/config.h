@@ -14,6 +14,7 @@
 //   can_signals: FILE
 //   devices: {can: [{interface: can0}]}    # the robot's own, where there is no recording
 //   map: FILE                      # a map.yaml
+//   site: FOLDER/FLOOR             # landmarks and map are those of this floor
 //   initial_pose: {x_m: 0, y_m: 0, heading_rad: 0, sigma_xy_m: 0.05, sigma_heading_rad: 0.05}
 //   merge: {horizon_ms: 300, ...}  # wm_runtime_params
 //   publish: {rate_hz: 50, ...}
@@ -36,6 +37,7 @@
 #include "waymark/detector.h"
 #include "waymark/devices.h"
 #include "waymark/estimator.h"
+#include "waymark/floors.h"
 #include "waymark/recording.h"
 #include "waymark/source.h"
 #include "waymark/status.h"
@@ -129,6 +131,7 @@ typedef struct wm_config {
   wm_runtime_params runtime;
   int32_t lateness_is_stated;  // merge.lateness_max_ms
   wm_recording_overrides overrides;
+  wm_chosen_floor floor;  // of `site`; without a name: none
   wm_vision_config vision[WM_VISION_MAX];
   size_t vision_count;
   wm_devices_config devices;

@@ -38,6 +38,9 @@ const config_key kConfigKeys[] = {
      .about = "The robot's own devices, for `waymark run` without a recording. See below.", .of = kConfigDevicesKeys},
     {"map", CONFIG_FILE, "the recording's map/map.yaml",
      .about = "Raster map (a map.yaml) to take instead of the recording's."},
+    {"site", CONFIG_PATH, "none",
+     .about = "A building's folder and a floor of it, `SITE/FLOOR`: its landmarks, map, origin and saved points "
+              "(docs/building.md)."},
     {"initial_pose", CONFIG_MAP, "the recording's",
      .about = "Start pose: `t_ns`, `x_m`, `y_m`, `z_m`, `heading_rad` or `heading_deg`, `qx`, `qy`, `qz`, `qw`, "
               "`sigma_xy_m`, "

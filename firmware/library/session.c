@@ -265,8 +265,7 @@ static wm_status write_summary(session *self, wm_error *err) {
   wm_status status = found && health ? session_health(self, health, err)
                                      : wm_fail(err, WM_IO, "%s: no memory for health.json", self->out);
   if (status == WM_OK) status = wm_run_folder_health(self->folder, health, found, err);
-  if (status == WM_OK)
-    status = wm_run_folder_map(self->folder, self->pipeline.fuser.estimator, self->pipeline.fuser.state, err);
+  if (status == WM_OK) status = wm_run_folder_map(self->folder, self->pipeline.fuser.state, err);
   free(health);
   free(found);
   return status;

@@ -281,6 +281,22 @@ static wm_status copy_file(recorder *self, const char *from, const char *name, w
   return status;
 }
 
+// With the floor's origin, which the recording has from nowhere else.
+static wm_status copy_calibration(recorder *self, wm_error *err) {
+  const wm_recording_overrides *files = &self->config->overrides;
+  char *text, *with_origin = NULL, origin[96];
+  size_t length;
+  if (!files->has_origin || !files->calibration[0]) return copy_file(self, files->calibration, "calibration.yaml", err);
+  (void)snprintf(origin, sizeof origin, "[%.9f, %.9f, %.3f]", files->origin[0], files->origin[1], files->origin[2]);
+  wm_status status = wm_text_read_file(files->calibration, FILE_BYTES_MAX, &text, &length, err);
+  if (status != WM_OK) return status;
+  status = wm_yaml_edit(text, length, "gnss.origin", origin, "", &with_origin, &length, err);
+  if (status == WM_OK) status = write_text(self, "calibration.yaml", with_origin, length, err);
+  free(with_origin);
+  free(text);
+  return status;
+}
+
 typedef struct bus_files {
   char dbc[WM_CAN_IFACE_MAX + 20], signals[WM_CAN_IFACE_MAX + 20];
 } bus_files;
@@ -294,7 +310,7 @@ static bus_files files_of(const wm_config *config, size_t bus) {
   return out;
 }
 
-#define CHANGES_MAX (5 + 2 * WM_CAN_DEVICES_MAX)
+#define CHANGES_MAX (6 + 2 * WM_CAN_DEVICES_MAX)
 
 // Keys of the configuration and their file names in the recording.
 static size_t changes_of(const wm_config *config, const wm_yaml *doc, bus_files buses[WM_CAN_DEVICES_MAX],
@@ -304,6 +320,7 @@ static size_t changes_of(const wm_config *config, const wm_yaml *doc, bus_files 
   } files[] = {{"calibration", "calibration.yaml"},
                {"landmarks", "landmarks.csv"},
                {"map", "map/map.yaml"},
+               {"site", NULL},
                {"dbc", config->devices.can_count > 1 ? NULL : "vehicle.dbc"},
                {"can_signals", config->devices.can_count > 1 ? NULL : "can-signals.yaml"}};
   wm_yaml_node root = wm_yaml_root(doc);
@@ -372,7 +389,7 @@ static wm_status write_about(recorder *self, wm_error *err) {
   // No list of streams: the files that are there are read, also after a power cut.
   wm_status status = write_text(self, "recording.yaml", text, (size_t)used, err);
   if (status == WM_OK) status = write_config(self, err);
-  if (status == WM_OK) status = copy_file(self, config->overrides.calibration, "calibration.yaml", err);
+  if (status == WM_OK) status = copy_calibration(self, err);
   if (status == WM_OK) status = copy_file(self, config->overrides.landmarks, "landmarks.csv", err);
   if (status == WM_OK && config->overrides.map[0])
     status = copy_map(config->overrides.map, self->options->out_dir, err);

@@ -6,6 +6,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "live/command_socket.h"
 #include "live/lcm_commands.h"
@@ -132,10 +133,10 @@ static int start_where_it_was(live *self) {
 }
 
 // Continues with the saved map. Without a saved pose the start is unknown: the configuration's start is of another map.
-static void go_on_with_map(live *self, int has_pose) {
+static void go_on_with_map(live *self, const char *file, int has_pose) {
   wm_setup *setup = &self->assembly.setup;
   wm_error err;
-  wm_status status = wm_saved_map_read(self->config->saved_map, self->config, setup, &self->map, &err);
+  wm_status status = wm_saved_map_read(file, self->config, setup, &self->map, &err);
   if (status != WM_OK) {
     live_say(self, "start: no saved map is used: %s", err.text);
     return;
@@ -151,8 +152,17 @@ static void go_on_with_map(live *self, int has_pose) {
            has_pose ? "" : "; the robot is relocalized in it");
 }
 
+// The robot's own; before its first run the floor's saved points.
+static const char *map_before(const wm_config *config) {
+  const char *points = config->floor.floor.points;
+  return points[0] && (!config->saved_map[0] || access(config->saved_map, F_OK) != 0) ? points : config->saved_map;
+}
+
 static void take_up_what_was(live *self) {
   const wm_config *config = self->config;
+  const wm_chosen_floor *chosen = &config->floor;
+  if (chosen->floor.name[0])
+    live_say(self, "map: floor %s, version %s", chosen->floor.name, chosen->version[0] ? chosen->version : "none");
   int has_pose = self->options->start != NULL;
   if (has_pose) {
     self->assembly.setup.start = *self->options->start;
@@ -162,7 +172,8 @@ static void take_up_what_was(live *self) {
   self->disk.keeps_pose = config->saved_pose[0] != '\0';
   self->disk.keeps_map =
       (config->saved_map[0] != '\0' || config->black_box[0] != '\0') && wm_keeper_of(config->estimator);
-  if (!self->disk.keeps_map || config->saved_map[0] == '\0') return;
+  const char *map = map_before(config);
+  if (map[0] == '\0' || !wm_keeper_of(config->estimator)) return;
   const size_t largest_bytes = map_slot_bytes(self);
   if (largest_bytes > WM_SAVED_MAP_BYTES_MAX)
     live_say(
@@ -171,7 +182,7 @@ static void take_up_what_was(live *self) {
         "have (%.0f MB): one that grows so large is not saved. Lower the landmarks' capacity",
         (double)largest_bytes * 1e-6, (double)WM_SAVED_MAP_BYTES_MAX * 1e-6);
   self->disk.map_identity = wm_map_identity_of(config, &self->assembly.setup);
-  go_on_with_map(self, has_pose);
+  go_on_with_map(self, map, has_pose);
 }
 
 // At the end, after the estimator's and the disk thread.
@@ -432,7 +443,7 @@ static wm_status write_summary(live *self, wm_live_report *report, wm_error *err
                             .memory_bytes = self->arena.bytes};
   wm_status status = wm_run_folder_health(self->disk.folder, &report->run.health, &report->run.findings, err);
   const wm_fuser *fuser = &e->pipeline.fuser;
-  if (status == WM_OK) status = wm_run_folder_map(self->disk.folder, fuser->estimator, fuser->state, err);
+  if (status == WM_OK) status = wm_run_folder_map(self->disk.folder, fuser->state, err);
   return status == WM_OK ? wm_run_folder_timing(self->disk.folder, &timing, err) : status;
 }
 

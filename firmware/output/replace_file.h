@@ -7,6 +7,10 @@
 
 #include "waymark/status.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef struct file_part {
   const void *bytes;
   size_t count;
@@ -18,5 +22,9 @@ wm_status replace_file(const char *path, const file_part *parts, size_t count, w
 
 // Renames and syncs the folder, so that a power cut does not take the new name back. 0 or an errno.
 int rename_through(const char *from, const char *to);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -14,8 +14,10 @@
 #include "output/event_log.h"
 #include "output/json_files.h"
 #include "output/new_file.h"
+#include "output/saved_map.h"
 #include "output/saved_pose.h"
 #include "output/search_outcome_file.h"
+#include "waymark/keeper.h"
 
 typedef struct table {
   char path[WM_PATH_MAX + 32];
@@ -420,8 +422,26 @@ wm_status wm_run_folder_timing(wm_run_folder *self, const wm_timing *timing, wm_
   return wm_write_timing_json(self->dir, timing, err);
 }
 
-wm_status wm_run_folder_map(wm_run_folder *self, const wm_estimator *estimator, const void *state, wm_error *err) {
-  return wm_write_map(self->dir, estimator, state, err);
+static wm_status write_joint_map(const char *dir, const wm_assembly *assembly, const void *state, wm_error *err) {
+  const wm_config *config = assembly->config;
+  const wm_setup *setup = &assembly->setup;
+  const wm_keeper *keeper = wm_keeper_of(config->estimator);
+  const size_t capacity = keeper ? keeper->bytes_max(config->estimator_params, setup) : 0;
+  if (capacity == 0 || capacity > WM_SAVED_MAP_BYTES_MAX) return WM_OK;
+  void *image = malloc(capacity);
+  if (!image) return wm_fail(err, WM_IO, "%s: no memory for the map", dir);
+  const size_t bytes = keeper->keep(state, image, capacity);
+  char path[WM_PATH_MAX + 32];
+  (void)snprintf(path, sizeof path, "%s/map-estimate.wmmap", dir);
+  const wm_map_identity identity = wm_map_identity_of(config, setup);
+  const wm_status status = bytes > 0 ? wm_saved_map_write(path, &identity, 0.0, image, bytes, err) : WM_OK;
+  free(image);
+  return status;
+}
+
+wm_status wm_run_folder_map(wm_run_folder *self, const void *state, wm_error *err) {
+  const wm_status status = wm_write_map(self->dir, self->assembly->config->estimator, state, err);
+  return status == WM_OK ? write_joint_map(self->dir, self->assembly, state, err) : status;
 }
 
 wm_status wm_run_folder_close(wm_run_folder *self, wm_error *err) {

@@ -50,8 +50,9 @@ typedef struct wm_timing {
 // landmarks ran.
 wm_status wm_run_folder_health(wm_run_folder *self, const wm_health *health, wm_findings *found, wm_error *err);
 wm_status wm_run_folder_timing(wm_run_folder *self, const wm_timing *timing, wm_error *err);
-// map-estimate.csv: the estimated landmarks; no file without any.
-wm_status wm_run_folder_map(wm_run_folder *self, const wm_estimator *estimator, const void *state, wm_error *err);
+// map-estimate.csv: the estimated landmarks, and map-estimate.wmmap: with their joint covariance (output/saved_map.h);
+// no files without any.
+wm_status wm_run_folder_map(wm_run_folder *self, const void *state, wm_error *err);
 // Closes everything. WM_IO with the first thing that could not be written.
 wm_status wm_run_folder_close(wm_run_folder *self, wm_error *err);
 

@@ -187,7 +187,7 @@ static wm_status write_summary(replay *self, wm_run_report *report, wm_error *er
                             .memory_bytes = self->arena.bytes};
   wm_status status = wm_run_folder_health(self->folder, &report->health, &report->findings, err);
   const wm_fuser *fuser = &self->pipeline.fuser;
-  if (status == WM_OK) status = wm_run_folder_map(self->folder, fuser->estimator, fuser->state, err);
+  if (status == WM_OK) status = wm_run_folder_map(self->folder, fuser->state, err);
   return status == WM_OK ? wm_run_folder_timing(self->folder, &timing, err) : status;
 }
 

@@ -152,7 +152,7 @@ static wm_status write_summary(log_replay *self, wm_run_report *report, wm_error
                             .page_faults_after_start = report->page_faults_after_start,
                             .memory_bytes = self->arena.bytes};
   wm_status status = wm_run_folder_health(self->folder, &report->health, &report->findings, err);
-  if (status == WM_OK) status = wm_run_folder_map(self->folder, self->fuser.estimator, self->fuser.state, err);
+  if (status == WM_OK) status = wm_run_folder_map(self->folder, self->fuser.state, err);
   return status == WM_OK ? wm_run_folder_timing(self->folder, &timing, err) : status;
 }
 

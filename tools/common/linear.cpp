@@ -13,9 +13,18 @@ Eigen::MatrixXd inverse_symmetric(const Eigen::MatrixXd &A) {
 
 Eigen::Matrix<double, 6, 6> inverse_of_six(const Eigen::Matrix<double, 6, 6> &A) { return A.inverse(); }
 
-Eigen::VectorXd smallest_eigenvector(const Eigen::MatrixXd &A) {
-  return Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(A).eigenvectors().col(0);
+Eigen::MatrixXd inverse_factor(const Eigen::MatrixXd &A) {
+  const Eigen::LLT<Eigen::MatrixXd> factor(A);
+  if (factor.info() != Eigen::Success) return Eigen::MatrixXd::Constant(A.rows(), A.cols(), std::nan(""));
+  return factor.matrixL().solve(Eigen::MatrixXd::Identity(A.rows(), A.cols()));
 }
+
+Spectrum spectrum_of(const Eigen::MatrixXd &A) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solved(A);
+  return {solved.eigenvalues(), solved.eigenvectors()};
+}
+
+Eigen::VectorXd smallest_eigenvector(const Eigen::MatrixXd &A) { return spectrum_of(A).vectors.col(0); }
 
 Svd3 svd_of(const Eigen::Matrix3d &M) {
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(M, Eigen::ComputeFullU | Eigen::ComputeFullV);

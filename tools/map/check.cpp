@@ -3,25 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdarg>
-#include <cstdio>
 #include <memory>
 
 #include "common/failure.h"
+#include "common/text.h"
 #include "waymark/map.h"
 
 namespace wm::tools {
 namespace {
-
-std::string text(const char *format, ...) __attribute__((format(printf, 1, 2)));
-std::string text(const char *format, ...) {
-  char out[256];
-  va_list arguments;
-  va_start(arguments, format);
-  (void)std::vsnprintf(out, sizeof out, format, arguments);
-  va_end(arguments);
-  return out;
-}
 
 size_t share_of(const std::vector<uint8_t> &layer) {
   return static_cast<size_t>(std::count(layer.begin(), layer.end(), 255));

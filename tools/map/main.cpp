@@ -14,7 +14,9 @@
 #include "map/check.h"
 #include "map/layers.h"
 #include "map/look.h"
+#include "map/merge_command.h"
 #include "map/print_markers.h"
+#include "map/site_commands.h"
 #include "map/survey.h"
 #include "map/survey_bearings.h"
 #include "map/train_cascade.h"
@@ -96,12 +98,14 @@ void parse_make(wm::cli::App &app, Make &a) {
 }
 
 void parse_check(wm::cli::App &app, Check &a) {
-  app.description("Describes a raster map and reports its errors.");
-  app.add_option("MAP", a.map, "a map.yaml")->required();
-  app.add_option("--recording", a.recording, "also check whether its start pose is on the map");
-  app.add_option("--draw", a.draw, "a PNG to draw");
+  app.description("Describes a raster map, or a building with all of its maps, and reports their errors.");
+  app.add_option("MAP", a.map, "a map.yaml; or a building's folder, with site.yaml or one map")->required();
+  app.add_option("--recording", a.recording, "of a map.yaml: also check whether its start pose is on the map");
+  app.add_option("--draw", a.draw, "of a map.yaml: a PNG to draw");
   app.footer(
-      "example: waymark map check map/map.yaml --recording recordings/drive --draw map.png\n"
+      "examples:\n"
+      "  waymark map check map/map.yaml --recording recordings/drive --draw map.png\n"
+      "  waymark map check office\n"
       "Exit code: 0 good, 1 something is wrong, 2 it can't be read.");
 }
 
@@ -313,6 +317,11 @@ int make(Make &a) {
 }
 
 int check(const Check &a) {
+  if (fs::is_directory(a.map)) {
+    if (!a.recording.empty() || !a.draw.empty())
+      throw Failure("--recording and --draw are of one map: name its map.yaml, not " + a.map, kUsage);
+    return check_site_command(a.map);
+  }
   std::vector<Eigen::Vector2d> starts;
   if (!a.recording.empty()) {
     const fs::path file = fs::path(a.recording) / "recording.yaml";
@@ -344,15 +353,24 @@ int survey(const SurveyArguments &a) {
 }  // namespace
 
 int main(int argc, char **argv) {
-  wm::cli::App app("Maps: raster maps made from plans and checked, landmarks surveyed, coded markers printed.",
-                   "waymark map");
+  wm::cli::App app(
+      "Maps: raster maps made from plans and checked, buildings in versions, landmarks surveyed, coded markers "
+      "printed.",
+      "waymark map");
   app.require_subcommand(1);
+  MergeArguments merge_arguments;
+  wm::cli::App *merge_app = app.add_subcommand("merge", "merges the maps of many drives to one with its covariance");
+  parse_merge(*merge_app, merge_arguments);
+  VersionArguments version_arguments;
+  wm::cli::App *version_app =
+      app.add_subcommand("version", "makes a version of a building's maps, lists them, goes back to one");
+  parse_version(*version_app, version_arguments);
   app.footer("example: waymark map make plan.png --resolution 0.02\nwaymark map SUBCOMMAND --help has more.");
   Make make_arguments;
   Check check_arguments;
   SurveyArguments survey_arguments;
   wm::cli::App *make_app = app.add_subcommand("make", "makes a raster map from a floor plan or an occupancy map");
-  wm::cli::App *check_app = app.add_subcommand("check", "describes a raster map and reports its errors");
+  wm::cli::App *check_app = app.add_subcommand("check", "describes a raster map or a building and reports errors");
   wm::cli::App *survey_app = app.add_subcommand(
       "survey", "reports how well the landmarks of a run fit, and which moved, are duplicates or are misread");
   parse_survey(*survey_app, survey_arguments);
@@ -375,6 +393,8 @@ int main(int argc, char **argv) {
   parse_make(*make_app, make_arguments);
   parse_check(*check_app, check_arguments);
   return run_program(app, argc, argv, [&] {
+    if (merge_app->parsed()) return merge_command(merge_arguments);
+    if (version_app->parsed()) return version_command(version_arguments);
     if (survey_app->parsed()) return survey(survey_arguments);
     if (look_app->parsed()) return look_at_picture(look_arguments) > 0 ? kDone : kFailed;
     if (add_app->parsed()) return add(add_arguments);

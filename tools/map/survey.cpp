@@ -3,8 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdarg>
-#include <cstdio>
 #include <map>
 #include <nlohmann/json.hpp>
 
@@ -12,6 +10,7 @@
 #include "common/json_file.h"
 #include "common/run_folder.h"
 #include "common/statistics.h"
+#include "common/text.h"
 
 namespace wm::tools {
 namespace {
@@ -21,16 +20,6 @@ constexpr size_t kSettled = 3;  // fused ones between two streaks: it was there 
 constexpr double kOftenRefused = 0.05;
 constexpr double kFitsBadly = 2.0;  // sigmas
 constexpr size_t kFew = 3;          // an identity seen so seldom, and not on the map
-
-std::string text(const char *format, ...) __attribute__((format(printf, 1, 2)));
-std::string text(const char *format, ...) {
-  char out[256];
-  va_list arguments;
-  va_start(arguments, format);
-  (void)std::vsnprintf(out, sizeof out, format, arguments);
-  va_end(arguments);
-  return out;
-}
 
 // One sighting of a landmark: its rows, one a residual.
 struct Seen {

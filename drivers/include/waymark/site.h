@@ -24,6 +24,10 @@ typedef struct wm_recording_overrides {
   char dbc[WM_PATH_MAX];
   char can_signals[WM_PATH_MAX];
   char map[WM_PATH_MAX];  // a map.yaml
+  // WGS84 of the map's origin: latitude and longitude in degrees, altitude in m. calibration.yaml must have none then,
+  // or the same.
+  int has_origin;
+  double origin[3];
 } wm_recording_overrides;
 
 // What a warning is about.

@@ -289,11 +289,12 @@ TEST(misspelt) {
           "dir/x.yaml:3: motion.noise.sped_mps: unknown key; did you mean 'motion.noise.speed_mps'?");
   refused(HEAD "cloud_filter: {windows: 1}\n",
           "dir/x.yaml:3: cloud_filter.windows: unknown key; did you mean 'cloud_filter.window_s'?");
-  refused(HEAD "something: 1\n",
-          "dir/x.yaml:3: something: unknown key; known here: format, estimator, sources, calibration, landmarks, dbc, "
-          "can_signals, devices, map, initial_pose, vision, start, black_box, publish, commands, merge, integrity, "
-          "realtime, motion, "
-          "sightings, pole_filter, cloud_filter");
+  refused(
+      HEAD "something: 1\n",
+      "dir/x.yaml:3: something: unknown key; known here: format, estimator, sources, calibration, landmarks, dbc, "
+      "can_signals, devices, map, site, initial_pose, vision, start, black_box, publish, commands, merge, integrity, "
+      "realtime, motion, "
+      "sightings, pole_filter, cloud_filter");
   refused(HEAD "pole_filter: {states: {other: 1}}\n",
           "dir/x.yaml:3: pole_filter.states.other: unknown key; known here: yaw_sigma_rad, slots, deep");
   refused("format: waymark-config/1\nestimator: pole_filtre\n",

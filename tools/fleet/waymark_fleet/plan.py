@@ -13,7 +13,7 @@ from .sums import of_text
 
 FORMAT = "waymark-plan/1"
 # Kept of each run: what reports, `diff` and `eval` read. An event log repeats what the recording has.
-KEPT = ["trajectory.csv", "innovations.csv", "map-estimate.csv", "looked-for.csv", "reference.csv", "health.json", "timing.json"]
+KEPT = ["trajectory.csv", "innovations.csv", "map-estimate.csv", "map-estimate.wmmap", "looked-for.csv", "reference.csv", "health.json", "timing.json"]
 _KEYS = {"format", "recordings", "configurations", "programs", "seeds", "replay", "eval", "keep"}
 
 

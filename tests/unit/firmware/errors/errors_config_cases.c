@@ -18,7 +18,7 @@ const error_case kErrorCases[] = {
      "config/robot.yaml:3: horizon_ms: unknown key; did you mean 'merge.horizon_ms'?"},
     {CONFIG, "Unknown key", FILE_, "colour: red\n",
      "config/robot.yaml:3: colour: unknown key; known here: format, estimator, sources, calibration, landmarks, dbc, "
-     "can_signals, devices, map, initial_pose, vision, start, black_box, publish, commands, merge, integrity, "
+     "can_signals, devices, map, site, initial_pose, vision, start, black_box, publish, commands, merge, integrity, "
      "realtime, motion, "
      "sightings, positions, markers, localizer, landmark_ekf, edge_mcl, pf_edges, slam, "
      "stereo_ekf"},
@@ -89,6 +89,10 @@ const error_case kErrorCases[] = {
      "config/robot.yaml:3: sources[0].until_s: 25 is not after from_s (30): nothing would be taken"},
     {CONFIG, "File that is not there", FILE_, "landmarks: hall.csv\n",
      "config/robot.yaml:3: landmarks: 'hall.csv' cannot be read (looked for config/hall.csv)"},
+    {CONFIG, "Building that is not there", FILE_, "site: office/ground\n",
+     "config/robot.yaml:3: site: config/office/ground: is no site: there is no site.yaml in it, no landmarks.csv and "
+     "no "
+     "map.yaml (docs/building.md)"},
     {CONFIG, "Start pose with an unknown key", FILE_, "initial_pose: {x_m: 1, y_m: 2, yaw_rad: 0}\n",
      "config/robot.yaml:3: initial_pose.yaw_rad: unknown key; known are: t_ns, x_m, y_m, z_m, heading_rad, "
      "heading_deg, qx, qy, qz, qw, sigma_xy_m, sigma_heading_rad, sigma_heading_deg"},

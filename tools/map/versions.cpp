@@ -1,0 +1,286 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "map/versions.h"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cinttypes>
+#include <cstring>
+#include <ctime>
+#include <set>
+
+#include "common/failure.h"
+#include "common/program.h"
+#include "common/text.h"
+#include "map/site.h"
+#include "output/replace_file.h"
+#include "waymark/floors.h"
+
+namespace wm::tools {
+namespace {
+
+namespace fs = std::filesystem;
+constexpr char kStaged[] = ".new", kGone[] = ".gone";  // folders in versions/ that a killed program may leave
+
+struct Descriptor {
+  int fd;
+  explicit Descriptor(int of) : fd(of) {}
+  ~Descriptor() {
+    if (fd >= 0) (void)close(fd);
+  }
+  Descriptor(const Descriptor &) = delete;
+  Descriptor &operator=(const Descriptor &) = delete;
+};
+
+// A file or a folder's names, to the disk.
+void sync(const fs::path &path) {
+  const Descriptor file(open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  if (file.fd < 0 || fsync(file.fd) != 0)
+    throw Failure(path.string() + ": can't be written to the disk: " + std::strerror(errno));
+}
+
+// One program at a time: held until it is destroyed, or its program ends.
+class Lock {
+ public:
+  explicit Lock(const fs::path &site) : folder_(made(site)) {
+    if (folder_.fd < 0) throw Failure(site.string() + "/versions: can't be opened: " + std::strerror(errno));
+    if (flock(folder_.fd, LOCK_EX | LOCK_NB) != 0)
+      throw Failure(site.string() + ": another program changes its versions just now; try again when it is done");
+    for (const auto &entry : fs::directory_iterator(site / "versions"))
+      if (entry.path().filename().string().rfind('.', 0) == 0) fs::remove_all(entry.path());
+  }
+
+ private:
+  static int made(const fs::path &site) {
+    fs::create_directory(site / "versions");
+    return open((site / "versions").c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  }
+  Descriptor folder_;
+};
+
+struct Record : wm_map_version {
+  Record() : wm_map_version{} {}
+  ~Record() { std::free(files); }
+  Record(const Record &) = delete;
+  Record &operator=(const Record &) = delete;
+};
+
+std::string current_of(const fs::path &site) {
+  char name[WM_MAP_VERSION_NAME];
+  wm_error error{};
+  need_ok(wm_map_version_current(site.c_str(), name, &error), error);
+  return name;
+}
+
+uint64_t hash_of(const fs::path &file) {
+  wm_error error{};
+  uint64_t out = 0;
+  need_ok(wm_file_hash(file.c_str(), &out, &error), error);
+  return out;
+}
+
+struct Draft {
+  std::vector<wm_map_version_file> files;
+  std::string name;
+};
+
+Draft draft_of(const fs::path &site) {
+  Draft out;
+  for (const std::string &below : files_of(*read_floors(site))) {
+    wm_map_version_file file{};
+    if (below.size() >= sizeof file.path) throw Failure(below + ": the path is too long");
+    std::memcpy(file.path, below.c_str(), below.size() + 1);
+    file.hash = hash_of(site / below);
+    out.files.push_back(file);
+  }
+  wm_map_version version{};
+  version.files = out.files.data();
+  version.file_count = out.files.size();
+  char name[WM_MAP_VERSION_NAME];
+  wm_map_version_name(&version, name);
+  out.name = name;
+  return out;
+}
+
+std::string utc_now() {
+  char out[24];
+  timespec now{};
+  tm parts{};
+  (void)clock_gettime(CLOCK_REALTIME, &now);
+  (void)gmtime_r(&now.tv_sec, &parts);
+  (void)strftime(out, sizeof out, "%Y-%m-%dT%H:%M:%S", &parts);
+  return out + text(".%03ldZ", now.tv_nsec / 1000000);
+}
+
+std::string quoted(const std::string &value) {
+  std::string out = "\"";
+  for (const char c : value) {
+    if (static_cast<unsigned char>(c) < ' ') continue;
+    if (c == '"' || c == '\\') out += '\\';
+    out += c;
+  }
+  return out + "\"";
+}
+
+std::string record_text(const Draft &draft, const std::string &base, const std::string &author, const std::string &note) {
+  std::string out = "format: waymark-site-version/1\n";
+  if (!base.empty()) out += "base: \"" + base + "\"\n";
+  out += "date: \"" + utc_now() + "\"\nauthor: " + quoted(author) + "\n";
+  if (!note.empty()) out += "note: " + quoted(note) + "\n";
+  out += "files:\n";
+  for (const wm_map_version_file &file : draft.files)
+    out += "  " + quoted(file.path) + text(": \"%016" PRIx64 "\"\n", file.hash);
+  return out + text("# seal %016" PRIx64 "\n", wm_map_version_seal(out.data(), out.size()));
+}
+
+void write_through(const fs::path &path, const std::string &bytes) {
+  wm_error error{};
+  const file_part part{bytes.data(), bytes.size()};
+  need_ok(replace_file(path.c_str(), &part, 1, &error), error);
+}
+
+void set_current(const fs::path &site, const std::string &name) { write_through(site / "versions/current", name + "\n"); }
+
+// Into the staged folder: by a link where the base has the same file, else a copy. True where it is shared.
+bool stage(const fs::path &site, const wm_map_version_file &file, const wm_map_version &base, const fs::path &staged) {
+  const fs::path to = staged / file.path;
+  fs::create_directories(to.parent_path());
+  const bool is_there =
+      std::any_of(base.files, base.files + base.file_count, [&](const wm_map_version_file &other) {
+        return other.hash == file.hash && std::strcmp(other.path, file.path) == 0;
+      });
+  std::error_code no_link;
+  if (is_there) fs::create_hard_link(site / "versions" / base.name / file.path, to, no_link);
+  if (is_there && !no_link) return true;
+  fs::copy_file(site / file.path, to);
+  if (hash_of(to) != file.hash)
+    throw Failure((site / file.path).string() + ": was changed while the version was made; make it again");
+  sync(to);
+  return false;
+}
+
+void sync_folders(const fs::path &staged) {
+  for (const auto &entry : fs::recursive_directory_iterator(staged))
+    if (entry.is_directory()) sync(entry.path());
+  sync(staged);
+}
+
+// Begins with `begin`.
+std::vector<std::string> names_of(const fs::path &site, const std::string &begin = "") {
+  std::vector<std::string> out;
+  if (!fs::is_directory(site / "versions")) return out;
+  for (const auto &entry : fs::directory_iterator(site / "versions"))
+    if (const std::string name = entry.path().filename(); entry.is_directory() && name[0] != '.')
+      if (name.rfind(begin, 0) == 0) out.push_back(name);
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
+void need_sound(const fs::path &site, const std::string &name, Record *out) {
+  wm_error error{};
+  need_ok(wm_map_version_read(site.c_str(), name.c_str(), out, &error), error);
+}
+
+void need_good(const fs::path &site) {
+  const SiteReport report = check_floors(site);
+  if (report.wrong.empty()) return;
+  std::string lines = site.string() + ": no version is made, as robots could not use it:";
+  for (const std::string &line : report.wrong) lines += "\n  " + line;
+  throw Failure(lines);
+}
+
+}  // namespace
+
+std::vector<VersionListed> list_versions(const fs::path &site) {
+  std::vector<VersionListed> out;
+  std::string current, damage;
+  try {
+    current = current_of(site);
+  } catch (const Failure &failure) {
+    damage = failure.what();
+  }
+  for (const std::string &name : names_of(site)) {
+    Record record;
+    wm_error error{};
+    const bool is_sound = wm_map_version_read(site.c_str(), name.c_str(), &record, &error) == WM_OK;
+    out.push_back({name, record.base, record.date, record.author, record.note, record.file_count, name == current,
+                   is_sound ? "" : error.text});
+  }
+  const auto is_listed = [&](const VersionListed &v) { return v.is_current; };
+  if (damage.empty() && !current.empty() && std::none_of(out.begin(), out.end(), is_listed))
+    damage = site.string() + "/versions/current: names " + current + ", which is not there; take another one (--use)";
+  std::sort(out.begin(), out.end(), [](const VersionListed &a, const VersionListed &b) {
+    return a.date != b.date ? a.date < b.date : a.name < b.name;
+  });
+  if (!damage.empty()) out.push_back({"current", "", "", "", "", 0, true, damage});
+  return out;
+}
+
+std::string version_line(const VersionListed &v) {
+  return text("%s version %s  %s  %s, %zu files%s%s%s%s", v.is_current ? "*" : " ", v.name.c_str(), v.date.c_str(),
+              v.author.c_str(), v.files, v.base.empty() ? "" : ", base ", v.base.c_str(), v.note.empty() ? "" : ": ",
+              v.note.c_str());
+}
+
+std::string draft_against_current(const fs::path &site) {
+  const std::string current = current_of(site);
+  if (current.empty() || draft_of(site).name == current) return "";
+  return site.string() + ": its files differ from the current version, which robots take; `waymark map version " +
+         site.string() + "` makes a version of them";
+}
+
+MadeVersion make_version(const fs::path &site, const std::string &author, const std::string &note) {
+  need_good(site);
+  const Draft draft = draft_of(site);
+  const Lock lock(site);
+  const fs::path versions = site / "versions", staged = versions / kStaged;
+  MadeVersion out{draft.name, !fs::exists(versions / draft.name), draft.files.size(), 0};
+  Record base;
+  if (const std::string current = current_of(site); !current.empty()) need_sound(site, current, &base);
+  if (out.is_new) {
+    fs::create_directory(staged);
+    for (const wm_map_version_file &file : draft.files) out.shared += stage(site, file, base, staged) ? 1 : 0;
+    write_through(staged / "version.yaml", record_text(draft, base.name, author, note));
+    sync_folders(staged);
+    if (const int failed = rename_through(staged.c_str(), (versions / draft.name).c_str()); failed != 0)
+      throw Failure((versions / draft.name).string() + ": can't be written: " + std::strerror(failed));
+    sync(site);
+  } else {
+    Record again;
+    need_sound(site, draft.name, &again);
+  }
+  set_current(site, draft.name);
+  return out;
+}
+
+std::string use_version(const fs::path &site, const std::string &begin) {
+  const std::vector<std::string> found = names_of(site, begin);
+  if (found.empty())
+    throw Failure(site.string() + ": has no version " + begin + "; `waymark map version " + site.string() + " --list`",
+                  kUsage);
+  if (found.size() > 1) throw Failure(begin + ": " + std::to_string(found.size()) + " versions begin so", kUsage);
+  const Lock lock(site);
+  Record record;
+  need_sound(site, found.front(), &record);
+  set_current(site, found.front());
+  return found.front();
+}
+
+std::vector<std::string> collect_versions(const fs::path &site, size_t keep) {
+  const Lock lock(site);
+  const std::vector<VersionListed> all = list_versions(site);
+  std::vector<std::string> out;
+  for (size_t i = 0; i + keep < all.size(); i++) {
+    if (all[i].is_current) continue;
+    const fs::path gone = site / "versions" / (kGone + all[i].name);
+    fs::rename(site / "versions" / all[i].name, gone);
+    fs::remove_all(gone);
+    out.push_back(all[i].name);
+  }
+  return out;
+}
+
+}  // namespace wm::tools
