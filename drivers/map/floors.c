@@ -215,8 +215,8 @@ wm_status wm_floors_of_version(const char *folder, const char *name, wm_floors *
   wm_status status = wm_map_version_read(folder, name, &version, err);
   free(version.files);
   if (status == WM_OK && snprintf(path, sizeof path, "%s/versions/%s", folder, name) >= WM_PATH_MAX)
-    status = wm_fail(err, WM_BAD_USAGE, "%s/versions/%s: the path is longer than %d bytes", folder, name,
-                     WM_PATH_MAX - 1);
+    status =
+        wm_fail(err, WM_BAD_USAGE, "%s/versions/%s: the path is longer than %d bytes", folder, name, WM_PATH_MAX - 1);
   if (status == WM_OK) status = wm_floors_read(path, out, err);
   if (status == WM_OK) (void)snprintf((*out)->version, sizeof(*out)->version, "%s", name);
   return status;

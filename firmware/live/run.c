@@ -148,8 +148,9 @@ static void go_on_with_map(live *self, const char *file, int has_pose) {
     wm_start_init(&setup->start);
     setup->start.t_ns = t_ns;
   }
-  live_say(self, "start: continues with the map saved %.0f s ago%s", live_utc_s() - self->map.utc_s,
-           has_pose ? "" : "; the robot is relocalized in it");
+  char age[48] = "";  // unknown: a replay's map, which is the same bytes each time
+  if (self->map.utc_s > 0) (void)snprintf(age, sizeof age, " saved %.0f s ago", live_utc_s() - self->map.utc_s);
+  live_say(self, "start: continues with the map%s%s", age, has_pose ? "" : "; the robot is relocalized in it");
 }
 
 // The robot's own; before its first run the floor's saved points.

@@ -22,7 +22,7 @@ wm_map_identity wm_map_identity_of(const wm_config *config, const wm_setup *setu
 typedef struct wm_saved_map {
   void *image;  // free() it
   size_t bytes;
-  double utc_s;  // when it was saved, by this computer's clock at that time
+  double utc_s;  // when it was saved, by this computer's clock at that time; 0: unknown
 } wm_saved_map;
 
 // Replaces the file atomically. Not on the real-time thread.

@@ -9,6 +9,7 @@ import pathlib
 import random
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
@@ -185,6 +186,55 @@ def robot(folder):
     check("its hash is not the version's" in said, "a damaged version is refused at the start")
 
 
+def origins(folder):
+    """The floor's origin takes the place of the calibration's, also in a recording, and must not contradict it."""
+    site, drive = folder / "origins", folder / "drive"
+    (site / "hall").mkdir(parents=True)
+    shutil.copy(drive / "landmarks.csv", site / "hall/landmarks.csv")
+    (site / "site.yaml").write_text(
+        "format: waymark-site/1\nname: B\norigin: [52.5, 13.4, 34]\nfloors:\n  - {name: hall, landmarks: hall/landmarks.csv}\n")
+    config = folder / "origin.yaml"
+    with socket.socket() as gpsd:
+        gpsd.bind(("127.0.0.1", 0))
+        gpsd.listen()
+        config.write_text(
+            "format: waymark-config/1\nestimator: landmark_ekf\nsite: origins/hall\ncalibration: calibration.yaml\n"
+            f"devices: {{gpsd: [{{host: 127.0.0.1, port: {gpsd.getsockname()[1]}}}]}}\n")
+        (folder / "calibration.yaml").write_text("wheels: {radius_m: 0.1, ticks_per_turn: 2048, track_m: 0.44}\n")
+        run("waymark", "record", "--config", config, "--out", folder / "kept", "--duration", "1", "--free-mb", "0", expect=(0, 1))
+    (kept,) = folder.glob("kept*/calibration.yaml")
+    check("origin: [52.5" in kept.read_text(), "a recording has the floor's origin in its calibration")
+    check("site" not in (kept.parent / "config.yaml").read_text(), "and no floor in its configuration")
+    check((kept.parent / "landmarks.csv").read_text() == (site / "hall/landmarks.csv").read_text(), "but the floor's landmarks")
+    config.write_text(f"{CONFIG}site: origins/hall\ncalibration: calibration.yaml\n")
+    replay = ("waymark", "replay", drive, "--config", config, "--out", folder / "w", "--force")
+    (folder / "calibration.yaml").write_text((drive / "calibration.yaml").read_text() + "\ngnss: {origin: [52.5, 13.4, 34]}\n")
+    run(*replay)
+    (folder / "calibration.yaml").write_text((drive / "calibration.yaml").read_text() + "\ngnss: {origin: [52.5, 13.5, 34]}\n")
+    said = run(*replay, expect=(2,))
+    check("is [52.5000000, 13.5000000, 34.00], the floor's is [52.5000000, 13.4000000, 34.00]" in said, f"another origin is refused: {said.strip()[-160:]}")
+
+
+def points(folder):
+    """A run's map as a floor's saved points: another run goes on with it, and saves its own."""
+    drive, site = folder / "laps", folder / "points"
+    run("waymark-simulate", ROOT / "config/worlds/loops-landmarks.yaml", "--seed", 1, "--out", drive)
+    config = folder / "slam.yaml"
+    text = (ROOT / "config/datasets/loops-landmarks.yaml").read_text() + "\npublish: {lcm: false}\nrealtime: {lock_memory: false}\n"
+    config.write_text(text)
+    run("waymark", "replay", drive, "--config", config, "--out", folder / "mapped")
+    (site / "hall").mkdir(parents=True)
+    shutil.copy(folder / "mapped/map-estimate.wmmap", site / "hall/saved.wmmap")
+    (site / "site.yaml").write_text("format: waymark-site/1\nname: B\nfloors:\n  - {name: hall, points: hall/saved.wmmap}\n")
+    run("waymark-map", "version", site)
+    config.write_text(text + "start: {saved_map: own.wmmap}\nsite: points\n")
+    live = ("waymark", "run", "--config", config, "--recording", drive, "--resume", "--speed", "30", "--duration", "1")
+    said = run(*live)
+    check("start: continues with the map;" in said and f"version {current(site)}" in said, f"the run begins with the floor's points {said[:300]}")
+    check((folder / "own.wmmap").exists() and "wrong" not in run("waymark-map", "check", site), "and saves a map of its own; the floor's is as it was")
+    check("start: continues with the map saved" in run(*live), "which the next run begins with")
+
+
 def kills(folder, count):
     """Each version has megabytes to write, and each is another one."""
     site = folder / "office"
@@ -205,14 +255,14 @@ def kills(folder, count):
         old = current(site)
         change(number)
         program = subprocess.Popen([BIN / "waymark-map", "version", str(site)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        time.sleep(RANDOM.uniform(0, 1.2 * needs_s))
+        time.sleep(RANDOM.uniform(0, 2 * needs_s))
         program.send_signal(signal.SIGKILL)
         program.wait()
         said = subprocess.run([BIN / "waymark-map", "version", str(site), "--list"], capture_output=True, text=True)
         if said.returncode != 0 or sum(line.startswith("*") for line in said.stdout.splitlines()) != 1:
             broken.append(said.stdout + said.stderr)
         outcomes["before" if current(site) == old else "new"] += 1
-    check(not broken, f"killed {count} times within {1.2 * needs_s:.2f} s: a whole version each time, {outcomes}" + "".join(broken[:1]))
+    check(not broken, f"killed {count} times within {2 * needs_s:.2f} s: a whole version each time, {outcomes}" + "".join(broken[:1]))
     check(outcomes["before"] >= count // 4, "kills in the midst of the work")
     change(count + 1)
     run("waymark-map", "version", site)
@@ -227,6 +277,8 @@ def main(count):
         mistakes(folder)
         versions(folder)
         robot(folder)
+        origins(folder)
+        points(folder)
         kills(folder, count)
     return 1 if failures else 0
 

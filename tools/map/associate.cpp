@@ -12,14 +12,14 @@ namespace {
 
 using Eigen::Index;
 
-// Of chi-square with two degrees of freedom: a pair of places. A pair that is not found is a landmark twice; a wrong one
-// is found by the drive's chi-square.
+// Of chi-square with two degrees of freedom: a pair of places. A pair that is not found is a landmark twice; a wrong
+// one is found by the drive's chi-square.
 constexpr double kGate = 0.99999;
-constexpr double kReach_sigma = 3; // of a distance between two landmarks
-constexpr double kLeast_m = 2;     // apart: nearer ones do not show a turn
-constexpr double kEnough = 0.95;   // of the landmarks are paired: no other motion is tried
-constexpr size_t kTries = 100000;  // motions, then the best one is taken: some seconds
-constexpr size_t kPairs = 4;          // landmarks that must fit at once: fewer fit by chance
+constexpr double kReach_sigma = 3;  // of a distance between two landmarks
+constexpr double kLeast_m = 2;      // apart: nearer ones do not show a turn
+constexpr double kEnough = 0.95;    // of the landmarks are paired: no other motion is tried
+constexpr size_t kTries = 100000;   // motions, then the best one is taken: some seconds
+constexpr size_t kPairs = 4;        // landmarks that must fit at once: fewer fit by chance
 
 using Place = KnownPlace;
 
@@ -29,8 +29,8 @@ Eigen::Matrix2d rotation(double angle) {
   return out;
 }
 
-// Places with the covariance of the map's shape: what is left of it when the map is laid over another one, Q P Q' with Q
-// = I - G (G'G)^-1 G', G the derivatives by shift and turn. Where a drive began is no matter.
+// Places with the covariance of the map's shape: what is left of it when the map is laid over another one, Q P Q' with
+// Q = I - G (G'G)^-1 G', G the derivatives by shift and turn. Where a drive began is no matter.
 std::vector<Place> places_of(const DriveMap &drive) {
   const auto count = static_cast<Index>(drive.landmarks.size());
   std::vector<Index> at;
@@ -65,11 +65,13 @@ double distance2(const Place &a, const Place &b, const Eigen::Vector3d &frame) {
   const Eigen::Matrix2d turned = rotation(frame.z());
   const Eigen::Vector2d way = frame.head<2>() + turned * a.p_m - b.p_m;
   const Eigen::Matrix2d S = b.covariance + turned * a.covariance * turned.transpose();
-  return (S(1, 1) * way.x() * way.x() - 2 * S(0, 1) * way.x() * way.y() + S(0, 0) * way.y() * way.y()) / S.determinant();
+  return (S(1, 1) * way.x() * way.x() - 2 * S(0, 1) * way.x() * way.y() + S(0, 0) * way.y() * way.y()) /
+         S.determinant();
 }
 
 // Each other's nearest within the gate.
-std::vector<Pair> pairs_in(const std::vector<Place> &drive, const std::vector<Place> &map, const Eigen::Vector3d &frame) {
+std::vector<Pair> pairs_in(const std::vector<Place> &drive, const std::vector<Place> &map,
+                           const Eigen::Vector3d &frame) {
   static const double kLimit = chi2_quantile(kGate, 2);
   const auto nearest = [&](const auto &distance, size_t count) {
     size_t best = 0;

@@ -28,16 +28,20 @@ std::string contradiction(const wm_floors &site, const wm_connection &one, const
   const double way_a = (place(one_a) - place(other_a)).norm(), way_b = (place(one_b) - place(other_b)).norm();
   if (std::abs(way_a - way_b) > kMeet_m + kScale * std::max(way_a, way_b))
     return name_of(site, other) +
-           text(": is %.2f m from '%s' on floor '%s', but %.2f m on floor '%s': one of the two maps has a wrong scale "
-                "(`resolution`), or an end a wrong place",
-                way_a, one.name, site.floors[a].name, way_b, site.floors[b].name);
+           text(
+               ": is %.2f m from '%s' on floor '%s', but %.2f m on floor '%s': one of the two maps has a wrong scale "
+               "(`resolution`), or an end a wrong place",
+               way_a, one.name, site.floors[a].name, way_b, site.floors[b].name);
   const double off_m = (carry(one_a, one_b, place(other_a)) - place(other_b)).norm();
-  const double turn_deg = std::remainder((other_b.heading_rad - other_a.heading_rad) - (one_b.heading_rad - one_a.heading_rad),
-                                         2 * 180 * kDegree) / kDegree;
+  const double turn_deg =
+      std::remainder((other_b.heading_rad - other_a.heading_rad) - (one_b.heading_rad - one_a.heading_rad),
+                     2 * 180 * kDegree) /
+      kDegree;
   if (off_m <= kMeet_m + kScale * way_a && std::abs(turn_deg) <= kMeet_deg) return "";
-  return name_of(site, other) + text(": does not meet: by '%s' its end on floor '%s' is %.2f m and %.0f degrees off; "
-                                     "correct x_m, y_m or heading_deg of one of the two",
-                                     one.name, site.floors[b].name, off_m, std::abs(turn_deg));
+  return name_of(site, other) + text(
+                                    ": does not meet: by '%s' its end on floor '%s' is %.2f m and %.0f degrees off; "
+                                    "correct x_m, y_m or heading_deg of one of the two",
+                                    one.name, site.floors[b].name, off_m, std::abs(turn_deg));
 }
 
 // The floors' axes are east and north of their origins: an end is the same place of the world on both.
@@ -50,9 +54,10 @@ std::string against_origins(const wm_floors &site, const wm_connection &c, int a
   const double off_m = (place(other) + Eigen::Vector2d(shift_m[0], shift_m[1]) - place(one)).norm();
   const double turn_deg = std::remainder(other.heading_rad - one.heading_rad, 2 * 180 * kDegree) / kDegree;
   if (off_m <= kOriginMeet_m && std::abs(turn_deg) <= kMeet_deg) return "";
-  return name_of(site, c) + text(": by the origins of floors '%s' and '%s' its ends are %.2f m and %.0f degrees apart; "
-                                 "correct an `origin`, or give floors of other axes one of their own",
-                                 from.name, to.name, off_m, std::abs(turn_deg));
+  return name_of(site, c) + text(
+                                ": by the origins of floors '%s' and '%s' its ends are %.2f m and %.0f degrees apart; "
+                                "correct an `origin`, or give floors of other axes one of their own",
+                                from.name, to.name, off_m, std::abs(turn_deg));
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A saved map is `firmware/output/saved_map.h`'s head and an image of slam (estimator/filters/slam/keep.cpp), version 1.
+// A saved map is `firmware/output/saved_map.h`'s head and an image of slam (estimator/filters/slam/keep.cpp),
+// version 1.
 #include "map/drive_map.h"
 
 #include <cmath>
@@ -75,7 +76,8 @@ struct Image {
 };
 
 Image read_image_head(Bytes &bytes, const std::string &path) {
-  if (!bytes.is("WMSLAM\n")) throw Failure(path + ": is no map of slam; other estimators' maps have no landmarks to merge");
+  if (!bytes.is("WMSLAM\n"))
+    throw Failure(path + ": is no map of slam; other estimators' maps have no landmarks to merge");
   bytes.skip(1);
   if (bytes.get<uint32_t>() != 1) throw Failure(path + ": its map has another version than this program reads");
   Image out{};
@@ -124,7 +126,8 @@ void read_states(Bytes &bytes, const std::vector<int> &into, DriveMap *out) {
 DriveMap read_drive_map(const fs::path &from) {
   const fs::path file = fs::is_directory(from) ? from / "map-estimate.wmmap" : from;
   if (!fs::exists(file))
-    throw Failure(file.string() + ": is not there; a run of `slam` that was tracking at its end writes it (replay the drive)");
+    throw Failure(file.string() +
+                  ": is not there; a run of `slam` that was tracking at its end writes it (replay the drive)");
   Bytes bytes(file);
   check_head(bytes, file.string());
   const Image image = read_image_head(bytes, file.string());

@@ -30,7 +30,7 @@ double turn(double angle) { return std::remainder(angle, 2 * 3.14159265358979323
 // A drive's rows: residual, derivative by its frame; derivative by its landmarks, which is a rotation of pairs.
 struct Rows {
   VectorXd residual;
-  MatrixXd by_frame;    // n x 3
+  MatrixXd by_frame;       // n x 3
   Eigen::Matrix2d turned;  // d h / d x of a place; 1 of a heading
 };
 
@@ -129,17 +129,18 @@ VectorXd picked(const VectorXd &from, const std::vector<Index> &at) {
 MatrixXd picked(const MatrixXd &from, const std::vector<Index> &rows, const std::vector<Index> &columns) {
   MatrixXd out(static_cast<Index>(rows.size()), static_cast<Index>(columns.size()));
   for (size_t j = 0; j < columns.size(); j++)
-    for (size_t i = 0; i < rows.size(); i++) out(static_cast<Index>(i), static_cast<Index>(j)) = from(rows[i], columns[j]);
+    for (size_t i = 0; i < rows.size(); i++)
+      out(static_cast<Index>(i), static_cast<Index>(j)) = from(rows[i], columns[j]);
   return out;
 }
 
 // A drive's part of the normal equations, its frame eliminated (Schur's complement).
 struct Share {
-  MatrixXd information;           // of its landmarks
+  MatrixXd information;  // of its landmarks
   VectorXd right;
-  MatrixXd frame_by_places;       // S^-1 Jt' A B, 3 x n
+  MatrixXd frame_by_places;  // S^-1 Jt' A B, 3 x n
   Eigen::Matrix3d frame_covariance;
-  Eigen::Vector3d frame_right;    // S^-1 Jt' A r
+  Eigen::Vector3d frame_right;  // S^-1 Jt' A r
 };
 
 Share share_of(const Measured &drive, const Rows &rows) {
@@ -175,7 +176,8 @@ FusedMap begin(const std::vector<Measured *> &drives, int landmarks) {
       const auto l = static_cast<size_t>(drive->landmark[j]);
       const Index at = static_cast<Index>(j) * width;
       if (out.x_at[l] < 0) {
-        const Eigen::Vector2d place = drive->frame.head<2>() + rotation(drive->frame.z()) * drive->map->mean.segment<2>(at);
+        const Eigen::Vector2d place =
+            drive->frame.head<2>() + rotation(drive->frame.z()) * drive->map->mean.segment<2>(at);
         out.x_at[l] = states;
         values.insert(values.end(), {place.x(), place.y()});
         states += 2;
@@ -190,8 +192,8 @@ FusedMap begin(const std::vector<Measured *> &drives, int landmarks) {
   return out;
 }
 
-// r' D^+ r with D = P - G C G', the covariance of the residual after the fusion: the same as the innovation of the drive
-// against all the others.
+// r' D^+ r with D = P - G C G', the covariance of the residual after the fusion: the same as the innovation of the
+// drive against all the others.
 void judge(const Measured &drive, const FusedMap &map, double *chi2, int *dof) {
   const std::vector<Index> at = states_of(drive, map);
   const Rows rows = rows_of(drive, picked(map.mean, at));

@@ -7,8 +7,9 @@
 //
 // Gauss-Newton over all x and T; the cost is linear in the drives. A drive may not know its map's size: its
 // error s d has the direction d = m - centre of the map that it measured. Taken so, the drives' other errors shrink the
-// merged map, as d and they are correlated (Peelle's puzzle [DAgostini1994]). So P is carried to the merged places, with
-// e = h - m, by P' = T P T', T = I + e g' + J e k': g and k measure size and turn of an error, J turns by 90 degrees.
+// merged map, as d and they are correlated (Peelle's puzzle [DAgostini1994]). So P is carried to the merged places,
+// with e = h - m, by P' = T P T', T = I + e g' + J e k': g and k measure size and turn of an error, J turns by 90
+// degrees.
 #pragma once
 
 #include <Eigen/Core>

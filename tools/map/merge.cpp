@@ -12,11 +12,11 @@
 namespace wm::tools {
 namespace {
 
-constexpr double kGate = 0.9999;   // one good drive of ten thousand is left out
-constexpr double kWidest = 9;      // filters' sigmas may be three times too small on a real floor; beyond is an error
-constexpr size_t kSeeds = 5;       // drives that are tried as the first one: an outlying one is none of the others'
-constexpr int kRounds = 30;        // of leaving out and taking in
-constexpr double kFarOut = 2;      // times the gate: left out together, else the worst alone
+constexpr double kGate = 0.9999;  // one good drive of ten thousand is left out
+constexpr double kWidest = 9;     // filters' sigmas may be three times too small on a real floor; beyond is an error
+constexpr size_t kSeeds = 5;      // drives that are tried as the first one: an outlying one is none of the others'
+constexpr int kRounds = 30;       // of leaving out and taking in
+constexpr double kFarOut = 2;     // times the gate: left out together, else the worst alone
 
 struct Merge {
   std::vector<Measured> all;
@@ -45,8 +45,7 @@ std::vector<Fit> fits_to(const Merge &m, size_t one) {
 double typical(const std::vector<Fit> &fits, size_t self) {
   std::vector<double> ratios;
   for (size_t k = 0; k < fits.size(); k++)
-    if (k != self)
-      ratios.push_back(fits[k].dof > 0 ? fits[k].chi2 / fits[k].dof : std::numeric_limits<double>::max());
+    if (k != self) ratios.push_back(fits[k].dof > 0 ? fits[k].chi2 / fits[k].dof : std::numeric_limits<double>::max());
   return percentile(ratios, 50);
 }
 
@@ -54,9 +53,8 @@ double typical(const std::vector<Fit> &fits, size_t self) {
 size_t choose_reference(const Merge &m, bool is_surveyed, std::vector<Fit> *fits) {
   std::vector<size_t> order(m.all.size());
   for (size_t k = 0; k < order.size(); k++) order[k] = k;
-  std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) {
-    return m.all[a].landmark.size() > m.all[b].landmark.size();
-  });
+  std::stable_sort(order.begin(), order.end(),
+                   [&](size_t a, size_t b) { return m.all[a].landmark.size() > m.all[b].landmark.size(); });
   if (is_surveyed) order.assign(1, 0);
   size_t best = order.front();
   double best_ratio = std::numeric_limits<double>::infinity();
@@ -132,9 +130,10 @@ DriveVerdict verdict(const Merge &m, size_t k, double widened) {
   if (found.dof == 0)
     out.why_not = text("shares %d landmarks with the others: it can't be laid over them", found.shared);
   else
-    out.why_not = text("does not fit the others: chi-square %.0f of %d, %.0f is allowed. Another building, a wrong "
-                       "calibration, or landmarks that were moved",
-                       out.chi2, out.dof, widened * gate(out.dof));
+    out.why_not = text(
+        "does not fit the others: chi-square %.0f of %d, %.0f is allowed. Another building, a wrong "
+        "calibration, or landmarks that were moved",
+        out.chi2, out.dof, widened * gate(out.dof));
   return out;
 }
 

@@ -47,7 +47,8 @@ std::vector<size_t> in_order(const MergeResult &result) {
   std::vector<size_t> out;
   for (size_t l = 0; l < result.landmarks.size(); l++)
     if (result.map.has(static_cast<int>(l))) out.push_back(l);
-  std::sort(out.begin(), out.end(), [&](size_t a, size_t b) { return result.landmarks[a].id < result.landmarks[b].id; });
+  std::sort(out.begin(), out.end(),
+            [&](size_t a, size_t b) { return result.landmarks[a].id < result.landmarks[b].id; });
   return out;
 }
 
@@ -129,7 +130,8 @@ Target target_of(const std::string &named) {
     names += (i > 0 ? ", " : "") + std::string(floor.name);
     if (is_whole ? site->floor_count > 1 : path.filename() != floor.name) continue;
     if (floor.landmarks[0] == '\0')
-      throw Failure(out.site.string() + ": floor '" + floor.name + "' has no `landmarks`; name a file for them", kUsage);
+      throw Failure(out.site.string() + ": floor '" + floor.name + "' has no `landmarks`; name a file for them",
+                    kUsage);
     return {out.site, floor.landmarks};
   }
   throw Failure(named + ": name a floor, SITE/FLOOR; " + out.site.string() + " has " + names, kUsage);
@@ -148,7 +150,10 @@ void deliver(const MergeArguments &a, const MergeResult &result) {
   fs::path beside = target.landmarks;
   write(beside.replace_extension().concat("-covariance.npy"), covariance_of(result));
   const char *user = std::getenv("USER");
-  const MadeVersion made = make_version(target.site, !a.author.empty() ? a.author : user != nullptr ? user : "unknown",
+  const MadeVersion made = make_version(target.site,
+                                        !a.author.empty() ? a.author
+                                        : user != nullptr ? user
+                                                          : "unknown",
                                         !a.note.empty() ? a.note : text("merged of %zu drives", a.drives.size()));
   std::printf("%s: version %s\n", target.site.c_str(), made.name.c_str());
 }
@@ -159,11 +164,13 @@ void parse_merge(cli::App &app, MergeArguments &a) {
   app.description(
       "Merges the maps that drives made to one, with its covariance. Drives that do not fit the others are named and "
       "left out.");
-  app.add_option("DRIVE", a.drives, "runs of `slam` (their map-estimate.wmmap), or files of start.saved_map")->required();
+  app.add_option("DRIVE", a.drives, "runs of `slam` (their map-estimate.wmmap), or files of start.saved_map")
+      ->required();
   app.add_option("--out", a.out, "folder for landmarks.csv and landmarks-covariance.npy");
-  app.add_option("--site", a.site,
-                 "SITE/FLOOR: the floor's landmarks, and a new version of the building. The floor's landmarks of before "
-                 "are --surveyed, where nothing else is");
+  app.add_option(
+      "--site", a.site,
+      "SITE/FLOOR: the floor's landmarks, and a new version of the building. The floor's landmarks of before "
+      "are --surveyed, where nothing else is");
   app.add_option("--surveyed", a.surveyed, "landmarks.csv with sigmas: they give the map's frame");
   app.add_flag("--one-frame", a.options.one_frame,
                "all drives began in one frame, each with its start's sigma; without: each has a frame of its own, and "
@@ -181,7 +188,8 @@ void parse_merge(cli::App &app, MergeArguments &a) {
 }
 
 int merge_command(const MergeArguments &a) {
-  if (a.out.empty() && a.site.empty()) throw Failure("--out FOLDER or --site SITE/FLOOR: where shall the map go?", kUsage);
+  if (a.out.empty() && a.site.empty())
+    throw Failure("--out FOLDER or --site SITE/FLOOR: where shall the map go?", kUsage);
   Progress progress;
   std::vector<DriveMap> drives;
   for (const std::string &name : a.drives) {

@@ -95,9 +95,10 @@ void check_extent(const FloorContent &content, const std::string &at, SiteReport
                    : 0;
   }
   if (outside == 0) return;
-  const std::string line = at + text(": %zu of %zu landmarks lie outside of the map's picture: is `resolution` or "
-                                     "`origin` of map.yaml another one than the landmarks' axes have?",
-                                     outside, content.landmarks.size());
+  const std::string line = at + text(
+                                    ": %zu of %zu landmarks lie outside of the map's picture: is `resolution` or "
+                                    "`origin` of map.yaml another one than the landmarks' axes have?",
+                                    outside, content.landmarks.size());
   (2 * outside > content.landmarks.size() ? report->wrong : report->odd).push_back(line);
 }
 
@@ -200,7 +201,8 @@ Floors read_floors(const fs::path &site) {
 std::vector<std::string> files_of(const wm_floors &site) {
   std::set<std::string> out;
   const auto add = [&](const fs::path &file, const std::string &named_by) {
-    const std::string below = fs::path(file).lexically_normal().lexically_relative(fs::path(site.folder).lexically_normal());
+    const std::string below =
+        fs::path(file).lexically_normal().lexically_relative(fs::path(site.folder).lexically_normal());
     if (below.empty() || below.rfind("..", 0) == 0)
       throw Failure(named_by + ": names " + file.string() + ", outside of the site's folder; put a copy into it");
     if (!fs::is_regular_file(file)) throw Failure(named_by + ": names " + file.string() + ", which is not there");

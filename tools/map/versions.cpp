@@ -125,7 +125,8 @@ std::string quoted(const std::string &value) {
   return out + "\"";
 }
 
-std::string record_text(const Draft &draft, const std::string &base, const std::string &author, const std::string &note) {
+std::string record_text(const Draft &draft, const std::string &base, const std::string &author,
+                        const std::string &note) {
   std::string out = "format: waymark-site-version/1\n";
   if (!base.empty()) out += "base: \"" + base + "\"\n";
   out += "date: \"" + utc_now() + "\"\nauthor: " + quoted(author) + "\n";
@@ -142,16 +143,17 @@ void write_through(const fs::path &path, const std::string &bytes) {
   need_ok(replace_file(path.c_str(), &part, 1, &error), error);
 }
 
-void set_current(const fs::path &site, const std::string &name) { write_through(site / "versions/current", name + "\n"); }
+void set_current(const fs::path &site, const std::string &name) {
+  write_through(site / "versions/current", name + "\n");
+}
 
 // Into the staged folder: by a link where the base has the same file, else a copy. True where it is shared.
 bool stage(const fs::path &site, const wm_map_version_file &file, const wm_map_version &base, const fs::path &staged) {
   const fs::path to = staged / file.path;
   fs::create_directories(to.parent_path());
-  const bool is_there =
-      std::any_of(base.files, base.files + base.file_count, [&](const wm_map_version_file &other) {
-        return other.hash == file.hash && std::strcmp(other.path, file.path) == 0;
-      });
+  const bool is_there = std::any_of(base.files, base.files + base.file_count, [&](const wm_map_version_file &other) {
+    return other.hash == file.hash && std::strcmp(other.path, file.path) == 0;
+  });
   std::error_code no_link;
   if (is_there) fs::create_hard_link(site / "versions" / base.name / file.path, to, no_link);
   if (is_there && !no_link) return true;

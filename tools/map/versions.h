@@ -24,7 +24,7 @@ std::string draft_against_current(const std::filesystem::path &site);
 
 struct MadeVersion {
   std::string name;
-  bool is_new = false;  // else these files are a version already, which is current now
+  bool is_new = false;           // else these files are a version already, which is current now
   size_t files = 0, shared = 0;  // shared: unchanged ones, which take no room of their own
 };
 // Makes a version of the site's files and takes it for current. Throws Failure where something is wrong with them (the
