@@ -171,6 +171,10 @@ def hard_ones(folder, drives, runs, truth, config):
     for file, expected in ((damaged, "its checksum is wrong"), (folder / "none.wmmap", "is not there")):
         said = merged(folder, "w", [runs[0], file], expect=(1,))[1]
         check(expected in said, f"{file.name}: {said.strip()}")
+    out, said = merged(folder, "partly", [*runs, damaged], expect=(1,))
+    check(left_out(said)[0].startswith(f"left out: {damaged}: ") and (out / "landmarks.csv").exists(), "a damaged map is named, the others are merged")
+    lone = places(merged(folder, "lone", runs[:1])[0] / "landmarks.csv")
+    check(error_m(lone, places(runs[0] / "map-estimate.csv")) < 1e-6, "one drive's map is its own")
     said = merged(folder, "w", [runs[0], away], expect=(1,))[1]
     check("no two of the drives fit each other" in said, f"two that have nothing in common: {said.strip()[:150]}")
 

@@ -157,6 +157,12 @@ void associate_by_id(const DriveMap &drive, std::vector<Merged> *known, std::vec
   }
 }
 
+std::vector<KnownPlace> places_known(const DriveMap &drive, const std::vector<int> &landmark) {
+  std::vector<KnownPlace> out = places_of(drive);
+  for (KnownPlace &place : out) place.landmark = landmark[static_cast<size_t>(place.landmark)];
+  return out;
+}
+
 void associate_by_place(const DriveMap &drive, std::vector<KnownPlace> *places, std::vector<Merged> *known,
                         std::vector<int> *landmark) {
   const std::vector<Place> own = places_of(drive);

@@ -23,6 +23,7 @@ struct KnownPlace {
   Eigen::Matrix2d covariance;
   int landmark;
 };
+std::vector<KnownPlace> places_known(const DriveMap &drive, const std::vector<int> &landmark);
 // By place: a rigid motion that lays the most landmarks over those that are known, within both covariances, then pairs
 // that are each other's nearest within the gate of chi-square. Landmarks without a pair are new; those of a drive that
 // fits nowhere all are, and their places are not compared with.

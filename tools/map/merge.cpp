@@ -57,11 +57,11 @@ size_t choose_reference(const Merge &m, bool is_surveyed, std::vector<Fit> *fits
                    [&](size_t a, size_t b) { return m.all[a].landmark.size() > m.all[b].landmark.size(); });
   if (is_surveyed) order.assign(1, 0);
   size_t best = order.front();
-  double best_ratio = std::numeric_limits<double>::infinity();
+  double best_ratio = 0;
   for (size_t i = 0; i < std::min(order.size(), kSeeds); i++) {
     const std::vector<Fit> tried = fits_to(m, order[i]);
     const double ratio = typical(tried, order[i]);
-    if (ratio < best_ratio) best = order[i], best_ratio = ratio, *fits = tried;
+    if (i == 0 || ratio < best_ratio) best = order[i], best_ratio = ratio, *fits = tried;
   }
   return best;
 }
@@ -145,6 +145,7 @@ void associate(const std::vector<const DriveMap *> &maps, const MergeOptions &op
     drive.is_fixed = options.one_frame;
     if (!options.by_place && map->has_identities) {
       associate_by_id(*map, &m->landmarks, &drive.landmark);
+      if (places.empty()) places = places_known(*map, drive.landmark);
       continue;
     }
     associate_by_place(*map, &places, &m->landmarks, &drive.landmark);

@@ -42,6 +42,23 @@ void write(const fs::path &path, const std::string &bytes) {
   need_ok(replace_file(path.c_str(), &part, 1, &error), error);
 }
 
+// Drives whose map can't be read are named with the others that are left out.
+std::vector<DriveMap> read_all(const std::vector<std::string> &names, Progress *progress,
+                               std::vector<DriveVerdict> *unread) {
+  std::vector<DriveMap> out;
+  for (const std::string &name : names) {
+    try {
+      out.push_back(read_drive_map(name));
+    } catch (const Failure &failure) {
+      if (names.size() == 1) throw;
+      unread->push_back({name, false, 0, 0, 0, 0, failure.what()});
+    }
+    progress->tell(text("%zu of %zu maps read", out.size() + unread->size(), names.size()));
+  }
+  if (out.empty()) throw Failure("no drive's map can be read: " + unread->front().why_not);
+  return out;
+}
+
 // Merged landmarks that are in the map, by their ids.
 std::vector<size_t> in_order(const MergeResult &result) {
   std::vector<size_t> out;
@@ -191,18 +208,16 @@ int merge_command(const MergeArguments &a) {
   if (a.out.empty() && a.site.empty())
     throw Failure("--out FOLDER or --site SITE/FLOOR: where shall the map go?", kUsage);
   Progress progress;
-  std::vector<DriveMap> drives;
-  for (const std::string &name : a.drives) {
-    drives.push_back(read_drive_map(name));
-    progress.tell(text("%zu of %zu maps read", drives.size(), a.drives.size()));
-  }
+  std::vector<DriveVerdict> unread;
+  const std::vector<DriveMap> drives = read_all(a.drives, &progress, &unread);
   std::string surveyed_file = a.surveyed;
   if (surveyed_file.empty() && !a.site.empty() && !a.options.by_place)
     if (const fs::path there = target_of(a.site).landmarks; fs::exists(there)) surveyed_file = there.string();
   DriveMap surveyed;
   if (!surveyed_file.empty()) surveyed = read_surveyed_map(surveyed_file);
-  const MergeResult result = merge_maps(drives, surveyed_file.empty() ? nullptr : &surveyed, a.options,
-                                        [&](const std::string &line) { progress.tell(line); });
+  MergeResult result = merge_maps(drives, surveyed_file.empty() ? nullptr : &surveyed, a.options,
+                                  [&](const std::string &line) { progress.tell(line); });
+  result.drives.insert(result.drives.end(), unread.begin(), unread.end());
   if (a.json)
     std::printf("%s\n", json_of(result).dump(2).c_str());
   else
