@@ -190,6 +190,8 @@ def as_version(folder, drives, runs, truth):
     check(said.count("version ") >= 1 and not left_out(said), f"a new version of the floor: {said.splitlines()[-1]}")
     found = places(site / "hall/landmarks.csv")
     check(error_m(found, truth) < 0.01 and len(found) == len(truth), f"surveyed landmarks give the frame: {1000 * error_m(found, truth):.2f} mm")
+    stored = site / "versions" / (site / "versions/current").read_text().strip() / "hall/landmarks-covariance.npy"
+    check(len(load_npy(stored)) == 2 * len(truth), "the version has the joint covariance")
     listed = run("waymark-map", "version", site, "--list")
     check("merged of 10 drives" in listed and listed.count("version ") == 2, "both versions are listed")
     config = folder / "robot.yaml"

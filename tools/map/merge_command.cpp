@@ -157,15 +157,15 @@ Target target_of(const std::string &named) {
 void deliver(const MergeArguments &a, const MergeResult &result) {
   if (!a.out.empty()) {
     fs::create_directories(a.out);
-    write(fs::path(a.out) / "landmarks.csv", csv_of(result));
-    write(fs::path(a.out) / "landmarks-covariance.npy", covariance_of(result));
+    const fs::path landmarks = fs::path(a.out) / "landmarks.csv";
+    write(landmarks, csv_of(result));
+    write(covariance_beside(landmarks), covariance_of(result));
     std::printf("%s: landmarks.csv, landmarks-covariance.npy\n", a.out.c_str());
   }
   if (a.site.empty()) return;
   const Target target = target_of(a.site);
   write(target.landmarks, csv_of(result));
-  fs::path beside = target.landmarks;
-  write(beside.replace_extension().concat("-covariance.npy"), covariance_of(result));
+  write(covariance_beside(target.landmarks), covariance_of(result));
   const char *user = std::getenv("USER");
   const MadeVersion made = make_version(target.site,
                                         !a.author.empty() ? a.author

@@ -198,6 +198,11 @@ Floors read_floors(const fs::path &site) {
   return {out, std::free};
 }
 
+fs::path covariance_beside(const fs::path &landmarks) {
+  fs::path out = landmarks;
+  return out.replace_extension().concat("-covariance.npy");
+}
+
 std::vector<std::string> files_of(const wm_floors &site) {
   std::set<std::string> out;
   const auto add = [&](const fs::path &file, const std::string &named_by) {
@@ -217,6 +222,7 @@ std::vector<std::string> files_of(const wm_floors &site) {
     const fs::path looks = fs::path(floor.landmarks).parent_path() / "landmarks";
     if (floor.landmarks[0] != '\0' && fs::exists(looks / "appearance.csv"))
       for (const auto &entry : fs::directory_iterator(looks)) add(entry.path(), looks.string());
+    if (const fs::path covariance = covariance_beside(floor.landmarks); fs::exists(covariance)) add(covariance, yaml);
     if (floor.map[0] == '\0') continue;
     const Yaml map(floor.map);
     for (const char *key : {"image", "layers.edges", "layers.drivable"})

@@ -15,6 +15,9 @@ using Floors = std::unique_ptr<wm_floors, void (*)(void *)>;
 // The files that people edit. Throws Failure where the folder is no site.
 Floors read_floors(const std::filesystem::path &site);
 
+// Where the joint covariance of merged landmarks is, with their file: landmarks-covariance.npy beside landmarks.csv.
+std::filesystem::path covariance_beside(const std::filesystem::path &landmarks);
+
 // The files that a version has, below the site's folder, sorted: site.yaml and all that it names, with the pictures of
 // maps and landmarks. Throws Failure where one is not there or lies outside.
 std::vector<std::string> files_of(const wm_floors &site);
