@@ -215,6 +215,36 @@ def origins(folder):
     check("is [52.5000000, 13.5000000, 34.00], the floor's is [52.5000000, 13.4000000, 34.00]" in said, f"another origin is refused: {said.strip()[-160:]}")
 
 
+def reload(folder):
+    """A run on devices (one that is absent) takes the new version on SIGHUP, and stays with its own where that is damaged."""
+    site, said = folder / "origins", folder / "reload.txt"
+    run("waymark-map", "version", site)
+    first = current(site)
+    (folder / "calibration.yaml").write_text("wheels: {radius_m: 0.1, ticks_per_turn: 2048, track_m: 0.44}\n")
+    config = folder / "reload.yaml"
+    config.write_text(f"{CONFIG}site: origins/hall\ncalibration: calibration.yaml\npublish: {{lcm: false}}\n"
+                      "realtime: {priority: 0, lock_memory: false}\ndevices: {gpsd: [{host: 127.0.0.1, port: 1}]}\n")
+
+    def wait_for(text):
+        until = time.monotonic() + 20
+        while text not in said.read_text() and time.monotonic() < until:
+            time.sleep(0.05)
+        check(text in said.read_text(), f"the run states: {text}" + ("" if text in said.read_text() else f"; not in {said.read_text()}"))
+
+    with open(said, "w") as to, subprocess.Popen([BIN / "waymark", "run", "--config", config], stdout=to, stderr=to) as program:
+        wait_for(f"map: floor hall, version {first}")
+        landmarks = site / "hall/landmarks.csv"
+        landmarks.write_text("\n".join(landmarks.read_text().splitlines()[:-1]) + "\n")
+        run("waymark-map", "version", site)
+        program.send_signal(signal.SIGHUP)
+        wait_for(f"map: floor hall, version {current(site)}")
+        with open(site / "versions" / current(site) / "hall/landmarks.csv", "a") as stored:
+            stored.write("\n")
+        program.send_signal(signal.SIGHUP)
+        wait_for("The run continues unchanged")
+        program.send_signal(signal.SIGTERM)
+
+
 def points(folder):
     """A run's map as a floor's saved points: another run goes on with it, and saves its own."""
     drive, site = folder / "laps", folder / "points"
@@ -278,6 +308,7 @@ def main(count):
         versions(folder)
         robot(folder)
         origins(folder)
+        reload(folder)
         points(folder)
         kills(folder, count)
     return 1 if failures else 0
