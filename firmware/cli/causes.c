@@ -29,6 +29,7 @@ static void become(const causes_question *question, int to) {
     words[count++] = options[i].name;
     words[count++] = options[i].value;
   }
+  if (question->clocks_apart) words[count++] = "--clocks-apart";
   if (dup2(to, STDOUT_FILENO) >= 0) run_desk_command("causes", (char *const *)words);
   _exit(127);
 }

@@ -10,6 +10,7 @@ typedef struct causes_question {
   const char *config, *recording;
   const char *landmarks, *calibration, *map;  // in place of the recording's; NULL: its own
   const char *apply_to;                       // folder of a corrected copy; NULL: none
+  int clocks_apart;                           // of two streams of motion
 } causes_question;
 
 typedef struct causes_answer {

@@ -186,6 +186,8 @@ static void put(void *context, wm_output_kind kind, const void *record, size_t b
 static void ask_for_causes(checked *self) {
   causes_answer answer;
   const size_t consequences = self->found->count;
+  for (size_t i = 0; i < consequences; i++)
+    self->question.clocks_apart |= self->found->at[i].id == WM_FOUND_CLOCK_DRIFTS;
   causes_ask(&self->question, self->found, &answer);
   if (!answer.is_installed) {
     fact(
@@ -215,7 +217,7 @@ static int may_have_a_cause(const wm_findings *found, size_t from) {
   for (size_t i = from; i < found->count; i++) {
     const wm_finding_id id = found->at[i].id;
     const int says_it = id == WM_FOUND_DATA_UNUSED || id == WM_FOUND_ROWS_UNUSED || id == WM_FOUND_CLOCK_JUMPED ||
-                        id == WM_FOUND_CLOCK_COARSE || id == WM_FOUND_CLOCK_DRIFTS || id == WM_FOUND_COUNTER_RESTARTS;
+                        id == WM_FOUND_CLOCK_COARSE || id == WM_FOUND_COUNTER_RESTARTS;
     if (found->at[i].severity == WM_SEVERITY_BAD && !says_it) return 1;
   }
   return 0;
@@ -390,7 +392,7 @@ int command_check(int argc, char *const *argv) {
   }
   if (config.estimator || (count == 1 && wm_devices_count(&config.devices) == 0)) check_config(&config, &found);
   if (count > 1)
-    check_recording(&config, &(causes_question){words[0], words[1], landmarks, calibration, map, apply_to}, is_quick,
+    check_recording(&config, &(causes_question){words[0], words[1], landmarks, calibration, map, apply_to, 0}, is_quick,
                     &found);
   else if (wm_devices_count(&config.devices) > 0)
     check_devices(&config, &found);

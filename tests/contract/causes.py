@@ -30,7 +30,7 @@ RIGHT_FACTOR, RIGHT_M = 1.5, 0.02  # a drive is right whose position's error is 
 
 
 # ── mistakes ─────────────────────────────────────────────────────────────────────────────────────────────────────────
-# Each draws a size and returns the changes of the files, the name of the row that has to be named, and the size that undoes it.
+# Each draws a size and returns the changes of the files, the name of the row that has to be named (or of several), and the size that undoes it.
 
 def each(**columns):
     def change(row):
@@ -106,10 +106,26 @@ def counter(rng):
     return {"ticks.csv": each(left=lambda c: int(c) % 256, right=lambda c: int(c) % 256)}, "counters of 8 bits", [1.0]
 
 
+def counter_and_radius(rng):
+    f = rng.uniform(1.2, 1.9)
+    changes, name, size = counter(rng)
+    return changes | {"calibration.yaml": value(r"radius_m: 0.05", f"radius_m: {0.05 * f:.5f}")}, (name, "way of a tick"), (size, [1 / f])
+
+
+def bus_counter(rng):
+    bits = rng.choice((8, 10))
+
+    def frame(line):
+        head, _, data = line.partition("#")
+        counts = [int.from_bytes(bytes.fromhex(data[k:k + 8]), "little") % 2**bits for k in (0, 8)]
+        return f"{head}#{b''.join(c.to_bytes(4, 'little') for c in counts).hex().upper()}" if head.endswith(" 100") else line
+    return {"can.log": lambda whole: "\n".join(map(frame, whole.splitlines())) + "\n"}, f"counters of {bits} bits", [1.0]
+
+
 def clock_of(stream, name):
     """A stream of motion whose clock is some per cent fast or slow."""
     def mistake(rng):
-        rate = signed(rng, 0.03, 0.05)  # of less the pose hardly shows anything
+        rate = signed(rng, 0.01, 0.05)
         begin = small_robot.START_NS
         return {f"{stream}.csv": stamps(lambda t: t + round(rate * (t - begin)))}, f"drift of {stream}", [rate / (1 + rate)]
     mistake.__name__ = name
@@ -278,9 +294,9 @@ def none(rng):
 
 
 PLANTED = [(landmarks_robot, m) for m in (none, map_scale, clock, yaw, place, tick, track, ranges, exchange, lag, bearings, gyro)]
-PLANTED += [(tables_robot, m) for m in (none, counter, clock_of("imu", "gyro_clock"), clock_of("ticks", "counts_clock"))]
+PLANTED += [(tables_robot, m) for m in (none, counter, counter_and_radius, clock_of("imu", "gyro_clock"), clock_of("ticks", "counts_clock"))]
 PLANTED += [(satellites_robot, m) for m in (none, antenna, small_antenna, receiver, mirrored, turn_rate)]
-PLANTED += [(landmarks_robot, m) for m in (wheels_swapped, byte_order, setting)]
+PLANTED += [(landmarks_robot, m) for m in (wheels_swapped, byte_order, setting, bus_counter)]
 PLANTED += [(tags_robot, m) for m in (none, tag_size, tilt, tag_yaw, tags_exchanged, tags_scaled, camera_late)]
 PLANTED += [(fork_robot, m) for m in (none, steering_ratio)]
 PLANS = [(plan_robots.corridor, m) for m in (none, plan_scale, plan_turned, camera_tilt, camera_height, camera_yaw, camera_place)]
@@ -323,7 +339,8 @@ def judge(options, robot, mistake, seed, folder):
         config = folder / "robot.yaml"
         config.write_text(edit_of_config(right.read_text()))
     begun = time.monotonic()
-    done = subprocess.run([options.bin_dir / "waymark", "causes", config, made, "--json", "--apply", fixed], capture_output=True, text=True)
+    is_apart = ["--clocks-apart"] * ("clock-drifts" in found_by(options, config, made))  # as check does
+    done = subprocess.run([options.bin_dir / "waymark", "causes", config, made, "--json", "--apply", fixed, *is_apart], capture_output=True, text=True)
     row = {"robot": robot.__name__, "planted": mistake.__name__, "seed": seed, "size": size, "seconds": round(time.monotonic() - begun, 1)}
     row["right_m"], row["made_m"] = error_m(options, right, recording, recording), error_m(options, config, made, recording)
     limit_m = RIGHT_FACTOR * row["right_m"] + RIGHT_M
@@ -337,9 +354,10 @@ def judge(options, robot, mistake, seed, folder):
     row["drives"] = found["drives"]
     # A short drive shows a plan's scale, and not about which place it is: the fix lists each.
     names = ["scale of the plan" if c["name"].startswith("scale of the plan") else c["name"] for c in causes]
-    wanted = "scale of the plan" if str(name).startswith("scale of the plan") else name
-    row["is_wrong"] = bool(causes) and names[0] != wanted
-    is_named = names == [wanted] and is_size(name, causes[0]["size"], size)
+    several, sizes = (name, size) if isinstance(name, tuple) else ((name,), (size,))
+    wanted = ["scale of the plan" if str(one).startswith("scale of the plan") else one for one in several]
+    row["is_wrong"] = any(one not in wanted for one in names)
+    is_named = names == wanted and all(is_size(one, c["size"], right) for one, c, right in zip(wanted, causes, sizes))
     row["is_right"] = not causes if name is None else is_named or (row["is_harmless"] and not causes)
     if fixed.is_dir():
         corrected = fixed / config.name
@@ -379,6 +397,12 @@ def judge_answers(options):
     return failures
 
 
+def found_by(options, config, recording):
+    """The identifiers of what a quick check finds."""
+    done = subprocess.run([options.bin_dir / "waymark", "check", config, recording, "--quick", "--json"], capture_output=True, text=True)
+    return [finding["id"] for finding in json.loads(done.stdout)["findings"]]
+
+
 def checked(options, config, recording):
     done = subprocess.run([options.bin_dir / "waymark", "check", config, recording, "--quick"], capture_output=True, text=True)
     return "good" if done.returncode == 0 else "bad"
@@ -389,7 +413,7 @@ def show(options, row):
     fixed = "-" if "fixed_m" not in row else f"{row['fixed_m']:.3f}{'' if row['is_mended'] else ' BAD'}"
     text = json.dumps(row) if options.json else (f"{row['robot']:16} {row['planted']:14} seed {row['seed']:3}  {verdict:5} {'GOOD' if row['is_good'] else 'small' if row['is_harmless'] else '':5} "
                                                  f"right {row['right_m']:.3f} made {row['made_m']:.3f} fixed {fixed:9} m {row['seconds']:5.1f} s  "
-                                                 f"planted {[round(s, 3) for s in row['size']]}: {row['named']}")
+                                                 f"planted {[round(s, 3) if isinstance(s, float) else s for s in row['size']]}: {row['named']}")
     print(text, flush=True)
 
 

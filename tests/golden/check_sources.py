@@ -196,13 +196,25 @@ def counters(bits, stated, rate_hz=200):
             "can-signals.yaml": "- {quantity: wheel_ticks_left, message: WHEELS, signal: LEFT}\n- {quantity: wheel_ticks_right, message: WHEELS, signal: RIGHT}\n"}
 
 
+def stuck(table, since_s):
+    """A table whose rows repeat the values of one time from then on."""
+    head, *rows = [row.split(",") for row in table.splitlines()]
+    last = max(k for k, row in enumerate(rows) if int(row[0]) <= ns(since_s))
+    return "\n".join(",".join(row) for row in [head, *rows[:last], *([row[0], *rows[last][1:]] for row in rows[last:])]) + "\n"
+
+
+def backwards(left, right):
+    """Ticks of which one wheel's count falls where it drives forwards."""
+    return table("t_ns,left,right", [[t, left * int(a), right * int(b)] for t, a, b in (row.split(",") for row in ticks().splitlines()[1:])])
+
+
 def both(**files):
     """motion.csv and imu.csv, and what replaces or joins them."""
     return {"motion.csv": motion(), "imu.csv": imu(), **{k.replace("_csv", ".csv").replace("_yaml", ".yaml"): v for k, v in files.items()}}
 
 
 DISAGREE, STAMPS = "sensors-disagree", "clock-jumped"
-BROKEN = ("counter-restarts", "clock-drifts", "clock-coarse", STAMPS)
+BROKEN = ("counter-restarts", "motion-sensor", "clock-drifts", "clock-coarse", STAMPS)
 # name, files, finding (severity, identifier, about), words of its text, words of its fix
 FAULTS = [
     ("gyro of the other sign", both(imu_csv=imu(factor=-1)), ("bad", DISAGREE, "imu"), "-1.00 times", "wz_radps times -1"),
@@ -240,6 +252,12 @@ FAULTS = [
     ("speed backwards on CAN", {**can(v=-1), "increments.csv": increments()}, ("bad", DISAGREE, "can"), "goes forwards where", "`scale: -1` at the one that is not positive forwards"),
     ("values in threes, turn too small", {"motion.csv": motion(100, w=0.6, repeat=3), "imu.csv": imu()}, ("bad", DISAGREE, "*"), "times", "times"),
     ("ticks of swapped wheels", {"ticks.csv": ticks(swap=True), "imu.csv": imu(), "calibration.yaml": WHEELS}, ("bad", DISAGREE, "*"), "turns left where", ""),
+    ("left wheel's ticks backwards", {"ticks.csv": backwards(-1, 1), "imu.csv": imu(), "calibration.yaml": WHEELS}, ("bad", DISAGREE, "ticks"), "the left wheel's counter runs backwards", "left times -1"),
+    ("right wheel's ticks backwards", {"ticks.csv": backwards(1, -1), "imu.csv": imu(), "calibration.yaml": WHEELS}, ("bad", DISAGREE, "ticks"), "the right wheel's counter runs backwards", "right times -1"),
+    ("left wheel is not counted", {"ticks.csv": backwards(0, 1), "imu.csv": imu(), "calibration.yaml": WHEELS}, ("bad", "motion-sensor", "ticks"), "left is 0 in all", "encoder"),
+    ("gyro that repeats its last value", both(imu_csv=stuck(imu(), 10)), ("bad", "motion-sensor", "imu"), "repeats 0.29", "must not send the last value"),
+    ("gyro that repeats its last value for 4 s", both(imu_csv=(lambda s: "\n".join(s.splitlines()[:1401] + imu().splitlines()[1401:]) + "\n")(stuck(imu(), 10))), ("bad", "motion-sensor", "imu"), "from 10.00 to 13.99 s", "last value"),
+    ("twist that repeats its last value", both(motion_csv=stuck(motion(), 10)), ("bad", "motion-sensor", "motion"), "w_radps of motion repeats", "last value"),
     ("track of half the length", {"ticks.csv": ticks(track_m=1.0), "imu.csv": imu(), "calibration.yaml": WHEELS}, ("bad", DISAGREE, "*"), "times", ""),
     ("counter that starts anew at 3000", {"ticks.csv": ticks(wraps_at=3000), "imu.csv": imu(), "calibration.yaml": WHEELS}, ("bad", "counter-restarts", "ticks"), "anew at about 30", "ticks.csv"),
     *[(f"counter of {bits} bits in a table", {"ticks.csv": ticks(wraps_at=2**bits, rate_hz=200, begin=50000), "imu.csv": imu(), "calibration.yaml": WHEELS}, ("bad", "counter-restarts", "ticks"), f"anew after {2**bits} counts", f"plus {2**bits} from") for bits in (8, 12, 16)],
@@ -285,6 +303,7 @@ RIGHT = [
     ("a gyro with a bias", both(imu_csv=imu(bias=0.01))),
     ("a slow gyro with much noise", both(imu_csv=imu(20, sigma=0.05))),
     ("a base that turns a fifth less than its wheels", both(motion_csv=motion(w=1.2))),
+    ("a robot that is turned by hand while its wheels stand", both(motion_csv=table("t_ns,v_mps,w_radps", [[row[0], *(["0", "0"] if 4 < k / 50 < 12 else row[1:])] for k, row in enumerate(r.split(",") for r in motion().splitlines()[1:])]))),
     ("values in threes beside a gyro", {"motion.csv": motion(100, repeat=3), "imu.csv": imu()}),
     ("sightings of posts on the map", sighted()),
     ("positions at one speed, the antenna's place unknown", {"motion.csv": motion(steady=True), "gnss.csv": gnss(sigma=0.03, steady=True), "heading.csv": headings(), "recording.yaml": RECORDING.format("motion.csv, gnss.csv, heading.csv").split("vehicle:")[0], "config.yaml": "format: waymark-config/1\nestimator: landmark_ekf\n"}, "not-observable"),

@@ -298,6 +298,14 @@ class Coarse(BagTest):
         self.assertIn("no stamp", said)
         self.assert_end(recording, said, end=END)
 
+    def test_headers_without_a_stamp_have_the_log_s_times(self):
+        bag = self.bag()
+        for t in times():
+            bag.odometry(0, ns(t) + 2_000_000, place(t), (SPEED, 0, 0), (0, 0, turn_rate(t)))
+        recording, said = self.take(bag)
+        self.assertIn("note: /odom: its messages have no stamp: the times of the log are used", said)
+        self.assert_end(recording, said)
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -60,6 +60,7 @@ class Fixes(BagTest):
     def test_how_drivers_fill_latitude_and_longitude(self):
         minutes = lambda v: 100 * np.trunc(v) + 60 * (v - np.trunc(v))  # noqa: E731
         kinds = {"exchanged": lambda w: w[::-1], "in radians": lambda w: tuple(np.radians(w)), "ten-millionths": lambda w: tuple(1e7 * np.array(w)),
+                 "in millionths": lambda w: tuple(1e6 * np.array(w)),
                  "degrees and minutes": lambda w: tuple(map(minutes, w)), "exchanged and in radians": lambda w: tuple(np.radians(w))[::-1]}
         for name, filled in kinds.items():
             with self.subTest(name):
@@ -75,6 +76,11 @@ class Fixes(BagTest):
                     message.twist.twist.linear.x *= slip
             _, said = self.take(bag, "--motion-by", "twists")
             self.assertNotIn("latitude and longitude are", said)
+
+    def test_a_latitude_without_its_sign_is_named(self):
+        recording, said = self.take(self.drive(lambda i, w, a: ((-w[0], w[1]), a, 0)))
+        self.assertIn("finding: /fix: its way is the mirror image of that of /odom", said)
+        np.testing.assert_allclose(recording.table("gnss.csv")["y_m"], [-place(t)[1] for t in np.arange(16.0)], atol=0.01)
 
     def test_a_status_that_nobody_set_is_no_missing_fix(self):
         recording, said = self.take(self.drive(lambda i, w, a: (w, a, -2)))

@@ -172,6 +172,23 @@ class SensorsWithALever(BagTest):
             self.assertIn(f"motion of '{child}'", said)
             self.assert_end(recording, said)
 
+    def test_frames_whose_names_say_that_z_is_ahead(self):
+        """Poses of a camera's optical frame in a world on the same axes, as visual odometry gives them without tf."""
+        world = np.eye(4)
+        world[:3, :3] = OPTICAL.T
+        optical = np.eye(4)
+        optical[:3, :3] = OPTICAL
+        for child, place_of_camera in (("camera_optical", None), ("left_optical_frame", matrix((0.5, 0, 0.3)))):
+            bag, camera = self.bag(), np.eye(4) if place_of_camera is None else place_of_camera
+            if place_of_camera is not None:
+                bag.tf("base_link", "left_frame", camera)
+            for t in times():
+                x, y, heading = place(t)
+                bag.odometry(ns(t), ns(t), world @ matrix((x, y, 0), (0, 0, heading)) @ camera @ optical, (0, 0, 0), (0, 0, 0), child=child)
+            recording, said = self.take(bag)
+            self.assertIn("on the axes that its name states" if place_of_camera is None else "with this lever", said)
+            self.assert_end(recording, said)
+
     def test_a_child_that_is_the_world_is_the_robot(self):
         bag = self.bag()
         bag.drive(child="odom")
@@ -216,6 +233,15 @@ class Contradictions(BagTest):
             bag.odometry(ns(t), ns(t), (1000 * x, 1000 * y, heading), (SPEED, 0, 0), (0, 0, turn_rate(t)))
         recording, said = self.take(bag)
         self.assertIn("mm in place of m", said)
+        self.assert_end(recording, said)
+
+    def test_headings_in_degrees_do_not_drive(self):
+        bag = self.bag()
+        for t in times():
+            x, y, heading = place(t)
+            bag.odometry(ns(t), ns(t), (x, y, np.degrees(heading)), (SPEED, 0, 0), (0, 0, turn_rate(t)))
+        recording, said = self.take(bag)
+        self.assertIn("finding: /odom: its poses turn 57.3 times as far as its twist", said)
         self.assert_end(recording, said)
 
     def test_poses_that_are_reset_go_on(self):

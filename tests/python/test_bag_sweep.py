@@ -232,7 +232,8 @@ class Sweep(BagTest):
         done = subprocess.run([BIN / "waymark", "check", self.folder / "robot.yaml", out, "--quick"], capture_output=True, text=True, check=False)
         if "vehicle.dbc: is not there, but needed" not in done.stdout:  # what frames mean is the user's to write, where nothing else drives
             self.assertNotIn("refused-input", done.stdout, f"{name}\n{text}")
-        self.assertGreaterEqual(done.returncode, 0, f"{name}: check died\n{done.stderr}")
+        self.assertIn(done.returncode, (0, 1, 2), f"{name}: check died\n{done.stderr}")
+        self.assertNotRegex(done.stderr, "Sanitizer|runtime error", name)
 
     def test_mutants(self):
         base = drive()

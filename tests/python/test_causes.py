@@ -71,6 +71,9 @@ class Changes(unittest.TestCase):
         self.assertIn(b"TICKS : 7|32@0- (1,0)", changes.Signal("f", "ODOMETRY", "TICKS", "order").apply(DBC))
         self.assertIn(b"TICKS : 8|16@1- (2,0)", changes.Signal("f", "OTHER", "TICKS", "sign").apply(DBC))
         self.assertIn(b"TICKS : 8|12@1+ (2,0)", changes.Signal("f", "OTHER", "TICKS", "bits", 12).apply(DBC))
+        motorola = DBC.replace(b"8|16@1+", b"15|16@0+")
+        self.assertIn(b"TICKS : 11|12@0+ (2,0)", changes.Signal("f", "OTHER", "TICKS", "bits", 12).apply(motorola))
+        self.assertIn(b"TICKS : 23|8@0+ (2,0)", changes.Signal("f", "OTHER", "TICKS", "bits", 8).apply(motorola))
         for signal, layout, bits in (("NONE", "sign", 0), ("TICKS", "bits", 16)):
             with self.assertRaises(changes.Impossible):
                 changes.Signal("f", "OTHER", signal, layout, bits).apply(DBC)
@@ -137,8 +140,8 @@ class Judgement(unittest.TestCase):
         self.assertEqual(self.judged(drive(2.0, unusual=1.0), drive(2.001, unusual=15.0))[:2], ("row 0", []))
 
     def test_a_small_gain_names_nothing(self):
-        self.assertFalse(self.search._helps(drive(1.05), drive(1.0)))
-        self.assertTrue(self.search._helps(drive(1.2), drive(1.0)))
+        found = [search.Candidate(dataclasses.replace(row("row"), is_shown=is_shown), (1.0,), drive(gain)) for gain, is_shown in ((1.05, False), (1.2, False), (1.05, True))]
+        self.assertEqual([self.search._helps(one, drive(1.0)) for one in found], [False, True, True])
 
     def test_a_size_is_the_top_of_the_parabola(self):
         fault = Fault("f", ((0.0,),), lambda _: [], lambda _: "", step=(1.0,))
@@ -180,9 +183,9 @@ class Judgement(unittest.TestCase):
     def test_two_landmarks_that_few_observations_see_are_named_by_these(self):
         few = np.where(np.arange(40) % 20 == 5, 30.0, 0.0)
         better = dataclasses.replace(drive(1.0), gain=drive(1.0).gain + few)
-        self.assertFalse(self.search._helps(better, drive(1.0)))
-        self.assertTrue(self.search._helps(dataclasses.replace(better, is_local=True), drive(1.0)))
-        self.assertFalse(self.search._helps(dataclasses.replace(drive(1.0), is_local=True), drive(1.0)))
+        self.assertFalse(self.search._helps(search.Candidate(row("row"), (1.0,), better), drive(1.0)))
+        self.assertTrue(self.search._helps(search.Candidate(row("row"), (1.0,), dataclasses.replace(better, is_local=True)), drive(1.0)))
+        self.assertFalse(self.search._helps(search.Candidate(row("row"), (1.0,), dataclasses.replace(drive(1.0), is_local=True)), drive(1.0)))
 
     def test_student_s_distribution(self):
         self.assertAlmostEqual(search._student(2.086, 20), 0.975, places=3)

@@ -187,7 +187,9 @@ class Maps(Folder):
     def test_what_is_refused(self):
         (self.folder / "a.png").write_bytes(png(self.grey)[:60])
         (self.folder / "b.png").write_bytes(png(self.grey))
+        (self.folder / "c.pgm").write_bytes(b"P5\n%d %d\n255\n" % self.grey.shape[::-1] + self.grey.astype(np.uint8).tobytes()[:-9])
         for keys, words in (("image: a.png\n", "a.png: this is no picture that can be read, or it is cut off"),
+                            ("image: c.pgm\n", "c.pgm: this is no picture that can be read, or it is cut off"),
                             ("image: b.png\nmode: graded\n", "mode: 'graded' is none of trinary"),
                             ("image: b.png\nmode: raw\nnegate: 1\n", "negate: the map servers")):
             (self.folder / "map.yaml").write_text(f"resolution: 0.05\norigin: [0, 0, 0]\n{keys}")

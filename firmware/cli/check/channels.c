@@ -67,8 +67,25 @@ static void spread(const channels *all, channel *self, wm_time_ns from_ns, wm_ti
   }
 }
 
-static void note_value(channel *self, double value) {
-  if (self->values++ == 0) self->least = self->most = value;
+static void note_run(channel *self, double value, wm_time_ns t_ns) {
+  const int goes_on = self->run > 0 && value == self->last;
+  self->run = goes_on ? self->run + 1 : 1;
+  if (!goes_on) self->run_ns = t_ns;
+  const int is_longest = self->longest > 0 && self->run_ns == self->longest_ns[0];
+  if (self->run > self->longest) {
+    if (!is_longest) self->second = self->longest;
+    self->longest = self->run;
+    self->longest_ns[0] = self->run_ns;
+    self->longest_ns[1] = t_ns;
+    self->longest_value = value;
+  } else if (!is_longest && self->run > self->second) {
+    self->second = self->run;
+  }
+}
+
+static void note_value(channel *self, double value, wm_time_ns t_ns) {
+  note_run(self, value, t_ns);
+  if (self->values++ == 0) self->least = self->most = value, self->first_ns = t_ns;
   self->least = fmin(self->least, value);
   self->most = fmax(self->most, value);
   self->zeros += value == 0;
@@ -85,7 +102,7 @@ static void take_rate(channels *all, channel_kind kind, const wm_event *event, d
   if (dt_s < 0) return;  // a row in disorder, or of a clock that was set back
   if (dt_s > 0 && dt_s <= HELD_MAX_S) spread(all, self, self->last_ns, event->t_ns, self->last * dt_s);
   self->has_scale = (uint8_t)has_scale;
-  note_value(self, value);
+  note_value(self, value, event->t_ns);
   self->last_ns = event->t_ns;
 }
 
@@ -94,7 +111,7 @@ static void take_amount(channels *all, channel_kind kind, uint16_t source, wm_ti
   channel *self = isfinite(amount) ? channel_of(all, kind, source) : NULL;
   if (!self) return;
   self->has_scale = (uint8_t)has_scale;
-  note_value(self, amount);
+  note_value(self, amount, to_ns);
   spread(all, self, from_ns, to_ns, amount);
 }
 
@@ -182,7 +199,7 @@ static void take_heading(channels *all, const wm_event *event) {
   const double dt_s = self->last_ns == WM_TIME_NONE ? 0 : wm_seconds_between(self->last_ns, event->t_ns);
   if (dt_s > 0 && dt_s <= HELD_MAX_S)
     spread(all, self, self->last_ns, event->t_ns, remainder(heading_rad - self->last, 2 * M_PI));
-  note_value(self, heading_rad);
+  note_value(self, heading_rad, event->t_ns);
   self->last_ns = event->t_ns;
 }
 

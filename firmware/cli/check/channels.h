@@ -42,7 +42,12 @@ typedef struct channel {
   // Of its values.
   uint64_t values, zeros, lone_zeros;  // lone: between two values that are not zero
   double least, most, last, before;
-  wm_time_ns last_ns;  // stamp of the last one; WM_TIME_NONE: none
+  wm_time_ns first_ns, last_ns;  // stamps; WM_TIME_NONE: none
+  // Values that repeat the one before: how many in a row now, at most, and in the next longest row.
+  uint64_t run, longest, second;
+  wm_time_ns run_ns, longest_ns[2];  // since when; of the longest, the stamps of its first and last value
+  double longest_value;
+  uint8_t is_stuck;
   // In each window: the sum, rad or m, and the seconds of it that are covered.
   float *sum, *cover;
   size_t windows;

@@ -25,7 +25,6 @@
 #define APART_SHARE 0.005    // of the time's sum, that the way leaves: a speed that varies by 7 %, or stops
 #define DEGREES (180 / M_PI)
 #define KMH 3.6
-#define G_MPS2 9.80665
 
 typedef struct fit {
   double aa, bb, ab;  // sums over the windows
@@ -156,8 +155,9 @@ int comparisons_is_broken(const channel *c, const wm_assembly *assembly, const w
   const char *name = source_of(c, assembly);
   for (size_t i = 0; i < sizeof kOfClock / sizeof kOfClock[0]; i++)
     if (wm_findings_has(found, kOfClock[i], name)) return 1;
-  return (c->kind == CHANNEL_TICKS_TURN || c->kind == CHANNEL_TICKS_WAY) &&
-         wm_findings_has(found, WM_FOUND_COUNTER_RESTARTS, name);
+  const int counts = c->kind == CHANNEL_TICKS_TURN || c->kind == CHANNEL_TICKS_WAY;
+  return c->is_stuck || (counts && (wm_findings_has(found, WM_FOUND_COUNTER_RESTARTS, name) ||
+                                    wm_findings_has(found, WM_FOUND_MOTION_SENSOR, name)));
 }
 
 static const char *word_of(const channel *c, const wm_assembly *assembly) {
@@ -184,7 +184,7 @@ static const char *word_of(const channel *c, const wm_assembly *assembly) {
 }
 
 // "wz_radps of imu"; of CAN the quantity alone.
-static const char *name_of(const channel *c, const wm_assembly *assembly, char *out, size_t capacity) {
+const char *comparisons_name(const channel *c, const wm_assembly *assembly, char *out, size_t capacity) {
   const char *word = word_of(c, assembly), *source = source_of(c, assembly);
   (void)(is_can(c, assembly) ? snprintf(out, capacity, "%s", word)
                              : snprintf(out, capacity, "%s of %.40s", word, source));
@@ -209,43 +209,6 @@ typedef struct scene {
   wm_findings *out;
 } scene;
 
-// Whether the accelerometer of this source shows that it hangs upside down.
-static int is_upside_down(const channels *all, uint16_t source) {
-  const double *a = all->acceleration[source];
-  const double n = (double)all->accelerations[source];
-  return n > 0 && a[2] / n < -0.7 * sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]) / n && a[2] / n < -2;
-}
-
-static void matrix_of(const double rpy[3], double out[3][3]) {
-  const double sr = sin(rpy[0]), cr = cos(rpy[0]), sp = sin(rpy[1]), cp = cos(rpy[1]), sy = sin(rpy[2]),
-               cy = cos(rpy[2]);
-  const double m[3][3] = {{cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr},
-                          {sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr},
-                          {-sp, cp * sr, cp * cr}};
-  memcpy(out, m, sizeof m);
-}
-
-// The line that mounts an IMU which, on the axes of base_link as they are stated, has to be turned by rpy_deg more.
-static const char *mounting_line(const scene *s, double roll_deg, double pitch_deg, char *out, size_t capacity) {
-  static const double kNone[3] = {0, 0, 0};
-  const double more[3] = {roll_deg / DEGREES, pitch_deg / DEGREES, 0};
-  double by[3][3], old[3][3], m[3][3];
-  matrix_of(more, by);
-  matrix_of(s->assembly->imu ? s->assembly->imu->rpy_rad : kNone, old);
-  for (int i = 0; i < 3; i++)
-    for (int k = 0; k < 3; k++) m[i][k] = by[i][0] * old[0][k] + by[i][1] * old[1][k] + by[i][2] * old[2][k];
-  const int is_upright = fabs(m[2][0]) < 1 - 1e-9;  // else roll and yaw are one
-  const double rpy[3] = {is_upright ? atan2(m[2][1], m[2][2]) : 0, asin(fmax(-1, fmin(1, -m[2][0]))),
-                         is_upright ? atan2(m[1][0], m[0][0]) : atan2(-m[0][1], m[1][1])};
-  double deg[3];
-  for (int i = 0; i < 3; i++) {
-    deg[i] = round(rpy[i] * DEGREES * 10) / 10 + 0.0;
-    if (deg[i] == -180) deg[i] = 180;
-  }
-  (void)snprintf(out, capacity, "`imu: {mounting: {rpy_deg: [%g, %g, %g]}}`", deg[0], deg[1], deg[2]);
-  return out;
-}
-
 static void sign_line(const scene *s, const channel *c, char *fix, size_t capacity) {
   const char *source = source_of(c, s->assembly);
   char line[96];
@@ -254,14 +217,14 @@ static void sign_line(const scene *s, const channel *c, char *fix, size_t capaci
                    channel_is_way(c->kind)
                        ? "`scale: -1` at the one that is not positive forwards"
                        : "`scale: -1` at the one that is not positive to the left; or left and right are swapped");
-  else if (c->kind == CHANNEL_YAW_RATE && is_upside_down(s->all, c->source))
+  else if (c->kind == CHANNEL_YAW_RATE && gravity_is_below(s->all, c->source))
     (void)snprintf(fix, capacity, "it hangs upside down. calibration.yaml: %s",
-                   mounting_line(s, 180, 0, line, sizeof line));
+                   gravity_mounting(s->assembly, 180, 0, line, sizeof line));
   else if (c->kind == CHANNEL_YAW_RATE)
     (void)snprintf(
         fix, capacity,
         "calibration.yaml: %s where it hangs upside down; else %s.csv: wz_radps times -1: positive is to the left",
-        mounting_line(s, 180, 0, line, sizeof line), source);
+        gravity_mounting(s->assembly, 180, 0, line, sizeof line), source);
   else
     (void)snprintf(fix, capacity, "%s.csv: %s times -1: positive is %s", source, word_of(c, s->assembly),
                    channel_is_way(c->kind) ? "forwards" : "to the left");
@@ -330,8 +293,36 @@ static const channel *other_axis(const channels *all, const channel *gyro, const
 // The mounting by which the axis that turns, by its sign, becomes z.
 static const char *turned_mounting(const scene *s, const channel *axis, double r, char *out, size_t capacity) {
   const double by_deg = r > 0 ? 90 : -90;
-  return axis->kind == CHANNEL_ROLL_RATE ? mounting_line(s, 0, -by_deg, out, capacity)
-                                         : mounting_line(s, by_deg, 0, out, capacity);
+  return axis->kind == CHANNEL_ROLL_RATE ? gravity_mounting(s->assembly, 0, -by_deg, out, capacity)
+                                         : gravity_mounting(s->assembly, by_deg, 0, out, capacity);
+}
+
+// The way of the wheels whose difference is this turn; NULL: it is none.
+static const channel *way_of_wheels(const channels *all, const channel *turn) {
+  const channel_kind kind = turn->kind == CHANNEL_TICKS_TURN    ? CHANNEL_TICKS_WAY
+                            : turn->kind == CHANNEL_WHEELS_TURN ? CHANNEL_WHEELS_WAY
+                                                                : CHANNEL_KINDS;
+  for (size_t i = 0; i < all->count; i++)
+    if (all->at[i].kind == kind && all->at[i].source == turn->source) return &all->at[i];
+  return NULL;
+}
+
+// Where one of two counters runs backwards, their sum is what the robot turns. Makes the finding.
+static int counts_backwards(const scene *s, const channel *quiet, const channel *turn) {
+  const channel *way = turn->kind == CHANNEL_TICKS_TURN ? way_of_wheels(s->all, turn) : NULL;
+  if (!way) return 0;
+  const fit f = best_fit(quiet, way);
+  if (!is_excited(&f, 0) || fabs(f.r) < FIT_MIN) return 0;
+  const char *source = source_of(turn, s->assembly), *side = f.r > 0 ? "left" : "right";
+  char name[96], fix[WM_FINDING_FIX_MAX];
+  (void)(is_can(turn, s->assembly) ? snprintf(fix, sizeof fix, "can-signals.yaml: `scale: -1` at wheel_ticks_%s", side)
+                                   : snprintf(fix, sizeof fix, "%s.csv: %s times -1", source, side));
+  wm_find(s->out, WM_FOUND_SENSORS_DISAGREE, WM_SEVERITY_BAD, source, fix,
+          "the sum of the wheels' ticks follows %s, as their difference should (r %.2f): the %s wheel's counter runs "
+          "backwards",
+          comparisons_name(quiet, s->assembly, name, sizeof name), fabs(f.r), side)
+      ->size = f.r;
+  return 1;
 }
 
 static void shows_nothing(const scene *s, const channel *quiet, const channel *other, const fit *f) {
@@ -341,10 +332,11 @@ static void shows_nothing(const scene *s, const channel *quiet, const channel *o
   double r = 0;
   (void)snprintf(fix, sizeof fix, "look at the %s, and at the signal's place in the DBC",
                  quiet->kind == CHANNEL_YAW_RATE ? "gyro" : "sensor");
-  (void)name_of(quiet, s->assembly, name, sizeof name);
-  (void)name_of(other, s->assembly, of, sizeof of);
+  (void)comparisons_name(quiet, s->assembly, name, sizeof name);
+  (void)comparisons_name(other, s->assembly, of, sizeof of);
   // A speed beside a gyro, as of a DVL, has no turn rate of its own: the column is filled with zeros, and not read.
   if (quiet->kind == CHANNEL_TWIST_TURN && quiet->zeros == quiet->values && other->kind == CHANNEL_YAW_RATE) return;
+  if (counts_backwards(s, quiet, other)) return;
   const int is_constant = quiet->least == quiet->most;
   const wm_severity severity =
       channels_are_commands(s->all, other) && !is_constant ? WM_SEVERITY_NOTE : WM_SEVERITY_BAD;
@@ -378,8 +370,8 @@ static void disagrees(const scene *s, const channel *c, const channel *other, co
   const double factor = factor_of(f), sign = f->r < 0 ? -1 : 1;
   const double size = factor != 1 || f->ab == 0 ? factor : sqrt(f->aa / f->bb);
   char name[96], of[96], fix[WM_FINDING_FIX_MAX];
-  (void)name_of(c, s->assembly, name, sizeof name);
-  (void)name_of(other, s->assembly, of, sizeof of);
+  (void)comparisons_name(c, s->assembly, name, sizeof name);
+  (void)comparisons_name(other, s->assembly, of, sizeof of);
   const int is_unit = unit_of(factor, is_way) != NULL || unit_of(1 / factor, is_way) != NULL;
   const int is_weak =
       (channels_are_commands(s->all, c) || channels_are_commands(s->all, other)) && !is_unit && f->r < OBEYED;
@@ -401,16 +393,6 @@ static void disagrees(const scene *s, const channel *c, const channel *other, co
           fix, "%s is %.2f times %s%s (r %.2f, %.1f %s in all)", name, factor, is_way ? "" : "the turn rate by ", of,
           f->r, f->total[1], is_way ? "m" : "rad")
       ->size = factor;
-}
-
-// The way of the wheels whose difference is this turn; NULL: it is none.
-static const channel *way_of_wheels(const channels *all, const channel *turn) {
-  const channel_kind kind = turn->kind == CHANNEL_TICKS_TURN    ? CHANNEL_TICKS_WAY
-                            : turn->kind == CHANNEL_WHEELS_TURN ? CHANNEL_WHEELS_WAY
-                                                                : CHANNEL_KINDS;
-  for (size_t i = 0; i < all->count; i++)
-    if (all->at[i].kind == kind && all->at[i].source == turn->source) return &all->at[i];
-  return NULL;
 }
 
 // Of a gyro beside the wheels' difference: what it shows at rest, rad/s, by least squares over turn, time and way. A
@@ -448,8 +430,9 @@ static int has_bias(const scene *s, const channel *c, const channel *other) {
     (void)snprintf(fix, sizeof fix, "%s.csv: wz_radps less %.3g; and let the gyro find its zero at rest",
                    source_of(c, s->assembly), bias);
   wm_find(s->out, WM_FOUND_SENSORS_DISAGREE, WM_SEVERITY_BAD, source_of(c, s->assembly), fix,
-          "%s shows %.3f rad/s where %s shows no turn: its zero is off", name_of(c, s->assembly, name, sizeof name),
-          bias, name_of(other, s->assembly, of, sizeof of))
+          "%s shows %.3f rad/s where %s shows no turn: its zero is off",
+          comparisons_name(c, s->assembly, name, sizeof name), bias,
+          comparisons_name(other, s->assembly, of, sizeof of))
       ->size = bias;
   return 1;
 }
@@ -508,53 +491,9 @@ static void judge_straight(const scene *s) {
   char name[96], of[96];
   wm_find(s->out, WM_FOUND_NOT_OBSERVABLE, WM_SEVERITY_NOTE, "motion", "record a drive with turns to both sides",
           "it turns by %.2g rad in all: sign and scale of %s against %s are not observable in this drive", turned,
-          name_of(seen[0], s->assembly, name, sizeof name), name_of(seen[1], s->assembly, of, sizeof of))
+          comparisons_name(seen[0], s->assembly, name, sizeof name),
+          comparisons_name(seen[1], s->assembly, of, sizeof of))
       ->size = turned;
-}
-
-// An accelerometer at rest, or on the average of a drive, measures 9.8 m/s2 upwards.
-static void judge_gravity(const scene *s, uint16_t source) {
-  static const struct {
-    double size;
-    const char *unit;
-  } kUnits[] = {{1, "g"}, {1000, "thousandths of g"}, {100 * G_MPS2, "cm/s2"}};
-  const double n = (double)s->all->accelerations[source];
-  double a[3], size = 0;
-  if (n < 100) return;
-  int axis = 0;
-  for (int k = 0; k < 3; k++) {
-    a[k] = s->all->acceleration[source][k] / n;
-    size += a[k] * a[k];
-    if (fabs(a[k]) > fabs(a[axis])) axis = k;
-  }
-  size = sqrt(size);
-  const char *about = wm_assembly_source_name(s->assembly, source);
-  char fix[WM_FINDING_FIX_MAX];
-  const char *unit = NULL;
-  double off = NEAR;
-  for (size_t i = 0; i < sizeof kUnits / sizeof kUnits[0]; i++) {
-    if (!(fabs(size / kUnits[i].size - 1) < off)) continue;
-    off = fabs(size / kUnits[i].size - 1);
-    unit = kUnits[i].unit;
-  }
-  if (unit || size > 3 * G_MPS2) {
-    (void)snprintf(fix, sizeof fix, "its accelerations are in %s: times %.6g (ax_mps2, ay_mps2, az_mps2)",
-                   unit ? unit : "another unit", G_MPS2 / size);
-    wm_find(s->out, WM_FOUND_VALUE_IMPLAUSIBLE, WM_SEVERITY_BAD, about, fix,
-            "the mean of its acceleration is %.2f m/s2, gravity is 9.8", size);
-    return;
-  }
-  // Within 45 degrees of up, or no gravity in it: a tilt is the mounting's own business.
-  if (wm_findings_has(s->out, WM_FOUND_SENSORS_DISAGREE, about)) return;
-  if (size < 8 || size > 11.5 || (axis == 2 && a[2] > 0) || fabs(a[axis]) < 0.9 * size) return;
-  const double by_deg = axis == 2 ? 180 : a[axis] > 0 ? 90 : -90;
-  char line[96];
-  (void)snprintf(fix, sizeof fix, "calibration.yaml: %s, with the last number by its direction%s",
-                 mounting_line(s, axis == 0 ? 0 : by_deg, axis == 0 ? -by_deg : 0, line, sizeof line),
-                 axis == 2 ? "; or all accelerations have the other sign" : "");
-  wm_find(s->out, WM_FOUND_SENSORS_DISAGREE, WM_SEVERITY_BAD, about, fix,
-          "its accelerometer shows gravity on %s%c: that axis is up, not z", a[axis] < 0 ? "-" : "", "xyz"[axis])
-      ->size = a[axis];
 }
 
 void comparisons_judge(const channels *self, const wm_assembly *assembly, wm_findings *out) {
@@ -562,8 +501,7 @@ void comparisons_judge(const channels *self, const wm_assembly *assembly, wm_fin
   judge_quantity(&s, 0);
   judge_quantity(&s, 1);
   judge_straight(&s);
-  for (uint16_t source = 0; source < assembly->source_count && source < WM_SOURCES_MAX; source++)
-    judge_gravity(&s, source);
+  gravity_judge(self, assembly, out);
 }
 
 void comparisons_print(const channels *self, const wm_assembly *assembly, FILE *to) {
@@ -575,8 +513,8 @@ void comparisons_print(const channels *self, const wm_assembly *assembly, FILE *
         continue;
       fit f;
       const contradiction how = compare(a, b, &f);
-      (void)fprintf(to, "compared     %s with %s: ", name_of(a, assembly, name, sizeof name),
-                    name_of(b, assembly, of, sizeof of));
+      (void)fprintf(to, "compared     %s with %s: ", comparisons_name(a, assembly, name, sizeof name),
+                    comparisons_name(b, assembly, of, sizeof of));
       if (how == UNKNOWN && !is_excited(&f, channel_is_way(a->kind)))
         (void)fprintf(to, "not observable in this drive\n");
       else if (fabs(f.r) > CORRELATION_MIN && a->has_scale && b->has_scale)

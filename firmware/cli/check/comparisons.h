@@ -9,8 +9,19 @@
 #include "findings/findings.h"
 #include "fusion/assembly.h"
 
-// Whether a finding of fact says that this channel's clock or counter is broken, so that no other channel is compared
-// with it.
+// "wz_radps of imu"; of CAN the quantity alone. Returns out.
+const char *comparisons_name(const channel *c, const wm_assembly *assembly, char *out, size_t capacity);
+// Whether the accelerometer of this source shows that it hangs upside down.
+int gravity_is_below(const channels *all, uint16_t source);
+// The line that mounts an IMU which, on the axes of base_link as they are stated, has to be turned by so much more.
+const char *gravity_mounting(const wm_assembly *assembly, double roll_deg, double pitch_deg, char *out,
+                             size_t capacity);
+// Findings about an IMU's axes and the unit of its accelerations.
+void gravity_judge(const channels *self, const wm_assembly *assembly, wm_findings *out);
+// Finds sensors that repeat a value while another one moves, and marks them.
+void stuck_judge(channels *self, const wm_assembly *assembly, wm_findings *out);
+// Whether a finding of fact says that this channel, its clock or its counter is broken, so that no other channel is
+// compared with it.
 int comparisons_is_broken(const channel *c, const wm_assembly *assembly, const wm_findings *found);
 // Findings about the sensors that contradict the others.
 void comparisons_judge(const channels *self, const wm_assembly *assembly, wm_findings *out);

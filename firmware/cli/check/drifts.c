@@ -177,11 +177,12 @@ static int is_apart(const channel *a, const channel *b, clock_fit *out) {
 }
 
 // The turn that a source shows best: of a twist, else of what is integrated, else of a gyro. NULL: none, a command, or
-// of a clock or a counter that is known to be broken.
+// or of a clock, a counter or a scale that is known to be broken.
 static const channel *turn_of(const channels *all, uint16_t source, const wm_assembly *assembly,
                               const wm_findings *found) {
   static const channel_kind kBest[] = {CHANNEL_TWIST_TURN, CHANNEL_INCREMENT_TURN, CHANNEL_YAW_RATE, CHANNEL_TICKS_TURN,
                                        CHANNEL_WHEELS_TURN};
+  if (wm_findings_has(found, WM_FOUND_SENSORS_DISAGREE, wm_assembly_source_name(assembly, source))) return NULL;
   for (size_t k = 0; k < sizeof kBest / sizeof kBest[0]; k++)
     for (size_t i = 0; i < all->count; i++)
       if (all->at[i].kind == kBest[k] && all->at[i].source == source &&

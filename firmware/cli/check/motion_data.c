@@ -144,7 +144,9 @@ static void judge_wrap(const motion_data *self, int side, const char *about, wm_
   if (bits > 0) {
     char fix[WM_FINDING_FIX_MAX];
     if (strncmp(about, ABOUT, strlen(ABOUT)) == 0)
-      (void)snprintf(fix, sizeof fix, "vehicle.dbc: the signal has %d bits, the lower ones: `SG_ NAME : FIRST|%d@1+`",
+      (void)snprintf(fix, sizeof fix,
+                     "vehicle.dbc: the signal has %d bits, the lower ones: `SG_ NAME : FIRST|%d@1+` (of @0 FIRST moves "
+                     "by those that go)",
                      bits, bits);
     else
       (void)snprintf(fix, sizeof fix,

@@ -274,6 +274,7 @@ void source_data_judge(source_data *self, uint32_t bound, const wm_health *healt
     if (self->facts[i].events > 1 && &self->facts[i] != motion && !self->facts[i].jumps) spans(self, i, motion, out);
   course_data_judge(&self->course, out);
   if (kinds & WM_EVENT_BIT(WM_EVENT_QUANTITIES)) motion_data_judge(&self->motion, self->assembly, bound, out);
+  stuck_judge(&self->channels, self->assembly, out);
   comparisons_judge(&self->channels, self->assembly, out);
   drifts_judge(&self->channels, self->assembly, out);
 }

@@ -92,13 +92,15 @@ def _grey(path: Path, about: Path) -> tuple[Array, Array]:
     """A picture's grey levels and where it is opaque, the lowest row first."""
     try:
         with Image.open(path) as picture:
-            if max(picture.size) > _SIDE_MAX_PX:
-                raise ValueError(f"{path}: {picture.size[0]} x {picture.size[1]} pixels; up to {_SIDE_MAX_PX} a side are read")
-            grey, opaque = _levels(picture)
+            size = picture.size
+            levels = _levels(picture) if max(size) <= _SIDE_MAX_PX else None
     except FileNotFoundError:
         raise FileNotFoundError(f"{about}: its picture {path} is not there") from None
-    except (OSError, SyntaxError, Image.DecompressionBombError):
+    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError):
         raise ValueError(f"{path}: this is no picture that can be read, or it is cut off") from None
+    if levels is None:
+        raise ValueError(f"{path}: {size[0]} x {size[1]} pixels; up to {_SIDE_MAX_PX} a side are read")
+    grey, opaque = levels
     return grey[::-1], np.ones(grey.shape, dtype=bool) if opaque is None else opaque[::-1]
 
 

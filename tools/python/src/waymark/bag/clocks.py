@@ -293,6 +293,9 @@ def settle(stamps: dict[str, Array], note: Say) -> dict[str, Clock]:
     """The clock of each topic by its (stamp, log) pairs (n, 2), in the order of the log. What was found is said."""
     topics = [_look(name, times) for name, times in sorted(stamps.items()) if len(times)]
     stamped = [topic for topic in topics if topic.known.any()]
+    for topic in topics:
+        if not topic.known.any():
+            note(topic.name, "its messages have no stamp: the times of the log are used")
     if not stamped:
         return {topic.name: Clock(by_log=True) for topic in topics}
     reference, reference_ns = _reference(stamped)

@@ -12,8 +12,8 @@ from ..tables import Array
 
 BASES = ("base_link", "base_footprint", "base", "chassis", "chassis_link", "base_frame", "robot_base", "vehicle", "body")
 """Names of the robot's own frame, in the order of preference (REP 105, REP 120; the others are in common use)."""
-_DOWNWARDS = re.compile(r"_(ned|frd)$", re.I)  # REP 103: `_ned` has z down; `_frd` is the same of a body (MAVROS)
-_HALF_ROLL = np.diag([1.0, -1.0, -1.0, 1.0])
+# Axes that a frame's name states, in those of the frame without that ending (REP 103; `_frd` is `_ned` of a body, by MAVROS).
+_AXES = ((re.compile(r"_(ned|frd)$", re.I), np.diag([1.0, -1.0, -1.0])), (re.compile(r"_optical(?=(_frame|_link)?$)", re.I), OPTICAL))
 _STILL_M, _STILL_RAD = 1e-3, 1e-3  # a transform that changes by more is a joint that moves: sums of floats change by less
 _DECODED_MAX = 2000  # messages of /tf that are read in whole; of further ones every tenth: joints move all the time
 
@@ -26,6 +26,13 @@ def bare(frame: str) -> str:
 def is_world(frame: str) -> bool:
     """Whether a frame is one of the world, in which the robot moves (REP 105)."""
     return re.match(r"(odom|map|world|earth|local_origin|enu|ned)([_/].*)?$", bare(frame), re.I) is not None
+
+
+def named_axes(frame: str) -> Array:
+    """The pose of a frame whose name states its axes, at the place of the frame without that ending."""
+    out = np.eye(4)
+    out[:3, :3] = next((turn for axes, turn in _AXES if axes.search(frame)), np.eye(3))
+    return out
 
 
 class Frames:
@@ -109,9 +116,9 @@ class Frames:
         frame, base = frame.lstrip("/"), base.lstrip("/")
         way = self._way(frame, base, also_moving=False)
         if way is None:
-            upright = _DOWNWARDS.sub("", frame)
-            place = None if upright == frame else np.eye(4) if self.is_base(upright, base) else self.transform(upright, base)
-            return None if place is None else place @ _HALF_ROLL
+            plain = next((axes.sub("", frame) for axes, _ in _AXES if axes.search(frame)), frame)
+            place = None if plain == frame else np.eye(4) if self.is_base(plain, base) else self.transform(plain, base)
+            return None if place is None else place @ named_axes(frame)
         matrix = np.eye(4)
         for parent, child, up in way:
             step = self._edges[parent, child]

@@ -167,7 +167,7 @@ def _minutes(value: Array) -> Array:
 # How drivers fill latitude and longitude, in words, and the degrees that are meant.
 _READINGS: tuple[tuple[str, Callable[[Array], Array]], ...] = (
     ("", lambda v: v), ("in radians", np.degrees), ("degrees and minutes in one number, as NMEA has them", _minutes),
-    ("in ten-millionths of a degree", lambda v: v * 1e-7))
+    ("in ten-millionths of a degree", lambda v: v * 1e-7), ("in millionths of a degree", lambda v: v * 1e-6))
 
 
 def _read(into: Collection, topic: str, motion: Motion | None, t_ns: Array, values: Array, antenna: Array) -> Array:
@@ -193,6 +193,9 @@ def _read(into: Collection, topic: str, motion: Motion | None, t_ns: Array, valu
             if rests[k] <= limit and rests[0] > max(limit, 3 * rests[k]):
                 said, best = choices[k]
                 said += f", as {motion.topic} shows: its way is {rests[k]:.2g} m off them then, and {rests[0]:.3g} m as they are"
+            elif rests[k] > limit and (rest := _laid(way * (1, -1), _plane(best[seen])[:, :2])[1]) <= limit and rests[k] > 3 * rest:
+                into.find(topic, f"its way is the mirror image of that of {motion.topic} ({rest:.2g} m off it, and {rests[k]:.3g} m off that way itself): a latitude "
+                                 f"or longitude without its sign (south, west), or the turns of {motion.topic} have the other sign. It is kept as it is")
     if said:
         into.find(topic, f"its latitude and longitude are {said}: mended")
     return np.hstack([best, values[:, 2:]])

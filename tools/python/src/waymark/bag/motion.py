@@ -11,11 +11,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..geometry import rotation_vectors, rotations
+from ..geometry import rotation_vectors, rotations, turned
 from ..tables import Array, Table
 from . import compare
 from .collection import Collection, NoSuchTopic
-from .frames import is_world
+from .frames import is_world, named_axes
 from .samples import Samples
 from .tables import without_arrival
 
@@ -35,6 +35,7 @@ _LATE_MAX_NS = 100_000_000  # differences are known at their end: as twists only
 _POSE_UNITS = {1000.0: "mm", 100.0: "cm", 39.37: "inches"}
 _FLAT = 1e-3  # m/s, rad/s: a part of the twist that stays below is none: the floats' own, or that of poses as text
 _LEVER_R, _LEVER_M = 0.95, 0.05  # skid steer and legs slide, too, and their sideways speed follows nothing so closely
+_UPRIGHT = np.cos(np.radians(30))  # of the robot's z axis, in the mean of a drive: no slope is steeper
 _NAMES = ("x", "y", "z")
 
 
@@ -119,6 +120,8 @@ class _Odometry:
             return self.twist
         if turns and self._is_late(by_pose, borders):
             return rates
+        if moves and self._has_degrees(by_pose, by_twist):
+            return self.twist
         out = self._linear(rates, by_pose, by_twist, borders) if moves else self.twist
         if turns and not self.by_poses:
             out = self._angular(out, rates, by_pose, by_twist)
@@ -148,6 +151,15 @@ class _Odometry:
             self.say(f"its twist turns {lag * compare.WINDOW_S:.2f} s later than its poses, as a running mean does (r {alike[lag].r:.2f}, at once "
                      f"{alike[0].r:.2f}): the differences of its poses are used; --motion-by twists takes its twists")
         return self.by_poses
+
+    def _has_degrees(self, by_pose: Array, by_twist: Array) -> bool:
+        """Whether the headings of the poses are degrees that were taken for radians: then their ways are on wrong axes, too."""
+        alike = compare.likeness(by_pose[:, 5], by_twist[:, 5])
+        off = compare.likeness(by_pose[:, :3].ravel(), by_twist[:, :3].ravel()).r < _FITS
+        if not (off and alike.r >= _FITS and alike.known == 180 / np.pi):
+            return False
+        self.say(f"its poses turn {alike.factor:.3g} times as far as its twist (r {alike.r:.2f}), as degrees in place of radians: the twist is used", finding=True)
+        return True
 
     def _linear(self, rates: Array, by_pose: Array, by_twist: Array, borders: Array) -> Array:
         """Frame, empty axes and size of the speeds."""
@@ -216,7 +228,9 @@ def _place(into: Collection, topic: str, frame: str, base: str) -> tuple[Array, 
         return np.eye(4), f"its child_frame_id is '{frame}', a frame of the world: its motion is taken as that of '{base}'"
     matrix = into.frames.transform(frame, base)
     if matrix is None:
-        return np.eye(4), f"{into.frames.why_not(frame, base)}: its motion is taken as that of '{base}'"
+        axes = named_axes(frame)
+        words = "" if np.array_equal(axes, np.eye(4)) else ", on the axes that its name states"
+        return axes, f"{into.frames.why_not(frame, base)}: its motion is taken as that of '{base}'{words}"
     if np.allclose(matrix[:2, 3], 0, atol=1e-6) and np.allclose(matrix[:3, :3], np.eye(3), atol=1e-6):
         return matrix, ""
     x, y, z = matrix[:3, 3]
@@ -259,8 +273,6 @@ def _plain(into: Collection, topic: str, samples: Samples, base: str) -> Motion:
     """A topic of twists alone."""
     t, arrival, values = into.timed(topic, samples)
     out = Motion(topic, t, arrival, values, is_command=bool(_COMMAND.search(topic)))
-    if not samples.times[:, 0].any():
-        out.said.append((False, "its messages have no stamp: the times of the log are used"))
     if is_world(samples.frame):
         out.said.append((True, f"its twists are said to be on the axes of '{samples.frame}', and no pose comes with them: taken as the robot's"))
     elif samples.frame:
@@ -346,12 +358,16 @@ def choose(into: Collection, given: argparse.Namespace, base: str) -> Motion | N
 
 
 def _increments(motion: Motion) -> Table:
-    """Differences of consecutive poses in the plane. A pose that repeats the one before is no new one."""
+    """Differences of consecutive poses in the plane on which the robot stands. A pose that repeats the one before is no new one."""
     assert motion.poses is not None
     places, turns = motion.poses
     ok: Array = np.asarray(np.isfinite(places).all(axis=1) & np.isfinite(turns).all(axis=(1, 2)))
     ok[1:] &= np.diff(motion.t_ns) > 0
     t, places, turns, arrival = motion.t_ns[ok], places[ok], turns[ok], motion.arrival_ns[ok]
+    up = turns[:, :, 2].mean(axis=0)
+    if len(t) and up[2] < _UPRIGHT * np.linalg.norm(up):  # a world on the axes of a camera
+        level = turned(up, np.array([0.0, 0.0, 1.0]))
+        places, turns = places @ level.T, level @ turns
     heading = np.arctan2(turns[:, 1, 0], turns[:, 0, 0])
     c, s, (dx, dy) = np.cos(heading[:-1]), np.sin(heading[:-1]), np.diff(places[:, :2], axis=0).T
     turn = np.remainder(np.diff(heading) + np.pi, 2 * np.pi) - np.pi

@@ -295,8 +295,12 @@ class Signal(Edit):
             raise Impossible(f"{self.file} has no signal {self.signal}")
         start, bits, order, sign, scale, offset = layout.groups()
         if self.layout == "bits":
-            if order == "0" or self.shift >= int(bits):
+            left = int(bits) - self.shift
+            if left <= 0:
                 raise Impossible(f"{self.signal} has not more bits")
+            if order == "0":  # Motorola's first bit is the highest one, and the next ones are below it
+                byte, down = divmod(int(start) // 8 * 8 + 7 - int(start) % 8 + left, 8)
+                start = str(8 * byte + 7 - down)
             return f"{text[:layout.start()]}{start}|{self.shift}@{order}{sign} ({scale},{offset}){text[layout.end():]}".encode()
         first = int(start) + self.shift
         if first < 0:

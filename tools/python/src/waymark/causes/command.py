@@ -32,6 +32,7 @@ def _parser() -> argparse.ArgumentParser:
     for name, what in (("landmarks", "instead of the recording's map"), ("calibration", "instead of the recording's"),
                        ("map", "a map.yaml instead of the recording's")):
         parser.add_argument(f"--{name}", type=Path, metavar="FILE", help=what)
+    parser.add_argument("--clocks-apart", action="store_true", help="the clocks of two streams of motion run apart, as `waymark check` finds: name whose is off")
     parser.add_argument("--apply", type=Path, metavar="FOLDER", help="a corrected copy of the recording, and of the configuration where that has the mistake")
     parser.add_argument("--json", action="store_true", help="for programs")
     return parser
@@ -59,7 +60,7 @@ def report(robot: Robot, verdict: Verdict) -> dict[str, Any]:
         after = verdict.after
         out |= {"after": _share(after), "probability": round(min(verdict.probability, NAMED_MOST), 4), "gain_nats": round(verdict.gain, 3)}
         before, surely = verdict.before, f"probability {min(verdict.probability, NAMED_MOST):.4g}"
-        if verdict.gain >= GAIN_MIN:
+        if verdict.gain >= GAIN_MIN or any(fault.is_shown for fault, _ in verdict.causes):
             better = (f"and each is {math.exp(min(20, verdict.gain)):.1f} times as likely, on the half of the drive that this was not fitted to ({surely})")
         elif before.unusual - after.unusual < 1:
             better = "and they fit as well without it: the filter refuses what it cannot use"
@@ -86,7 +87,7 @@ def main(arguments: list[str] | None = None) -> int:
     named = {file: path for file, key in NAMED.items() if (path := getattr(options, key, None)) is not None}
     trials: Trials | None = None
     try:
-        robot = Robot.read(options.recording, options.config, named)
+        robot = Robot.read(options.recording, options.config, named, options.clocks_apart)
         folder = scratch_folder()
         driven = with_points(robot, folder)
         trials = Trials(driven, folder)

@@ -62,6 +62,8 @@ class Fault:
     """What it does to stamps."""
     is_fact: bool = False
     """The data prove it without a drive: it is undone before other mistakes are looked for."""
+    is_shown: bool = False
+    """Other data prove this mistake or one of a few others: a small gain over no mistake names it, where it beats these."""
     is_local: bool = False
     """It touches few observations: those of two landmarks, or those until a pose is found."""
     scales: str = ""

@@ -90,16 +90,17 @@ def _clocks(robot: Robot, source: Source) -> Iterator[Fault]:
                            lambda _, u=unit: f"the stamps of {name} are in {u}", group=f"clock of {name}")
         yield Fault(f"clock of {name}", ((gap,), (float(round(gap)),)), shift, late)
         return
+    is_shown = robot.clocks_apart and source.file in MOTION
     begin, only, offset = int(stamps.min()), source.sensor if source.kind != "pictures" else "", f"{source.sensor or source.kind}.time_offset_s"
     yield Fault(f"clock of {name}", tuple((s,) for s in (CLOCKS_S if source.file in OBSERVED and source.kind != "points" or source.kind == "pictures" else CLOCKS_FEWER_S)), shift, late, step=(0.25,), smallest=(0.01,),
                 is_possible=lambda size: abs(size[0]) <= CLOCK_MOST_S, clock=Clock(name, begin), group=f"along the way of {name}",
-                settled=lambda size, states: (size[0] - states.get(offset, 0.0),))
+                settled=lambda size, states: (size[0] - states.get(offset, 0.0),), is_shown=is_shown)
     yield Fault(f"drift of {name}", tuple((rate,) for rate in DRIFTS),
                 lambda size: [stretched(source.file, n, size[0], begin, only, n != "t_ns") for n in STAMPS],
                 lambda size: f"the stamps of {name} run away: {abs(size[0]) * 1e3:.3g} ms {'more' if size[0] > 0 else 'less'} each second "
                              "(a queue that nobody empties, or a clock of its own)",
                 step=(0.01,), smallest=(1e-4,), is_possible=lambda size: abs(size[0]) < 0.3, clock=Clock(name, begin, is_rate=True, is_motion=source.file in MOTION), group=f"along the way of {name}",
-                settled=lambda size, states: (size[0] - 2e9 * states.get(offset, 0.0) / max(1, int(stamps.max()) - begin),))  # the state is that of half the time
+                is_shown=is_shown, settled=lambda size, states: (size[0] - 2e9 * states.get(offset, 0.0) / max(1, int(stamps.max()) - begin),))  # the state is that of half the time
 
 
 # ── values ───────────────────────────────────────────────────────────────────────────────────────────────────────────

@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A recording of pictures of a floor as one of the edge points that its detector finds in them: they are looked at once, not in each trial."""
+"""What one replay gives to all trials: the edge points that a detector finds in pictures of a floor, and the counts of wheels on a bus."""
 
+import tempfile
 from pathlib import Path
 
 import numpy as np
 import yaml
 
+from ..native import WaymarkError, library
 from ..replaying import EventLog, replay
+from ..tables import Array
 from .changes import NAMED, link
 from .robot import Robot
 
@@ -19,10 +22,8 @@ def with_points(robot: Robot, folder: Path) -> Robot:
     sees_floor = isinstance(vision, dict) and list(vision) == [DETECTOR] and len(cameras) == 1 and not robot.has("points.csv")
     if not sees_floor or not any(source.kind == "pictures" for source in robot.sources):
         return robot
-    files, run = robot.files, folder / "looked"
-    replay(files.recording, files.config, out=run, landmarks=files.named.get("landmarks.csv"), calibration=files.named.get("calibration.yaml"),
-           map=files.named.get("map/map.yaml"))
-    scans = EventLog(run / "events.wmlog").events("points")
+    files = robot.files
+    scans = _logged(robot, folder / "looked").events("points")
     recording = folder / "seen"
     link(files.recording.resolve(), recording, {"video"})
     with (recording / "points.csv").open("w") as out:
@@ -34,3 +35,25 @@ def with_points(robot: Robot, folder: Path) -> Robot:
     config["sources"] = [source | {"name": "points"} if source.get("name") == DETECTOR else source for source in config.get("sources") or []]
     (folder / "points.yaml").write_text(yaml.safe_dump(config))
     return Robot.read(recording, folder / "points.yaml", files.named) if len(np.atleast_1d(scans)) else robot
+
+
+def counts(robot: Robot) -> list[Array]:
+    """Counts of the left and of the right wheel as they are read, of ticks.csv or of a bus; none where the drive can't be read."""
+    if robot.has("ticks.csv"):
+        table = robot.table("ticks.csv")
+        return [table[name] for name in ("left", "right")]
+    try:
+        with tempfile.TemporaryDirectory(prefix="waymark-causes-") as folder:
+            events = _logged(robot, Path(folder) / "run").events("quantities")
+    except WaymarkError:
+        return []
+    sent = np.arange(events["id"].shape[1]) < events["count"][:, None]
+    return [events["value"][sent & (events["id"] == side)] for side in (library().WM_Q_WHEEL_TICKS_LEFT, library().WM_Q_WHEEL_TICKS_RIGHT)]
+
+
+def _logged(robot: Robot, run: Path) -> EventLog:
+    """The drive's data as a run logs them."""
+    files = robot.files
+    replay(files.recording, files.config, out=run, landmarks=files.named.get("landmarks.csv"), calibration=files.named.get("calibration.yaml"),
+           map=files.named.get("map/map.yaml"))
+    return EventLog(run / "events.wmlog")

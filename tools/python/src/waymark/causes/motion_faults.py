@@ -9,6 +9,7 @@ import numpy as np
 
 from ..tables import Array
 from .changes import Counted, Edit, Signal, Value, column, degrees, numbers, swapped
+from .features import counts
 from .fault import DEG, NEAR, Fault, Size, discrete, factor_words
 from .robot import Robot
 
@@ -72,10 +73,11 @@ def _wheels(robot: Robot, bound: dict[str, int]) -> Iterator[Fault]:
     for sides, counted in (((0,), "wheel_ticks_left counts"), ((1,), "wheel_ticks_right counts"), ((0, 1), "both wheels' ticks count")):
         yield discrete(f"ticks {sides}", lambda _, s=sides: turned(s), lambda _, w=counted: f"{w} backwards (scale: -1)")
 
+    read = counts(robot)
     for bits in BITS:
-        if edits := _counters(robot, bound, bits):
-            yield discrete(f"counters of {bits} bits", lambda _, e=edits: e, lambda _, b=bits: f"the wheels' counters have {b} bits, and are read as longer ones",
-                           is_fact=robot.has("ticks.csv"))
+        if _are_folded(read, bits):
+            yield discrete(f"counters of {bits} bits", lambda _, b=bits: _counters(robot, bound, b),
+                           lambda _, b=bits: f"the wheels' counters have {b} bits, and are read as longer ones", is_fact=True)
 
     # The way of a tick is radius over ticks: the drive shows it, not which of both is wrong.
     def places(size: Size) -> list[list[Edit]]:
@@ -97,17 +99,21 @@ def _wheels(robot: Robot, bound: dict[str, int]) -> Iterator[Fault]:
 
 
 def _counters(robot: Robot, bound: dict[str, int], bits: int) -> list[Edit]:
-    """What undoes counters of so many bits that are read as longer ones; empty: they are not."""
-    if not robot.has("ticks.csv"):
-        items = [robot.bindings[bound[name]] for name in TICKS]
-        return [Signal("vehicle.dbc", str(item.get("message")), str(item.get("signal")), "bits", bits) for item in items]
+    """What undoes counters of so many bits that are read as longer ones."""
+    if robot.has("ticks.csv"):
+        return [Counted("ticks.csv", bits)]
+    items = [robot.bindings[bound[name]] for name in TICKS]
+    return [Signal("vehicle.dbc", str(item.get("message")), str(item.get("signal")), "bits", bits) for item in items]
+
+
+def _are_folded(read: Sequence[Array], bits: int) -> bool:
+    """Whether counts prove counters of so many bits: each step of more than half a cycle is a usual one less the cycle."""
     half = 2 ** (bits - 1)
-    steps = np.concatenate([np.diff(robot.table("ticks.csv")[name]) for name in ("left", "right")])
+    steps = np.concatenate([np.diff(side) for side in read]) if read else np.zeros(0)
     folded = np.abs(steps) > half
-    # Proof: each fall of more than half a cycle is a usual step less the cycle.
     usual = np.abs(steps[~folded]).max(initial=0) + FOLD_COUNTS
     wraps = folded.any() and np.abs((steps[folded] + half) % (2 * half) - half).max() <= min(usual, half / 2)
-    return [Counted("ticks.csv", bits)] if wraps and np.abs(steps).max() <= 2 * half else []
+    return bool(wraps and np.abs(steps).max() <= 2 * half)
 
 
 def _scaled(robot: Robot, item: int, factor: float) -> Value:

@@ -43,14 +43,16 @@ class Robot:
     """The files of a robot and its drive."""
 
     files: Files
+    clocks_apart: bool = False
+    """The clocks of two streams of motion run apart, as `waymark check` finds by their turns."""
     _tables: dict[str, Table] = field(default_factory=dict)
 
     @classmethod
-    def read(cls, recording: Path, config: Path, named: dict[str, Path]) -> "Robot":
+    def read(cls, recording: Path, config: Path, named: dict[str, Path], clocks_apart: bool = False) -> "Robot":
         """`named`: files in place of the recording's, by the names there; those of the configuration are added."""
         content = yaml.safe_load(config.read_text()) or {}
         files = {file: config.parent / content[key] for file, key in NAMED.items() if isinstance(content.get(key), str)}
-        return cls(Files(recording, config, files | named))
+        return cls(Files(recording, config, files | named), clocks_apart)
 
     def _yaml(self, file: str) -> Any:
         try:

@@ -122,7 +122,7 @@ class Search:
             found = self._round(fixed, now)
             if fixed == self.facts:
                 firsts = found[:FIRSTS]
-            if not found or not self._helps(found[0].drive, now):
+            if not found or not self._helps(found[0], now):
                 break
             best, tied, probability = self._judge(found, now)
             if self._is_right(best.drive):
@@ -192,7 +192,8 @@ class Search:
         told = self._by_states(rows, now)
         growing = [Candidate(*change, now) for change in told if change[0].clock and change[0].clock.is_rate]  # which the whole drive shows
         late = [(row, size) for row in rows if row.clock and row.clock.is_rate and row.clock.is_motion for size in row.start]  # of motion, no state tells
-        growing += self._within_reach(self._best_sizes(self._tried(late, fixed, 0.0), 0.0), now, 0.0)
+        late_best = self._best_sizes(self._tried(late, fixed, 0.0), 0.0)
+        growing += [c for c in late_best if c.fault.is_shown] or self._within_reach(late_best, now, 0.0)
         told = [c for c in told if c[0] not in [g.fault for g in growing]] + self._fitted(growing, fixed, 0.0)
         final = self._tried([*fitted, *others, *told], fixed, 0.0, has_states=True)
         return self._ordered(final)
@@ -367,8 +368,8 @@ class Search:
         best = next((c for c in unbeaten if self._is_right(c.drive)), unbeaten[0] if unbeaten else None)
         return [c for c in left if c is best] + [c for c in left if c is not best]
 
-    def _helps(self, drive: Drive, now: Drive) -> bool:
-        return self._beats(drive, now, GAIN_MIN)[0]
+    def _helps(self, found: Candidate, now: Drive) -> bool:
+        return self._beats(found.drive, now, APART_MIN if found.fault.is_shown else GAIN_MIN)[0]
 
     def _judge(self, found: list[Candidate], now: Drive) -> tuple[Candidate, list[Candidate], float]:
         """The best, the rows of other families that explain the drive as well, and the probability against all others."""
@@ -397,7 +398,7 @@ class Search:
                 break
             fixed = [*self.facts, (first.fault, first.size)]
             found = self._round(fixed, first.drive)
-            if not found or not self._helps(found[0].drive, first.drive) or not self._helps(found[0].drive, before):
+            if not found or not self._helps(found[0], first.drive) or not self._helps(found[0], before):
                 continue
             best, tied, probability = self._judge(found, first.drive)
             if tied or probability < NAMED_FROM or not self._is_right(best.drive):
