@@ -195,8 +195,8 @@ class Search:
         late_best = self._best_sizes(self._tried(late, fixed, 0.0), 0.0)
         growing += [c for c in late_best if c.fault.is_shown] or self._within_reach(late_best, now, 0.0)
         told = [c for c in told if c[0] not in [g.fault for g in growing]] + self._fitted(growing, fixed, 0.0)
-        final = self._tried([*fitted, *others, *told], fixed, 0.0, has_states=True)
-        return self._ordered(final)
+        by_states = [self._settled(c, fixed) for c in self._tried(told, fixed, 0.0, has_states=True)]
+        return self._ordered([*self._tried([*fitted, *others], fixed, 0.0, has_states=True), *by_states])
 
     def _by_states(self, rows: list[Fault], now: Drive) -> list[Change]:
         """Rows that a calibration state took up: their sizes are what the state says."""
@@ -320,10 +320,9 @@ class Search:
         return changed if is_unique or len(changed) > 2 else {}
 
     def _settled(self, best: Candidate, fixed: list[Change]) -> Candidate:
-        """The size with what the filter's states took of it, where the drive is as good with it."""
+        """The size with what the filter's states took of it, where the drive is as good with it. `best` has its states."""
         for _ in range(SETTLED_MOST if best.fault.step else 0):
-            drive = self.trials.run([[*fixed, (best.fault, best.size)]], has_states=True)[0]
-            size = best.fault.neat(best.fault.settled(best.size, drive.states if drive else {}))
+            size = best.fault.neat(best.fault.settled(best.size, best.drive.states))
             if not best.fault.is_possible(size) or all(abs(a - b) < least for a, b, least in zip(size, best.size, best.fault.smallest)):
                 break
             again = self.trials.run([[*fixed, (best.fault, size)]], has_states=True)[0]
