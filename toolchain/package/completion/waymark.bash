@@ -34,7 +34,7 @@ _waymark() {
     "doctor") words='--json --seconds' ;;
     "stamps") words='' ;;
     "config") words='--schema' ;;
-    "causes") words='--help --landmarks --calibration --map --apply --json' ;;
+    "causes") words='--help --landmarks --calibration --map --clocks-apart --apply --json' ;;
     "mavlink") words='--help --link --as --frame --north --zero --origin --rate --take --system --component --url --prefix --duration' ;;
     "suggest") words='--help --out --against --only --from --to --minutes --json' ;;
     "batch") words='--help --out --jobs --part --list' ;;
