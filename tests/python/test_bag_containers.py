@@ -301,6 +301,15 @@ class Messages(BagTest):
             self.assertEqual(len(waymark.Recording(folder).table("motion.csv")["t_ns"]), 17)
             self.assertIn("note: /odom: 3 of 20 messages are left out; the first at 1700000000.203 s: its 40 bytes are no nav_msgs/msg/Odometry", text)
 
+    def test_a_message_whose_log_is_beyond_all_stamps_costs_itself(self):
+        events = Events().drive(20)
+        for i, log_ns in ((5, 4_100_000_000_000_000_000), (9, 2**63 - 1), (12, 2**63)):
+            events.items[i] = (log_ns, *events.items[i][1:])
+        text, folder = self.take(events.mcap(self.folder / "a.mcap"))
+        self.assertEqual(len(waymark.Recording(folder).table("motion.csv")["t_ns"]), 17, text)
+        self.assertIn("3 of 20 messages are left out", text)
+        self.assertIn("the bag's log has no time for it", text)
+
     def test_topics_that_cant_be_read_cost_themselves(self):
         path = self.folder / "a.mcap"
         good = Events().drive(5)

@@ -77,7 +77,7 @@ def field_text(value: Any) -> str:
     return "" if np.isnan(value) else repr(float(value))
 
 
-_NS_MOST = 4_000_000_000_000_000_000
+NS_MOST = 4_000_000_000_000_000_000
 """ns, about 127 years: the runtime reads stamps up to this."""
 
 
@@ -92,14 +92,14 @@ def _stamps(name: str, column: Array, where: str) -> Array:
     if np.isnat(column).any():
         raise ValueError(f"{where}: {name} has no time (NaT) in row {int(np.argmax(np.isnat(column)))}")
     seconds = column.astype(f"{kind}[s]").astype(np.int64)
-    if len(seconds) and max(abs(int(seconds.min())), abs(int(seconds.max()))) > _NS_MOST // 10**9:
+    if len(seconds) and max(abs(int(seconds.min())), abs(int(seconds.max()))) > NS_MOST // 10**9:
         raise ValueError(f"{where}: {name} has a time that doesn't fit into 64-bit nanoseconds")
     return column.astype(f"{kind}[ns]").astype(np.int64)
 
 
 def _whole(name: str, column: Array, where: str) -> Array:
     """Floating point as whole numbers."""
-    whole = np.isfinite(column) & (column == np.floor(column)) & (np.abs(column) <= _NS_MOST)
+    whole = np.isfinite(column) & (column == np.floor(column)) & (np.abs(column) <= NS_MOST)
     if not whole.all():
         row = int(np.argmin(whole))
         unit = "; are these seconds? (1e9 * t).round().astype(np.int64) makes nanoseconds of them" if name.endswith("_ns") else ""
@@ -136,9 +136,9 @@ def as_column(name: str, values: Any, where: str) -> Array:
         kind = type(column.flat[0]).__name__ if column.dtype.kind == "O" and column.size else str(column.dtype)
         raise ValueError(f"{where}: {name} holds {kind}; {_needed(name)} are needed")
     if is_integer(name) and column.dtype.kind in "iu" and column.size:
-        far = np.flatnonzero((column > _NS_MOST) | (column < -_NS_MOST))
+        far = np.flatnonzero((column > NS_MOST) | (column < -NS_MOST))
         if len(far):
-            raise ValueError(f"{where}: {name} has {int(column[far[0]])} in row {int(far[0])}; whole numbers up to {_NS_MOST} are read")
+            raise ValueError(f"{where}: {name} has {int(column[far[0]])} in row {int(far[0])}; whole numbers up to {NS_MOST} are read")
     return _whole(name, column, where) if is_integer(name) and column.dtype.kind == "f" else column
 
 

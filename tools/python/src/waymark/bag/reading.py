@@ -4,6 +4,7 @@
 from collections.abc import Callable
 from typing import Any
 
+from ..tables import NS_MOST
 from . import sight
 from .cameras import PICTURE_KINDS
 from .collection import Collection, stamp_ns
@@ -16,7 +17,6 @@ from .takers import TAKERS, elsewhere
 Progress = Callable[[float], None]
 _EVERY = 200  # messages between two reports of progress
 _LOOK_MAX_BYTES = 64 << 20  # of messages that are looked at to see which topics are pictures
-_LOG_MAX_NS = 2**63 - 1
 
 
 def is_ours(topic: Topic) -> bool:
@@ -81,7 +81,7 @@ def _own(into: Collection, own: dict[str, list[Any]], topic: Topic, log_ns: int,
 def _take(into: Collection, topic: Topic, log_ns: int, raw: Any) -> None:
     t_ns = log_ns
     try:
-        if not 0 <= log_ns <= _LOG_MAX_NS:
+        if not 0 <= log_ns <= NS_MOST:
             raise BadMessage("the bag's log has no time for it")
         message = topic.decode(raw)
         if hasattr(message, "header"):
