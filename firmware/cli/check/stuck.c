@@ -5,11 +5,11 @@
 
 #include "cli/check/comparisons.h"
 
-#define TIMES_LONGEST 4     // runs of repeats: as the estimators' watch of a gyro (estimator/motion/spatial_source.cpp)
-#define SAME_MIN_S 3.0      // as there (repeated_value.hpp)
-#define APART_MIN_RAD 0.3   // as there
-#define APART_MIN_M 1.0     // a robot's length
-#define COVER_MIN 0.8       // share of a window that has data
+#define TIMES_LONGEST 4    // runs of repeats: as the estimators' watch of a gyro (estimator/motion/spatial_source.cpp)
+#define SAME_MIN_S 3.0     // as there (repeated_value.hpp)
+#define APART_MIN_RAD 0.3  // as there
+#define APART_MIN_M 1.0    // a robot's length
+#define COVER_MIN 0.8      // share of a window that has data
 
 // The largest amount by which the other one has moved further, or less far, in the time of the longest run.
 static double apart(const channels *all, const channel *c, const channel *other) {
