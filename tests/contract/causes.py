@@ -394,6 +394,17 @@ def judge_answers(options):
             mine = [f for f in report["findings"] if f["about"] == "cause"]
             if [f["id"] for f in mine] != [identifier] * count or report["causes"] != (answer if isinstance(answer, dict) else None):
                 failures.append(f"{identifier}: {mine}, causes {report['causes']}")
+        # Where turns show that two clocks run apart the engine is asked whose it is.
+        tables_robot(here / "tables", 1)
+        replays.copy_changed(here / "tables", here / "apart", clock_of("imu", "gyro_clock")(random.Random(1))[0])
+        engine.write_text("#!/bin/sh\nprintf '{\"told\": \"'\nprintf '%s' \"$*\"\nprintf '\"}'\n")
+        engine.chmod(0o755)
+        for name, is_apart in (("made", False), ("apart", True)):
+            done = subprocess.run([here / "waymark", "check", options.source_dir / "config/robot.yaml", here / name, "--json"], capture_output=True, text=True,
+                                  env={"PATH": "/usr/bin:/bin"})
+            asked = (json.loads(done.stdout)["causes"] or {}).get("told", "")
+            if ("--clocks-apart" in asked) != is_apart:
+                failures.append(f"{name}: the engine was asked: {asked}")
     return failures
 
 

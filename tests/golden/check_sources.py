@@ -367,6 +367,8 @@ def main():
                 failures.append(f"{name}: not found")
             if identifier in BROKEN:  # a stream that is known to be broken blames no other one
                 failures += [f"{name}: {f['about']}: {f['text']}" for f in said["findings"] if f["id"] == DISAGREE]
+            if identifier == DISAGREE:  # nor has one that disagrees a clock that drifts
+                failures += [f"{name}: {f['about']}: {f['text']}" for f in said["findings"] if f["id"] == "clock-drifts"]
             if said["good"] != (severity != "bad"):
                 failures.append(f"{name}: good is {said['good']}")
     print(f"{len(FAULTS)} faults planted, {len(RIGHT)} right drives")
