@@ -14,6 +14,7 @@ import sys
 import tempfile
 import unittest
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 from common import BIN
@@ -148,6 +149,14 @@ class Judgement(unittest.TestCase):
         size, step = search._parabola(fault, (3.0,), 0, 1.0, [-(2.0 - 3.4) ** 2, -(3.0 - 3.4) ** 2, -(4.0 - 3.4) ** 2])
         self.assertAlmostEqual(size[0], 3.4)
         self.assertLess(step, 1.0)
+
+    def test_a_size_takes_what_a_state_took_of_it_where_the_drive_is_as_good(self):
+        clock = Fault("clock", ((0.0,),), lambda _: [], lambda _: "", step=(0.25,), smallest=(0.01,), settled=lambda size, states: (size[0] - states["offset"],))
+        first = search.Candidate(clock, (-2.3,), dataclasses.replace(drive(2.0), states={"offset": 0.36}))
+        for loss, size in ((2.0, -2.66), (10.0, -2.3)):  # nats of the whole drive
+            again = dataclasses.replace(drive(2.0 - loss / 800), states={"offset": 0.0})
+            self.search.trials = SimpleNamespace(run=lambda jobs, has_states, again=again: [again] * len(jobs))
+            self.assertAlmostEqual(self.search._settled(first, []).size[0], size)
 
     def test_ranges_that_are_scaled_down_gain_nothing_by_it(self):
         def rows(scale):

@@ -109,7 +109,7 @@ class Search:
         self.rows = all_faults(self.robot)
         before = self._begin()
         verdict = Verdict(before, rows=len(self.rows))
-        if before is None:
+        if before is None or not self.robot.sources:  # nothing is observed that a cause could explain
             return verdict
         self.facts = [(row, row.start[0]) for row in self.rows if row.is_fact]
         mended = self.trials.run([self.facts], keeps=True, has_states=True)[0] if self.facts else None
@@ -326,7 +326,7 @@ class Search:
             if not best.fault.is_possible(size) or all(abs(a - b) < least for a, b, least in zip(size, best.size, best.fault.smallest)):
                 break
             again = self.trials.run([[*fixed, (best.fault, size)]], has_states=True)[0]
-            if not again or _worth(again) < _worth(best.drive) or not self._is_right(again):
+            if not again or _worth(again) < _worth(best.drive) - STATES_APART or not self._is_right(again):
                 break
             best = Candidate(best.fault, size, again)
         return best
