@@ -40,7 +40,7 @@ wm_verdict update(planar_filter *filter, innovation &&prepared, const residual *
     if (policy.learns) options.source[i] = {r[i].source.kind, r[i].source.own * g.noise_scale};
   }
   if (!filter->update(std::move(prepared), rows, options)) return WM_REJECTED_NUMERIC;
-  filter->noise().forget(filter->now_ns());
+  filter->noise().pass(filter->now_ns());
   return WM_FUSED;
 }
 

@@ -33,7 +33,7 @@ void position_aid::carry_error(wm_time_ns t_ns, double position_sigma_m, planar_
   if (error_ < 0) return;
   noise_adaption &noise = filter->noise();
   const receiver_error::step step = receiver_.move_to(t_ns, position_sigma_m, params_);
-  const double variance = square(receiver_.sigma_m()) * noise.scale(noise_adaption::kPlace);
+  const double variance = square(receiver_.sigma_m()) * noise.lasting_scale();
   if (step.is_first && params_.correlated_m < 0.0) {
     for (int k = 0; k < 2; k++) filter->forget(error_ + k, 0.0, variance);
     noise.begin_correlated(variance);
@@ -47,14 +47,15 @@ void position_aid::carry_error(wm_time_ns t_ns, double position_sigma_m, planar_
 
 void position_aid::release(planar_motion *filter) const {
   if (error_ < 0 || !receiver_.is_used()) return;
-  const double variance = square(receiver_.sigma_m()) * filter->noise().scale(noise_adaption::kPlace);
+  const double variance = square(receiver_.sigma_m()) * filter->noise().lasting_scale();
   for (int k = 0; k < 2; k++) filter->forget(error_ + k, 0.0, variance);
   filter->noise().begin_correlated(variance);
 }
 
 double position_aid::lasting_error(const planar_motion &filter) const {
   if (error_ < 0 || !receiver_.is_used()) return 0.0;
-  return std::sqrt(square(filter.value(error_)) + square(filter.value(error_ + 1))) / receiver_.sigma_m();
+  const double variance = square(receiver_.sigma_m()) * filter.noise().lasting_scale();
+  return std::sqrt((square(filter.value(error_)) + square(filter.value(error_ + 1))) / variance);
 }
 
 // Where the delay is uncertain, its derivatives are those of the chord over two sigmas: a robot that may have stood

@@ -29,7 +29,7 @@ class position_aid {
     const wm_position_params &params = params_ = position_params_of(setup);
     time_ = params.time_offset_sigma_s > 0.0 ? add(0.0, params.time_offset_sigma_s) : -1;
     error_ = pair_of(std::fabs(params.correlated_m));  // below 0: the first position sets its variance
-    if (error_ >= 0) filter->noise().begin_correlated(square(params.correlated_m));
+    if (params.correlated_m > 0.0) filter->noise().begin_correlated(square(params.correlated_m));
     const antenna mounted = antenna_of(setup, params);
     // Without motion data the heading is that of nothing: no place in base_link is learnt.
     antenna_ = setup.motion->model == WM_MOTION_CONSTANT_VELOCITY ? -1 : pair_of(mounted.sigma_m);

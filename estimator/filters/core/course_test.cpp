@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The dead reckoning of a window is laid over the positions by the best turn and shift [Horn1987], as it is, and with
-// the turn's sign changed. With an unknown variance the log likelihood ratio of both is half the number of coordinates
-// times the logarithm of the ratio of the sums of squares. The stated variances are added to both sums: below them a
+// the turn's sign changed. What remains is a bias of the turn rate, and the receiver's error, a first-order
+// autoregression. With an unknown variance the log likelihood ratio of both is half the number of coordinates times the
+// logarithm of the ratio of the sums of squared innovations. The stated variances are added to both sums: below them a
 // difference has no meaning. Neither the pose nor its heading are needed, so that a start that is wrong does not
 // matter.
 #include "filters/core/course_test.hpp"
@@ -18,6 +19,7 @@ constexpr int kWindows[] = {6, 16, 33};  // slots: 30, 80 and 165 s
 constexpr int kSlotsLeast = 3;           // a mirror image of fewer places fits as well
 constexpr double kSparse = 3.0;          // a window reaches back at most so many times its length
 constexpr double kAlarm_log = 9.21;      // -log(1e-4)
+constexpr double kBias_radps = 0.02;     // of a cheap gyro, before it is learnt (motion.states.yaw_rate_bias)
 // Prior log odds of a mistaken sign of a turn or an axis in a configuration: one in 55.
 constexpr double kMirrored = -4.0;
 constexpr double kGap_s = 1.5;  // without motion for longer, dead reckoning begins anew
@@ -35,35 +37,97 @@ const slot &slot_at(const course &self, int age) {
 struct plane {
   double x, y;
 };
+plane operator+(plane a, plane b) { return {a.x + b.x, a.y + b.y}; }
+plane operator-(plane a, plane b) { return {a.x - b.x, a.y - b.y}; }
+plane operator*(double by, plane a) { return {by * a.x, by * a.y}; }
+double dot(plane a, plane b) { return a.x * b.x + a.y * b.y; }
+plane left_of(plane a) { return {-a.y, a.x}; }
+plane turned(sin_cos by, plane a) { return by.cos * a + by.sin * left_of(a); }
 
-plane mean_of(const double sum[2], double count) { return {sum[0] / count, sum[1] / count}; }
+// Slots of a window, from the newest one on: about their middles.
+struct track {
+  plane at[WM_MONITOR_COURSE_SLOTS], middle;
+};
+
+template <class Place>
+track track_of(int n, Place place) {
+  track out;
+  out.middle = {};
+  for (int i = 0; i < n; i++) out.middle = out.middle + (1.0 / n) * (out.at[i] = place(i));
+  for (int i = 0; i < n; i++) out.at[i] = out.at[i] - out.middle;
+  return out;
+}
+
+double sum_of_products(const track &a, const track &b, int n) {
+  double sum = 0.0;
+  for (int i = 0; i < n; i++) sum += dot(a.at[i], b.at[i]);
+  return sum;
+}
+
+// How a bias of the turn rate bends the way, 1 rad/s of it, but for a turn and a shift.
+track bend_of(const course &self, const track &way, int n) {
+  const wm_time_ns newest_ns = slot_at(self, 0).begin_ns;
+  const double middle_s = 0.5 * wm_seconds_between(newest_ns, slot_at(self, n - 1).begin_ns);
+  plane bent{};
+  track out = track_of(n, [&](int i) {
+    if (i == 0) return bent;
+    const double at_s = 0.5 * (wm_seconds_between(newest_ns, slot_at(self, i).begin_ns) +
+                               wm_seconds_between(newest_ns, slot_at(self, i - 1).begin_ns));
+    return bent = bent + (at_s - middle_s) * left_of(way.at[i] - way.at[i - 1]);
+  });
+  double across = 0.0;
+  for (int i = 0; i < n; i++) across += dot(out.at[i], left_of(way.at[i]));
+  const double turn = across / sum_of_products(way, way, n);
+  for (int i = 0; i < n; i++) out.at[i] = out.at[i] - turn * left_of(way.at[i]);
+  return out;
+}
+
+// The sum of squared innovations of an autoregression from slot to slot. A receiver's error lasts for minutes, so that
+// each of many slots tells little that is new.
+double innovations_m2(const track &left, int n) {
+  double newer = 0.0, older = 0.0, products = 0.0;
+  for (int i = 0; i + 1 < n; i++) {
+    newer += dot(left.at[i], left.at[i]);
+    older += dot(left.at[i + 1], left.at[i + 1]);
+    products += dot(left.at[i], left.at[i + 1]);
+  }
+  const double stays = !(products > 0.0) ? 0.0 : products < older ? products / older : 1.0;
+  const double oldest = (1.0 - square(stays)) * dot(left.at[n - 1], left.at[n - 1]);
+  return newer - 2.0 * stays * products + square(stays) * older + oldest;
+}
 
 // The way, or its mirror image (side -1), laid over the positions: by this turn about its middle, then the shift from
-// there to the positions' middle. `left_m2`: sum of squares of what remains.
+// there to the positions' middle. `nats`: the log likelihood, but for a constant.
 struct overlay {
-  double left_m2, turn_rad;
+  double nats, turn_rad;
   plane way, place;
 };
 
-overlay lay_over(const course &self, int n, double side) {
-  plane place{}, way{};
-  for (int i = 0; i < n; i++) {
+overlay lay_over(const course &self, int n, double side, double stated_m2) {
+  const track place = track_of(n, [&](int i) {
     const slot &s = slot_at(self, i);
-    const plane p = mean_of(s.place_m, s.count), w = mean_of(s.way_m, s.count);
-    place = {place.x + p.x / n, place.y + p.y / n};
-    way = {way.x + w.x / n, way.y + w.y / n};
-  }
-  double squares = 0.0, along = 0.0, across = 0.0;
-  for (int i = 0; i < n; i++) {
+    return (1.0 / s.count) * plane{s.place_m[0], s.place_m[1]};
+  });
+  const track way = track_of(n, [&](int i) {
     const slot &s = slot_at(self, i);
-    const plane p = mean_of(s.place_m, s.count), w = mean_of(s.way_m, s.count);
-    const plane a = {p.x - place.x, p.y - place.y}, b = {w.x - way.x, side * (w.y - way.y)};
-    squares += square(a.x) + square(a.y) + square(b.x) + square(b.y);
-    along += a.x * b.x + a.y * b.y;
-    across += a.y * b.x - a.x * b.y;
+    return (1.0 / s.count) * plane{s.way_m[0], side * s.way_m[1]};
+  });
+  plane turn{};
+  for (int i = 0; i < n; i++) turn = turn + plane{dot(way.at[i], place.at[i]), dot(left_of(way.at[i]), place.at[i])};
+  overlay out{0.0, atan2(turn.y, turn.x), {way.middle.x, side * way.middle.y}, place.middle};
+  const sin_cos by = sincos(out.turn_rad);
+  track left = place, bend = bend_of(self, way, n);
+  for (int i = 0; i < n; i++) {
+    left.at[i] = left.at[i] - turned(by, way.at[i]);
+    bend.at[i] = turned(by, bend.at[i]);
   }
-  const double sum = squares - 2.0 * std::sqrt(square(along) + square(across));
-  return {sum > 0.0 ? sum : 0.0, atan2(across, along), way, place};
+  // The bias by its prior, with the variance of what remains.
+  const double noise_m2 = (sum_of_products(left, left, n) + stated_m2) / (2.0 * n);
+  const double bias =
+      sum_of_products(bend, left, n) / (sum_of_products(bend, bend, n) + noise_m2 / square(kBias_radps));
+  for (int i = 0; i < n; i++) left.at[i] = left.at[i] - bias * bend.at[i];
+  out.nats = -n * log(innovations_m2(left, n) + stated_m2) - 0.5 * square(bias / kBias_radps);
+  return out;
 }
 
 // How many of the newest slots a window of `slots` has.
@@ -87,10 +151,10 @@ void test_mirror(course *self) {
       const slot &s = slot_at(*self, i);
       stated += s.variance / s.count;
     }
-    const overlay mirror = lay_over(*self, n, -1.0);
-    const double as_is = lay_over(*self, n, 1.0).left_m2 + stated, mirrored = mirror.left_m2 + stated;
-    if (!(mirrored > 0.0) || !(as_is > 0.0)) continue;
-    self->nats = n * log(as_is / mirrored);
+    const overlay mirror = lay_over(*self, n, -1.0, stated);
+    const double nats = mirror.nats - lay_over(*self, n, 1.0, stated).nats;
+    if (!finite(nats)) continue;
+    self->nats = nats;
     if (self->nats < self->least_nats) self->least_nats = self->nats;
     self->mirror_turn_rad = mirror.turn_rad;
     const double middle[4] = {mirror.way.x, mirror.way.y, mirror.place.x, mirror.place.y};

@@ -179,7 +179,8 @@ void planar_filter::put_adapted(const sparse_row &row, double by[noise_adaption:
 // The rows one after the other, each with what those before it leave of its innovation.
 void planar_filter::adapt(const innovation &i, const sparse_row *rows, const update_options &options) {
   for (int k = 0; k < i.rows; k++) {
-    noise_adaption::row adapted{{}, {}, i.left[k], i.left_variance[k], options.source[k].own, options.source[k].kind};
+    noise_adaption::row adapted{{}, {}, i.left[k], i.left_variance[k], options.source[k].own, options.source[k].kind,
+                                k};
     put_adapted(rows[k], adapted.by);
     for (int m = 0; m < (correlated_ < 0 ? kPoseStates : noise_adaption::kBlock); m++) {
       const int state = m < kPoseStates ? m : correlated_ + m - kPoseStates;
