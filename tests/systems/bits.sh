@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 # bits.sh [--compile] [SYSTEM...]: do the systems that Waymark is built on give the same bits? SYSTEM is e.g. debian-13-arm64; all of the table by default.
-# Unpacks each system's libraries below .cache/systems (by mmdebstrap, 0.3 to 1.3 GB each; nothing of it is installed), then compares
+# Unpacks each system's libraries below .cache/systems (by mmdebstrap, 0.3 to 1.5 GB each; nothing of it is installed). Those of an arm64 system whose archive
+# can't be had are built from the suite's sources by the suite's own cross compiler (from_sources.sh), which the output says. Then compares
 # - what their libjpeg-turbo makes of the same pictures, with SIMD and without (jpegs.c), and their libav of the same videos (videos.c);
 # - replays of simulated drives and their event logs by this build, with that system's libraries in place of this one's (tests/boards/bits.py);
 # - with --compile: the same by a daemon that the system's own compiler made there (an hour each on two cores).
@@ -28,20 +29,23 @@ ubuntu-24.04-arm64 noble $ports main,universe 13
 ubuntu-26.04-arm64 resolute $ubuntu main,universe 15"
 libraries=libc6-dev,libeigen3-dev,libyaml-dev,liblcm-dev,nlohmann-json3-dev,libcli11-dev,libturbojpeg0-dev,libpng-dev,zlib1g-dev,libapriltag-dev,libavformat-dev,libavcodec-dev,libavutil-dev,libswscale-dev
 compilers=ninja-build,gcc,g++,g++-aarch64-linux-gnu,python3,python3-yaml,pkg-config,liblcm-bin,dash,bash,coreutils,sed,grep,findutils
+compilers+=,make,cmake,meson,autoconf,automake,libtool,libltdl-dev,dpkg-dev,perl,mawk,diffutils,hostname,python3-packaging # of from_sources.sh
+sources="zlib libffi glib2.0 libpng1.6 libjpeg-turbo libyaml lcm apriltag ffmpeg"
+ubuntu_keys=/usr/share/keyrings/ubuntu-archive-keyring.gpg # in Debian 13's ubuntu-keyring
 
 say() { printf '\033[1m== %s\033[0m\n' "$*"; }
 
 unpack() { # NAME SUITE ARCHIVE COMPONENTS LIBSTDCXX
   local root=$systems/$1 arch=${1##*-} keyring=() packages=$libraries,libstdc++-$5-dev folder
-  [ -e "$root/.complete" ] && return
-  [ "$3" != - ] || { say "$1: no archive: name it by WM_DEBIAN_ARCHIVE, WM_UBUNTU_ARCHIVE, WM_UBUNTU_PORTS"; return 1; }
   [ "$arch" = arm64 ] || packages+=,$compilers
-  if [[ $1 == ubuntu* ]]; then # its keys are a package of Debian 13
-    [ -e "$systems/debian-13-amd64/.complete" ] || unpack $(grep '^debian-13-amd64' <<<"$table")
-    keyring=(--keyring="$systems/debian-13-amd64/usr/share/keyrings/ubuntu-archive-keyring.gpg")
-  fi
   [ "$1" = debian-13-amd64 ] && packages+=,ubuntu-keyring
-  rm -rf "$root" "$root.new"
+  [ "$(cat "$root/.complete" 2>/dev/null)" = "$packages" ] && return
+  [ "$3" != - ] || { echo "$1: no archive: name it by WM_DEBIAN_ARCHIVE, WM_UBUNTU_ARCHIVE, WM_UBUNTU_PORTS" >>"$root.log"; return 1; }
+  if [[ $1 == ubuntu* ]]; then
+    unpack $(grep '^debian-13-amd64' <<<"$table") || return 1
+    keyring=(--keyring="$systems/debian-13-amd64$ubuntu_keys")
+  fi
+  rm -rf "$root.new"
   say "unpacking $1"
   for folder in "$2-updates" ""; do # a mirror may be amid taking its updates
     mmdebstrap --variant=extract --architectures="$arch" "${keyring[@]}" --include="$packages" "$2" "$root.new" \
@@ -58,8 +62,39 @@ unpack() { # NAME SUITE ARCHIVE COMPONENTS LIBSTDCXX
     fi
     [ -e "$root.new/$folder" ] || { mkdir -p "$root.new/usr/$folder" && ln -s "usr/$folder" "$root.new/$folder"; }
   done
+  rm -rf "$root"
   mv "$root.new" "$root"
-  touch "$root/.complete"
+  echo "$packages" >"$root/.complete"
+}
+
+inside() { # ROOT SYSROOT WORD... : a command in ROOT, which sees this checkout at its path, and SYSROOT ("": none) as that of arm64
+  unshare --mount --pid --fork --kill-child bash -euc '
+    root=$1 here=$2 sysroot=$3
+    mkdir -p "$root$here" "$root/dev"
+    mount --rbind "$here" "$root$here"
+    [ -z "$sysroot" ] || { mkdir -p "$root$here/.cache/sysroot/arm64"; mount --bind "$sysroot" "$root$here/.cache/sysroot/arm64"; }
+    mount -t proc proc "$root/proc"
+    mount -t tmpfs tmpfs "$root/tmp"
+    for device in null urandom; do : >>"$root/dev/$device"; mount --bind "/dev/$device" "$root/dev/$device"; done
+    shift 3
+    exec nice chroot "$root" env -i HOME=/root PATH=/usr/sbin:/usr/bin:/sbin:/bin LC_ALL=C.UTF-8 "$@"' bash "$1" "$here" "${@:2}"
+}
+
+from_sources() { # NAME SUITE ... : an arm64 system by the sources and the cross compiler of its sibling on amd64
+  local root=$systems/$1 sibling=${1%-arm64}-amd64 keyring=/usr/share/keyrings/debian-archive-keyring.gpg also=() pcre=pcre2 row archive components
+  [[ $1 == *-arm64 ]] && row=$(grep "^$sibling " <<<"$table") && unpack $row || return 1
+  [ "$(cat "$root/.complete" 2>/dev/null)" = "$sources" ] && return
+  read -r _ _ archive components _ <<<"$row"
+  [[ $1 != ubuntu* ]] || keyring=$systems/debian-13-amd64$ubuntu_keys
+  [ "$debian" = - ] || also=(--also "$debian")
+  [ "$2" != jammy ] || pcre=pcre3 # glib's before 2.74
+  say "building $1 from its sources (10 minutes on two idle cores; log: $root.log)"
+  rm -rf "$root.new"
+  python3 tests/systems/sources.py --components "$components" "${also[@]}" "$keyring" "$archive" "$2" "$root-sources" $pcre $sources >"$root.log" 2>&1 &&
+    inside "$systems/$sibling" "" bash "$here/tests/systems/from_sources.sh" "$root-sources" "$root.new" >>"$root.log" 2>&1 || return 1
+  rm -rf "$root"
+  mv "$root.new" "$root"
+  echo "$sources" >"$root/.complete"
 }
 
 loaded() { # NAME PROGRAM... : a program with that system's libraries
@@ -90,17 +125,7 @@ compile() { # NAME : the daemon by that system's compiler, in NAME-build
   if [ "$arch" = arm64 ]; then options+=("-DCMAKE_TOOLCHAIN_FILE=$here/toolchain/arm64.cmake"); else options+=(-DCMAKE_C_COMPILER=gcc -DCMAKE_CXX_COMPILER=g++); fi
   mkdir -p "$out"
   say "compiling in $1"
-  unshare --mount --pid --fork --kill-child bash -euc '
-    root=$1 here=$2 sysroot=$3
-    mkdir -p "$root$here" "$root/dev"
-    mount --rbind "$here" "$root$here"
-    [ -z "$sysroot" ] || { mkdir -p "$root$here/.cache/sysroot/arm64"; mount --bind "$sysroot" "$root$here/.cache/sysroot/arm64"; }
-    mount -t proc proc "$root/proc"
-    mount -t tmpfs tmpfs "$root/tmp"
-    for device in null urandom; do : >>"$root/dev/$device"; mount --bind "/dev/$device" "$root/dev/$device"; done
-    shift 3
-    exec nice chroot "$root" env -i HOME=/root PATH=/usr/sbin:/usr/bin:/sbin:/bin LC_ALL=C.UTF-8 bash -euc "$@"' \
-    bash "$tools" "$here" "$([ "$arch" = amd64 ] || echo "$root")" \
+  inside "$tools" "$([ "$arch" = amd64 ] || echo "$root")" bash -euc \
     '"$1" -G Ninja -S "$2" -B "$3" -DCMAKE_BUILD_TYPE=RelWithDebInfo "${@:4}" && "$1" --build "$3" --target waymark' \
     bash "$cmake" "$here" "$out" "${options[@]}" >"$out/compile.log" 2>&1 || { tail -20 "$out/compile.log" >&2; return 1; }
 }
@@ -112,8 +137,12 @@ for word in "$@"; do if [ "$word" = --compile ]; then is_compiled=1; else chosen
 code=0 there=()
 for name in "${chosen[@]}"; do
   row=$(grep "^$name " <<<"$table") || { echo "bits.sh: '$name' is none of: $(cut -d' ' -f1 <<<"$table" | xargs)" >&2; exit 2; }
-  if unpack $row; then there+=("$name"); else
-    echo "$name can't be had: $(grep -m1 -E '^(E|Err|W):' "$systems/$name.log" || tail -1 "$systems/$name.log")"
+  if unpack $row; then there+=("$name"); elif from_sources $row; then
+    there+=("$name")
+    echo "$name: built from its sources by its own cross compiler:"
+    sed 's/^/  /' "$systems/$name/.versions"
+  else
+    echo "$name can't be had: $(grep -m1 -E '^(E|Err|W):' "$systems/$name.log" || tail -1 "$systems/$name.log") (log: $systems/$name.log)"
     code=77
   fi
 done
