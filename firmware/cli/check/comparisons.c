@@ -307,12 +307,14 @@ static const channel *way_of_wheels(const channels *all, const channel *turn) {
   return NULL;
 }
 
-// Where one of two counters runs backwards, their sum is what the robot turns. Makes the finding.
+// Where one of two counters runs backwards, their sum is what the robot turns: 2 / track for each metre of the mean. A
+// gyro's zero follows the way as well, by far less. Makes the finding.
 static int counts_backwards(const scene *s, const channel *quiet, const channel *turn) {
   const channel *way = turn->kind == CHANNEL_TICKS_TURN ? way_of_wheels(s->all, turn) : NULL;
-  if (!way) return 0;
+  if (!way || !way->has_scale || !turn->has_scale) return 0;
   const fit f = best_fit(quiet, way);
-  if (!is_excited(&f, 0) || fabs(f.r) < FIT_MIN) return 0;
+  const double share = fabs(f.ab / f.bb) * s->all->wheels->track_m / 2;
+  if (!is_excited(&f, 0) || fabs(f.r) < FIT_MIN || !(share > 0.5 && share < 2)) return 0;
   const char *source = source_of(turn, s->assembly), *side = f.r > 0 ? "left" : "right";
   char name[96], fix[WM_FINDING_FIX_MAX];
   (void)(is_can(turn, s->assembly) ? snprintf(fix, sizeof fix, "can-signals.yaml: `scale: -1` at wheel_ticks_%s", side)
