@@ -215,7 +215,7 @@ class Corners(BagTest):
                     events.put("/tag_detections", f"{kind}/AprilTagDetectionArray", t_ns, M.make(f"{kind}/AprilTagDetectionArray", header=header, detections=[tag]))
                 text, folder = self.take(events.mcap(self.folder / f"isaac-{turn}.mcap"), out=f"isaac-{family}-{turn}")
                 if turn:
-                    self.assertIn("contradict each other", text)
+                    self.assertIn("go round the other way" if isinstance(turn, str) else "contradict each other", text)
                     continue
                 tables = waymark.Recording(folder).table("marker-corners.csv")
             for i, row in enumerate(own):
@@ -365,6 +365,64 @@ class Rectified(BagTest):
             text, found = self.corners(info, out=str(i))
             np.testing.assert_allclose(found, as_read, atol=1e-9)
             self.assertNotIn("--tags raw", text)
+
+
+class Siblings(BagTest):
+    """Tags of other families, detectors and pictures than those above."""
+
+    AS_READ = Rectified.POINTS - 0.5
+    LENS = {"k": (F, F, *C)}
+
+    def found(self, events, name, out=None):
+        text, folder = self.take(events.mcap(self.folder / "a.mcap"), out=out or name)
+        return text, waymark.Recording(folder).table(name)
+
+    def test_families_as_they_are_spelt(self):
+        for family, order, is_known in (("tag36_11", [1, 0, 3, 2], True), ("DICT_APRILTAG_36h11", [1, 0, 3, 2], True), ("TAG25H9", [1, 0, 3, 2], True),
+                                        ("tagStandard52h13", [3, 2, 1, 0], True), ("tagCircle49h12", [3, 2, 1, 0], True), ("tag25h7", [3, 2, 1, 0], False),
+                                        ("", [3, 2, 1, 0], False)):
+            text, table = self.found(april_events(Rectified.POINTS, family=family, info=self.LENS), "marker-corners.csv", out=f"of-{family}")
+            corners = [[table[f"{axis}{k}_px"][0] for axis in "uv"] for k in range(4)]
+            np.testing.assert_allclose(corners, self.AS_READ[order], atol=1e-9, err_msg=family)
+            self.assertEqual("no family whose way up is known" not in text, is_known, text)
+        self.assertIn("- tag36h11\n", (self.folder / "of-tag36_11/calibration.yaml").read_text())
+
+    def test_corners_of_a_mirrored_print_are_none(self):
+        """As of a node that fills AprilTag's messages by OpenCV's detector."""
+        text, _ = self.take(april_events(Rectified.POINTS[::-1], info=self.LENS).mcap(self.folder / "a.mcap"))
+        self.assertIn("all 2 messages are bad", text)
+        self.assertIn("corners go round the other way", text)
+
+    def test_pictures_of_another_size_than_the_lens_s(self):
+        for scale, count, said in ((2, 1, "2 of 2 tags have corners beyond the 320 x 240 pixels"), (0.5, 50, "all of 100 tags lie in the upper left quarter"), (1, 50, "")):
+            events = april_events(Rectified.POINTS * scale, info=self.LENS)
+            events.items = events.items * count
+            text, _ = self.take(events.mcap(self.folder / "a.mcap"), out=f"by-{scale}")
+            self.assertIn(said, text)
+            self.assertEqual("finding: /cam/detections" in text, bool(said), text)
+
+    def seen(self, class_id, detection, place=(0.1, 0, 1), array_frame="cam_optical", frame="cam_optical"):
+        events = Events()
+        pose = M.make("PoseWithCovariance", pose=M.pose(place, (1, 0, 0, 0)))
+        events.put("/cam/seen", "Detection2DArray", START_NS, M.make("Detection2DArray", header=M.header(START_NS, array_frame), detections=[M.make(
+            "Detection2D", header=M.header(START_NS, frame), id=detection, results=[M.make("ObjectHypothesisWithPose", hypothesis=M.make(
+                "ObjectHypothesis", class_id=class_id), pose=pose)])]))
+        return events
+
+    def test_numbers_of_classes(self):
+        for class_id, detection, number in (("tag36h11:5", "", 5), ("tag36h11_00005", "", 5), ("5 (36h11)", "", 5), ("tag36h11", "7", 7), ("aruco_4x4_50", "7", 7),
+                                            ("id7_0.16m", "", 7), ("DICT_4X4_50/7", "", 7)):
+            _, table = self.found(self.seen(class_id, detection), "markers.csv", out=f"{class_id.replace('/', '-')} {detection}")
+            self.assertEqual(list(table["id"]), [number], class_id)
+        for class_id, detection in (("tag36h11", ""), ("-1", "3"), ("person", "3")):
+            text, _ = self.take(self.seen(class_id, detection).mcap(self.folder / "a.mcap"), code=1, out=f"none {class_id}")
+            self.assertIn("no number of a tag", text)
+
+    def test_poses_elsewhere(self):
+        text, _ = self.take(self.seen("5", "", frame="map").mcap(self.folder / "a.mcap"), code=1)
+        self.assertIn("its poses are in 'map'", text)
+        text, _ = self.found(self.seen("5", "", place=(100, 0, 900)), "markers.csv")
+        self.assertIn("more than 900 m away", text)
 
 
 class Bad(BagTest):

@@ -99,7 +99,11 @@ def detections(kind: str) -> Callable[[Collection, str, Any, int], None]:
         if bad:
             raise bad
         if reader.families:
-            into.sight.families.update("tag" + tag.family.removeprefix("tag") for tag in message.detections)
+            for family in {tag.family for tag in message.detections}:
+                into.sight.families.add(tags.family_of(family))
+                if not tags.is_known(family):
+                    into.note(topic, f"'{family}' is no family whose way up is known: its corners are taken as of the newer ones; a print that comes out "
+                                     "upside down is half a turn from them")
 
     return take
 
@@ -159,6 +163,9 @@ def _write_tags(into: Collection, found: list[cameras.Found], rectified: bool | 
         columns[0], columns[-1] = into.clocks[topic](columns[0], columns[-1])
         if rows.has_corners:
             of_corners.add(name)
+            pixels = np.stack(columns[2:10], axis=1).reshape(-1, 4, 2)
+            if camera and camera.lens.entry and (said := tags.of_another_picture(camera.lens.entry, pixels)):
+                into.find(topic, f"{said} Write the lens of the pictures that the detector read into calibration.yaml")
             if camera and (tags.READERS[rows.kind].is_of_rectified if rectified is None else rectified):
                 columns = _in_raw(into, topic, camera, columns, is_said=rectified is not None)
             if camera and camera.lens.entry:
@@ -175,6 +182,9 @@ def _write_tags(into: Collection, found: list[cameras.Found], rectified: bool | 
         else:
             if tags.READERS[rows.kind].is_half_turned:
                 into.note(topic, "its messages name no family: the poses are taken as of tag36h11, which is read half a turn from the library's way up")
+            if (far := float(np.median(columns[2]))) > tags.FARTHEST_M:
+                into.find(topic, f"half of its tags are more than {far:.4g} m away, farther than a print is read: the edge of the prints that its detector "
+                                 "was given is in another unit; set it in metres there, or give corners")
             place = tables.mounting(into, rows.frame, base, optical=True)
             written["markers.csv"].append(tags.pose_table(columns, name, place["rpy_deg"] if place else [0.0, 0.0, 0.0]))
     for file, parts in written.items():

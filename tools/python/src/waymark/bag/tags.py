@@ -30,10 +30,16 @@ from .decoding import BadMessage
 from .lens_fit import equidistant, radtan
 
 _HALF_TURNED = {"16h5", "25h9", "36h10", "36h11"}
+_FAMILY = re.compile(r"(\d+)[h_](\d+)$", re.ASCII)  # how users spell it, too: tag36_11, DICT_APRILTAG_36h11
+_UPRIGHT = ("standard", "circle", "custom")  # in the names of the families that the library draws as OpenCV's readers see them
 _UPRIGHT_ORDER, _HALF_TURNED_ORDER = (3, 2, 1, 0), (1, 0, 3, 2)
 _HALF_PX = 0.5
 _ALIKE = 0.7  # cosine of the upper edge by the corners and by the pose
+_NO_IDENTITY = re.compile(r"[a-z]*\d+h\d+|\d+x\d+(_\d+)?|\d*\.\d+")  # of a class: a family, a dictionary, a length
 _NUMBER = re.compile(r"(\d+)\D*$")
+_OUTSIDE = 0.01  # share of tags with a corner beyond the picture: detectors read whole tags alone
+_MANY = 100  # tags; a robot that moves sees them in more than a quarter of the picture
+FARTHEST_M = 100.0  # a print of 1 m is 10 pixels wide there at a focal length of 1000, about the least that detectors read
 _FACING_MIN = 0.05  # cosine; a print seen more askew than that, 87 degrees, isn't read by any detector
 
 
@@ -46,14 +52,33 @@ class Seen(NamedTuple):
     place: list[float] | None = None
 
 
+def family_of(name: str) -> str:
+    """A family's name as the library has it."""
+    found = _FAMILY.search(name.lower())
+    plain = f"{found[1]}h{found[2]}" if found else ""
+    return f"tag{plain if plain in _HALF_TURNED and not _is_upright(name) else name.removeprefix('tag')}"
+
+
+def _is_upright(family: str) -> bool:
+    return any(word in family.lower() for word in _UPRIGHT)
+
+
 def _is_half_turned(family: str) -> bool:
-    return family.lower().removeprefix("tag").removeprefix("_") in _HALF_TURNED
+    return family_of(family).removeprefix("tag") in _HALF_TURNED
+
+
+def is_known(family: str) -> bool:
+    """Whether it is known which way up AprilTag's library draws the family."""
+    return _is_upright(family) or _is_half_turned(family)
 
 
 def _corners(points: list[tuple[float, float]], order: tuple[int, ...], shift_px: float) -> list[float]:
     out = [float(value) - shift_px for k in order for value in points[k]]
     if not np.isfinite(out).all():
         raise BadMessage("a corner is no number")
+    (ax, ay), (bx, by) = np.subtract(out[4:6], out[:2]), np.subtract(out[6:], out[2:4])
+    if ax * by <= ay * bx:  # the diagonals' cross product, twice the area of corners that go round clockwise, v down
+        raise BadMessage("a tag's corners go round the other way than this type's detectors report them, as of a mirrored print")
     return out
 
 
@@ -93,9 +118,8 @@ def isaac(message: Any) -> Iterator[Seen]:
         if pose.position.z > 0:
             ahead, left, up, *right = _pose(int(tag.id), pose.position, pose.orientation, turned).place or [0.0] * 6
             edge = np.array([left * right[0] - ahead * right[1], up * right[0] - ahead * right[2]])  # of the picture, by the derivative of -left/ahead, -up/ahead
-            by_corners, down = np.subtract(corners[2:4], corners[:2]), np.subtract(corners[4:6], corners[2:4])
-            is_clockwise = by_corners[0] * down[1] > by_corners[1] * down[0]
-            if not is_clockwise or edge @ by_corners < _ALIKE * np.linalg.norm(edge) * np.linalg.norm(by_corners):
+            by_corners = np.subtract(corners[2:4], corners[:2])
+            if edge @ by_corners < _ALIKE * np.linalg.norm(edge) * np.linalg.norm(by_corners):
                 raise BadMessage(f"the corners of tag {tag.id} and its pose contradict each other: they are of another version's order")
         yield Seen(int(tag.id), corners)
 
@@ -132,11 +156,20 @@ def apriltag_poses(message: Any) -> Iterator[Seen]:
 
 
 def frame_of(message: Any) -> str:
-    """The frame of a message's tags: its own, or, where that is empty, that of its first tag (ar_track_alvar)."""
+    """The frame of a message's tags: that of its first tag's pose, of its first tag, or the message's."""
     tags = getattr(message, "markers", getattr(message, "detections", []))
-    parts: list[Any] = [message, *(part for tag in tags[:1] for part in (tag, getattr(tag, "pose", None)))]
+    parts: list[Any] = [*(part for tag in tags[:1] for part in (getattr(tag, "pose", None), tag)), message]
     headers = [part.header for part in parts if hasattr(part, "header")]
     return next((name for header in headers if (name := header.frame_id.lstrip("/"))), "")
+
+
+def _number(found: Any, name: str) -> int:
+    """The tag of a detection whose class is `name`: its number, or, where that is a family alone, the detection's."""
+    text = _NO_IDENTITY.sub("", name.lower())
+    number = not name.startswith("-") and _NUMBER.search(text) or (None if text == name.lower() else re.fullmatch(r"(\d+)", str(getattr(found, "id", ""))))
+    if not number:
+        raise BadMessage(f"a detection of class '{name}', which is no number of a tag")
+    return int(number[1])
 
 
 def vision_poses(message: Any) -> Iterator[Seen]:
@@ -146,15 +179,12 @@ def vision_poses(message: Any) -> Iterator[Seen]:
             continue
         best = found.results[0]
         about = getattr(best, "hypothesis", best)
-        name = str(getattr(about, "class_id", getattr(about, "id", "")))
-        number = _NUMBER.search(name)
+        number = _number(found, str(getattr(about, "class_id", getattr(about, "id", ""))))
         where = best.pose.pose if hasattr(best.pose, "pose") else best.pose
         place = where.position
-        if not number:
-            raise BadMessage(f"a detection of class '{name}', which is no number of a tag")
         if not any((place.x, place.y, place.z)):
             raise BadMessage("a detection without a pose: a box alone gives no corners of a tag")
-        yield _pose(int(number[1]), place, where.orientation)
+        yield _pose(number, place, where.orientation)
 
 
 @dataclass(frozen=True)
@@ -179,6 +209,18 @@ READERS = {
     kind: Reader(poses) for kind in ("aruco_msgs/msg/MarkerArray", "aruco_markers_msgs/msg/MarkerArray", "aruco_opencv_msgs/msg/ArucoDetection",
                                      "ros2_aruco_interfaces/msg/ArucoMarkers", "aruco_interfaces/msg/ArucoMarkers",
                                      "ar_track_alvar_msgs/msg/AlvarMarkers")}
+
+
+def of_another_picture(entry: dict[str, Any], pixels: Array) -> str:
+    """What corners (n, 4, 2) show of pictures that are larger or smaller than those of the lens; "": nothing."""
+    size = np.array(entry["size"])
+    outside = int((pixels > size).any((1, 2)).sum())
+    text = f"the {size[0]} x {size[1]} pixels of its camera's lens"
+    if outside > _OUTSIDE * len(pixels):
+        return f"{outside} of {len(pixels)} tags have corners beyond {text}: they were seen in larger pictures."
+    if len(pixels) >= _MANY and (pixels < size / 2).all():
+        return f"all of {len(pixels)} tags lie in the upper left quarter of {text}: were they seen in pictures of half the size?"
+    return ""
 
 
 def to_raw(camera: Found, pixels: Array) -> Array | None:
