@@ -268,7 +268,13 @@ bool Robot::binds(unsigned quantity) const {
 
 static void read_nmea2000(Robot &robot) {
   const Wish &wish = robot.wish;
-  const Nmea2000 found = wish.can_log.empty() ? Nmea2000{} : nmea2000_of(*survey_log(wish.can_log));
+  Nmea2000 found;
+  if (!wish.can_log.empty()) {
+    const auto survey = survey_log(wish.can_log);
+    uint64_t malformed = 0;
+    if (survey->frames == 0) (void)each_frame(wish.can_log, *survey, malformed, [](const wm_can_frame &) {});  // throws
+    found = nmea2000_of(*survey);
+  }
   if (found.dbc_text.empty())
     throw Failure("motion over CAN needs the bus' DBC file: --dbc FILE" +
                       (wish.can_log.empty() ? "" : "; " + wish.can_log + " has none of the groups of NMEA 2000"),

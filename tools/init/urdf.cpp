@@ -12,6 +12,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <optional>
 #endif
 #include <set>
 #include <sstream>
@@ -38,8 +40,9 @@ bool is_of_a_camera(const std::string &link) {
 }  // namespace
 
 std::string Urdf::link_of(const std::string &name, bool is_camera, bool is_only) const {
-  for (const char *end : {"", "_optical_frame", "_optical", "_link", "_frame"})
-    if (links.contains(name + end)) return name + end;
+  for (const std::string &before : {std::string(), prefix})
+    for (const char *end : {"", "_optical_frame", "_optical", "_link", "_frame"})
+      if (const std::string link = before + name + end; links.contains(link)) return link;
   std::string best, camera;
   std::set<std::set<std::string>> cameras;
   const auto take = [](std::string &to, const std::string &link) {  // one with z along the view, else the shortest name
@@ -47,9 +50,10 @@ std::string Urdf::link_of(const std::string &name, bool is_camera, bool is_only)
     if (to.empty() || rank(link) < rank(to)) to = link;
   };
   for (const auto &[link, pose] : links) {
-    if (is_camera && !is_of_a_camera(link)) continue;
-    if (is_camera) cameras.insert(own_words(link, true)), take(camera, link);
-    if (own_words(link, is_camera) == own_words(name, is_camera)) take(best, link);
+    const std::string own = link.starts_with(prefix) ? link.substr(prefix.size()) : link;
+    if (is_camera && !is_of_a_camera(own)) continue;
+    if (is_camera) cameras.insert(own_words(own, true)), take(camera, link);
+    if (own_words(own, is_camera) == own_words(name, is_camera)) take(best, link);
   }
   return best.empty() && is_only && cameras.size() == 1 ? camera : best;
 }
@@ -65,8 +69,26 @@ namespace {
 using tinyxml2::XMLElement;
 
 constexpr double kUsualPart_m = 20;       // a part farther from its parent is rather in mm
-constexpr double kWholeTurn_rad = 6.3;    // an angle beyond it is rather in degrees
+constexpr double kLargestWheel_m = 2;     // radius; tyres of the largest trucks are 4 m high
+constexpr double kWholeTurn_rad = 6.3;    // an angle beyond it, or a whole number, is rather in degrees
 constexpr double kFarthestPart_m = 1000;  // of a part from its parent: beyond it the number is no length in m
+
+const std::set<std::string> kTypes{"fixed", "revolute", "continuous", "prismatic", "floating", "planar"};
+
+bool is_named_wheel(const std::string &name) { return name.find("wheel") != std::string::npos; }
+
+// Also as before ROS Hydro, without the name space.
+bool is_xacro(const std::string &element) {
+  return element.starts_with("xacro:") || element == "include" || element == "property" || element == "macro";
+}
+
+// Of "robot1/base_link", and of "robot1_base_link", "robot1/" and "robot1_"; none where `link` is no `base`.
+std::optional<std::string> prefix_of(const std::string &link, const std::string &base) {
+  if (!link.ends_with(base)) return std::nullopt;
+  const std::string before = link.substr(0, link.size() - base.size());
+  if (!before.empty() && std::string("/:_").find(before.back()) == std::string::npos) return std::nullopt;
+  return before;
+}
 
 struct Joint {
   std::string name, parent, child;
@@ -89,10 +111,10 @@ class UrdfReader {
       fail(robot, "a URDF begins with <robot>; of a xacro file `xacro FILE > robot.urdf` makes one");
     for (const XMLElement *e = robot->FirstChildElement(); e != nullptr; e = e->NextSiblingElement()) {
       const std::string kind = e->Name();
-      if (kind == "link" || kind == "joint") refuse_xacro(e);
+      if (kind == "link" || kind == "joint" || is_xacro(kind)) refuse_xacro(e);
       if (kind == "link") add_link(e);
       if (kind == "joint") add_joint(e);
-      if (kind.starts_with("xacro:")) fail(e, "<" + kind + "> is xacro: `xacro FILE > robot.urdf` makes a URDF of it");
+      if (kind == "gazebo") note_sensors(e);
     }
     if (radius_.empty()) fail(robot, "has no <link>");
     return made();
@@ -107,8 +129,10 @@ class UrdfReader {
     notes_.push_back(path_ + ":" + std::to_string(e->GetLineNum()) + ": " + text);
   }
 
-  // "${...}" and "$(...)" in an attribute are left over from a xacro file.
+  // Elements of xacro, and "${...}" and "$(...)" in an attribute, are left over from a xacro file.
   void refuse_xacro(const XMLElement *e) const {
+    if (is_xacro(e->Name()))
+      fail(e, std::string("<") + e->Name() + "> is xacro: `xacro FILE > robot.urdf` makes a URDF of it");
     for (const tinyxml2::XMLAttribute *a = e->FirstAttribute(); a != nullptr; a = a->Next()) {
       const std::string value = a->Value();
       if (value.find("${") != std::string::npos || value.find("$(") != std::string::npos)
@@ -130,7 +154,7 @@ class UrdfReader {
     const std::optional<double> value = tools::number_of<double>(word);
     if (!value || !std::isfinite(*value) || std::abs(*value) > kFarthestPart_m)
       fail(e, std::string("<") + e->Name() + "> " + attribute + ": '" + word +
-                  "' is not a number from -1000 to 1000 (metres, radians)");
+                  "' is not a number from -1000 to 1000 (metres, radians; not millimetres)");
     return *value;
   }
 
@@ -146,21 +170,43 @@ class UrdfReader {
     return out;
   }
 
+  // A <pose>, or an <origin> beside `origin`, in a <link> or <joint>: people take it for the place.
+  void note_places(const XMLElement *of, const XMLElement *origin) {
+    for (const XMLElement *e = of->FirstChildElement(); e != nullptr; e = e->NextSiblingElement()) {
+      const std::string kind = e->Name();
+      if (e == origin || (kind != "pose" && kind != "origin")) continue;
+      note(e, (kind == "origin" && origin != nullptr ? "a second <origin>" : "<" + kind + ">") + " in a <" +
+                  of->Name() + "> means nothing in a URDF; " + need(of, "name") +
+                  " is placed by the first <origin xyz=\"...\" rpy=\"...\"/> of its <joint>, without one at 0, 0, 0");
+    }
+  }
+
+  // Gazebo moves a sensor within its link.
+  void note_sensors(const XMLElement *gazebo) {
+    for (const XMLElement *e = gazebo->FirstChildElement("sensor"); e != nullptr; e = e->NextSiblingElement("sensor"))
+      if (const XMLElement *pose = e->FirstChildElement("pose"); pose != nullptr && pose->GetText() != nullptr)
+        for (const std::string &word : split(pose->GetText()))
+          if (tools::number_of<double>(word).value_or(1) != 0)
+            return note(pose,
+                        "the sensor has a <pose> in its link, which Gazebo alone reads: its mounting is the link's");
+  }
+
   images::Pose origin(const XMLElement *of) {
     const XMLElement *e = of->FirstChildElement("origin");
-    const XMLElement *pose = of->FirstChildElement("pose");
-    if (e == nullptr && pose != nullptr)
-      note(pose, "<pose> in a <joint> means nothing in a URDF, so " + need(of, "name") +
-                     " is taken to be at 0, 0, 0; write <origin xyz=\"...\" rpy=\"...\"/>");
+    note_places(of, e);
+    for (const tinyxml2::XMLAttribute *a = e != nullptr ? e->FirstAttribute() : nullptr; a != nullptr; a = a->Next())
+      if (const std::string name = a->Name(); name != "xyz" && name != "rpy")
+        note(e, "<origin> " + name + ": is not read; write xyz=\"...\" in metres and rpy=\"...\" in radians");
     const images::Vec3 rpy = three(e, "rpy");
     images::Pose out = images::Pose::Identity();
     out.translation() = three(e, "xyz");
-    if (rpy.cwiseAbs().maxCoeff() > kWholeTurn_rad)
+    const bool has_whole = (rpy.array() != 0 && rpy.array() == rpy.array().round()).any();
+    if (rpy.cwiseAbs().maxCoeff() > kWholeTurn_rad || has_whole)
       note(e, "<origin> rpy: '" + std::string(e->Attribute("rpy")) +
                   "' is taken in radians, as a URDF has it; is it in degrees?");
     if (out.translation().cwiseAbs().maxCoeff() > kUsualPart_m)
       note(e, "<origin> xyz: '" + std::string(e->Attribute("xyz")) +
-                  "' is taken in metres, as a URDF has it; is it in millimetres?");
+                  "' is taken in metres, as a URDF has it; is it in millimetres or centimetres?");
     out.linear() =
         (Eigen::AngleAxisd(rpy.z(), images::Vec3::UnitZ()) * Eigen::AngleAxisd(rpy.y(), images::Vec3::UnitY()) *
          Eigen::AngleAxisd(rpy.x(), images::Vec3::UnitX()))
@@ -181,8 +227,9 @@ class UrdfReader {
           if (const XMLElement *s = geometry->FirstChildElement(shape); s != nullptr)
             radius = number(s, need(s, "radius"), "radius");
       }
-    if (radius > kUsualPart_m)
-      note(e, "<link name=\"" + name + "\">: its radius is taken in metres; is it in millimetres?");
+    if (radius > (is_named_wheel(name) ? kLargestWheel_m : kUsualPart_m))
+      note(e, "<link name=\"" + name + "\">: its radius is taken in metres; is it in millimetres or centimetres?");
+    note_places(e, nullptr);
     radius_[name] = radius;
   }
 
@@ -191,6 +238,9 @@ class UrdfReader {
     out.name = need(e, "name");
     out.line = e->GetLineNum();
     const std::string type = need(e, "type");
+    if (!kTypes.contains(type))
+      fail(e, "<joint name=\"" + out.name + "\">: type '" + type +
+                  "' is none of fixed, revolute, continuous, prismatic, floating, planar");
     const XMLElement *parent = e->FirstChildElement("parent"), *child = e->FirstChildElement("child");
     if (parent == nullptr || child == nullptr)
       fail(e, "<joint name=\"" + out.name + "\">: <parent> and <child> are needed");
@@ -198,9 +248,8 @@ class UrdfReader {
     out.child = need(child, "link");
     out.place = origin(e);
     out.moves = type != "fixed";
-    const auto named = [](const std::string &name) { return name.find("wheel") != std::string::npos; };
-    out.is_wheel =
-        type == "continuous" && (named(out.child) || named(out.name)) && out.child.find("caster") == std::string::npos;
+    out.is_wheel = type == "continuous" && (is_named_wheel(out.child) || is_named_wheel(out.name)) &&
+                   out.child.find("caster") == std::string::npos;
     if (!of_child_.emplace(out.child, out).second)
       fail(e, "<joint name=\"" + out.name + "\">: link " + out.child + " has a parent already; a URDF is a tree");
   }
@@ -241,26 +290,38 @@ class UrdfReader {
     return "";
   }
 
+  // base_footprint or base_link, else the one nearest to its root behind a prefix, else the root with the most links.
+  void choose_base(const std::map<std::string, std::vector<std::string>> &trees, Urdf &out) const {
+    size_t most = 0, nearest = SIZE_MAX;
+    for (const auto &[root, links] : trees)
+      if (links.size() > most) out.base = root, most = links.size();
+    for (const char *base : {"base_footprint", "base_link"})
+      for (const auto &[link, radius] : radius_)
+        if (const auto prefix = prefix_of(link, base)) {
+          const size_t far = prefix->empty() ? 0 : chain(link).size();
+          if (far < nearest) out.base = link, out.prefix = *prefix, nearest = far;
+        }
+  }
+
   [[nodiscard]] Urdf made() const {
     Urdf out;
     out.notes = notes_;
     std::map<std::string, images::Pose> of_root;
-    std::string first_root;
+    std::map<std::string, std::vector<std::string>> trees;  // root -> its links
     for (const auto &[name, radius] : radius_) {
       std::string root;
       of_root[name] = in_root(name, root);
-      if (first_root.empty()) first_root = root;
+      trees[root].push_back(name);
     }
-    out.base = radius_.contains("base_footprint") ? "base_footprint"
-               : radius_.contains("base_link")    ? "base_link"
-                                                  : first_root;
+    choose_base(trees, out);
     const images::Pose to_base = of_root.at(out.base).inverse();
-    std::string base_root;
-    (void)in_root(out.base, base_root);
-    for (const auto &[name, pose] : of_root) {
-      std::string root;
-      (void)in_root(name, root);
-      if (root == base_root) out.links[name] = to_base * pose;
+    for (const auto &[root, links] : trees) {
+      if (std::find(links.begin(), links.end(), out.base) != links.end()) {
+        for (const std::string &name : links) out.links[name] = to_base * of_root.at(name);
+      } else {
+        out.notes.push_back(path_ + ": no <joint> leads from " + out.base + " to link " + root + ": it is left out" +
+                            (links.size() > 1 ? ", with " + std::to_string(links.size() - 1) + " on it" : ""));
+      }
     }
     for (const auto &[name, pose] : out.links)
       if (const std::string joint = moving_joint(name, out.base); !joint.empty()) out.moving[name] = joint;

@@ -18,14 +18,16 @@ struct UrdfWheel {
 };
 
 struct Urdf {
-  std::string base;                           // base_footprint, base_link, or the root
+  std::string base;                           // base_footprint, base_link, or the root with the most links
+  std::string prefix;                         // of the base's name: of "robot1/base_link" "robot1/"
   std::map<std::string, images::Pose> links;  // in `base`
   std::vector<UrdfWheel> wheels;              // continuous joints whose link or joint is named so
   std::map<std::string, std::string> moving;  // link -> the joint between it and `base` that moves
   std::vector<std::string> notes;             // what is unusual in the file, with its line
 
   // Link of a sensor; "": none. The first that is there of: `name` itself, NAME_optical_frame, NAME_optical, NAME_link,
-  // NAME_frame, the one with the same words but for link, camera and the like. An only camera has the only camera's.
+  // NAME_frame, these behind `prefix`, the one with the same words but for `prefix`, link, camera and the like. An only
+  // camera has the only camera's.
   [[nodiscard]] std::string link_of(const std::string &name, bool is_camera, bool is_only) const;
   // A sensor's body frame (x along the view) in `base`; a link named ..._optical... looks along its z axis.
   [[nodiscard]] images::Pose body(const std::string &link) const;

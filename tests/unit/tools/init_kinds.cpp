@@ -105,6 +105,24 @@ TEST(test_urdfs_that_are_not_meant_so) {
       {"fixed", "<origin xyz=\"0.3 0 0.5\" rpy=\"-20 0 0\"/>", "is it in degrees?"},
       {"fixed", "<origin xyz=\"300 0 500\"/>", "robot.urdf:7: <origin> xyz: '300 0 500' is taken in metres"},
       {"fixed", "<origin xyz=\"0.3 0 0.5\" rpy=\"3.14159265 0 -6.28318531\"/>", ""},
+      {"fixed", "<origin xyz=\"0.3 0 0.5\" rpy=\"0 5 0\"/>", "robot.urdf:7: <origin> rpy: '0 5 0' is taken in radians"},
+      {"fixed", "<pose relative_to=\"arm\">0 0 1 0 0 0</pose><origin xyz=\"0.3 0 0.5\"/>",
+       "robot.urdf:7: <pose> in a <joint>"},
+      {"fixed", "<origin xyz=\"0 0 0\"/><origin xyz=\"0.3 0 0.5\"/>", "robot.urdf:7: a second <origin> in a <joint>"},
+      {"fixed", "<origin pos=\"0.3 0 0.5\"/>", "robot.urdf:7: <origin> pos: is not read"},
+      {"fixed", "<origin xyz=\"0.3 0 0.5\" quat_xyzw=\"0 0.17 0 0.98\"/>", "<origin> quat_xyzw: is not read"},
+      {"fixed",
+       "</joint><link name=\"a\"><pose>0 0 1 0 0 0</pose></link><joint name=\"b\" type=\"fixed\"><parent "
+       "link=\"arm\"/><child link=\"a\"/>",
+       "robot.urdf:7: <pose> in a <link>"},
+      {"fixed",
+       "</joint><gazebo><sensor><pose>0.1 0 0 0 0 0</pose></sensor></gazebo><link name=\"a\"/><joint name=\"b\" "
+       "type=\"fixed\"><parent link=\"arm\"/><child link=\"a\"/>",
+       "robot.urdf:7: the sensor has a <pose> in its link"},
+      {"fixed",
+       "</joint><link name=\"loose\"/><link name=\"on_it\"/><joint name=\"b\" type=\"fixed\"><parent "
+       "link=\"loose\"/><child link=\"on_it\"/>",
+       "robot.urdf: no <joint> leads from base_link to link loose: it is left out, with 1 on it"},
   };
   for (const Noted &row : kRows) {
     const std::vector<std::string> lines = noted(urdf_of(row.type, row.place));
@@ -125,7 +143,71 @@ TEST(test_a_wheel_in_millimetres) {
       urdf.find("<joint"),
       "<link name=\"wheel\"><collision><geometry><cylinder radius=\"100\" length=\"30\"/></geometry></collision>"
       "</link>\n");
-  TEST_ASSERT_TRUE(names(noted(urdf), "<link name=\"wheel\">: its radius is taken in metres; is it in millimetres?"));
+  TEST_ASSERT_TRUE(
+      names(noted(urdf), "<link name=\"wheel\">: its radius is taken in metres; is it in millimetres or centimetres?"));
+}
+
+// A wheel of 10 m is one in centimetres.
+TEST(test_a_wheel_in_centimetres) {
+  if (!can_read_urdf()) TEST_IGNORE_MESSAGE("this build reads no URDF");
+  std::string urdf = urdf_of("fixed", "");
+  urdf.insert(urdf.find("<joint"),
+              "<link name=\"wheel\"><visual><geometry><sphere radius=\"10\"/></geometry></visual></link>\n");
+  TEST_ASSERT_TRUE(names(noted(urdf), "<link name=\"wheel\">: its radius is taken in metres"));
+}
+
+TEST(test_what_is_no_urdf) {
+  if (!can_read_urdf()) TEST_IGNORE_MESSAGE("this build reads no URDF");
+  const auto refused = [](const std::string &urdf) -> std::string {
+    try {
+      (void)parse_urdf(urdf, "robot.urdf");
+    } catch (const wm::tools::Failure &failure) {
+      return failure.what();
+    }
+    return "";
+  };
+  const auto in_joint = [&](const char *place) { return refused(urdf_of("fixed", place)); };
+  const std::string robot = urdf_of("fixed", "");
+  const auto in_robot = [&](const std::string &what) {
+    return refused(robot.substr(0, robot.find("</robot>")) + what + "</robot>");
+  };
+  TEST_ASSERT_EQUAL_STRING("robot.urdf:7: <xacro:insert_block> is xacro: `xacro FILE > robot.urdf` makes a URDF of it",
+                           in_joint("<xacro:insert_block name=\"origin\"/>").c_str());
+  for (const char *block :
+       {"<xacro:if value=\"1\"><origin xyz=\"0.3 0 0.5\"/></xacro:if>", "<origin xyz=\"${x} 0 0\"/>"})
+    TEST_ASSERT_TRUE_MESSAGE(in_joint(block).find(" is xacro: ") != std::string::npos, block);
+  for (const char *old :
+       {"<include filename=\"cam.urdf\"/>", "<property name=\"x\" value=\"1\"/>", "<macro name=\"cam\"/>"})
+    TEST_ASSERT_TRUE_MESSAGE(in_robot(old).find(" is xacro: ") != std::string::npos, old);
+  TEST_ASSERT_EQUAL_STRING(
+      "robot.urdf:5: <joint name=\"pan\">: type 'weld' is none of fixed, revolute, continuous, prismatic, floating, "
+      "planar",
+      refused(urdf_of("weld", "")).c_str());
+}
+
+// The names of a robot's links often begin with its own.
+TEST(test_links_behind_a_prefix) {
+  if (!can_read_urdf()) TEST_IGNORE_MESSAGE("this build reads no URDF");
+  for (const std::string prefix : {"robot1_", "robot1/", "husky::"}) {
+    const auto link = [&](const std::string &name) { return "<link name=\"" + name + "\"/>"; };
+    const auto joint = [&](const std::string &from, const std::string &to, const char *place) {
+      return "<joint name=\"" + to + "\" type=\"fixed\"><parent link=\"" + from + "\"/><child link=\"" + to +
+             "\"/><origin xyz=\"" + place + "\"/></joint>";
+    };
+    std::string text = "<robot name=\"r\">" + link("a_world") + joint("a_world", prefix + "base_link", "5 0 1");
+    for (const char *name : {"base_link", "arm_base_link", "front_optical_frame", "rear_camera_link", "imu_link"})
+      text += link(prefix + name);
+    text += joint(prefix + "base_link", prefix + "arm_base_link", "0 0 1");
+    text += joint(prefix + "base_link", prefix + "front_optical_frame", "0.3 0 0.5");
+    text += joint(prefix + "base_link", prefix + "rear_camera_link", "-0.3 0 0.5");
+    text += joint(prefix + "base_link", prefix + "imu_link", "0.05 0 0.2") + "</robot>";
+    const Urdf urdf = parse_urdf(text, "robot.urdf");
+    TEST_ASSERT_EQUAL_STRING((prefix + "base_link").c_str(), urdf.base.c_str());
+    TEST_ASSERT_EQUAL_STRING((prefix + "front_optical_frame").c_str(), urdf.link_of("front", true, false).c_str());
+    TEST_ASSERT_EQUAL_STRING((prefix + "rear_camera_link").c_str(), urdf.link_of("rear", true, false).c_str());
+    TEST_ASSERT_EQUAL_STRING((prefix + "imu_link").c_str(), urdf.link_of("imu", false, false).c_str());
+    TEST_ASSERT_EQUAL_DOUBLE(0.2, urdf.links.at(prefix + "imu_link").translation().z());
+  }
 }
 
 // As printf's "%+g" writes them, and the robot's readers read them.
@@ -228,6 +310,17 @@ std::string boat() {
     out += at + "0DF80505#A02F00FFFFFFFFFF\n" + at + "0CFEF117#F39A03FFFFFFFFFF\n";
   }
   return out;
+}
+
+TEST(test_a_log_that_is_none_says_so) {
+  const made::Folder folder;
+  std::string said;
+  try {
+    (void)proposed("", "  can0  09F80105   [8]  01 02 03 04 05 06 07 08\n", folder);
+  } catch (const wm::tools::Failure &failure) {
+    said = failure.what();
+  }
+  TEST_ASSERT_TRUE_MESSAGE(names({said}, "drive.log:1: this is what candump shows on the screen"), said.c_str());
 }
 
 TEST(test_nmea2000_needs_no_dbc) {

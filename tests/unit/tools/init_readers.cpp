@@ -188,7 +188,7 @@ const BadInput kTable[] = {
     {"length in mm", kUrdf,
      ROBOT LINK("a") LINK("b") "<joint name=\"j\" type=\"fixed\"><parent link=\"a\"/><child link=\"b\"/>\n"
                                "<origin xyz=\"1500 0 0\"/></joint></robot>",
-     "robot.urdf:5: <origin> xyz: '1500' is not a number from -1000 to 1000 (metres, radians)"},
+     "robot.urdf:5: <origin> xyz: '1500' is not a number from -1000 to 1000 (metres, radians; not millimetres)"},
     {"no wheels", kUrdf, ROBOT LINK("base_link") "</robot>",
      "this motion needs numbers that no file had: --wheel-radius, --track"},
     {"sheared T_cam_imu", kCamchain,
