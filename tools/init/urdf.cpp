@@ -42,7 +42,7 @@ bool is_of_a_camera(const std::string &link) {
 std::string Urdf::link_of(const std::string &name, bool is_camera, bool is_only) const {
   for (const std::string &before : {std::string(), prefix})
     for (const char *end : {"", "_optical_frame", "_optical", "_link", "_frame"})
-      if (const std::string link = before + name + end; links.contains(link)) return link;
+      if (std::string link = before + name + end; links.contains(link)) return link;
   std::string best, camera;
   std::set<std::set<std::string>> cameras;
   const auto take = [](std::string &to, const std::string &link) {  // one with z along the view, else the shortest name
