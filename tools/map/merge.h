@@ -28,7 +28,7 @@ struct DriveVerdict {
 struct MergeResult {
   std::vector<Merged> landmarks;  // all that were seen; those that the map has are in it
   FusedMap map;                   // its covariance includes `widened`
-  double widened = 1;             // of the covariance: drives differ by more than theirs says
+  double widened = 1;             // factor of the covariance, where drives differ by more than their covariances
   std::vector<DriveVerdict> drives;
 };
 

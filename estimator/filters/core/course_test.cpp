@@ -83,7 +83,7 @@ track bend_of(const course &self, const track &way, int n) {
 }
 
 // The sum of squared innovations of an autoregression from slot to slot. A receiver's error lasts for minutes, so that
-// each of many slots tells little that is new.
+// consecutive slots carry little new information.
 double innovations_m2(const track &left, int n) {
   double newer = 0.0, older = 0.0, products = 0.0;
   for (int i = 0; i + 1 < n; i++) {

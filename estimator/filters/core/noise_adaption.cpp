@@ -261,7 +261,7 @@ void noise_adaption::pass(wm_time_ns t_ns) {
       learn(of);
       of = {};
     }
-    // Else what single innovations tell of the others moves it.
+    // Else a correction of the other factors by single innovations moves this one.
     for (int k = 0; k < kLasting; k++) covariance_[k][kLasting] = covariance_[kLasting][k] = 0.0;
   }
   if (forgotten_ns_ == WM_TIME_NONE) forgotten_ns_ = t_ns;

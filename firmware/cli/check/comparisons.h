@@ -20,8 +20,7 @@ const char *gravity_mounting(const wm_assembly *assembly, double roll_deg, doubl
 void gravity_judge(const channels *self, const wm_assembly *assembly, wm_findings *out);
 // Finds sensors that repeat a value while another one moves, and marks them.
 void stuck_judge(channels *self, const wm_assembly *assembly, wm_findings *out);
-// Whether a finding of fact says that this channel, its clock or its counter is broken, so that no other channel is
-// compared with it.
+// Whether a finding names this channel's clock or counter as broken. Then no other channel is compared with it.
 int comparisons_is_broken(const channel *c, const wm_assembly *assembly, const wm_findings *found);
 // Findings about the sensors that contradict the others.
 void comparisons_judge(const channels *self, const wm_assembly *assembly, wm_findings *out);

@@ -263,7 +263,7 @@ struct learned_once {
     }
   };
   // The maximum a posteriori of the log factors after such updates as the first of which something is learned: each
-  // tells all but the lasting error, and the sum of positions' innovations, 10 s later, that, too.
+  // updates all but the time-correlated error, and the sum of positions' innovations over 10 s that one, too.
   template <size_t kRows>
   void expect_learned(const double (&h)[kN], double own, int kind, const double (&sigmas)[kRows], double log_sigma) {
     posterior learned;
