@@ -14,15 +14,15 @@ import re
 import signal
 import subprocess
 import sys
-import tempfile
 import time
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
-sys.path.insert(0, str(ROOT / "tests/hil"))
+sys.path[:0] = [str(ROOT / "tests/hil"), str(ROOT / "tests/common")]
+import in_a_network  # noqa: E402
 import messages  # noqa: E402
 
 BUILD = pathlib.Path(sys.argv[1]).resolve()
-SECONDS = float(sys.argv[2]) if len(sys.argv) > 2 and sys.argv[2] != "inside" else 38
+SECONDS = float(sys.argv[2]) if len(sys.argv) > 2 else 38
 PRIORITY = 80  # realtime.priority, as by default
 URL = "udpm://239.255.76.67:7667?ttl=0"
 CAMERA = "\ncameras: [{name: front, size: [640, 360], rate_hz: 5, colour: false}]\n\npictures:"
@@ -173,19 +173,16 @@ def show(name, idle, loaded):
     print(f"\nDeadlines missed: {idle[1]} of {idle[2]}, under load {loaded[1]} of {loaded[2]}; poses heard: {idle[3]} and {loaded[3]}.", flush=True)
 
 
-def inside(work):
-    subprocess.run(["ip", "link", "set", "lo", "up"], check=True)
-    subprocess.run(["ip", "route", "add", "224.0.0.0/4", "dev", "lo"], check=True)
+def all_drives(work):
     print(f"{os.cpu_count()} processors, {os.uname().release}, load of the last minute before it began {os.getloadavg()[0]:.1f}")
     for name, (recording, config, observed) in make_recordings(work).items():
         show(name, *(drive(work, recording, config, observed, loaded) for loaded in (False, True)))
 
 
 def main():
-    if sys.argv[-1] == "inside":
-        with tempfile.TemporaryDirectory(prefix="waymark-latency-") as work:
-            return inside(pathlib.Path(work))
-    return subprocess.run(["unshare", "-n", sys.executable, __file__, BUILD, str(SECONDS), "inside"]).returncode
+    in_a_network.begin(programs=("lcm-logger", "cyclictest", "stress-ng"))
+    with in_a_network.work_folder("latency") as work:
+        all_drives(work)
 
 
 if __name__ == "__main__":

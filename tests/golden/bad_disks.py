@@ -5,26 +5,22 @@ pose is missing on LCM, what is lost is counted, and it is reported once. Needs 
 namespace (else 77).
 
     bad_disks.py LIBRARY        (tests/golden/slow_disk.c, to be preloaded)"""
+import contextlib
 import os
-import pathlib
-import shutil
 import subprocess
 import sys
-import tempfile
 import time
 
 import lcm_tools
 import restarts
+from lcm_tools import in_a_network
 
 DRIVE_S, BLOCK_S = 9, 5
 
 
 def drive(work, subscriber, disk, words=(), environment=None, meanwhile=None):
     """One drive whose files are in `disk`: what it printed, and its poses by LCM."""
-    (work / "config.yaml").write_text(
-        "format: waymark-config/1\nestimator: slam\npublish: {lcm_url: '" + lcm_tools.URL + "'}\n"
-        f"realtime: {{lock_memory: false}}\nstart: {{saved_pose: {disk}/pose.yaml, save_every_s: 0.5, saved_map: {disk}/map.bin, "
-        "save_map_every_s: 1}\n")
+    lcm_tools.config(work / "config.yaml", "slam", f"start: {{saved_pose: {disk}/pose.yaml, save_every_s: 0.5, saved_map: {disk}/map.bin, save_map_every_s: 1}}\n")
     subscriber.poses.clear()
     subscriber.healths.clear()
     run = subprocess.Popen([lcm_tools.WAYMARK, "run", "--config", work / "config.yaml", "--recording", work / "rest", "--resume", *words],
@@ -50,18 +46,30 @@ def show(name, run):
             print("   ", line)
 
 
+@contextlib.contextmanager
 def small_disk(work, size):
     disk = work / "disk"
     disk.mkdir(exist_ok=True)
     subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", disk], check=True)
-    return disk
-
-
-def inside(library):
-    work = pathlib.Path(tempfile.mkdtemp(prefix="waymark-bad-disks-"))
     try:
-        subprocess.run(["ip", "link", "set", "lo", "up"], check=True)
-        subprocess.run(lcm_tools.ROUTE, check=True)
+        yield disk
+    finally:
+        subprocess.run(["umount", disk], check=True)
+
+
+def make_read_only(disk):
+    time.sleep(4)
+    for _ in range(100):
+        if subprocess.run(["mount", "-o", "remount,ro", disk], capture_output=True).returncode == 0:
+            return
+        time.sleep(0.01)
+    raise RuntimeError("the disk could not be made read-only")
+
+
+def main():
+    lcm_tools.own_network(mounts=True)
+    library = sys.argv[1]
+    with in_a_network.work_folder("bad-disks") as work:
         waymark = lcm_tools.python_types(work)
         restarts.write_rest(work / "rest", 0.0, DRIVE_S)
         subscriber = restarts.Subscriber(waymark)
@@ -81,43 +89,22 @@ def inside(library):
         assert slow["said"].count("the map was not saved when it was due") == 1, slow["said"]
         assert restarts.check_files(work / "slow") >= 5
 
-        disk = small_disk(work, "120k")
-        full = drive(work, subscriber, disk, ["--out", disk / "run"])
+        with small_disk(work, "120k") as disk:
+            full = drive(work, subscriber, disk, ["--out", disk / "run"])
         show("full", full)
         assert full["code"] == 1 and "No space left" in full["said"] and full["said"].count("the next start will not") <= 2
-        subprocess.run(["umount", disk], check=True)
 
-        disk = small_disk(work, "4m")
-        def make_read_only():
-            time.sleep(4)
-            for _ in range(100):
-                if subprocess.run(["mount", "-o", "remount,ro", disk], capture_output=True).returncode == 0:
-                    return
-                time.sleep(0.01)
-            raise RuntimeError("the disk could not be made read-only")
-        read_only = drive(work, subscriber, disk, meanwhile=make_read_only)
+        with small_disk(work, "4m") as disk:
+            read_only = drive(work, subscriber, disk, meanwhile=lambda: make_read_only(disk))
+            restarts.check_files(disk)
         show("read-only", read_only)
         assert read_only["said"].count("Read-only file system") == 2, read_only["said"]  # pose and map, once each
-        restarts.check_files(disk)
-        subprocess.run(["umount", disk], check=True)
 
         for name, run in (("slow", slow), ("full", full), ("read-only", read_only)):
             # A busy computer delays a pose as well without it.
             assert run["missing"] <= good["missing"] + 10 and run["poses"] > 0.9 * good["poses"], f"{name}: poses are missing"
             assert run["gap_s"] < BLOCK_S / 2, f"{name}: the disk held poses up"
             assert run["off_m"] < restarts.RIGHT_M
-    finally:
-        subprocess.run(["umount", work / "disk"], capture_output=True)
-        shutil.rmtree(work)
-
-
-def main():
-    if len(sys.argv) > 2 and sys.argv[2] == "inside":
-        return inside(sys.argv[1])
-    python = lcm_tools.need_network()
-    if subprocess.run(["unshare", "-m", "true"], capture_output=True).returncode:
-        lcm_tools.skip("no right to a mount namespace")
-    return subprocess.run(["unshare", "-n", "-m", python, __file__, sys.argv[1], "inside"]).returncode
 
 
 if __name__ == "__main__":

@@ -17,13 +17,13 @@ import signal
 import struct
 import subprocess
 import sys
-import tempfile
 import threading
 import time
 import tty
 
 import lcm_tools
-from lcm_streams import heading_of, replay_both, rows, start, waymark
+from lcm_streams import heading_of, replay_both, rows, start
+from lcm_tools import in_a_network
 
 SECONDS = 6
 SPEED = 0.5
@@ -33,15 +33,9 @@ PORT = 2999
 GPSD_PATH = os.environ["PATH"] + ":/usr/sbin"
 SYS = pathlib.Path("/sys/bus/iio/devices")
 CONFIG = (
-    "format: waymark-config/1\nestimator: landmark_ekf\npublish: {lcm_url: '" + lcm_tools.URL + "'}\n"
-    "calibration: calibration.yaml\nrealtime: {lock_memory: false}\n"
+    "calibration: calibration.yaml\n"
     "devices:\n  lcm: [{stream: motion}]\n  iio: {device: bmi160, rate_hz: 100}\n"
     f"  gpsd: [{{port: {PORT}}}, {{port: {PORT}, take: course, course_min_mps: 0.3}}]\n")
-
-
-def need_gpsd():
-    if not shutil.which("gpsd", path=GPSD_PATH):
-        lcm_tools.skip("gpsd is missing (Debian: gpsd)")
 
 
 def nmea(text):
@@ -173,26 +167,6 @@ def check_record(work):
     replay_both(work, "robot")
 
 
-def inside():
-    work = pathlib.Path(tempfile.mkdtemp(prefix="waymark-kernel-"))
-    try:
-        subprocess.run(["ip", "link", "set", "lo", "up"], check=True)
-        subprocess.run(lcm_tools.ROUTE, check=True)
-        own_devices(work)
-        subprocess.run(["lcm-gen", "-p", "--ppath", work, *sorted((lcm_tools.ROOT / "msgs/lcm").glob("*.lcm"))], check=True)
-        sys.path.insert(0, str(work))
-        (work / "robot.yaml").write_text(CONFIG)
-        (work / "calibration.yaml").write_text("gnss: {origin: [%g, %g, %g]}\nimu: {mounting: {rpy_deg: [0, 0, 30]}}\n" % ORIGIN)
-        make_imu()
-        check_doctor(work)
-        check_drive(work)
-        check_record(work)
-        for what in ("robot", "robot-replayed"):
-            check_pose(work, what)
-    finally:
-        shutil.rmtree(work, ignore_errors=True)
-
-
 def own_devices(work):
     """An empty sysfs, and a /dev with what programs need."""
     dev = work / "dev"
@@ -211,10 +185,20 @@ def own_devices(work):
 
 
 def main():
-    if len(sys.argv) > 1:
-        return inside()
-    need_gpsd()
-    return subprocess.run(["unshare", "-n", "-m", lcm_tools.need_network(), __file__, "inside"]).returncode
+    if not shutil.which("gpsd", path=GPSD_PATH):
+        in_a_network.skip("gpsd is missing (Debian: gpsd)")
+    lcm_tools.own_network(mounts=True)
+    with in_a_network.work_folder("kernel") as work:
+        own_devices(work)
+        lcm_tools.python_types(work)
+        lcm_tools.config(work / "robot.yaml", "landmark_ekf", CONFIG)
+        (work / "calibration.yaml").write_text("gnss: {origin: [%g, %g, %g]}\nimu: {mounting: {rpy_deg: [0, 0, 30]}}\n" % ORIGIN)
+        make_imu()
+        check_doctor(work)
+        check_drive(work)
+        check_record(work)
+        for what in ("robot", "robot-replayed"):
+            check_pose(work, what)
 
 
 if __name__ == "__main__":

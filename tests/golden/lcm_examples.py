@@ -8,10 +8,10 @@ import re
 import shutil
 import subprocess
 import sys
-import tempfile
 import time
 
 import lcm_tools
+from lcm_tools import in_a_network
 
 LCM_JAR = pathlib.Path("/usr/share/java/lcm.jar")
 
@@ -28,12 +28,9 @@ def last_x(text):
     return float(found[-1]) if found else None
 
 
-def inside():
-    work = pathlib.Path(tempfile.mkdtemp(prefix="waymark-lcm-examples-"))
-    started = []
-    try:
-        subprocess.run(["ip", "link", "set", "lo", "up"], check=True)
-        subprocess.run(lcm_tools.ROUTE, check=True)
+def main():
+    lcm_tools.own_network()
+    with in_a_network.work_folder("lcm-examples") as work, lcm_tools.ended() as started:
         (work / "msgs").symlink_to(lcm_tools.ROOT / "msgs")
         for folder in ("types", "types-c", "types-java"):
             (work / folder).mkdir()
@@ -46,9 +43,7 @@ def inside():
                 subprocess.run(["sh", "-e", "-c", text], cwd=work, check=True, stdout=subprocess.DEVNULL)
                 print(f"made by the commands of {name}")
         lcm_tools.write_recording(work / "recording", 4)
-        (work / "config.yaml").write_text(
-            "format: waymark-config/1\nestimator: odometry\npublish: {lcm_url: '" + lcm_tools.URL + "'}\ncommands: {lcm: true}\n"
-            "realtime: {lock_memory: false}\n")
+        lcm_tools.config(work / "config.yaml", "odometry", "commands: {lcm: true}\n")
         environment = {**os.environ, "PYTHONPATH": str(work / "types")}
         start = lambda *command: started.append(subprocess.Popen([*command, lcm_tools.URL], cwd=work, env=environment,
                                                                  stdout=subprocess.PIPE, text=True))
@@ -66,15 +61,6 @@ def inside():
             print(f"{name}: {len(text.splitlines())} poses; the last: {text.splitlines()[-1] if text else 'none'}")
             assert last_x(text) is not None and abs(last_x(text) - 100) < 5, f"{name} did not hear the run that set_pose.py moved"
         assert [last_x(text) for text in heard].count(last_x(heard[0])) == 2, "Python and C heard different poses"
-    finally:
-        lcm_tools.end_all(started)
-        shutil.rmtree(work)
-
-
-def main():
-    if len(sys.argv) > 1 and sys.argv[1] == "inside":
-        return inside()
-    return subprocess.run(["unshare", "-n", lcm_tools.need_network(), __file__, "inside"]).returncode
 
 
 if __name__ == "__main__":

@@ -10,23 +10,20 @@ Then another one with counts of its wheels, a compass and positions, for landmar
 import csv
 import json
 import math
-import pathlib
 import re
-import shutil
 import signal
 import subprocess
 import sys
-import tempfile
 import time
 
 import lcm_tools
+from lcm_tools import in_a_network
 
 V, VY, W = 0.4, 0.2, 0.3
 SENDERS_CLOCK_NS = -10**15  # the gyro's computer started later
 SECONDS = 4
-CONFIG = (
-    "format: waymark-config/1\nestimator: odometry\npublish: {lcm_url: '" + lcm_tools.URL + "'}\n"
-    "initial_pose: {x_m: 0, y_m: 0, heading_rad: 0}\ncalibration: calibration.yaml\nrealtime: {lock_memory: false}\n"
+TWIST = (
+    "initial_pose: {x_m: 0, y_m: 0, heading_rad: 0}\ncalibration: calibration.yaml\n"
     "devices: {lcm: [{stream: motion}, {stream: imu, clock: sender, channel: GYRO}]}\n")
 
 
@@ -55,9 +52,7 @@ def publish():
 
 
 WHEELS = (
-    "format: waymark-config/1\nestimator: landmark_ekf\npublish: {lcm_url: '" + lcm_tools.URL + "'}\n"
-    "calibration: calibration.yaml\nrealtime: {lock_memory: false}\n"
-    "landmarks: landmarks.csv\ndevices: {lcm: [{stream: ticks}, {stream: heading}, {stream: gnss}], sightings: lcm}\n")
+    "calibration: calibration.yaml\nlandmarks: landmarks.csv\ndevices: {lcm: [{stream: ticks}, {stream: heading}, {stream: gnss}], sightings: lcm}\n")
 
 
 def publish_wheels():
@@ -92,9 +87,9 @@ def check_wheels(work):
     (work / "calibration.yaml").write_text("wheels: {radius_m: 0.1, ticks_per_turn: 1000, track_m: 0.5}\n"
                                            "sensors: {eye: {mounting: {xyz_m: [0, 0, 0], rpy_deg: [0, 0, 0]}, bearing_sigma_rad: 0.01}}\n")
     (work / "landmarks.csv").write_text("id,x_m,y_m,z_m,sigma_m\n1,10,105,0,0.01\n")
-    (work / "wheels.yaml").write_text(WHEELS)
+    lcm_tools.config(work / "wheels.yaml", "landmark_ekf", WHEELS)
     run = start(work, "wheels")
-    subprocess.run([sys.executable, __file__, "publish_wheels"], env={"PYTHONPATH": str(work)}, check=True)
+    subprocess.run([sys.executable, __file__, "publish_wheels"], env={"PYTHONPATH": str(work / "types")}, check=True)
     stop(run, 0.5)
     replay_both(work, "wheels")
     for what in ("wheels", "wheels-replayed"):
@@ -112,9 +107,8 @@ def check_wheels(work):
 
 ROLL = 0.05
 SPACE = (
-    "format: waymark-config/1\nestimator: stereo_ekf\npublish: {lcm_url: '" + lcm_tools.URL + "'}\n"
     "initial_pose: {x_m: 0, y_m: 0, z_m: -3, heading_rad: 0, sigma_heading_rad: 0.1}\ncalibration: calibration.yaml\n"
-    "realtime: {lock_memory: false}\nstereo_ekf: {states: {accelerometer_bias_sigma_mps2: 0.01}}\n"
+    "stereo_ekf: {states: {accelerometer_bias_sigma_mps2: 0.01}}\n"
     "devices: {lcm: [{stream: motion6}, {stream: imu}, {stream: depth}]}\n")
 
 
@@ -144,9 +138,9 @@ def publish_space():
 
 def check_space(work):
     (work / "calibration.yaml").write_text("{}\n")
-    (work / "space.yaml").write_text(SPACE)
+    lcm_tools.config(work / "space.yaml", "stereo_ekf", SPACE)
     run = start(work, "space")
-    subprocess.run([sys.executable, __file__, "publish_space"], env={"PYTHONPATH": str(work)}, check=True)
+    subprocess.run([sys.executable, __file__, "publish_space"], env={"PYTHONPATH": str(work / "types")}, check=True)
     stop(run, 0.5)
     replay_both(work, "space")
     for what in ("space", "space-replayed"):
@@ -214,10 +208,10 @@ def waymark(*words):
 
 
 def check_twist(work):
-    (work / "twist.yaml").write_text(CONFIG)
+    lcm_tools.config(work / "twist.yaml", "odometry", TWIST)
     (work / "calibration.yaml").write_text("imu: {mounting: {rpy_deg: [180, 0, 30]}}\n")
     run = start(work, "twist")
-    subprocess.run([sys.executable, __file__, "publish"], env={"PYTHONPATH": str(work)}, check=True)
+    subprocess.run([sys.executable, __file__, "publish"], env={"PYTHONPATH": str(work / "types")}, check=True)
     out, err = stop(run, 3)  # silent for longer than 2 s
     assert "no usable motion_t on WAYMARK_MOTION yet" in err, err
     assert "imu_t comes on WAYMARK_GYRO" in err and "no usable imu_t on WAYMARK_GYRO any more" in err, err
@@ -233,23 +227,15 @@ def check_twist(work):
     assert "\ngood" in waymark("check", recording / "config.yaml", recording, "--quick")
 
 
-def inside():
-    work = pathlib.Path(tempfile.mkdtemp(prefix="waymark-streams-"))
-    try:
-        subprocess.run(["ip", "link", "set", "lo", "up"], check=True)
-        subprocess.run(lcm_tools.ROUTE, check=True)
-        subprocess.run(["lcm-gen", "-p", "--ppath", work, *sorted((lcm_tools.ROOT / "msgs/lcm").glob("*.lcm"))], check=True)
+def main():
+    if len(sys.argv) > 1:
+        return {"publish": publish, "publish_wheels": publish_wheels, "publish_space": publish_space}[sys.argv[1]]()
+    lcm_tools.own_network()
+    with in_a_network.work_folder("streams") as work:
+        lcm_tools.python_types(work)
         check_twist(work)
         check_wheels(work)
         check_space(work)
-    finally:
-        shutil.rmtree(work)
-
-
-def main():
-    if len(sys.argv) > 1:
-        return {"inside": inside, "publish": publish, "publish_wheels": publish_wheels, "publish_space": publish_space}[sys.argv[1]]()
-    return subprocess.run(["unshare", "-n", lcm_tools.need_network(), __file__, "inside"]).returncode
 
 
 if __name__ == "__main__":

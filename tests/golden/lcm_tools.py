@@ -10,36 +10,47 @@ In a network of its own with nothing but a loopback:
   3. without a route for multicast the run says so once, goes on, and writes the same number of poses; a route that
      appears later is found.
 """
+import contextlib
 import csv
+import functools
 import json
 import math
 import os
 import pathlib
-import shutil
 import signal
 import subprocess
 import sys
-import tempfile
 import time
 import urllib.error
 import urllib.request
 
-SKIPPED = 77
 ROOT = pathlib.Path(os.environ.get("WM_SOURCE_DIR", ".")).resolve()
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "common"))
+import in_a_network  # noqa: E402
+from in_a_network import ROUTE  # noqa: E402
+
 WAYMARK = pathlib.Path(os.environ.get("WM_BIN_DIR", ROOT / "build/bin")) / "waymark"
 URL = "udpm://239.255.76.67:7667?ttl=0"
-ROUTE = ["ip", "route", "add", "224.0.0.0/4", "dev", "lo"]
 
 
-def skip(why):
-    print(f"skipped: {why}")
-    sys.exit(SKIPPED)
+# For who needs LCM's tools and its Python binding.
+again = functools.partial(in_a_network.again, "lcm", programs=("lcm-logger", "lcm-gen"))
+own_network = functools.partial(in_a_network.begin, "lcm", programs=("lcm-logger", "lcm-gen"))
 
 
-def end_all(processes):
-    """Kills those that still run."""
-    for process in processes:
-        if process.poll() is None:
+def config(path, estimator, more="", publish=""):
+    """Writes a configuration of a run on this network's LCM."""
+    path.write_text(f"format: waymark-config/1\nestimator: {estimator}\npublish: {{lcm_url: '{URL}'{publish}}}\nrealtime: {{lock_memory: false}}\n{more}")
+
+
+@contextlib.contextmanager
+def ended():
+    """A list of processes; those that still run after a with are killed."""
+    processes = []
+    try:
+        yield processes
+    finally:
+        for process in processes:
             process.kill()
 
 
@@ -222,40 +233,15 @@ def check_no_route(work):
     assert len(published(work / "silent")) > 100
 
 
-def inside():
-    work = pathlib.Path(tempfile.mkdtemp(prefix="waymark-lcm-"))
-    try:
-        subprocess.run(["ip", "link", "set", "lo", "up"], check=True)
-        subprocess.run(ROUTE, check=True)
+def main():
+    own_network()
+    with in_a_network.work_folder("lcm") as work:
         write_recording(work / "recording", 4)
-        (work / "config.yaml").write_text(
-            "format: waymark-config/1\nestimator: landmark_ekf\npublish: {lcm_url: '" + URL + "'}\n"
-            "commands: {lcm: true}\n"
-            "realtime: {lock_memory: false}\n")
+        config(work / "config.yaml", "landmark_ekf", "commands: {lcm: true}\n")
         check_logger(work)
         check_commands(work)
         check_web(work)
         check_no_route(work)
-    finally:
-        shutil.rmtree(work)
-
-
-def need_network():
-    for program in ("lcm-logger", "lcm-gen", "ip", "unshare"):
-        if not shutil.which(program):
-            skip(f"there is no {program}")
-    python = ROOT / ".cache/venv/bin/python"
-    if subprocess.run([python, "-c", "import lcm"], capture_output=True).returncode if python.exists() else True:
-        skip("LCM's Python binding is missing; tests/judges/setup.sh fetches it")
-    if subprocess.run(["unshare", "-n", "true"], capture_output=True).returncode:
-        skip("no right to a network namespace (root, or user namespaces)")
-    return python
-
-
-def main():
-    if len(sys.argv) > 1 and sys.argv[1] == "inside":
-        return inside()
-    return subprocess.run(["unshare", "-n", need_network(), __file__, "inside"]).returncode
 
 
 if __name__ == "__main__":

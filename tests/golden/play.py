@@ -6,12 +6,10 @@ import csv
 import json
 import os
 import pathlib
-import shutil
 import signal
 import struct
 import subprocess
 import sys
-import tempfile
 import time
 
 ROOT = pathlib.Path(os.environ.get("WM_SOURCE_DIR", ".")).resolve()
@@ -19,6 +17,7 @@ PLAY = pathlib.Path(os.environ.get("WM_BIN_DIR", ROOT / "build/bin")) / "waymark
 sys.path[:0] = [str(ROOT / "tests/golden"), str(ROOT / "tests/hil")]
 import lcm_tools  # noqa: E402
 import messages  # noqa: E402
+from lcm_tools import in_a_network  # noqa: E402
 
 SECONDS = 4
 
@@ -143,24 +142,16 @@ def check_reference():
 
 
 def main():
-    work = pathlib.Path(tempfile.mkdtemp(prefix="waymark-play-"))
-    try:
+    if in_a_network.INSIDE not in os.environ:
+        check_reference()
+    in_a_network.begin(programs=("lcm-logger",))
+    with in_a_network.work_folder("play") as work:
         recording = work / "recording"
         lcm_tools.write_recording(recording, SECONDS)
-        if sys.argv[1:] == ["inside"]:
-            subprocess.run(["ip", "link", "set", "lo", "up"], check=True)
-            subprocess.run(lcm_tools.ROUTE, check=True)
-            check_all(work, recording)
-            check_faults(work, recording)
-            check_end(work, recording)
-            check_mistakes(work, recording)
-            return 0
-        check_reference()
-        if not shutil.which("lcm-logger") or subprocess.run(["unshare", "-n", "true"], capture_output=True).returncode:
-            lcm_tools.skip("no lcm-logger, or no right to a network namespace")
-        return subprocess.run(["unshare", "-n", sys.executable, __file__, "inside"]).returncode
-    finally:
-        shutil.rmtree(work, ignore_errors=True)
+        check_all(work, recording)
+        check_faults(work, recording)
+        check_end(work, recording)
+        check_mistakes(work, recording)
 
 
 if __name__ == "__main__":

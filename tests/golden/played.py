@@ -176,16 +176,14 @@ def over_lcm(waymark, recording, estimator, most_m, seconds, work):
     assert off_m <= most_m and share > 0.95, (recording.name, off_m, share)
 
 
-def lcm_inside(args):
+def all_over_lcm(args):
     import lcm_tools
 
-    subprocess.run(["ip", "link", "set", "lo", "up"], check=True)
-    subprocess.run(lcm_tools.ROUTE, check=True)
+    lcm_tools.own_network()
     for name, estimator, most_m in OVER_LCM:
         with tempfile.TemporaryDirectory(prefix="waymark-played-") as folder:
             work = pathlib.Path(folder)
-            (work / "types").mkdir()
-            subprocess.run(["lcm-gen", "-p", "--ppath", work / "types", *sorted((lcm_tools.ROOT / "msgs/lcm").glob("*.lcm"))], check=True)
+            lcm_tools.python_types(work)
             over_lcm(args.bin / "waymark", args.data / name, estimator, most_m, args.lcm, work)
 
 
@@ -195,15 +193,13 @@ def main():
     parser.add_argument("data", type=pathlib.Path)
     parser.add_argument("--all", action="store_true", help="also the long recordings: ten minutes")
     parser.add_argument("--lcm", type=int, metavar="SECONDS", help="also over LCM, so many seconds of each")
-    parser.add_argument("--inside", action="store_true", help=argparse.SUPPRESS)
     args = parser.parse_args()
     args.data = args.data.resolve()
     if not (args.data / "mecanum-1").exists():
         print(f"skipped: {args.data} has no recordings")
         return SKIPPED
-    if args.inside:
-        lcm_inside(args)
-        return 0
+    if "WAYMARK_TEST_INSIDE" in os.environ:
+        return all_over_lcm(args)
     failed = []
     for name, estimator, speed in CASES + (MORE if args.all else []):
         with tempfile.TemporaryDirectory(prefix="waymark-played-") as folder:
@@ -213,11 +209,8 @@ def main():
         print("FAIL: other poses than the replay's, though no datum came late:", ", ".join(failed))
         return 1
     if args.lcm:
-        import lcm_tools
-
         os.environ.setdefault("WM_BIN_DIR", str(args.bin.resolve()))
-        return subprocess.run(["unshare", "-n", lcm_tools.need_network(), __file__, *map(str, (args.bin, args.data)), "--lcm", str(args.lcm),
-                               "--inside"]).returncode
+        return all_over_lcm(args)
     return 0
 
 

@@ -18,11 +18,11 @@ import re
 import shutil
 import subprocess
 import sys
-import tempfile
 import zlib
 
 import lcm_tools
 import restarts
+from lcm_tools import in_a_network
 
 RANDOM = random.Random(11)
 CALLS = "openat,write,fsync,fdatasync,rename,renameat,renameat2,unlink,unlinkat,link,linkat,ftruncate,close"
@@ -184,10 +184,9 @@ def start_from(state, work, robot, command):
 def main():
     cuts = int(sys.argv[1])
     if not shutil.which("strace"):
-        lcm_tools.skip("there is no strace")
-    work = pathlib.Path(tempfile.mkdtemp(prefix="waymark-power-")).resolve()
-    robot = work / "robot"
-    try:
+        in_a_network.skip("there is no strace")
+    with in_a_network.work_folder("power") as work:
+        robot = work / "robot"
         robot.mkdir()
         restarts.write_rest(work / "rest", 0.0, 9)
         (work / "config.yaml").write_text(
@@ -207,8 +206,6 @@ def main():
         kept = [start_from(s, work, robot, command) for s in RANDOM.sample([s for s, _ in states], max(6, cuts // 50))]
         print(f"{cuts} power cuts in {len(calls)} calls: no broken or lost saved pose or map ({len(with_map)} with a map); without the syncs "
               f"{len(unsynced)} faults; {len(kept)} starts from such states, {sum(kept)} logs of the black box replayed")
-    finally:
-        shutil.rmtree(work)
 
 
 if __name__ == "__main__":

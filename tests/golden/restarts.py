@@ -6,19 +6,18 @@ than its sigma, and no file of it is ever half written. A recording is played, o
     restarts.py KILLS"""
 import math
 import os
-import pathlib
 import random
 import shutil
 import signal
 import struct
 import subprocess
 import sys
-import tempfile
 import threading
 import time
 import zlib
 
 import lcm_tools
+from lcm_tools import in_a_network
 
 V_MPS, W_RADPS, LANDMARKS = 0.5, 0.25, 12
 RIGHT_M, RIGHT_WITHIN_S, LAP_S = 0.15, 5.0, 20.0
@@ -132,17 +131,11 @@ def one_run(work, subscriber, at_s, seconds, command):
             "landmarks": [landmarks_of(h) for h in subscriber.healths], "killed_at_s": poses[-1].t_ns * 1e-9}
 
 
-def inside(kills):
-    work = pathlib.Path(tempfile.mkdtemp(prefix="waymark-restarts-"))
-    try:
-        subprocess.run(["ip", "link", "set", "lo", "up"], check=True)
-        subprocess.run(lcm_tools.ROUTE, check=True)
+def drive_on(kills):
+    with in_a_network.work_folder("restarts") as work:
         waymark = lcm_tools.python_types(work)
-        (work / "config.yaml").write_text(
-            "format: waymark-config/1\nestimator: slam\npublish: {lcm_url: '" + lcm_tools.URL + "'}\n"
-            "realtime: {lock_memory: false}\n"
-            "start: {saved_pose: pose.yaml, save_every_s: 0.1, saved_map: map.bin, save_map_every_s: 0.2}\n"
-            "black_box: {folder: box}\n")
+        lcm_tools.config(work / "config.yaml", "slam", "start: {saved_pose: pose.yaml, save_every_s: 0.1, saved_map: map.bin, save_map_every_s: 0.2}\n"
+                         "black_box: {folder: box}\n")
         command = [lcm_tools.WAYMARK, "run", "--config", work / "config.yaml", "--recording", work / "rest", "--resume"]
         subscriber = Subscriber(waymark)
         subscriber.start()
@@ -182,18 +175,16 @@ def inside(kills):
         assert max(wrong) < RIGHT_WITHIN_S
         assert kept >= LANDMARKS and off_m(end) < END_M
         return TOO_SURE if max(beyond) >= SIGMAS else 0
-    finally:
-        shutil.rmtree(work)
 
 
 def main():
-    if sys.argv[-1] == "inside":
-        return inside(int(sys.argv[1]))
-    command = ["unshare", "-n", lcm_tools.need_network(), __file__, sys.argv[1], "inside"]
-    code = subprocess.run(command).returncode
+    if in_a_network.INSIDE in os.environ:
+        lcm_tools.own_network()
+        return drive_on(int(sys.argv[1]))
+    code = lcm_tools.again()
     if code == TOO_SURE:
         print(f"beyond {SIGMAS} sigma: once more", flush=True)
-        code = subprocess.run(command).returncode
+        code = lcm_tools.again()
     return code
 
 

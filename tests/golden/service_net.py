@@ -11,7 +11,11 @@ import socket
 import subprocess
 import sys
 
-UNIT = (pathlib.Path(__file__).resolve().parent.parent.parent / "config/waymark.service").read_text()
+TESTS = pathlib.Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(TESTS / "common"))
+import in_a_network  # noqa: E402
+
+UNIT = (TESTS.parent / "config/waymark.service").read_text()
 GROUP, PORT = "239.255.76.67", 7667
 
 
@@ -33,12 +37,12 @@ def source_of_multicast():
     return ipaddress.ip_address(receiver.recvfrom(100)[1][0])
 
 
-def inside():
-    for command in ("ip link set lo up", "ip link add nic0 type veth peer name nic1", "ip link set nic1 up", "ip addr add 192.0.2.2/24 dev nic0", "ip link set nic0 up",
+def main():
+    in_a_network.begin(programs=(), multicast=False)
+    for command in ("ip link add nic0 type veth peer name nic1", "ip link set nic1 up", "ip addr add 192.0.2.2/24 dev nic0", "ip link set nic0 up",
                     "ip route add default dev nic0"):
         if subprocess.run(command.split(), capture_output=True).returncode:
-            print(f"skipped: {command} fails here")
-            return 77
+            in_a_network.skip(f"{command} fails here")
     before = source_of_multicast()
     print(f"by the default route a local datagram comes from {before}")
     assert not any(before in network for network in allowed()), "this computer can't show it"
@@ -47,15 +51,6 @@ def inside():
     after = source_of_multicast()
     print(f"with the unit's route it comes from {after}")
     assert any(after in network for network in allowed()), "the unit's IP filter drops local LCM multicast"
-
-
-def main():
-    if sys.argv[-1] == "inside":
-        return inside()
-    if subprocess.run(["unshare", "-n", "true"], capture_output=True).returncode:
-        print("skipped: no right to a network namespace")
-        return 77
-    return subprocess.run(["unshare", "-n", sys.executable, __file__, "inside"]).returncode
 
 
 if __name__ == "__main__":

@@ -5,16 +5,14 @@ silent for the last part of the drive, which does not stop the watchdog either. 
 
     slow_disk.py LIBRARY        (tests/golden/slow_disk.c, to be preloaded)"""
 import os
-import pathlib
-import shutil
 import socket
 import subprocess
 import sys
-import tempfile
 import threading
 import time
 
 import lcm_tools
+from lcm_tools import in_a_network
 
 BLOCK_S, DRIVE_S, SILENT_S, WATCHDOG_S = 3, 6, 5, 1
 
@@ -52,20 +50,17 @@ def largest_gap(times):
     return max(b - a for a, b in zip(times, times[1:]))
 
 
-def inside(library):
-    work = pathlib.Path(tempfile.mkdtemp(prefix="waymark-slow-disk-"))
-    try:
-        subprocess.run(["ip", "link", "set", "lo", "up"], check=True)
-        subprocess.run(lcm_tools.ROUTE, check=True)
+def main():
+    lcm_tools.own_network()
+    library = sys.argv[1]
+    with in_a_network.work_folder("slow-disk") as work:
         waymark = lcm_tools.python_types(work)
         recording = work / "recording"
         lcm_tools.write_recording(recording, DRIVE_S)
         with open(recording / "sightings.csv", "a") as f:  # sightings go on without motion
             for i in range(DRIVE_S * 10, (DRIVE_S + SILENT_S) * 10):
                 f.write(f"{i * 100_000_000},eye,0,0,5\n")
-        (work / "config.yaml").write_text(
-            "format: waymark-config/1\nestimator: landmark_ekf\npublish: {lcm_url: '" + lcm_tools.URL + "'}\n"
-            "realtime: {lock_memory: false}\n")
+        lcm_tools.config(work / "config.yaml", "landmark_ekf")
         manager, subscriber = Manager(work / "notify"), Subscriber(waymark.pose_t)
         manager.start()
         subscriber.start()
@@ -91,14 +86,6 @@ def inside(library):
         print(" | ".join(states))
         assert any("silent: motion" in text for text in states), states
         assert "outputs: " not in done.stderr + done.stdout
-    finally:
-        shutil.rmtree(work)
-
-
-def main():
-    if len(sys.argv) > 2 and sys.argv[2] == "inside":
-        return inside(sys.argv[1])
-    return subprocess.run(["unshare", "-n", lcm_tools.need_network(), __file__, sys.argv[1], "inside"]).returncode
 
 
 if __name__ == "__main__":

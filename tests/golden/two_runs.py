@@ -11,26 +11,19 @@
 Needs lcm-gen, and the right to a network namespace (else 77)."""
 import csv
 import json
-import os
-import pathlib
-import shutil
 import signal
 import socket
 import stat
 import subprocess
 import sys
-import tempfile
 import time
 
 import lcm_tools
-from lcm_tools import ROUTE, URL, WAYMARK, write_recording
+from lcm_tools import WAYMARK, config, in_a_network, write_recording
 
 
 def configure(work, name, prefix, more=""):
-    path = work / f"{name}.yaml"
-    path.write_text(f"format: waymark-config/1\nestimator: odometry\npublish: {{lcm_url: '{URL}', channel_prefix: {prefix}}}\n"
-                    f"realtime: {{lock_memory: false}}\n{more}")
-    return path
+    config(work / f"{name}.yaml", "odometry", more, f", channel_prefix: {prefix}")
 
 
 def start(work, name, recording="recording"):
@@ -144,28 +137,13 @@ def check_other_network(work):
     print("told over the other network to stand at x = 100 m: ends at", last_x_m(work, "network"))
 
 
-def inside():
-    work = pathlib.Path(tempfile.mkdtemp(prefix="waymark-two-runs-"))
-    try:
-        subprocess.run(["ip", "link", "set", "lo", "up"], check=True)
-        subprocess.run(ROUTE, check=True)
+def main():
+    in_a_network.begin()
+    with in_a_network.work_folder("two-runs") as work:
         write_recording(work / "recording", 12)
         check_other_runs(work)
         check_commands(work)
         check_other_network(work)
-    finally:
-        shutil.rmtree(work)
-
-
-def main():
-    if sys.argv[-1] == "inside":
-        return inside()
-    for program in ("lcm-gen", "ip", "unshare"):
-        if not shutil.which(program):
-            lcm_tools.skip(f"there is no {program}")
-    if subprocess.run(["unshare", "-n", "true"], capture_output=True).returncode:
-        lcm_tools.skip("no right to a network namespace (root, or user namespaces)")
-    return subprocess.run(["unshare", "-n", sys.executable, __file__, "inside"], env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1"}).returncode
 
 
 if __name__ == "__main__":

@@ -4,21 +4,16 @@
 that sends rubbish. The run does not notice (no pose is lost, nothing is counted), those that read are answered, and what is answered is
 valid JSON, with names from messages as text. Needs the right to a network namespace; skipped (77) without."""
 import json
-import os
-import pathlib
-import shutil
 import signal
 import socket
 import subprocess
 import sys
-import tempfile
 import threading
 import time
 import urllib.error
 import urllib.request
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
-from lcm_tools import ROUTE, URL, WAYMARK, finish, published, run, skip, write_recording  # noqa: E402
+from lcm_tools import WAYMARK, config, ended, finish, in_a_network, published, run, write_recording
 
 SECONDS = 8
 WEB = WAYMARK.with_name("waymark-web")
@@ -99,23 +94,22 @@ def alone(work, name):
     return out
 
 
-def inside():
-    work = pathlib.Path(tempfile.mkdtemp(prefix="waymark-web-"))
-    web = None
-    try:
-        subprocess.run(["ip", "link", "set", "lo", "up"], check=True)
-        subprocess.run(ROUTE, check=True)
+def main():
+    if not WEB.exists():
+        in_a_network.skip("waymark-web is not built here (libmicrohttpd-dev)")
+    in_a_network.begin(programs=())
+    with in_a_network.work_folder("web") as work, ended() as started:
         write_recording(work / "recording", SECONDS)
         for file in ("calibration.yaml", "sightings.csv"):
             path = work / "recording" / file
             path.write_text(path.read_text().replace("{eye:", '{"' + NAME + '":').replace(",eye,", f",{NAME},"))
-        (work / "config.yaml").write_text("format: waymark-config/1\nestimator: landmark_ekf\n"
-                                          f"publish: {{lcm_url: '{URL}'}}\nrealtime: {{lock_memory: false}}\n")
+        config(work / "config.yaml", "landmark_ekf")
         quiet = alone(work, "quiet")
         web = subprocess.Popen([WEB, work / "config.yaml", "--recording", work / "recording", "--listen", "0"], stdout=subprocess.PIPE, text=True)
+        started.append(web)
         port = int(web.stdout.readline().rpartition(":")[2])
-        until, answers, failures, ended = time.monotonic() + SECONDS + 6, [], [], []
-        crowd = [threading.Thread(target=drip, args=(port, until, ended)) for _ in range(20)]
+        until, answers, failures, sent_away = time.monotonic() + SECONDS + 6, [], [], []
+        crowd = [threading.Thread(target=drip, args=(port, until, sent_away)) for _ in range(20)]
         crowd += [threading.Thread(target=never_read, args=(port, until)) for _ in range(10)]
         crowd += [threading.Thread(target=read_on, args=(port, until, answers, failures)) for _ in range(20)]
         crowd.append(threading.Thread(target=send_rubbish, args=(port, until, failures)))
@@ -146,27 +140,13 @@ def inside():
         # The run did not notice: every pose of its rate, none lost, the same fused.
         health = {name: json.loads((work / name / "health.json").read_text()) for name in ("quiet", "crowded")}
         poses = {name: len(published(work / name)) for name in health}
-        print(f"{len(answers)} answers to 20 browsers; poses alone {poses['quiet']}, in the crowd {poses['crowded']}; {len(ended)} that drip were sent away")
+        print(f"{len(answers)} answers to 20 browsers; poses alone {poses['quiet']}, in the crowd {poses['crowded']}; {len(sent_away)} that drip were sent away")
         assert poses["crowded"] > 0.9 * poses["quiet"], poses
         fused = {name: {source: value["fused"] for source, value in health[name]["sources"].items()} for name in health}
         assert fused["crowded"] == fused["quiet"], fused
         assert health["crowded"]["outputs_lost"] == 0
         web.send_signal(signal.SIGTERM)
         assert web.wait(timeout=20) == 0
-    finally:
-        if web and web.poll() is None:
-            web.kill()
-        shutil.rmtree(work)
-
-
-def main():
-    if len(sys.argv) > 1 and sys.argv[1] == "inside":
-        return inside()
-    if not WEB.exists():
-        skip("waymark-web is not built here (libmicrohttpd-dev)")
-    if not shutil.which("ip") or subprocess.run(["unshare", "-n", "true"], capture_output=True).returncode:
-        skip("no right to a network namespace (root, or user namespaces)")
-    return subprocess.run(["unshare", "-n", sys.executable, __file__, "inside"], env=dict(os.environ)).returncode
 
 
 if __name__ == "__main__":

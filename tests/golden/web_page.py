@@ -4,17 +4,13 @@
 elsewhere, trail and map are drawn, and in the live picture the map's edges beside those that the detector found. Skipped (77) without Chromium or the right to a network namespace.
 
     web_page.py [FOLDER]      with a folder: pictures of the page are left there (desk and phone, light and dark)"""
-import os
 import pathlib
-import shutil
 import signal
 import subprocess
 import sys
-import tempfile
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
-import browser  # noqa: E402
-from lcm_tools import ROOT, ROUTE, URL, WAYMARK, end_all, skip  # noqa: E402
+import browser
+from lcm_tools import ROOT, URL, WAYMARK, ended, in_a_network
 
 DRIVE_S, WAIT_S = 24, 40
 
@@ -29,12 +25,14 @@ def prepare(work):
                                      + f"\npublish: {{lcm_url: '{URL}', picture_socket: pictures}}\n")
 
 
-def inside(pictures):
-    work = pathlib.Path(tempfile.mkdtemp(prefix="waymark-page-"))
-    started = []
-    try:
-        subprocess.run(["ip", "link", "set", "lo", "up"], check=True)
-        subprocess.run(ROUTE, check=True)
+def main():
+    if not browser.program():
+        in_a_network.skip("there is no Chromium (apt install chromium)")
+    if not all(WAYMARK.with_name(name).exists() for name in ("waymark-web", "waymark-simulate")):
+        in_a_network.skip("waymark-web or waymark-simulate is not built here")
+    in_a_network.begin(programs=())
+    pictures = sys.argv[1] if len(sys.argv) > 1 else ""
+    with in_a_network.work_folder("page") as work, ended() as started:
         prepare(work)
         web = subprocess.Popen([WAYMARK.with_name("waymark-web"), work / "robot.yaml", "--recording", work / "recording", "--listen", "0"],
                                stdout=subprocess.PIPE, text=True)
@@ -72,22 +70,6 @@ def inside(pictures):
         assert run.returncode == 0, said
         web.send_signal(signal.SIGTERM)
         print(drawn, web.communicate(timeout=20)[0].strip())
-    finally:
-        end_all(started)
-        shutil.rmtree(work)
-
-
-def main():
-    pictures = sys.argv[1] if len(sys.argv) > 1 else ""
-    if pictures == "inside":
-        return inside(sys.argv[2])
-    if not browser.program():
-        skip("there is no Chromium (apt install chromium)")
-    if not all(WAYMARK.with_name(name).exists() for name in ("waymark-web", "waymark-simulate")):
-        skip("waymark-web or waymark-simulate is not built here")
-    if not shutil.which("ip") or subprocess.run(["unshare", "-n", "true"], capture_output=True).returncode:
-        skip("no right to a network namespace (root, or user namespaces)")
-    return subprocess.run(["unshare", "-n", sys.executable, __file__, "inside", pictures], env=dict(os.environ)).returncode
 
 
 if __name__ == "__main__":

@@ -6,7 +6,6 @@ written, and a run on each begins with its map, within half a second, and is rig
     cuts.py WORK WAYMARK        by hil.py; in a network of its own"""
 import csv
 import math
-import os
 import pathlib
 import random
 import re
@@ -17,10 +16,12 @@ import sys
 import time
 import zlib
 
-import drives
-import messages
-from published import IS_BUSY
-from write_log import WriteLog
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[1] / "common"))
+import drives  # noqa: E402
+import in_a_network  # noqa: E402
+import messages  # noqa: E402
+from published import IS_BUSY  # noqa: E402
+from write_log import WriteLog  # noqa: E402
 
 CUTS, DISK_BYTES, FILES_BYTES = 20, 64 << 20, 60 << 20
 MAPPED_S = 53            # of the drive: the map has all markers of the lap from here on
@@ -114,10 +115,7 @@ def start(waymark, work, folder, state, recording, config, began_utc_s):
 
 def main():
     work, waymark = (pathlib.Path(p) for p in sys.argv[1:3])
-    if os.environ.get("WM_INSIDE") != "1":
-        return subprocess.run(["unshare", "-n", sys.executable, *sys.argv], env=dict(os.environ, WM_INSIDE="1")).returncode
-    subprocess.run(["ip", "link", "set", "lo", "up"], check=True)
-    subprocess.run(["ip", "route", "add", "224.0.0.0/4", "dev", "lo"], check=True)
+    in_a_network.begin()
     recording, config = work / "office-recording", (work / "share/kills/robot.yaml").read_text()
     ahead_ns = int(re.search(r"ahead (-?\d+) ns", (work / "share/out/kills/drive.timeline.txt").read_text()).group(1))
     before = (work / "kills.before").read_bytes()

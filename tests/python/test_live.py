@@ -18,7 +18,8 @@ import time
 import unittest
 from socket import create_server
 
-from in_a_network import begin
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[1] / "common"))
+from in_a_network import begin  # noqa: E402
 
 begin("foxglove", "websockets")
 
@@ -39,11 +40,6 @@ CONFIG = "format: waymark-config/1\nestimator: landmark_ekf\npublish: {rate_hz: 
 STEADY = {"/tf", "/waymark/pose", "/waymark/odom", "/waymark/status", "/waymark/bound", "/waymark/innovations/sightings_eye/bearing",
           "/waymark/innovations/sightings_eye/range", "/recording/sightings", "/diagnostics", "/waymark/path", "/waymark/path/points",
           "/landmarks", "/landmarks/points"}
-
-
-def setUpModule():
-    subprocess.run(["ip", "link", "set", "lo", "up"], check=True)
-    subprocess.run(lcm_tools.ROUTE, check=True)
 
 
 class Viewer:
@@ -91,10 +87,10 @@ class LiveRun(unittest.TestCase):
         server = subprocess.Popen([BIN / "waymark", "watch", "--foxglove", str(PORT), "--config", folder / "robot.yaml", "--recording",
                                    folder / "rec", "--duration", str(SECONDS + 6)], stdout=subprocess.PIPE, text=True,
                                   env=cls.environment(folder))
-        cls.addClassCleanup(lcm_tools.end_all, [server])
+        cls.addClassCleanup(server.kill)
         cls.line = server.stdout.readline()
         viewer, run = Viewer(), lcm_tools.run(folder / "rec", folder / "robot.yaml", folder / "out")
-        cls.addClassCleanup(lcm_tools.end_all, [run])
+        cls.addClassCleanup(run.kill)
         cls.live, cls.viewer = [], viewer
         asyncio.run(cls.both(live, viewer, run))
         lcm_tools.finish(run)
@@ -283,7 +279,7 @@ class Fields(unittest.TestCase):
                                            f"publish: {{lcm_url: '{lcm_tools.URL}'}}\n")
         run = subprocess.Popen([BIN / "waymark", "run", "--config", folder / "robot.yaml", "--out", folder / "out"], stdout=subprocess.PIPE,
                                stderr=subprocess.PIPE, text=True)
-        self.addCleanup(lcm_tools.end_all, [run])
+        self.addCleanup(run.kill)
         lcm_tools.wait_for_listener()
         node = lcm.LCM(lcm_tools.URL)
         time.sleep(0.7)

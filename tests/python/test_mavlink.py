@@ -20,7 +20,8 @@ import time
 import types
 import unittest
 
-from in_a_network import begin
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[1] / "common"))
+from in_a_network import begin  # noqa: E402
 
 begin("pymavlink", "lcm", "serial")
 
@@ -41,11 +42,6 @@ PORT = 14550
 BOOTED_NS = 77 * 10**9  # the autopilot's clock at the test's start
 CONFIG = "format: waymark-config/1\nestimator: landmark_ekf\npublish: {rate_hz: 50}\nrealtime: {lock_memory: false}\n"
 STEP = 1.2e-7  # of a float, of its value
-
-
-def setUpModule():
-    subprocess.run(["ip", "link", "set", "lo", "up"], check=True)
-    subprocess.run(lcm_tools.ROUTE, check=True)
 
 
 def program(*words, **environment):
@@ -251,10 +247,10 @@ class OnTheWire(unittest.TestCase):
         autopilot, live, poses = Autopilot(PORT), waymark.Live(kinds=("POSE",)), {}
         self.addCleanup(autopilot.socket.close)
         bridge = program("--link", f"udpout:127.0.0.1:{PORT}", *words)
-        self.addCleanup(lcm_tools.end_all, [bridge])
+        self.addCleanup(bridge.kill)
         self.assertIn(f"-> udpout:127.0.0.1:{PORT}", bridge.stdout.readline())
         run = lcm_tools.run(folder / "rec", folder / "robot.yaml", folder / "out")
-        self.addCleanup(lcm_tools.end_all, [run])
+        self.addCleanup(run.kill)
         autopilot.hear(1, live, poses, run)
         autopilot.hear(1, live, poses)  # what is under way
         lcm_tools.finish(run)
@@ -372,13 +368,14 @@ class OnTheWire(unittest.TestCase):
             "--link", "udpin:127.0.0.1:14551", "--north", "-70", "--take", "197", "--component", "198", "--prefix", "SECOND_")
         second = subprocess.Popen([BIN / "waymark", "run", "--config", folder / "second.yaml", "--out", folder / "second"],
                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-        self.addCleanup(lcm_tools.end_all, [to, taking, second])
+        for process in (to, taking, second):
+            self.addCleanup(process.kill)
         for bridge in (to, taking):
             self.assertTrue(bridge.stdout.readline())
         poses, live = [], waymark.Live(kinds=("POSE",))
         time.sleep(1)
         first = lcm_tools.run(folder / "rec", folder / "robot.yaml", folder / "out")
-        self.addCleanup(lcm_tools.end_all, [first])
+        self.addCleanup(first.kill)
         until = time.monotonic() + SECONDS + 20
         while first.poll() is None and time.monotonic() < until:
             if message := live.next(0.05):
@@ -427,7 +424,7 @@ class Taken(unittest.TestCase):
     def after(self, messages, *words):
         """Rows of the run, the last line and the errors after such messages (name, component, fields)."""
         bridge = program("--link", f"udpout:127.0.0.1:{PORT}", *words)
-        self.addCleanup(lcm_tools.end_all, [bridge])
+        self.addCleanup(bridge.kill)
         self.assertTrue(bridge.stdout.readline())
         self.autopilot.hear(2.5)
         for name, component, fields in messages:

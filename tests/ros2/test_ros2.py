@@ -15,17 +15,16 @@ import math
 import os
 import pathlib
 import pickle
-import shutil
 import signal
 import struct
 import subprocess
 import sys
-import tempfile
 import time
 
 HERE = pathlib.Path(__file__).resolve().parent
-sys.path[:0] = [str(HERE), str(HERE.parent / "golden")]
-SKIPPED = 77
+sys.path[:0] = [str(HERE), str(HERE.parent / "golden"), str(HERE.parent / "common")]
+import in_a_network  # noqa: E402
+
 DOMAIN = "42"
 OUT = {"/tf": ("tf2_msgs/msg/TFMessage", "stream"), "/waymark/pose": ("geometry_msgs/msg/PoseWithCovarianceStamped", "latched"),
        "/waymark/odom": ("nav_msgs/msg/Odometry", "stream"), "/diagnostics": ("diagnostic_msgs/msg/DiagnosticArray", "stream")}
@@ -326,24 +325,17 @@ def check_sources(work, given):
     assert min(received.values()) >= 95 and not any(bad.values()), counts
 
 
-def inside(given):
+def check(given):
     global cyclone_probe, get_typestore, lcm_tools, np, Stores
     import cyclone_probe
     import lcm_tools
     import numpy as np
     from rosbags.typesys import Stores, get_typestore
-    work = pathlib.Path(tempfile.mkdtemp(prefix="waymark-ros2-"))
-    try:
-        subprocess.run(["ip", "link", "set", "lo", "up", "multicast", "on"], check=True)
-        subprocess.run(lcm_tools.ROUTE, check=True)
+    with in_a_network.work_folder("ros2") as work:
         lcm_tools.write_recording(work / "recording", given.seconds)
-        (work / "config.yaml").write_text(
-            "format: waymark-config/1\nestimator: odometry\npublish: {lcm_url: '" + lcm_tools.URL + "'}\n"
-            "commands: {lcm: true}\nrealtime: {lock_memory: false}\n")
+        lcm_tools.config(work / "config.yaml", "odometry", "commands: {lcm: true}\n")
         check_poses(work, given)
         check_sources(work, given)
-    finally:
-        shutil.rmtree(work)
 
 
 def main():
@@ -353,23 +345,12 @@ def main():
     parser.add_argument("--seconds", type=int, default=12)
     parser.add_argument("--age-ms", type=float, default=0)
     parser.add_argument("--stall", action="store_true", help="the bridge stands still for a second: 50 poses wait, none is lost")
-    parser.add_argument("--inside", action="store_true")
     given = parser.parse_args()
-    if given.inside:
-        return inside(given)
     for what in (given.bin / "waymark-ros2", given.probe):
         if not what.exists():
-            print(f"skipped: there is no {what}")
-            return SKIPPED
-    for module in ("cyclonedds", "rosbags"):
-        if subprocess.run([sys.executable, "-c", f"import {module}"], capture_output=True).returncode:
-            print(f"skipped: there is no {module}")
-            return SKIPPED
-    if not shutil.which("lcm-gen") or subprocess.run(["unshare", "-n", "true"], capture_output=True).returncode:
-        print("skipped: no lcm-gen, or no right to a network namespace")
-        return SKIPPED
-    return subprocess.run(["unshare", "-n", sys.executable, __file__, *sys.argv[1:], "--inside"],
-                          env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1"}).returncode
+            in_a_network.skip(f"there is no {what}")
+    in_a_network.begin("cyclonedds", "rosbags")
+    check(given)
 
 
 if __name__ == "__main__":
