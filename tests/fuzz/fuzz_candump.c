@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Any bytes as a candump line: read or refused with a text, never more than the frame has room for.
-#include <stdlib.h>
 #include <string.h>
 
+#include "fuzz.h"
 #include "waymark/can.h"
-
-int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
   wm_can_frame frame;

@@ -4,12 +4,11 @@
 #include <cstdlib>
 #include <cstring>
 
+#include "fuzz.h"
 #include "waymark/cascade_file.h"
 #include "waymark/internal/vision/cascade/evaluate.hpp"
 
-extern "C" int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
-
-extern "C" int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
   constexpr int kSide = WM_CASCADE_SIDE_MAX + 1;
   static uint32_t sums[kSide * kSide], squares[kSide * kSide];
   if (squares[kSide * kSide - 1] == 0)

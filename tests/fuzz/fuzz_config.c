@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Any bytes as a configuration: it is read, or refused with a message.
-#include <stdint.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "config/config.h"
-
-int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+#include "fuzz.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
   static wm_config config;

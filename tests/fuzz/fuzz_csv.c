@@ -2,26 +2,19 @@
 // Any bytes as one of a recording's files: what a stream hands out is finite where it must be and in the order of
 // arrival; landmarks.csv and can-signals.yaml are read or refused. The first byte picks the kind of file.
 #include <math.h>
-#include <stdint.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <sys/mman.h>
 #include <unistd.h>
 
 #include "calibration.h"
+#include "fuzz.h"
 #include "streams.h"
-
-int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
 static const stream_kind *const kKinds[] = {&kStreamMotion,  &kStreamMotion6, &kStreamSightings, &kStreamMarkers,
                                             &kStreamStereo,  &kStreamPoints,  &kStreamGnss,      &kStreamIncrements,
                                             &kStreamCorners, &kStreamImu};
 
 #define LANDMARKS 9  // by the first byte: landmarks.csv, then can-signals.yaml, then further streams
-
-static void check(int good) {
-  if (!good) abort();
-}
 
 static void drain(wm_source *source) {
   static wm_event event;

@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Any bytes as a DBC file. What is read is bound, every signal to every quantity in turn, and decodes random frames.
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "dbc.h"
+#include "fuzz.h"
 
 enum { kSignalsTried = 40, kFramesTried = 8 };
-
-int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
 static uint32_t next_random(uint32_t *state) {
   *state = *state * 1664525u + 1013904223u;

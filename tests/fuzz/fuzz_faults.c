@@ -1,16 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Any bytes as faults.yaml: it is read, or refused with a message; what is read has times in order, and prints as JSON.
 #include <math.h>
-#include <stdint.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
+#include "fuzz.h"
 #include "waymark/faults.h"
 
-int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
-
-static void check(const wm_fault *f) {
+static void check_fault(const wm_fault *f) {
   const wm_fault_kind_row *row = wm_fault_kind_of(f->kind);
   if (!(f->from_s >= 0 && f->until_s >= f->from_s) || !f->name[0]) abort();
   for (size_t i = 0; i < WM_FAULT_PARAMS_MAX && row->params[i].name; i++)
@@ -29,7 +26,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
   char *text = NULL;
   size_t length;
   for (size_t i = 0; i < faults.count; i++) {
-    check(&faults.fault[i]);
+    check_fault(&faults.fault[i]);
     (void)wm_faults_at(&faults, faults.fault[i].kind, "front", faults.fault[i].from_s);
   }
   FILE *to = open_memstream(&text, &length);

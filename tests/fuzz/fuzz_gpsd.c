@@ -1,17 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Any bytes as a line of gpsd. Numbers are finite or absent, texts end, and a position is some place in the map.
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
+#include "fuzz.h"
 #include "gpsd_report.h"
 #include "waymark/local_frame.h"
-
-int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
-
-static void check(int good) {
-  if (!good) abort();
-}
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
   static const double kOrigin[3] = {48, 11, 500};

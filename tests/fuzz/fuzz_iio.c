@@ -2,16 +2,10 @@
 // Any bytes as texts of sysfs: types of a scan's elements, a line each, then a mounting matrix. Elements lie within the
 // scan, and a matrix that is taken is a rotation.
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
+#include "fuzz.h"
 #include "scan.h"
-
-int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
-
-static void check(int good) {
-  if (!good) abort();
-}
 
 static void read_scan(iio_element *elements, size_t count) {
   static const uint8_t kScan[IIO_SCAN_BYTES_MAX];

@@ -2,18 +2,11 @@
 // Any bytes as a message of another program: a row of a stream, sightings, a command. What is taken is finite and
 // within its bounds. The first byte picks the reader.
 #include <math.h>
-#include <stdint.h>
-#include <stdlib.h>
 
+#include "fuzz.h"
 #include "waymark/lcm_messages.h"
 #include "waymark/lcm_streams.h"
 #include "waymark/streams.h"
-
-int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
-
-static void check(int good) {
-  if (!good) abort();
-}
 
 static void read_row(const char *stream, const uint8_t *data, size_t size) {
   const wm_mounting imu = {.rpy_rad = {0.1, 0.2, 0.3}};

@@ -3,12 +3,10 @@
 // refused call has a text; what comes out is finite. The first byte picks the estimator.
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
+#include "fuzz.h"
 #include "waymark/waymark.h"
-
-int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
 static const char *const kEstimators[] = {"landmark_ekf", "slam", "odometry", "stereo_ekf"};
 static const char *const kSources[] = {"motion",     "imu",     "gnss",     "sightings:front", "markers:front",
@@ -20,10 +18,6 @@ typedef struct input {
   const uint8_t *at;
   size_t left;
 } input;
-
-static void check(int good) {
-  if (!good) abort();
-}
 
 static void check_call(wm_status status, const wm_error *err) {
   check(status == WM_OK || status == WM_END || status == WM_AGAIN || err->text[0] != '\0');

@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Any bytes as a map's picture: it is read whole or refused with a reason.
-#include <stdint.h>
-#include <stdlib.h>
 #include <string.h>
 
+#include "fuzz.h"
 #include "waymark/map.h"
-
-int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
   wm_grey grey;

@@ -11,6 +11,8 @@
 #include <limits>
 #include <vector>
 
+#include "fuzz.h"
+
 extern "C" {
 #include "waymark/lcm_messages.h"
 #include "waymark/lcm_streams.h"
@@ -19,17 +21,11 @@ extern "C" {
 #include "ros2/incoming.h"
 #include "ros2/outgoing.h"
 
-extern "C" int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
-
 namespace wm::ros2 {
 namespace {
 
 constexpr uint32_t kXcdr1 = 1;
 constexpr size_t kHead = 4;  // representation and options, as ROS 2's messages begin
-
-void check(bool good) {
-  if (!good) std::abort();
-}
 
 std::vector<unsigned char> encode(const dds_topic_descriptor_t &type, const void *message) {
   dds_ostream_t out;

@@ -1,20 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Any bytes as the pose that a run saved: refused with a text, or a start that is finite, whatever the clock says.
 #include <math.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
+#include "fuzz.h"
 #include "output/saved_pose.h"
-
-int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
-
-static void check(int good) {
-  if (!good) abort();
-}
 
 static void check_start(const wm_saved_pose *saved, double utc_s) {
   static max_align_t motion[512];

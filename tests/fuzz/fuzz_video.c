@@ -1,22 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // Any bytes as a video: pictures lie within the file, one after the other, and the decoder takes or refuses them.
-#include <stdint.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <sys/mman.h>
 #include <unistd.h>
 
 #include "container.h"
+#include "fuzz.h"
 #include "jpeg.h"
-
-int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
 #define W 64
 #define H 48
-
-static void check(int good) {
-  if (!good) abort();
-}
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
   int fd = memfd_create("video", 0);

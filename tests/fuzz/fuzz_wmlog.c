@@ -1,18 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // Any bytes as an event log, as they are and with the records' sums mended (else no mutation would get past them):
 // refused with a text, or events that are within bounds, given to an estimator's front.
-#include <stdint.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "fusion/fuser.h"
+#include "fuzz.h"
 #include "output/crc32.h"
 #include "output/event_log.h"
 #include "tiny_estimator.h"
 #include "waymark/bytes.h"
-
-int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
 static void forget(void *context, wm_output_kind kind, const void *record, size_t bytes) {
   (void)context, (void)kind, (void)record, (void)bytes;

@@ -1,14 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Any bytes as YAML: every place is visited with every getter; then as calibration.yaml.
 #include <math.h>
-#include <stdint.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "calibration.h"
+#include "fuzz.h"
 #include "waymark/yaml.h"
-
-int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
 static size_t visited;
 

@@ -123,7 +123,7 @@ def check_doctor(work):
 
 
 def check_drive(work):
-    run = start(work, "robot", 60)
+    run = start(work, "robot")
     stop = threading.Event()
     feeds = [threading.Thread(target=feed, args=[stop]) for feed in (feed_imu, feed_motion)]
     for feed in feeds:

@@ -1,52 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "small_recording.h"
 
-#include <ftw.h>
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
+#include "common/folder.h"
 #include "unity.h"
 
 #define LANDMARKS 8
 #define ROWS_MAX 200000
 
-static char folder[256];
-
-const char *test_folder(void) {
-  if (folder[0]) return folder;
-  const char *tmp = getenv("TMPDIR");
-  (void)snprintf(folder, sizeof folder, "%s/waymark-test-XXXXXX", tmp && *tmp ? tmp : "/tmp");
-  TEST_ASSERT_NOT_NULL(mkdtemp(folder));
-  return folder;
-}
-
-static int remove_one(const char *path, const struct stat *s, int kind, struct FTW *ftw) {
-  (void)s, (void)kind, (void)ftw;
-  return remove(path);
-}
-
-void test_folder_remove(void) {
-  if (folder[0]) (void)nftw(folder, remove_one, 16, FTW_DEPTH | FTW_PHYS);
-  folder[0] = '\0';
-}
-
-const char *in_folder(const char *name) {
-  static char paths[4][512];
-  static int next;
-  char *path = paths[next++ % 4];
-  (void)snprintf(path, sizeof paths[0], "%s/%s", test_folder(), name);
-  return path;
-}
-
 static FILE *create(const char *recording, const char *file) {
-  char path[1024];
-  (void)snprintf(path, sizeof path, "%s/%s/%s", test_folder(), recording, file);
-  FILE *f = fopen(path, "w");
+  char path[256];
+  (void)snprintf(path, sizeof path, "%s/%s", recording, file);
+  folder_write(path, "");
+  FILE *f = fopen(folder_path(path), "w");
   TEST_ASSERT_NOT_NULL_MESSAGE(f, path);
   return f;
 }
@@ -119,7 +90,6 @@ static size_t sightings(const small_recording *what, row *rows) {
 }
 
 const char *small_recording_write(const char *name, const small_recording *what) {
-  (void)mkdir(in_folder(name), 0777);
   FILE *f = create(name, "recording.yaml");
   (void)fprintf(f,
                 "format: waymark-recording/1\nname: %s\nduration_s: %g\nstreams: [motion.csv, sightings.csv]\n"
@@ -163,7 +133,7 @@ const char *small_recording_write(const char *name, const small_recording *what)
                   rows[i].range, rows[i].arrival_ns);
   (void)fclose(f);
   free(rows);
-  return in_folder(name);
+  return folder_path(name);
 }
 
 // ── runs ────────────────────────────────────────────────────────────────────────────────────────────────────────────
@@ -174,9 +144,9 @@ void replay_into(const char *recording, const char *config_text, const char *run
   wm_recording *opened = NULL;
   wm_status status = wm_config_parse(config_text, strlen(config_text), "test.yaml", &config, &err);
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, status, err.text);
-  status = wm_recording_open(in_folder(recording), &config.overrides, NULL, NULL, &opened, &err);
+  status = wm_recording_open(folder_path(recording), &config.overrides, NULL, NULL, &opened, &err);
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, status, err.text);
-  const wm_replay_options options = {.out_dir = in_folder(run), .seed = 1};
+  const wm_replay_options options = {.out_dir = folder_path(run), .seed = 1};
   status = wm_replay_recording(&config, opened, &options, report, &err);
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, status, err.text);
   wm_recording_close(opened);
@@ -202,10 +172,10 @@ char *read_all(const char *path, size_t *length) {
 void assert_same_file(const char *a, const char *b, const char *file) {
   char path[512];
   size_t length_a, length_b;
-  (void)snprintf(path, sizeof path, "%s/%s/%s", test_folder(), a, file);
-  char *bytes_a = read_all(path, &length_a);
-  (void)snprintf(path, sizeof path, "%s/%s/%s", test_folder(), b, file);
-  char *bytes_b = read_all(path, &length_b);
+  (void)snprintf(path, sizeof path, "%s/%s", a, file);
+  char *bytes_a = read_all(folder_path(path), &length_a);
+  (void)snprintf(path, sizeof path, "%s/%s", b, file);
+  char *bytes_b = read_all(folder_path(path), &length_b);
   TEST_ASSERT_GREATER_THAN_MESSAGE(0, length_a, file);
   TEST_ASSERT_EQUAL_MESSAGE(length_a, length_b, file);
   TEST_ASSERT_TRUE_MESSAGE(memcmp(bytes_a, bytes_b, length_a) == 0, file);

@@ -16,13 +16,7 @@ typedef struct small_recording {
   double frame_hz, motion_hz;            // 0: 10 and 20
 } small_recording;
 
-// A folder of the test's own under $TMPDIR, removed with all in it by test_folder_remove.
-const char *test_folder(void);
-void test_folder_remove(void);
-// "FOLDER/NAME" in a buffer that the next calls but three leave alone.
-const char *in_folder(const char *name);
-
-// Writes the recording as FOLDER/`name`; returns its path.
+// Writes the recording as FOLDER/`name` (common/folder.h); returns its path.
 const char *small_recording_write(const char *name, const small_recording *what);
 
 // Replays FOLDER/`recording` with a configuration's text into FOLDER/`run`. Fails the test where that fails.

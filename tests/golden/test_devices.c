@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include "can_device.h"
+#include "common/folder.h"
 #include "common/suite.h"
 #include "live/robot.h"
 #include "live/run.h"
@@ -49,7 +50,7 @@ void setUp(void) {
   is_enough = NULL;
   atomic_store(&over, 0);
 }
-void tearDown(void) { test_folder_remove(); }
+void tearDown(void) { folder_remove(); }
 
 static void sleep_for(wm_time_ns duration_ns) {
   struct timespec left = {duration_ns / WM_NS_PER_S, duration_ns % WM_NS_PER_S};
@@ -142,7 +143,7 @@ static void a_run_on_can_survives_an_interface_that_goes_down(void) {
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_config_parse(kConfig, strlen(kConfig), "test.yaml", &config, &err), err.text);
   wm_recording *robot = robot_on(&can, &config);
   const wm_run_options options = {
-      .out_dir = in_folder("run"), .seed = 1, .speed = 1, .duration_s = LONGEST_S, .stop = &over, .say = hear};
+      .out_dir = folder_path("run"), .seed = 1, .speed = 1, .duration_s = LONGEST_S, .stop = &over, .say = hear};
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_run_live(&config, robot, &options, &live, &err), err.text);
   wm_recording_close(robot);
   wm_config_free(&config);
@@ -165,11 +166,11 @@ TEST(the_log_of_a_run_on_devices_gives_its_poses_again) {
   wm_error err;
   wm_log_reader *log;
   wm_config config;
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_log_open(in_folder("run/events.wmlog"), &log, &err), err.text);
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_log_open(folder_path("run/events.wmlog"), &log, &err), err.text);
   const wm_log_head *head = wm_log_reader_head(log);
   TEST_ASSERT_EQUAL(WM_OK,
                     wm_config_parse_logged(head->config_text, head->config_length, head->config_path, &config, &err));
-  const wm_replay_options options = {.out_dir = in_folder("again")};
+  const wm_replay_options options = {.out_dir = folder_path("again")};
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_replay_log(&config, log, &options, &report, &err), err.text);
   wm_config_free(&config);
   wm_log_reader_close(log);
@@ -184,7 +185,8 @@ TEST(a_run_begins_where_the_last_one_ended) {
   char text[1200];
   double ended_x_m = 1;
   wm_time_ns saved_ns = 0;  // at the earliest
-  (void)snprintf(text, sizeof text, "%sstart: {saved_pose: %s, save_every_s: 0.1}\n", kConfig, in_folder("pose.yaml"));
+  (void)snprintf(text, sizeof text, "%sstart: {saved_pose: %s, save_every_s: 0.1}\n", kConfig,
+                 folder_path("pose.yaml"));
   for (int run = 0; run < 2; run++) {
     bus can = {.frames = 60, .down_after = -1};
     wm_saved_pose saved;
@@ -197,7 +199,7 @@ TEST(a_run_begins_where_the_last_one_ended) {
     double longest_m = wm_seconds_between(first_ns, wm_monotonic_ns());
     wm_recording_close(robot);
     wm_config_free(&config);
-    TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_saved_pose_read(in_folder("pose.yaml"), &saved, &err), err.text);
+    TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_saved_pose_read(folder_path("pose.yaml"), &saved, &err), err.text);
     TEST_ASSERT_DOUBLE_WITHIN(0.1, 2, saved.start.p_m[1]);
     TEST_ASSERT_GREATER_THAN_DOUBLE(ended_x_m, saved.start.p_m[0]);
     TEST_ASSERT_LESS_THAN_DOUBLE(ended_x_m + longest_m, saved.start.p_m[0]);
@@ -259,15 +261,15 @@ TEST(a_run_without_its_interface_waits_and_says_so) {
   wm_config config;
   wm_recording *robot;
   char path[600], text[900];
-  FILE *f = fopen(in_folder("car.dbc"), "w");
+  FILE *f = fopen(folder_path("car.dbc"), "w");
   TEST_ASSERT_NOT_NULL(f);
   (void)fputs(kDbc, f);
   (void)fclose(f);
-  f = fopen(in_folder("signals.yaml"), "w");
+  f = fopen(folder_path("signals.yaml"), "w");
   TEST_ASSERT_NOT_NULL(f);
   (void)fputs(kSignals, f);
   (void)fclose(f);
-  (void)snprintf(path, sizeof path, "%s", in_folder("robot.yaml"));
+  (void)snprintf(path, sizeof path, "%s", folder_path("robot.yaml"));
   (void)snprintf(text, sizeof text,
                  "%sdevices: {can: [{interface: nocan7, dbc: car.dbc, can_signals: signals.yaml}]}\n", kConfig);
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_config_parse(text, strlen(text), path, &config, &err), err.text);

@@ -4,6 +4,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "common/folder.h"
 #include "common/suite.h"
 #include "live/run.h"
 #include "output/event_log.h"
@@ -16,7 +17,7 @@ static const char kConfig[] =
 static wm_live_report live;
 static wm_run_report report;
 
-void tearDown(void) { test_folder_remove(); }
+void tearDown(void) { folder_remove(); }
 
 static wm_time_ns some_late(size_t frame) { return (wm_time_ns)(frame % 5) * 30 * WM_NS_PER_MS; }
 
@@ -27,7 +28,7 @@ static void run_live(const char *recording, const char *config_text, const wm_ru
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_config_parse(config_text, strlen(config_text), "test.yaml", &config, &err),
                             err.text);
   TEST_ASSERT_EQUAL_MESSAGE(
-      WM_OK, wm_recording_open(in_folder(recording), &config.overrides, NULL, NULL, &opened, &err), err.text);
+      WM_OK, wm_recording_open(folder_path(recording), &config.overrides, NULL, NULL, &opened, &err), err.text);
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_run_live(&config, opened, options, &live, &err), err.text);
   wm_recording_close(opened);
   wm_config_free(&config);
@@ -36,11 +37,11 @@ static void run_live(const char *recording, const char *config_text, const wm_ru
 static void replay_log_into(const char *log_path, const char *run) {
   wm_error err;
   wm_log_reader *log;
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_log_open(in_folder(log_path), &log, &err), err.text);
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_log_open(folder_path(log_path), &log, &err), err.text);
   const wm_log_head *head = wm_log_reader_head(log);
   wm_config config;
   TEST_ASSERT_EQUAL(WM_OK, wm_config_parse(head->config_text, head->config_length, head->config_path, &config, &err));
-  const wm_replay_options options = {.out_dir = in_folder(run)};
+  const wm_replay_options options = {.out_dir = folder_path(run)};
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_replay_log(&config, log, &options, &report, &err), err.text);
   wm_config_free(&config);
   wm_log_reader_close(log);
@@ -49,7 +50,7 @@ static void replay_log_into(const char *log_path, const char *run) {
 TEST(the_log_of_a_run_gives_exactly_its_fused_poses) {
   small_recording_write("rec",
                         &(small_recording){.seconds = 3, .late_ns = some_late, .frame_hz = 20, .motion_hz = 100});
-  const wm_run_options options = {.out_dir = in_folder("run"), .seed = 1, .speed = 1};
+  const wm_run_options options = {.out_dir = folder_path("run"), .seed = 1, .speed = 1};
   run_live("rec", kConfig, &options);
   TEST_ASSERT_GREATER_THAN(200, live.run.poses);  // 300 where no thread was held up
   TEST_ASSERT_EQUAL_UINT64(0, live.run.health.outputs_lost);
@@ -62,7 +63,7 @@ TEST(the_log_of_a_run_gives_exactly_its_fused_poses) {
 
 TEST(the_estimators_thread_allocates_nothing_and_misses_no_page) {
   small_recording_write("rec", &(small_recording){.seconds = 2, .motion_hz = 100});
-  const wm_run_options options = {.out_dir = in_folder("run"), .seed = 1, .speed = 1};
+  const wm_run_options options = {.out_dir = folder_path("run"), .seed = 1, .speed = 1};
   run_live("rec", kConfig, &options);
   TEST_ASSERT_GREATER_THAN(100, live.deadlines_total);
   if (live.run.allocations_after_start < 0) TEST_IGNORE_MESSAGE("a sanitizer's malloc is in place");
@@ -75,7 +76,7 @@ TEST(the_estimators_thread_allocates_nothing_and_misses_no_page) {
 // seconds.
 TEST(everything_that_arrived_is_fused) {
   small_recording_write("rec", &(small_recording){.seconds = 30, .motion_hz = 100});
-  const wm_run_options options = {.out_dir = in_folder("run"), .seed = 1, .speed = 16};
+  const wm_run_options options = {.out_dir = folder_path("run"), .seed = 1, .speed = 16};
   run_live("rec",
            "format: waymark-config/1\nestimator: landmark_ekf\npublish: {lcm: false}\n"
            "merge: {horizon_ms: 30000, lateness_max_ms: 30000}\nrealtime: {priority: 0, lock_memory: false}\n",
@@ -101,10 +102,10 @@ TEST(a_stop_ends_the_run_and_everything_is_written) {
   small_recording_write("rec", &(small_recording){.seconds = 60});
   pthread_t thread;
   char path[600];
-  (void)snprintf(path, sizeof path, "%s", in_folder("run/trajectory.csv"));
+  (void)snprintf(path, sizeof path, "%s", folder_path("run/trajectory.csv"));
   atomic_store(&stop, 0);
   TEST_ASSERT_EQUAL(0, pthread_create(&thread, NULL, stop_when_poses_are_written, path));
-  const wm_run_options options = {.out_dir = in_folder("run"), .seed = 1, .speed = 1, .stop = &stop};
+  const wm_run_options options = {.out_dir = folder_path("run"), .seed = 1, .speed = 1, .stop = &stop};
   run_live("rec", kConfig, &options);
   pthread_join(thread, NULL);
   TEST_ASSERT_LESS_THAN_DOUBLE(60, live.run.recorded_s);

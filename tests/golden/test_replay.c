@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A recording in, files out: the same bytes every time, whatever arrives late, and an account of every datum.
+#include "common/folder.h"
 #include "common/suite.h"
 #include "findings/findings.h"
 #include "output/event_log.h"
@@ -13,7 +14,7 @@ static const char kConfig300[] =
 
 static wm_run_report report;
 
-void tearDown(void) { test_folder_remove(); }
+void tearDown(void) { folder_remove(); }
 
 static const wm_source_health *source(const char *name) {
   for (uint32_t i = 0; i < report.health.source_count; i++)
@@ -39,7 +40,7 @@ TEST(nothing_is_allocated_and_no_page_is_missing_after_the_start) {
   TEST_ASSERT_EQUAL_INT64(0, report.allocations_after_start);
   TEST_ASSERT_EQUAL_INT64(0, report.page_faults_after_start);
   size_t length;
-  char *timing = read_all(in_folder("run/timing.json"), &length);
+  char *timing = read_all(folder_path("run/timing.json"), &length);
   TEST_ASSERT_NOT_NULL(strstr(timing, "\"allocations_after_start\": 0,"));
   TEST_ASSERT_NOT_NULL(strstr(timing, "\"page_faults_after_start\": 0,"));
   free(timing);
@@ -50,11 +51,11 @@ TEST(the_event_log_gives_the_same_poses_without_the_recording) {
   replay_into("rec", kConfig, "run", &report);
   wm_error err;
   wm_log_reader *log;
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_log_open(in_folder("run/events.wmlog"), &log, &err), err.text);
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_log_open(folder_path("run/events.wmlog"), &log, &err), err.text);
   const wm_log_head *head = wm_log_reader_head(log);
   wm_config config;
   TEST_ASSERT_EQUAL(WM_OK, wm_config_parse(head->config_text, head->config_length, head->config_path, &config, &err));
-  const wm_replay_options options = {.out_dir = in_folder("again")};
+  const wm_replay_options options = {.out_dir = folder_path("again")};
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_replay_log(&config, log, &options, &report, &err), err.text);
   TEST_ASSERT_EQUAL(0, report.log_was_cut);
   wm_config_free(&config);
@@ -142,7 +143,7 @@ TEST(the_first_datum_after_a_silence_is_fused) {
   replay_into("rec", kConfig, "run", &report);
   TEST_ASSERT_EQUAL_UINT64(0, source("sightings:eye")->late);
   size_t length;
-  char *innovations = read_all(in_folder("run/innovations.csv"), &length);
+  char *innovations = read_all(folder_path("run/innovations.csv"), &length);
   const char *first = strstr(innovations, "\n12000000000,sightings:eye,");
   TEST_ASSERT_NOT_NULL(first);
   const char *end = strchr(first + 1, '\n');
@@ -157,7 +158,7 @@ TEST(silence_costs_the_published_pose_nothing) {
   small_recording_write("rec", &(small_recording){.seconds = 20, .silent_from_s = 5, .silent_until_s = 12});
   replay_into("rec", kConfig, "run", &report);
   size_t length;
-  char *published = read_all(in_folder("run/published.csv"), &length);
+  char *published = read_all(folder_path("run/published.csv"), &length);
   int64_t last_ns = INT64_MIN, rows = 0, in_silence = 0;
   for (char *line = strchr(published, '\n'); line && line[1]; line = strchr(line + 1, '\n')) {
     int64_t t_ns, sent_ns, fused_ns;
@@ -196,7 +197,7 @@ TEST(every_datum_is_accounted_for) {
 // What is wrong outside of the part is not the part's.
 TEST(from_and_until_take_a_part_of_a_source) {
   small_recording_write("rec", &(small_recording){.seconds = 20});
-  FILE *f = fopen(in_folder("rec/sightings.csv"), "a");
+  FILE *f = fopen(folder_path("rec/sightings.csv"), "a");
   TEST_ASSERT_NOT_NULL(f);
   (void)fputs("20000000000,eye,1,nothing,3,20000000000\n", f);
   (void)fclose(f);
@@ -208,7 +209,7 @@ TEST(from_and_until_take_a_part_of_a_source) {
               "run", &report);
   TEST_ASSERT_EQUAL_UINT64(0, source("sightings:eye")->malformed);
   size_t length;
-  char *innovations = read_all(in_folder("run/innovations.csv"), &length);
+  char *innovations = read_all(folder_path("run/innovations.csv"), &length);
   TEST_ASSERT_NOT_NULL(strstr(innovations, "\n2000000000,"));
   TEST_ASSERT_NULL(strstr(innovations, "\n1900000000,"));
   TEST_ASSERT_NULL(strstr(innovations, "\n5100000000,"));
@@ -224,7 +225,7 @@ TEST(a_source_that_is_not_used_does_not_hold_time_back) {
 }
 
 static FILE *create(const char *file) {
-  FILE *f = fopen(in_folder(file), "w");
+  FILE *f = fopen(folder_path(file), "w");
   TEST_ASSERT_NOT_NULL(f);
   return f;
 }
@@ -234,7 +235,7 @@ static double last_heading_rad(const char *run) {
   size_t length;
   double q[8];
   (void)snprintf(path, sizeof path, "%s/trajectory.csv", run);
-  char *text = read_all(in_folder(path), &length);
+  char *text = read_all(folder_path(path), &length);
   const char *row = text + length - 1;
   while (row > text && row[-1] != '\n') row--;
   for (int i = 0; i < 8; i++) {
@@ -249,7 +250,7 @@ static double last_heading_rad(const char *run) {
 // CAN turns at 0.5 rad/s, the IMU at 0.1: mixed, the two would be one gyro.
 TEST(a_streams_turn_rate_is_taken_instead_of_cans) {
   small_recording_write("rec", &(small_recording){.seconds = 1});
-  TEST_ASSERT_EQUAL(0, remove(in_folder("rec/motion.csv")) | remove(in_folder("rec/sightings.csv")));
+  TEST_ASSERT_EQUAL(0, remove(folder_path("rec/motion.csv")) | remove(folder_path("rec/sightings.csv")));
   FILE *f = create("rec/recording.yaml");
   fputs("format: waymark-recording/1\nvehicle: {initial_pose: {x_m: 0, y_m: 0, heading_rad: 0}}\n", f);
   fclose(f);
@@ -275,7 +276,7 @@ TEST(a_streams_turn_rate_is_taken_instead_of_cans) {
   replay_into("rec", "format: waymark-config/1\nestimator: odometry\n", "stream", &report);
   TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.4, last_heading_rad("stream"));
   size_t length;
-  char *health = read_all(in_folder("stream/health.json"), &length);
+  char *health = read_all(folder_path("stream/health.json"), &length);
   TEST_ASSERT_NOT_NULL(strstr(health, "can: yaw_rate is taken from imu"));
   free(health);
   replay_into("rec", "format: waymark-config/1\nestimator: odometry\nsources: [{name: imu, use: false}]\n", "can",

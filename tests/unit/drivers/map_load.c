@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Raster maps: what map.yaml and its pictures say, and what is said when they are wrong.
+#include "common/folder.h"
 #include "common/suite.h"
-#include "folder.h"
 #include "waymark/map.h"
 
 #define GEOMETRY "image: plan.pgm\nresolution: 0.05\norigin: [-1.5, 2.5, 0.5]\nnegate: 0\n"

@@ -2,8 +2,8 @@
 // One map as every kind of picture that people have it in: the same cells come out. And what a mode makes of a level.
 #include <zlib.h>
 
+#include "common/folder.h"
 #include "common/suite.h"
-#include "folder.h"
 #include "waymark/map.h"
 
 void setUp(void) { folder_make(); }

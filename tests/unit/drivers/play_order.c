@@ -2,11 +2,10 @@
 // A recording's data in the order of their times, with faults; the same items each time, and from later on.
 #include "waymark/play.h"
 
-#include <sys/stat.h>
 #include <unistd.h>
 
+#include "common/folder.h"
 #include "common/suite.h"
-#include "folder.h"
 #include "video_files.h"
 #include "waymark/lcm_messages.h"
 #include "waymark/lcm_streams.h"
@@ -18,7 +17,7 @@ static wm_play *play;
 static wm_faults faults;
 static wm_error err;
 static wm_play_item item;
-static char dir[256];
+static const char *dir;
 static bytes file;
 static uint8_t jpeg[65536];
 
@@ -38,7 +37,6 @@ static void write_recording(void) {
   strcat(text, "(104.000000) can0 20000080#0000000000000000\n(104.001000) can0 7FF#R4\nrubbish\n");
   folder_write("can.log", text);
   static const char *const kCameras[] = {"left", "right"};
-  (void)mkdir(folder_path("video"), 0777);
   for (int c = 0; c < 2; c++) {
     char name[64];
     file.size = 0;
@@ -71,18 +69,16 @@ static void write_recording(void) {
 }
 
 void setUp(void) {
-  (void)snprintf(dir, sizeof dir, "%s", folder_make());
+  dir = folder_make();
   write_recording();
   play = NULL;
   memset(&faults, 0, sizeof faults);
 }
 
 void tearDown(void) {
-  char command[400];
   wm_play_close(play);
   wm_faults_free(&faults);
-  (void)snprintf(command, sizeof command, "rm -r '%s'", dir);
-  TEST_ASSERT_EQUAL(0, system(command));
+  folder_remove();
 }
 
 static void open_at(double from_s, double until_s, uint32_t passes) {

@@ -4,8 +4,8 @@
 #include <dirent.h>
 #include <unistd.h>
 
+#include "common/folder.h"
 #include "common/suite.h"
-#include "folder.h"
 #include "waymark/recording.h"
 
 static const char *data_dir;

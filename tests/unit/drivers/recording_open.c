@@ -3,8 +3,8 @@
 #include <unistd.h>
 #include <zlib.h>
 
+#include "common/folder.h"
 #include "common/suite.h"
-#include "folder.h"
 #include "waymark/can.h"
 #include "waymark/recording.h"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The CSV streams: columns by name, stamps to the last digit, and each kind of broken row.
+#include "common/folder.h"
 #include "common/suite.h"
-#include "folder.h"
 #include "waymark/event_fields.h"
 #include "waymark/recording.h"
 

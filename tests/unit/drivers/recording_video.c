@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Videos of a recording: what is there becomes frames with their stamps, what isn't right is counted.
-#include <sys/stat.h>
 #include <unistd.h>
 
+#include "common/folder.h"
 #include "common/suite.h"
-#include "folder.h"
 #include "video_files.h"
 #include "waymark/video.h"
 
@@ -15,22 +14,19 @@ static wm_video *video;
 static wm_error err;
 static bytes file;
 static uint8_t jpeg[65536];
-static char dir[256];
+static const char *dir;
 static wm_camera camera;
 
 void setUp(void) {
-  (void)snprintf(dir, sizeof dir, "%s", folder_make());
-  (void)mkdir(folder_path("video"), 0777);
+  dir = folder_make();
   camera = (wm_camera){.name = "front", .width_px = W, .height_px = H};
   video = NULL;
   file.size = 0;
 }
 
 void tearDown(void) {
-  char command[400];
   wm_video_close(video);
-  (void)snprintf(command, sizeof command, "rm -r '%s'", dir);
-  TEST_ASSERT_EQUAL(0, system(command));
+  folder_remove();
 }
 
 static void rows(const char *text) { folder_write("video/front.csv", text); }
@@ -144,7 +140,6 @@ TEST(uncompressed) {
 }
 
 TEST(a_folder_of_files) {
-  (void)mkdir(folder_path("video/front"), 0777);
   for (int i = 0; i < 4; i++) {
     char name[64];
     size_t size = make_jpeg(W, H, 10 * i, jpeg, sizeof jpeg);

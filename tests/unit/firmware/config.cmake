@@ -2,7 +2,7 @@
 wm_test(config_parse SOURCES config_parse.c config_registry.c USES wm_config)
 wm_test(config_shipped SOURCES config_shipped.c USES wm_config)
 wm_test(wm_errors_config
-  SOURCES errors/errors_config.c errors/errors_config_cases.c ../drivers/folder.c
+  SOURCES errors/errors_config.c errors/errors_config_cases.c
   USES wm_config wm_recording)
 
 # Prints what docs/config.md is made of; tests/golden/docs.py runs it.

@@ -5,11 +5,13 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "common/folder.h"
 #include "common/suite.h"
 #include "output/black_box.h"
 
 static const char kConfig[] = "format: waymark-config/1\nestimator: odometry\n";
-static char folder[64], said[4096];
+static const char *folder;
+static char said[4096];
 static wm_config config;
 static wm_assembly assembly;
 static black_box box;
@@ -24,8 +26,7 @@ static void hear(void *context, const char *line) {
 void setUp(void) {
   wm_error err;
   said[0] = '\0';
-  (void)snprintf(folder, sizeof folder, "/tmp/wm_black_box_XXXXXX");
-  TEST_ASSERT_NOT_NULL(mkdtemp(folder));
+  folder = folder_make();
   TEST_ASSERT_EQUAL(WM_OK, wm_config_parse(kConfig, strlen(kConfig), "robot.yaml", &config, &err));
   memset(&assembly, 0, sizeof assembly);
   assembly.config = &config;
@@ -40,19 +41,8 @@ void setUp(void) {
 }
 
 void tearDown(void) {
-  char command[128];
   wm_config_free(&config);
-  (void)snprintf(command, sizeof command, "rm -rf %s", folder);
-  TEST_ASSERT_EQUAL(0, system(command));
-}
-
-// A path in the folder, until the next call but one.
-static const char *at(const char *name) {
-  static char paths[2][160];
-  static int which;
-  char *path = paths[which ^= 1];
-  (void)snprintf(path, sizeof paths[0], "%s/%s", folder, name);
-  return path;
+  folder_remove();
 }
 
 static void open_box(void) { black_box_open(&box, folder, 10, 2, &assembly, hear, NULL); }
@@ -74,7 +64,7 @@ static void drive(int seconds, wm_state state) {
 
 static size_t files(const char *pattern) {
   glob_t found;
-  size_t count = glob(at(pattern), 0, NULL, &found) == 0 ? found.gl_pathc : 0;
+  size_t count = glob(folder_path(pattern), 0, NULL, &found) == 0 ? found.gl_pathc : 0;
   globfree(&found);
   return count;
 }
@@ -86,7 +76,7 @@ static int events_of(const char *name, double *begins_x_m) {
   static wm_event event;
   uint64_t missing = 0;
   int cut = 0, count = 0;
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_log_open(at(name), &log, &err), name);
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_log_open(folder_path(name), &log, &err), name);
   *begins_x_m = wm_log_reader_head(log)->start.p_m[0];
   while (wm_log_next(log, &event, &missing, &cut, &err) == WM_OK) count++;
   wm_log_reader_close(log);
@@ -118,7 +108,7 @@ TEST(a_loss_is_kept_with_what_was_before_and_after) {
 static void expect_kept(const char *name, const char *map, double begins_x_m) {
   wm_error err;
   wm_log_reader *log;
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_log_open(at(name), &log, &err), name);
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_log_open(folder_path(name), &log, &err), name);
   const wm_log_head *head = wm_log_reader_head(log);
   TEST_ASSERT_EQUAL(strlen(map), head->kept_bytes);
   TEST_ASSERT_EQUAL_MEMORY(map, head->kept, strlen(map));
@@ -208,7 +198,7 @@ static void die(double at_s) {
   drive(2, WM_STATE_TRACKING);
   (void)fclose(box.log.file);
   const struct timespec when[2] = {{.tv_sec = (time_t)at_s}, {.tv_sec = (time_t)at_s}};
-  TEST_ASSERT_EQUAL(0, utimensat(AT_FDCWD, at("now.wmlog"), when, 0));
+  TEST_ASSERT_EQUAL(0, utimensat(AT_FDCWD, folder_path("now.wmlog"), when, 0));
 }
 
 // GIVEN an old incident WHEN a run dies again and again THEN the incident stays, with the loop's first and newest
@@ -231,7 +221,7 @@ TEST(a_crash_loop_evicts_no_old_incident) {
 }
 
 TEST(a_link_in_its_folder_is_not_followed) {
-  TEST_ASSERT_EQUAL(0, symlink(at("other"), at("now.wmlog")));
+  TEST_ASSERT_EQUAL(0, symlink(folder_path("other"), folder_path("now.wmlog")));
   open_box();
   drive(1, WM_STATE_TRACKING);
   black_box_close(&box);
@@ -240,7 +230,7 @@ TEST(a_link_in_its_folder_is_not_followed) {
 }
 
 static void touch(const char *name) {
-  FILE *f = fopen(at(name), "w");
+  FILE *f = fopen(folder_path(name), "w");
   TEST_ASSERT_NOT_NULL(f);
   (void)fclose(f);
 }
@@ -333,7 +323,7 @@ static void see(int seconds) {
 
 static int lines_of(const char *name) {
   int lines = 0;
-  FILE *f = fopen(at(name), "r");
+  FILE *f = fopen(folder_path(name), "r");
   if (!f) return -1;
   for (int c; (c = fgetc(f)) != EOF;) lines += c == '\n';
   (void)fclose(f);

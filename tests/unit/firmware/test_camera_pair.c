@@ -3,8 +3,8 @@
 #include <errno.h>
 
 #include "../drivers/fake_camera.h"
-#include "../drivers/folder.h"
 #include "camera_device.h"
+#include "common/folder.h"
 #include "common/suite.h"
 #include "rt/arena.h"
 #include "rt/clock.h"

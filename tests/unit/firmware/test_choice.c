@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A configuration that names no estimator: each row of the table that chooses one, what is read then, and what is said.
-#include "../drivers/folder.h"
+#include "common/folder.h"
 #include "common/suite.h"
 #include "fusion/assembly.h"
 #include "fusion/choice.h"

@@ -1,34 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 // The doctor's findings on a computer that the test breaks.
-#include <sys/stat.h>
-
 #include "cli/doctor/doctor.h"
+#include "common/folder.h"
 #include "common/suite.h"
 
-static char root[64];
+static const char *root;
 static wm_findings found;
 
 void setUp(void) {
   memset(&found, 0, sizeof found);
-  (void)snprintf(root, sizeof root, "/tmp/wm_doctor_XXXXXX");
-  TEST_ASSERT_NOT_NULL(mkdtemp(root));
+  root = folder_make();
 }
-void tearDown(void) {
-  char command[128];
-  (void)snprintf(command, sizeof command, "rm -rf %s", root);
-  TEST_ASSERT_EQUAL(0, system(command));
-}
+void tearDown(void) { folder_remove(); }
 
-static void put(const char *path, const char *text) {
-  char whole[256], command[400];
-  (void)snprintf(whole, sizeof whole, "%s%s", root, path);
-  (void)snprintf(command, sizeof command, "mkdir -p $(dirname %s)", whole);
-  TEST_ASSERT_EQUAL(0, system(command));
-  FILE *f = fopen(whole, "w");
-  TEST_ASSERT_NOT_NULL(f);
-  (void)fputs(text, f);
-  (void)fclose(f);
-}
+static void put(const char *path, const char *text) { folder_write(path + 1, text); }
 
 static const wm_finding *about(const char *what) {
   for (size_t i = 0; i < found.count; i++)

@@ -2,6 +2,7 @@
 #include <sys/stat.h>
 
 #include <wm_version.h>
+#include "common/folder.h"
 #include "common/suite.h"
 #include "log_fixture.h"
 #include "output/run_folder.h"
@@ -175,17 +176,13 @@ TEST(the_fuzzers_seeds_are_read_to_their_ends) {
 
 // ── a run folder below its limit ────────────────────────────────────────────────────────────────────────────────────
 
-static long size_of(const char *dir, const char *name) {
-  char path[200];
+static long size_of(const char *name) {
   struct stat file;
-  (void)snprintf(path, sizeof path, "%s/%s", dir, name);
-  return stat(path, &file) == 0 ? (long)file.st_size : -1;
+  return stat(folder_path(name), &file) == 0 ? (long)file.st_size : -1;
 }
 
-static void first_line(const char *dir, const char *name, char out[200]) {
-  char path[200];
-  (void)snprintf(path, sizeof path, "%s/%s", dir, name);
-  FILE *f = fopen(path, "r");
+static void first_line(const char *name, char out[200]) {
+  FILE *f = fopen(folder_path(name), "r");
   TEST_ASSERT_NOT_NULL(f);
   TEST_ASSERT_NOT_NULL(fgets(out, 200, f));
   fclose(f);
@@ -194,13 +191,12 @@ static void first_line(const char *dir, const char *name, char out[200]) {
 // GIVEN a limit of 400 kB WHEN a run writes for long THEN tables and log rotate, and the log goes on from the newest
 // pose.
 TEST(tables_and_log_rotate_by_their_size) {
-  char dir[] = "/tmp/wm_rotate_XXXXXX", command[64], head[200], again[200], path[200];
+  char head[200], again[200];
   static wm_config config;
   static wm_assembly assembly;
   fixture_assembly(&config, &assembly);
-  TEST_ASSERT_NOT_NULL(mkdtemp(dir));
   wm_run_folder *folder;
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_run_folder_open(dir, &assembly, &folder, &err), err.text);
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_run_folder_open(folder_make(), &assembly, &folder, &err), err.text);
   wm_run_folder_limit(folder, 400000);
   wm_output out = wm_run_folder_output(folder);
   for (int second = 0; second < 100; second++) {
@@ -221,20 +217,19 @@ TEST(tables_and_log_rotate_by_their_size) {
                                        "innovations.1.csv", "events.1.wmlog"};
   long bytes = 0;
   for (size_t i = 0; i < sizeof kNames / sizeof kNames[0]; i++) {
-    TEST_ASSERT_GREATER_THAN_MESSAGE(0, size_of(dir, kNames[i]), kNames[i]);
-    bytes += size_of(dir, kNames[i]);
+    TEST_ASSERT_GREATER_THAN_MESSAGE(0, size_of(kNames[i]), kNames[i]);
+    bytes += size_of(kNames[i]);
   }
   TEST_ASSERT_LESS_THAN(440000, bytes);  // a second more on each side
-  first_line(dir, "published.csv", head);
-  first_line(dir, "published.1.csv", again);
+  first_line("published.csv", head);
+  first_line("published.1.csv", again);
   TEST_ASSERT_EQUAL_STRING(head, again);
   for (int part = 0; part < 2; part++) {
     wm_log_reader *log;
-    (void)snprintf(path, sizeof path, "%s/events%s.wmlog", dir, part ? ".1" : "");
+    const char *path = folder_path(part ? "events.1.wmlog" : "events.wmlog");
     TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_log_open(path, &log, &err), err.text);
     TEST_ASSERT_GREATER_THAN_DOUBLE(1, wm_log_reader_head(log)->start.p_m[0]);
     wm_log_reader_close(log);
   }
-  (void)snprintf(command, sizeof command, "rm -rf %s", dir);
-  TEST_ASSERT_EQUAL(0, system(command));
+  folder_remove();
 }

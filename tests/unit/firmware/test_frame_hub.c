@@ -6,6 +6,7 @@
 #include <stdatomic.h>
 #include <sys/stat.h>
 
+#include "common/folder.h"
 #include "common/suite.h"
 #include "output/avi_writer.h"
 #include "sources/frame_hub.h"
@@ -16,20 +17,16 @@
 #define H 6
 #define PICTURES 200
 
-static char folder[64];
+static const char *folder;
 static wm_error err;
 static frame_hub *hub;
 
 // Picture i is of grey i everywhere.
 static void write_video(void) {
-  char path[128];
   uint8_t grey[W * H];
-  (void)snprintf(path, sizeof path, "%s/video", folder);
-  TEST_ASSERT_EQUAL(0, mkdir(path, 0777));
-  (void)snprintf(path, sizeof path, "%s/video/front.avi", folder);
-  FILE *video = fopen(path, "wb");
-  (void)snprintf(path, sizeof path, "%s/video/front.csv", folder);
-  FILE *stamps = fopen(path, "w");
+  TEST_ASSERT_EQUAL(0, mkdir(folder_path("video"), 0777));
+  FILE *video = fopen(folder_path("video/front.avi"), "wb");
+  FILE *stamps = fopen(folder_path("video/front.csv"), "w");
   TEST_ASSERT_TRUE(video && stamps);
   TEST_ASSERT_EQUAL(0, avi_begin(video, "Y800", W, H, 30));
   (void)fputs("frame,t_ns\n", stamps);
@@ -50,17 +47,14 @@ static void open_hub(void) {
 }
 
 void setUp(void) {
-  (void)snprintf(folder, sizeof folder, "/tmp/wm_hub_XXXXXX");
-  TEST_ASSERT_NOT_NULL(mkdtemp(folder));
+  folder = folder_make();
   write_video();
   open_hub();
 }
 
 void tearDown(void) {
-  char command[128];
   frame_hub_close(hub);
-  (void)snprintf(command, sizeof command, "rm -rf %s", folder);
-  TEST_ASSERT_EQUAL(0, system(command));
+  folder_remove();
 }
 
 static wm_frame_source *subscribe(uint32_t waiting_max, int wait_ms) {

@@ -7,13 +7,14 @@
 #include <unistd.h>
 
 #include "cli/doctor/doctor.h"
+#include "common/folder.h"
 #include "common/suite.h"
 #include "live/row_source.h"
 #include "rt/clock.h"
 
 #define MS WM_NS_PER_MS
 
-static char root[64];
+static const char *root;
 static wm_source *source;
 static wm_event event;
 static wm_error err;
@@ -127,15 +128,14 @@ static void sample(int64_t t_ns, int wx, int wz, int az) {
 void setUp(void) {
   config = (wm_iio_device_config){.device = "bmi160"};
   writer = -1;
-  (void)snprintf(root, sizeof root, "/tmp/wm_iio_XXXXXX");
-  TEST_ASSERT_NOT_NULL(mkdtemp(root));
+  root = folder_make();
 }
 
 void tearDown(void) {
   if (source) source->ops->close(source);
   source = NULL;
   if (writer >= 0) (void)close(writer);
-  run("rm -rf %s%s", "");
+  folder_remove();
 }
 
 TEST(a_buffer_is_set_up_and_read) {

@@ -1,22 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // A session gives what the replay of the same data gives, bit by bit: rows, events, CAN frames, pictures. Then changed
 // values, event logs, sizes and refusals.
-#include <math.h>
-#include <stddef.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
-#include "../drivers/folder.h"
-#include "common/suite.h"
+#include "library_robot.h"
 #include "rt/memory.h"
 #include "waymark/codec.h"
-#include "waymark/waymark.h"
 
-static char dir[256], config[300];
-static wm_error err;
 static uint32_t source;
 
 // Hash and count of the records by kind.
@@ -44,31 +34,10 @@ static void take(void *context, waymark_record kind, const void *record, size_t 
   }
 }
 
-static void write_config(const char *text) {
-  folder_write("robot.yaml", text);
-  (void)snprintf(config, sizeof config, "%s", folder_path("robot.yaml"));
-}
+void setUp(void) { robot_write(); }
+void tearDown(void) { folder_remove(); }
 
-void setUp(void) {
-  (void)snprintf(dir, sizeof dir, "%s", folder_make());
-  folder_write("recording.yaml",
-               "format: waymark-recording/1\nvehicle: {initial_pose: {x_m: 0, y_m: 0, heading_rad: 0}}\n");
-  folder_write("calibration.yaml",
-               "sensors: {eye: {mounting: {xyz_m: [0.1, 0, 0]}, bearing_sigma_rad: 0.01, range_sigma_m: 0.05}}\n"
-               "wheels: {radius_m: 0.05, ticks_per_turn: 1000, track_m: 0.3}\n");
-  folder_write("landmarks.csv", "id,x_m,y_m,z_m,sigma_m\n1,5,1,0,0.01\n2,5,-3,0,0.01\n");
-  write_config("format: waymark-config/1\nestimator: landmark_ekf\n");
-}
-
-void tearDown(void) {
-  char command[400];
-  (void)snprintf(command, sizeof command, "rm -r '%s'", dir);
-  TEST_ASSERT_EQUAL(0, system(command));
-}
-
-static void ok(wm_status status) { TEST_ASSERT_EQUAL_MESSAGE(WM_OK, status, err.text); }
-
-static waymark_session *open_session(taken *into, const char *changes, const char *out) {
+static waymark_session *open_taking(taken *into, const char *changes, const char *out) {
   waymark_session *session;
   const waymark_options options = {.bytes = sizeof options,
                                    .config = config,
@@ -166,7 +135,7 @@ static void push_rows(waymark_session *session) {
 TEST(test_rows_and_events_give_the_replay_s_bits) {
   taken pushed, replayed;
   write_rows();
-  waymark_session *session = open_session(&pushed, NULL, NULL);
+  waymark_session *session = open_taking(&pushed, NULL, NULL);
   push_rows(session);
   wm_health health;
   ok(waymark_health(session, &health, sizeof health, &err));
@@ -193,7 +162,7 @@ TEST(test_files_of_a_session_are_a_run_and_its_log_gives_the_same_bits) {
   char out[300], log[320];
   (void)snprintf(out, sizeof out, "%s/out", dir);
   (void)snprintf(log, sizeof log, "%s/events.wmlog", out);
-  waymark_session *session = open_session(&pushed, NULL, out);
+  waymark_session *session = open_taking(&pushed, NULL, out);
   push_rows(session);
   ok(waymark_close(session, &err));
   replay(&again, log, NULL, NULL);
@@ -245,7 +214,7 @@ TEST(test_can_frames_give_the_replay_s_bits) {
   folder_write("can-signals.yaml",
                "- {quantity: wheel_ticks_left, message: ODOMETRY, signal: LEFT}\n"
                "- {quantity: wheel_ticks_right, message: ODOMETRY, signal: RIGHT}\n");
-  write_config("format: waymark-config/1\nestimator: odometry\n");
+  folder_write("robot.yaml", "format: waymark-config/1\nestimator: odometry\n");
   uint8_t data[8];
   for (int i = 0; i < STEPS; i++) {
     can_data(i, data);
@@ -254,7 +223,7 @@ TEST(test_can_frames_give_the_replay_s_bits) {
     n += (size_t)sprintf(log + n, "\n");
   }
   folder_write("can.log", log);
-  waymark_session *session = open_session(&pushed, NULL, NULL);
+  waymark_session *session = open_taking(&pushed, NULL, NULL);
   TEST_ASSERT_EQUAL(WM_NOT_FOUND, waymark_add_source(session, "can:can7", &source, &err));
   ok(waymark_add_source(session, "can", &source, &err));
   ok(waymark_start(session, &err));
@@ -323,7 +292,6 @@ static void write_video(void) {
     draw(i, at);
     at += W * H;
   }
-  (void)mkdir(folder_path("video"), 0777);
   folder_write_bytes("video/front.avi", (const char *)file, ALL);
   free(file);
   char rows[PICTURES * 60];
@@ -331,20 +299,6 @@ static void write_video(void) {
   for (int i = 0; i < PICTURES; i++)
     n += (size_t)sprintf(rows + n, "%d,%d,0,%d\n", i, 100000000 * (i + 1), 100000000 * (i + 1) + 30000000);
   folder_write("video/front.csv", rows);
-}
-
-static void write_map(void) {
-  static char pgm[20 + 100 * 100];
-  size_t n = (size_t)sprintf(pgm, "P5\n100 100\n255\n");
-  memset(pgm + n, 0, 10000);
-  for (int row = 0; row < 100; row++) pgm[n + (size_t)row * 100 + 80] = (char)255;
-  (void)mkdir(folder_path("map"), 0777);
-  folder_write_bytes("map/edges.pgm", pgm, n + 10000);
-  for (size_t i = 0; i < 10000; i++) pgm[n + i] = (char)255;
-  folder_write_bytes("map/free.pgm", pgm, n + 10000);
-  folder_write("map/map.yaml",
-               "image: free.pgm\nresolution: 0.1\norigin: [-5, -5, 0]\nnegate: 0\noccupied_thresh: 0.65\n"
-               "free_thresh: 0.2\nlayers: {edges: edges.pgm, drivable: free.pgm}\n");
 }
 
 TEST(test_pictures_give_the_replay_s_bits) {
@@ -358,9 +312,9 @@ TEST(test_pictures_give_the_replay_s_bits) {
                "cameras:\n  front: {model: equidistant, size: [320, 180], intrinsics: [130, 130, 160, 90], "
                "distortion: [0, 0, 0, 0], mounting: {xyz_m: [0.5, 0, 0.4], rpy_deg: [0, 22, 0]}}\n");
   write_video();
-  write_map();
-  write_config("format: waymark-config/1\nestimator: edge_mcl\nvision: {edges: {}}\n");
-  waymark_session *session = open_session(&pushed, NULL, NULL);
+  robot_map(100, 80);
+  folder_write("robot.yaml", "format: waymark-config/1\nestimator: edge_mcl\nvision: {edges: {}}\n");
+  waymark_session *session = open_taking(&pushed, NULL, NULL);
   uint32_t to;
   ok(waymark_add_source(session, "motion", &to, &err));
   ok(waymark_start(session, &err));
@@ -389,7 +343,7 @@ TEST(test_pictures_give_the_replay_s_bits) {
 TEST(test_a_bound_asked_for_wrongly_is_refused) {
   taken into;
   wm_bound bound;
-  waymark_session *session = open_session(&into, NULL, NULL);
+  waymark_session *session = open_taking(&into, NULL, NULL);
   TEST_ASSERT_EQUAL(WM_BAD_USAGE, waymark_bound(NULL, &bound, sizeof bound, &err));
   TEST_ASSERT_EQUAL(WM_BAD_USAGE, waymark_bound(session, &bound, sizeof bound, &err));  // not started
   ok(waymark_add_source(session, "sightings:eye", &source, &err));
@@ -425,7 +379,7 @@ TEST(test_sizes_are_checked) {
   ok(waymark_open(&options, &session, &err));
   ok(waymark_close(session, &err));
 
-  session = open_session(&into, NULL, NULL);
+  session = open_taking(&into, NULL, NULL);
   ok(waymark_add_source(session, "sightings:eye", &source, &err));
   const wm_event event = sighting_at(0);
   TEST_ASSERT_EQUAL(WM_BAD_USAGE, waymark_push_event(session, source, &event, sizeof event, &err));  // not started
@@ -450,7 +404,7 @@ TEST(test_sizes_are_checked) {
 
 TEST(test_data_that_cannot_be_are_refused_and_change_nothing) {
   taken into;
-  waymark_session *session = open_session(&into, NULL, NULL);
+  waymark_session *session = open_taking(&into, NULL, NULL);
   uint32_t motion, eye;
   TEST_ASSERT_EQUAL(WM_NOT_FOUND, waymark_add_source(session, "sonar", &motion, &err));
   TEST_ASSERT_EQUAL(WM_NOT_FOUND, waymark_add_source(session, "sightings:", &motion, &err));

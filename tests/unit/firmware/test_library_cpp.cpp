@@ -10,7 +10,7 @@
 #include "waymark/waymark.hpp"
 
 extern "C" {
-#include "../drivers/folder.h"
+#include "common/folder.h"
 #include "common/suite.h"
 }
 
@@ -39,7 +39,7 @@ extern "C" void setUp() {
   folder_write("motion.csv", "t_ns,v_mps,w_radps\n0,0.5,0\n1000000000,0.5,0\n");
 }
 
-extern "C" void tearDown() { std::filesystem::remove_all(dir); }
+extern "C" void tearDown() { folder_remove(); }
 
 TEST(test_a_session_moves_and_its_sources_stay) {
   std::vector<wm_estimate> fused;

@@ -443,19 +443,6 @@ static waymark_session *start_other(const char *changes, const char *source, uin
   return session;
 }
 
-static void write_map(void) {
-  static char pgm[20 + 20 * 20];
-  const size_t n = (size_t)sprintf(pgm, "P5\n20 20\n255\n");
-  memset(pgm + n, 255, 400);
-  TEST_ASSERT_EQUAL(0, mkdir(folder_path("map"), 0777));
-  folder_write_bytes("map/free.pgm", pgm, n + 400);
-  for (size_t i = 0; i < 400; i++) pgm[n + i] = (char)(i % 20 == 15 ? 255 : 0);
-  folder_write_bytes("map/edges.pgm", pgm, n + 400);
-  folder_write("map/map.yaml",
-               "image: free.pgm\nresolution: 0.1\norigin: [-1, -1, 0]\nnegate: 0\noccupied_thresh: 0.65\n"
-               "free_thresh: 0.2\nlayers: {edges: edges.pgm, drivable: free.pgm}\n");
-}
-
 void setUp(void) {
   robot_write();
   closed = open_session();
@@ -463,7 +450,7 @@ void setUp(void) {
   fresh = open_session();
   started = start_with_all();
   of_pair = start_other("estimator: stereo_ekf", "stereo", &stereo);
-  write_map();
+  robot_map(20, 15);
   of_map = start_other("estimator: edge_mcl", "points", &points);
 
   char log[320];
@@ -488,7 +475,7 @@ void tearDown(void) {
   ok(waymark_close(started, &err));
   ok(waymark_close(of_pair, &err));
   ok(waymark_close(of_map, &err));
-  robot_remove();
+  folder_remove();
 }
 
 TEST(test_each_misuse_has_a_status_and_a_text) {

@@ -1,17 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // A NaN in each number that a session takes: the datum is refused, or the number counts as absent. Poses stay finite
 // and right.
-#include <math.h>
-#include <stddef.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include "../drivers/folder.h"
-#include "common/suite.h"
+#include "library_robot.h"
 #include "waymark/event_fields.h"
 #include "waymark/streams.h"
-#include "waymark/waymark.h"
 
 #define STEPS 200  // of 20 ms
 #define STEP_NS (20 * WM_NS_PER_MS)
@@ -20,8 +12,6 @@
 #define BROKEN_STEP 100  // of which the datum has the NaN
 #define FAR_OFF_M 0.1    // more than any right run is from the truth
 
-static char dir[256], config[300];
-static wm_error err;
 static wm_estimate last;
 static size_t not_finite;
 
@@ -35,24 +25,11 @@ static void take(void *context, waymark_record kind, const void *record, size_t 
 }
 
 void setUp(void) {
-  (void)snprintf(dir, sizeof dir, "%s", folder_make());
-  folder_write("recording.yaml",
-               "format: waymark-recording/1\nvehicle: {initial_pose: {x_m: 0, y_m: 0, heading_rad: 0}}\n");
-  folder_write("calibration.yaml",
-               "sensors: {eye: {mounting: {xyz_m: [0.1, 0, 0]}, bearing_sigma_rad: 0.01, range_sigma_m: 0.05}}\n"
-               "wheels: {radius_m: 0.05, ticks_per_turn: 1000, track_m: 0.3, wheelbase_m: 1}\n"
-               "markers: {size_m: 0.2}\n");
+  robot_write();
   folder_write("landmarks.csv", "id,x_m,y_m,z_m,sigma_m,yaw_rad\n1,5,1,0,0.01,0\n");
-  (void)snprintf(config, sizeof config, "%s", folder_path("robot.yaml"));
 }
 
-void tearDown(void) {
-  char command[400];
-  (void)snprintf(command, sizeof command, "rm -r '%s'", dir);
-  TEST_ASSERT_EQUAL(0, system(command));
-}
-
-static void ok(wm_status status) { TEST_ASSERT_EQUAL_MESSAGE(WM_OK, status, err.text); }
+void tearDown(void) { folder_remove(); }
 
 // What a source gives of a robot that drives along x: a row, or an event.
 typedef struct given {

@@ -20,7 +20,7 @@ void setUp(void) {
 
 void tearDown(void) {
   ok(waymark_close(started, &err));
-  robot_remove();
+  folder_remove();
 }
 
 static char noted[512];

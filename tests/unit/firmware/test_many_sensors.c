@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // As many sensors as the filter takes, each with all its calibration states: no value and no alarm is lost on the way
 // from the estimator to health, health.json and LCM.
-#include "../drivers/folder.h"
+#include "common/folder.h"
 #include "common/suite.h"
 #include "fusion/fuser.h"
 #include "output/json_files.h"

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // The player keeps the times: 2000 CAN frames a second and two cameras at 30 Hz, nothing lost, each datum in its order.
 #include <errno.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
-#include "../drivers/folder.h"
 #include "../drivers/video_files.h"
 #include "cli/play/player.h"
+#include "common/folder.h"
 #include "common/suite.h"
 #include "rt/clock.h"
 
@@ -16,7 +15,7 @@
 #define W 320
 #define H 200
 
-static char dir[256];
+static const char *dir;
 static bytes file;
 static uint8_t jpeg[1 << 17];
 static player self;
@@ -59,7 +58,6 @@ static void write_recording(void) {
     used += (size_t)sprintf(text + used, "(%d.%06d) can0 1A0#%08X\n", 5 + i / FRAMES_HZ,
                             i % FRAMES_HZ * (1000000 / FRAMES_HZ), i);
   folder_write("can.log", text);
-  (void)mkdir(folder_path("video"), 0777);
   for (int c = 0; c < 2; c++) {
     file.size = 0;
     avi_head(&file, "MJPG", W, H, 0);
@@ -79,18 +77,16 @@ static void write_recording(void) {
 }
 
 void setUp(void) {
-  (void)snprintf(dir, sizeof dir, "%s", folder_make());
+  dir = folder_make();
   write_recording();
   memset(&self, 0, sizeof self);
   memset(sink, 0, sizeof sink);
 }
 
 void tearDown(void) {
-  char command[400];
   wm_play_close(self.play);
   wm_faults_free(&faults);
-  (void)snprintf(command, sizeof command, "rm -r '%s'", dir);
-  TEST_ASSERT_EQUAL(0, system(command));
+  folder_remove();
 }
 
 static void start(double speed) {

@@ -3,6 +3,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "common/folder.h"
 #include "common/suite.h"
 #include "live/copy_map.h"
 #include "live/record.h"
@@ -10,22 +11,14 @@
 #include "waymark/can.h"
 #include "waymark/video.h"
 
-static char folder[64], video[128], stamps[128], avi[128];
+static const char *folder;
 static wm_error err;
 
 void setUp(void) {
-  (void)snprintf(folder, sizeof folder, "/tmp/wm_record_XXXXXX");
-  TEST_ASSERT_NOT_NULL(mkdtemp(folder));
-  (void)snprintf(video, sizeof video, "%s/video", folder);
-  (void)snprintf(avi, sizeof avi, "%s/front.avi", video);
-  (void)snprintf(stamps, sizeof stamps, "%s/front.csv", video);
-  TEST_ASSERT_EQUAL(0, mkdir(video, 0777));
+  folder = folder_make();
+  TEST_ASSERT_EQUAL(0, mkdir(folder_path("video"), 0777));
 }
-void tearDown(void) {
-  char command[128];
-  (void)snprintf(command, sizeof command, "rm -rf %s", folder);
-  TEST_ASSERT_EQUAL(0, system(command));
-}
+void tearDown(void) { folder_remove(); }
 
 static void expect_again(const char *line) {
   wm_can_frame frame;
@@ -56,7 +49,7 @@ TEST(lines_of_candump_are_written_as_they_were_read) {
 
 static size_t write_video(void) {
   uint8_t grey[20 * H];
-  FILE *f = fopen(avi, "wb"), *csv = fopen(stamps, "w");
+  FILE *f = fopen(folder_path("video/front.avi"), "wb"), *csv = fopen(folder_path("video/front.csv"), "w");
   TEST_ASSERT_TRUE(f && csv);
   TEST_ASSERT_EQUAL(0, avi_begin(f, "Y800", W, H, 30));
   (void)fputs("frame,t_ns,exposure_ns,arrival_ns\n", csv);
@@ -89,7 +82,7 @@ TEST(a_video_that_was_cut_anywhere_is_read_up_to_there) {
   size_t length = write_video(), picture = 8 + W * H;
   TEST_ASSERT_EQUAL(PICTURES, pictures_in());
   for (size_t cut = length; cut-- > length - picture * 2 - 3;) {
-    TEST_ASSERT_EQUAL(0, truncate(avi, (off_t)cut));
+    TEST_ASSERT_EQUAL(0, truncate(folder_path("video/front.avi"), (off_t)cut));
     int whole = cut >= length - picture ? PICTURES - 1 : cut >= length - 2 * picture ? PICTURES - 2 : PICTURES - 3;
     TEST_ASSERT_EQUAL(whole, pictures_in());
   }
@@ -102,20 +95,10 @@ TEST(an_empty_configuration_is_refused) {
   TEST_ASSERT_EQUAL(WM_BAD_CONFIG, wm_record(&config, &options, &report, &err));
 }
 
-static void put(const char *name, const char *text) {
-  char path[200];
-  (void)snprintf(path, sizeof path, "%s/%s", folder, name);
-  FILE *f = fopen(path, "w");
-  TEST_ASSERT_NOT_NULL_MESSAGE(f, path);
-  (void)fputs(text, f);
-  (void)fclose(f);
-}
-
 static void expect_text(const char *name, const char *text) {
-  char path[200], there[400] = "";
-  (void)snprintf(path, sizeof path, "%s/%s", folder, name);
-  FILE *f = fopen(path, "r");
-  TEST_ASSERT_NOT_NULL_MESSAGE(f, path);
+  char there[400] = "";
+  FILE *f = fopen(folder_path(name), "r");
+  TEST_ASSERT_NOT_NULL_MESSAGE(f, name);
   there[fread(there, 1, sizeof there - 1, f)] = '\0';
   (void)fclose(f);
   TEST_ASSERT_EQUAL_STRING(text, there);
@@ -154,10 +137,10 @@ TEST(two_buses_are_recorded_and_read_again) {
   wm_config config;
   wm_record_report report;
   wm_recording *recording;
-  put("fast.dbc", "BO_ 256 Motion: 2 X\n SG_ V : 0|16@1+ (0.001,0) [0|65] \"m/s\" X\n");
-  put("fast.yaml", SIGNALS("vehicle_speed", "V"));
-  put("body.dbc", "BO_ 256 Motion: 2 X\n SG_ W : 0|16@1- (0.001,0) [-32|32] \"rad/s\" X\n");
-  put("body.yaml", SIGNALS("yaw_rate", "W"));
+  folder_write("fast.dbc", "BO_ 256 Motion: 2 X\n SG_ V : 0|16@1+ (0.001,0) [0|65] \"m/s\" X\n");
+  folder_write("fast.yaml", SIGNALS("vehicle_speed", "V"));
+  folder_write("body.dbc", "BO_ 256 Motion: 2 X\n SG_ W : 0|16@1- (0.001,0) [-32|32] \"rad/s\" X\n");
+  folder_write("body.yaml", SIGNALS("yaw_rate", "W"));
   // Any style: a map in lines, a list in brackets, the second bus by the files at the top.
   (void)snprintf(
       text, sizeof text,
@@ -169,7 +152,7 @@ TEST(two_buses_are_recorded_and_read_again) {
   const wm_record_options options = {.out_dir = out, .duration_s = 0.2};
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_record(&config, &options, &report, &err), err.text);
   wm_config_free(&config);
-  put("rec/can.log", "(1.000000) nocan7 100#E803\n(1.010000) nocan8 100#9CFF\n(1.020000) nocan9 100#0000\n");
+  folder_write("rec/can.log", "(1.000000) nocan7 100#E803\n(1.010000) nocan8 100#9CFF\n(1.020000) nocan9 100#0000\n");
 
   // What was written is a configuration, and names the recording's own files.
   (void)snprintf(path, sizeof path, "%s/config.yaml", out);
@@ -200,18 +183,16 @@ TEST(two_buses_are_recorded_and_read_again) {
 
 // Wherever its pictures lie, in the recording they lie beside it.
 TEST(a_map_is_copied_with_its_pictures) {
-  char yaml[512], out[128], sub[128], from[160];
-  (void)snprintf(sub, sizeof sub, "%s/plans", folder);
+  char yaml[512], out[128], from[160];
   (void)snprintf(out, sizeof out, "%s/rec", folder);
-  TEST_ASSERT_EQUAL(0, mkdir(sub, 0777));
   TEST_ASSERT_EQUAL(0, mkdir(out, 0777));
-  put("plans/floor.png", "floor");
-  put("floor.png", "edges");
+  folder_write("plans/floor.png", "floor");
+  folder_write("floor.png", "edges");
   (void)snprintf(yaml, sizeof yaml,
                  "resolution: 0.05\norigin: [0, 0, 0]  # at the door\nimage: nowhere.png\n"
                  "layers: {edges: %s/floor.png, drivable: plans/floor.png}\n",
                  folder);
-  put("map.yaml", yaml);
+  folder_write("map.yaml", yaml);
   (void)snprintf(from, sizeof from, "%s/map.yaml", folder);
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, copy_map(from, out, &err), err.text);
   expect_text("rec/map/map.yaml",

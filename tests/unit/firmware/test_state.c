@@ -3,6 +3,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "common/folder.h"
 #include "common/suite.h"
 #include "config/config.h"
 #include "fusion/budget.h"
@@ -10,7 +11,7 @@
 #include "output/saved_pose.h"
 #include "waymark/keeper.h"
 
-static char folder[64], path[128];
+static char path[512];
 static wm_error err;
 static wm_config slam;
 static wm_motion_params *motion;  // defaults: noise.hold_mps2 1, noise.hold_radps2 0.5, hold_max_s 2
@@ -19,15 +20,12 @@ void setUp(void) {
   motion = malloc(wm_motion_params_table.bytes);
   TEST_ASSERT_NOT_NULL(motion);
   wm_params_defaults(&wm_motion_params_table, motion);
-  (void)snprintf(folder, sizeof folder, "/tmp/wm_state_XXXXXX");
-  TEST_ASSERT_NOT_NULL(mkdtemp(folder));
-  (void)snprintf(path, sizeof path, "%s/pose.yaml", folder);
+  (void)snprintf(path, sizeof path, "%s", folder_path("pose.yaml"));
 }
 void tearDown(void) {
   wm_config_free(&slam);
   free(motion);
-  (void)unlink(path);
-  (void)rmdir(folder);  // fails the next test's count where something else was left there
+  folder_remove();
 }
 
 static wm_estimate tracking(double x_m, double sigma_m) {
@@ -327,7 +325,7 @@ TEST(a_map_with_nan_is_refused) {
 TEST(links_are_not_followed) {
   char beside[160], other[160];
   (void)snprintf(beside, sizeof beside, "%s.new", path);
-  (void)snprintf(other, sizeof other, "%s/other", folder);
+  (void)snprintf(other, sizeof other, "%s", folder_path("other"));
   FILE *f = fopen(other, "w");
   fputs("precious", f);
   fclose(f);

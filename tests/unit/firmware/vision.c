@@ -4,10 +4,9 @@
 #include <dirent.h>
 #include <malloc.h>
 #include <stdatomic.h>
-#include <sys/stat.h>
 #include <turbojpeg.h>
 
-#include "../drivers/folder.h"
+#include "common/folder.h"
 #include "common/suite.h"
 #include "sources/vision.h"
 
@@ -15,7 +14,7 @@
 #define H 180
 #define FRAMES 12
 
-static char dir[256];
+static const char *dir;
 static wm_error err;
 static wm_config config;
 static wm_recording *recording;
@@ -37,8 +36,6 @@ static void write_jpeg(const char *name, const uint8_t *pixels) {
 static void write_pictures(const char *camera) {
   static uint8_t pixels[W * H];
   char name[64], csv[1024] = "frame,t_ns,exposure_ns,arrival_ns\n", row[80];
-  (void)snprintf(name, sizeof name, "video/%s", camera);
-  (void)mkdir(folder_path(name), 0777);
   for (int i = 0; i < FRAMES; i++) {
     for (int k = 0; k < W * H; k++) pixels[k] = (uint8_t)(i % 3 == 2 ? 100 + i : k / W < 90 + i ? 60 : 150);
     (void)snprintf(name, sizeof name, "video/%s/%06d.jpg", camera, i);
@@ -56,8 +53,7 @@ static void write_pictures(const char *camera) {
   "distortion: [0, 0, 0, 0], mounting: {xyz_m: [0.5, 0, 0.4], rpy_deg: [0, 22, 0]}}\n"
 
 void setUp(void) {
-  (void)snprintf(dir, sizeof dir, "%s", folder_make());
-  (void)mkdir(folder_path("video"), 0777);
+  dir = folder_make();
   folder_write("recording.yaml", "format: waymark-recording/1\n");
   folder_write("motion.csv", "t_ns,v_mps,w_radps\n0,0,0\n");
   folder_write("calibration.yaml", "cameras:\n" CAMERA("front") CAMERA("rear"));
@@ -70,13 +66,11 @@ void setUp(void) {
 }
 
 void tearDown(void) {
-  char command[400];
   wm_vision_close(vision);
   wm_recording_close(recording);
   wm_config_free(&config);
   wm_arena_close(&arena);
-  (void)snprintf(command, sizeof command, "rm -r '%s'", dir);
-  TEST_ASSERT_EQUAL(0, system(command));
+  folder_remove();
 }
 
 static void parse(const char *section, uint32_t takes) {
