@@ -24,13 +24,13 @@ namespace {
 struct ready_map {
   wm::edge_map map;
   wm::score_field field;
-  bench::block memory, layers;
+  block memory, layers;
   size_t bytes = 0;
   void make(const wm_raster &raster) {
     bytes = wm::edge_map::bytes(raster) + wm::score_field::bytes(raster);
     if (!memory) {
-      memory = bench::allocate(wm::edge_map::bytes(raster));
-      layers = bench::allocate(wm::score_field::bytes(raster) + 1);
+      memory = allocate(wm::edge_map::bytes(raster));
+      layers = allocate(wm::score_field::bytes(raster) + 1);
     }
     map.init(raster, memory.get());
     wm::score_table table;

@@ -12,9 +12,9 @@
 #include "drawn_picture.h"
 #include "drawn_search.h"
 #include "drawn_street.h"
+#include "drawn_window.h"
 #include "landmark_drive.h"
 #include "plain_ekf.h"
-#include "vision/edges_hough/hough.hpp"
 
 // Callgrind counts inside of this function alone.
 extern "C" __attribute__((noinline)) void wm_counted(const std::function<void()> *work) {
@@ -65,17 +65,8 @@ void plain_steps() {
 }
 
 void windows() {
-  uint8_t window[50 * 50], turned[50 * 50];
-  for (size_t i = 0; i < sizeof window; i++) window[i] = static_cast<uint8_t>(256 * wm_random_uniform(1, 1, i));
-  for (int y = 0; y < 50; y++)
-    for (int x = 0; x < 50; x++) turned[x * 50 + y] = window[y * 50 + x];
-  const auto work = std::make_unique<wm::hough_work>();
-  count([&] {
-    for (int q = 0; q < 4; q++) {
-      const uint8_t *from = q & 1 ? turned : window;
-      (void)wm::hough_transform(q & 2 ? from + 49 : from, 50, 50, q & 2 ? -1 : 1, work.get());
-    }
-  });
+  bench::window_at_work window;
+  count([&] { (void)window.all_slopes(wm::hough_transform); });
 }
 
 }  // namespace

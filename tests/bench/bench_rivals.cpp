@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "drawn_map.h"
+#include "drawn_window.h"
 #include "timing.h"
-#include "vision/edges_hough/hough.hpp"
 #include "waymark/random.h"
 #ifdef WM_HAS_MRPT
 #include <mrpt/maps/COccupancyGridMap2D.h>
@@ -87,25 +87,16 @@ void mrpt_field() {
 }
 
 void windows() {
-  uint8_t window[50 * 50], turned[50 * 50];
-  for (int i = 0; i < 2500; i++)  // a line in noise, as a gradient's magnitude has it
-    window[i] = static_cast<uint8_t>((std::abs(i % 50 - 10 - i / 100) < 2 ? 180 : 0) +
-                                     40 * wm_random_uniform(1, 2, static_cast<uint64_t>(i)));
-  for (int y = 0; y < 50; y++)
-    for (int x = 0; x < 50; x++) turned[x * 50 + y] = window[y * 50 + x];
-  const auto work = std::make_unique<wm::hough_work>();
-  volatile int kept = 0;
-  const double us = bench::median_us(1001, [&] {
-    for (int q = 0; q < 4; q++) {
-      const uint8_t *from = q & 1 ? turned : window;
-      kept = kept + wm::hough_transform(q & 2 ? from + 49 : from, 50, 50, q & 2 ? -1 : 1, work.get())->sums[60];
-    }
+  bench::window_at_work window([](int i) {  // a line in noise, as a gradient's magnitude has it
+    return (std::abs(i % 50 - 10 - i / 100) < 2 ? 180 : 0) + 40 * wm_random_uniform(1, 2, static_cast<uint64_t>(i));
   });
+  volatile int kept = 0;
+  const double us = bench::median_us(1001, [&] { kept = kept + window.all_slopes(wm::hough_transform); });
   std::printf("window of 50 x 50: ours, all slopes of four quadrants %9.1f us\n", us);
 #ifdef WM_HAS_OPENCV
   cv::setNumThreads(1);
   cv::Mat edge(50, 50, CV_8UC1);
-  for (int i = 0; i < 2500; i++) edge.data[i] = window[i] > 30 ? 255 : 0;
+  for (int i = 0; i < 2500; i++) edge.data[i] = window.pixels[i] > 30 ? 255 : 0;
   std::vector<cv::Vec2f> lines;
   const double theirs = bench::median_us(201, [&] { cv::HoughLines(edge, lines, 1, CV_PI / 200, 25); });
   std::printf("window of 50 x 50: OpenCV's HoughLines, 200 angles %9.1f us (%zu lines)\n", theirs, lines.size());

@@ -9,6 +9,7 @@
 #include <memory>
 #include <vector>
 
+#include "common/block.hpp"
 #include "filters/pf_edges/particles.hpp"
 #include "waymark/random.h"
 
@@ -37,12 +38,6 @@ inline std::vector<uint8_t> drawn_edges() {
   for (int x : {1000, 1180, 3000, 3180}) line(x, 345, x, 1000);
   return edges;
 }
-
-struct freed {
-  void operator()(void *memory) const { std::free(memory); }
-};
-using block = std::unique_ptr<void, freed>;
-inline block allocate(size_t bytes) { return block(std::aligned_alloc(64, (bytes + 63) / 64 * 64)); }
 
 inline constexpr int kScanPoints = 180;
 inline constexpr double kScanAperture_rad = 2.4;

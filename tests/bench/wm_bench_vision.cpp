@@ -7,9 +7,8 @@
 #include <vector>
 
 #include "drawn_picture.h"
+#include "drawn_window.h"
 #include "timing.h"
-#include "vision/edges_hough/hough.hpp"
-#include "waymark/random.h"
 
 namespace {
 
@@ -44,24 +43,13 @@ void hemispherical_picture() {
 }  // namespace
 
 int main() {
-  uint8_t window[50 * 50];
-  for (size_t i = 0; i < sizeof window; i++) window[i] = static_cast<uint8_t>(256 * wm_random_uniform(1, 1, i));
-  uint8_t turned[50 * 50];
-  for (int y = 0; y < 50; y++)
-    for (int x = 0; x < 50; x++) turned[x * 50 + y] = window[y * 50 + x];
-  const auto work = std::make_unique<wm::hough_work>();
+  bench::window_at_work window;
   volatile int kept = 0;
-  const auto all = [&](auto transform) {
-    for (int q = 0; q < 4; q++) {
-      const uint8_t *from = q & 1 ? turned : window;
-      const wm::hough_plane *plane = transform(q & 2 ? from + 49 : from, 50, 50, q & 2 ? -1 : 1, work.get());
-      kept = kept + plane->sums[60];
-    }
-  };
+  const auto all = [&](auto transform) { kept = kept + window.all_slopes(transform); };
   std::printf("hough_50x50_us %.2f\n", fifty_us([&] { all(wm::hough_transform); }));
   std::printf("hough_50x50_scalar_us %.2f\n", fifty_us([&] { all(wm::hough_transform_scalar); }));
   std::printf("hough_50x50_find_us %.2f\n", fifty_us([&] {
-                for (int q = 0; q < 4; q++) kept = kept + wm::hough_find(work->a, 50).t;
+                for (int q = 0; q < 4; q++) kept = kept + wm::hough_find(window.work->a, 50).t;
               }));
   whole_pictures();
   hemispherical_picture();

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "common/drawn_walls.hpp"
 #include "waymark/random.h"
 
 namespace drives {
@@ -17,31 +18,12 @@ double wrapped(double angle) { return std::remainder(angle, 2 * M_PI); }
 
 // The room's walls: 9.6 x 7.6 m, with niches that a half turn about the middle maps onto each other, a
 // pillar, and corners that are cut off.
-struct wall {
-  double ax, ay, bx, by;
-};
-constexpr wall kWalls[] = {
+const std::vector<segment> kWalls = {
     {1.2, 1.2, 4, 1.2},     {4, 1.2, 4, 0.8},     {4, 0.8, 5.2, 0.8},    {5.2, 0.8, 5.2, 1.2}, {5.2, 1.2, 10.8, 1.2},
     {10.8, 1.2, 10.8, 8.8}, {10.8, 8.8, 8, 8.8},  {8, 8.8, 8, 9.2},      {8, 9.2, 6.8, 9.2},   {6.8, 9.2, 6.8, 8.8},
     {6.8, 8.8, 1.2, 8.8},   {1.2, 8.8, 1.2, 1.2}, {5.8, 4.8, 6.2, 4.8},  {6.2, 4.8, 6.2, 5.2}, {6.2, 5.2, 5.8, 5.2},
     {5.8, 5.2, 5.8, 4.8},   {8.6, 1.2, 8.6, 2.4}, {8.6, 2.4, 10.8, 2.4}, {2.0, 1.2, 2.0, 3.0}, {2.0, 3.0, 1.2, 3.0},
 };
-
-// First wall along a ray; *normal: direction of its normal towards the wall's dark side.
-double cast(double x, double y, double angle, double *normal) {
-  double best = 1e9;
-  const double c = std::cos(angle), s = std::sin(angle);
-  for (const wall &w : kWalls) {
-    const double ex = w.bx - w.ax, ey = w.by - w.ay, det = ex * s - ey * c;
-    if (std::fabs(det) < 1e-9) continue;
-    const double t = (ex * (w.ay - y) - ey * (w.ax - x)) / det, u = (c * (w.ay - y) - s * (w.ax - x)) / det;
-    if (!(t > 0.05 && u >= 0 && u <= 1 && t < best)) continue;
-    best = t;
-    const double across = std::atan2(ex, -ey);
-    *normal = std::cos(across - angle) > 0 ? across : across + M_PI;
-  }
-  return best;
-}
 
 void rotate(const double rpy[3], double out[3][3]) {
   const double cr = std::cos(rpy[0]), sr = std::sin(rpy[0]), cp = std::cos(rpy[1]), sp = std::sin(rpy[1]);
@@ -111,7 +93,7 @@ void scene::begin(unsigned happens) {
   };
   for (double x = 1.3; x < 10.7; x += kPixel_m)
     for (double y = 1.3; y < 8.7; y += kPixel_m) drivable_[pixel(x, y)] = 255;
-  for (const wall &w : kWalls)
+  for (const segment &w : kWalls)
     for (double u = 0; u <= 1; u += 0.002) edges_[pixel(w.ax + u * (w.bx - w.ax), w.ay + u * (w.by - w.ay))] = 255;
   map_ = {kMapWidth, kMapHeight, kPixel_m, 0, 0, 0, edges_.data(), drivable_.data(), 1};
   setup_.sensors = sensors_;
@@ -269,7 +251,7 @@ void scene::add_scan(unsigned happens, double t_s) {
   seen_++;
   for (int i = 0; i < 110; i++) {
     const double angle = -1.2 + 2.4 * i / 109;
-    double normal_rad = 0, range = cast(eye[0], eye[1], then.heading_rad + angle, &normal_rad);
+    double normal_rad = 0, range = cast(kWalls, eye[0], eye[1], then.heading_rad + angle, &normal_rad);
     if (happens & kReflections) {
       if (i % 9 < 2) range *= 0.8;
       if (i > 50 && i < 62) range = std::fmin(range, 1.6);

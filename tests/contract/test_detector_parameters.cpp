@@ -4,6 +4,7 @@
 
 #include <memory>
 
+#include "common/block.hpp"
 #include "common/suite.h"
 #include "parameter_sweep.hpp"
 #include "pictures.hpp"
@@ -46,7 +47,7 @@ bool run(const wm_detector &of, const film &seen, const values &params, trace *o
   const char *why = "";
   const size_t bytes = of.state_bytes(params.data(), &view, &why);
   if (bytes == 0) return false;
-  const std::unique_ptr<void, decltype(&std::free)> state(std::aligned_alloc(64, (bytes + 63) / 64 * 64), &std::free);
+  const block state = allocate(bytes);
   if (!state || of.init(state.get(), params.data(), &view) != WM_OK) return false;
   constexpr size_t kEvents = 256;
   static wm_event events[kEvents];

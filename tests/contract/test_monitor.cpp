@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "common/block.hpp"
 #include "common/suite.h"
 #include "drives.hpp"
 #include "filters/core/calibration_list.hpp"
@@ -15,10 +16,6 @@ namespace {
 
 constexpr double kContradicted_s = 20.0, kEnd_s = 50.0;
 constexpr double kDegradedWithin_s = 6.0, kLostWithin_s = 25.0;
-
-struct free_memory {
-  void operator()(void *p) const { std::free(p); }
-};
 
 struct seen {
   double doubted_s = INFINITY, lost_s = INFINITY;  // the first time
@@ -79,7 +76,7 @@ seen drive(const char *name, drives::scene &scene, const std::vector<parameters:
   const char *why = "";
   const size_t bytes = of.state_bytes(params.data(), &setup, &why);
   TEST_ASSERT_GREATER_THAN_MESSAGE(0, bytes, why);
-  const std::unique_ptr<void, free_memory> state(std::aligned_alloc(64, (bytes + 63) / 64 * 64));
+  const block state = allocate(bytes);
   TEST_ASSERT_EQUAL(WM_OK, of.init(state.get(), params.data(), &setup));
   static wm_monitor monitor;
   wm_monitor_init(&monitor, &setup, 1);

@@ -9,6 +9,7 @@
 #include <memory>
 #include <string>
 
+#include "common/block.hpp"
 #include "common/suite.h"
 #include "drives.hpp"
 #include "parameter_sweep.hpp"
@@ -20,11 +21,6 @@ using parameters::setting;
 using parameters::stage;
 using parameters::trace;
 using parameters::values;
-
-struct freed {
-  void operator()(void *memory) const { std::free(memory); }
-};
-using block = std::unique_ptr<void, freed>;
 
 void add_estimate(const wm_estimate &e, trace *out) {
   out->add(e.pose_map_base.p_m, 3);
@@ -111,7 +107,7 @@ bool run(const wm_estimator &of, const whole_table &tables, drives::scene &scene
   const wm_setup &setup = scene.setup(tables.setup(params));
   const size_t bytes = of.state_bytes(params.data(), &setup, &why);
   if (bytes == 0) return false;
-  const block state(std::aligned_alloc(64, (bytes + 63) / 64 * 64));
+  const block state = allocate(bytes);
   if (!state || of.init(state.get(), params.data(), &setup) != WM_OK) return false;
   wm_innovation records[WM_INNOVATIONS_PER_EVENT_MAX];
   wm_estimate estimate;

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "common/folder.h"
+#include "output/event_log.h"
 #include "unity.h"
 
 #define LANDMARKS 8
@@ -151,6 +152,21 @@ void replay_into(const char *recording, const char *config_text, const char *run
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, status, err.text);
   wm_recording_close(opened);
   wm_config_free(&config);
+}
+
+void replay_log_into(const char *log_path, const char *run, wm_run_report *report) {
+  wm_error err = {0};
+  wm_log_reader *log;
+  wm_config config;
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_log_open(folder_path(log_path), &log, &err), err.text);
+  const wm_log_head *head = wm_log_reader_head(log);
+  TEST_ASSERT_EQUAL_MESSAGE(
+      WM_OK, wm_config_parse_logged(head->config_text, head->config_length, head->config_path, &config, &err),
+      err.text);
+  const wm_replay_options options = {.out_dir = folder_path(run)};
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_replay_log(&config, log, &options, report, &err), err.text);
+  wm_config_free(&config);
+  wm_log_reader_close(log);
 }
 
 char *read_all(const char *path, size_t *length) {

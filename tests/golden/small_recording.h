@@ -21,6 +21,8 @@ const char *small_recording_write(const char *name, const small_recording *what)
 
 // Replays FOLDER/`recording` with a configuration's text into FOLDER/`run`. Fails the test where that fails.
 void replay_into(const char *recording, const char *config_text, const char *run, wm_run_report *report);
+// Replays the log FOLDER/`log` into FOLDER/`run`. Fails the test where that fails.
+void replay_log_into(const char *log, const char *run, wm_run_report *report);
 // The whole of a file; the caller's to free. Fails the test where it can't be read.
 char *read_all(const char *path, size_t *length);
 // Fails the test where FOLDER/`a`/`file` and FOLDER/`b`/`file` differ in a byte, or are empty.

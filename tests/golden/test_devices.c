@@ -163,17 +163,7 @@ static void a_run_on_can_survives_an_interface_that_goes_down(void) {
 
 TEST(the_log_of_a_run_on_devices_gives_its_poses_again) {
   a_run_on_can_survives_an_interface_that_goes_down();
-  wm_error err;
-  wm_log_reader *log;
-  wm_config config;
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_log_open(folder_path("run/events.wmlog"), &log, &err), err.text);
-  const wm_log_head *head = wm_log_reader_head(log);
-  TEST_ASSERT_EQUAL(WM_OK,
-                    wm_config_parse_logged(head->config_text, head->config_length, head->config_path, &config, &err));
-  const wm_replay_options options = {.out_dir = folder_path("again")};
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_replay_log(&config, log, &options, &report, &err), err.text);
-  wm_config_free(&config);
-  wm_log_reader_close(log);
+  replay_log_into("run/events.wmlog", "again", &report);
   assert_same_file("run", "again", "trajectory.csv");
 }
 

@@ -34,19 +34,6 @@ static void run_live(const char *recording, const char *config_text, const wm_ru
   wm_config_free(&config);
 }
 
-static void replay_log_into(const char *log_path, const char *run) {
-  wm_error err;
-  wm_log_reader *log;
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_log_open(folder_path(log_path), &log, &err), err.text);
-  const wm_log_head *head = wm_log_reader_head(log);
-  wm_config config;
-  TEST_ASSERT_EQUAL(WM_OK, wm_config_parse(head->config_text, head->config_length, head->config_path, &config, &err));
-  const wm_replay_options options = {.out_dir = folder_path(run)};
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_replay_log(&config, log, &options, &report, &err), err.text);
-  wm_config_free(&config);
-  wm_log_reader_close(log);
-}
-
 TEST(the_log_of_a_run_gives_exactly_its_fused_poses) {
   small_recording_write("rec",
                         &(small_recording){.seconds = 3, .late_ns = some_late, .frame_hz = 20, .motion_hz = 100});
@@ -54,7 +41,7 @@ TEST(the_log_of_a_run_gives_exactly_its_fused_poses) {
   run_live("rec", kConfig, &options);
   TEST_ASSERT_GREATER_THAN(200, live.run.poses);  // 300 where no thread was held up
   TEST_ASSERT_EQUAL_UINT64(0, live.run.health.outputs_lost);
-  replay_log_into("run/events.wmlog", "again");
+  replay_log_into("run/events.wmlog", "again", &report);
   TEST_ASSERT_EQUAL(0, report.log_was_cut);
   TEST_ASSERT_EQUAL_UINT64(live.run.events, report.events);
   assert_same_file("run", "again", "trajectory.csv");
@@ -110,7 +97,7 @@ TEST(a_stop_ends_the_run_and_everything_is_written) {
   pthread_join(thread, NULL);
   TEST_ASSERT_LESS_THAN_DOUBLE(60, live.run.recorded_s);
   TEST_ASSERT_GREATER_THAN(2, live.run.poses);
-  replay_log_into("run/events.wmlog", "again");
+  replay_log_into("run/events.wmlog", "again", &report);
   TEST_ASSERT_EQUAL(0, report.log_was_cut);
   assert_same_file("run", "again", "trajectory.csv");
 }

@@ -49,17 +49,8 @@ TEST(nothing_is_allocated_and_no_page_is_missing_after_the_start) {
 TEST(the_event_log_gives_the_same_poses_without_the_recording) {
   small_recording_write("rec", &(small_recording){.seconds = 20});
   replay_into("rec", kConfig, "run", &report);
-  wm_error err;
-  wm_log_reader *log;
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_log_open(folder_path("run/events.wmlog"), &log, &err), err.text);
-  const wm_log_head *head = wm_log_reader_head(log);
-  wm_config config;
-  TEST_ASSERT_EQUAL(WM_OK, wm_config_parse(head->config_text, head->config_length, head->config_path, &config, &err));
-  const wm_replay_options options = {.out_dir = folder_path("again")};
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_replay_log(&config, log, &options, &report, &err), err.text);
+  replay_log_into("run/events.wmlog", "again", &report);
   TEST_ASSERT_EQUAL(0, report.log_was_cut);
-  wm_config_free(&config);
-  wm_log_reader_close(log);
   assert_same_file("run", "again", "trajectory.csv");
   assert_same_file("run", "again", "trajectory.tum");
   assert_same_file("run", "again", "innovations.csv");

@@ -42,13 +42,20 @@ static void numbered_rows(int count) {
 
 static void save(const char *name) { folder_write_bytes(name, (const char *)file.data, file.size); }
 
-static void add_jpeg(int level) {
-  size_t size = make_jpeg(W, H, level, jpeg, sizeof jpeg);
-  avi_chunk(&file, "00dc", jpeg, size);
+static void add_to(const char *chunk, int level) {
+  const size_t size = make_jpeg(W, H, level, jpeg, sizeof jpeg);
+  avi_chunk(&file, chunk, jpeg, size);
 }
+static void add_jpeg(int level) { add_to("00dc", level); }
 
 static void open_it(void) {
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_video_open(dir, &camera, 3, NULL, NULL, &video, &err), err.text);
+}
+
+static void open_video(const char *name, int count) {
+  save(name);
+  numbered_rows(count);
+  open_it();
 }
 
 // The next frame; its left half has this level.
@@ -72,15 +79,12 @@ static void expect_end(void) {
 
 TEST(avi_of_jpegs) {
   avi_head(&file, "MJPG", W, H, 1);
-  size_t size = make_jpeg(W, H, 20, jpeg, sizeof jpeg);
   avi_chunk(&file, "00wb", "sound", 5);
-  avi_chunk(&file, "01dc", jpeg, size);
+  add_to("01dc", 20);
   bytes_put(&file, "LIST\0\0\0\0rec ", 12);
-  size = make_jpeg(W, H, 60, jpeg, sizeof jpeg);
-  avi_chunk(&file, "01dc", jpeg, size);
+  add_to("01dc", 60);
   bytes_put(&file, "RIFF\0\0\0\0AVIXLIST\0\0\0\0movi", 24);
-  size = make_jpeg(W, H, 90, jpeg, sizeof jpeg);
-  avi_chunk(&file, "01dc", jpeg, size);
+  add_to("01dc", 90);
   avi_chunk(&file, "idx1", "whatever", 8);
   save("video/front.avi");
   numbered_rows(3);
@@ -112,9 +116,7 @@ TEST(matroska) {
     mkv_block(&file, 2, jpeg, size);
     if (i == 1) mkv_block(&file, 2, jpeg, 0);
   }
-  save("video/front.mkv");
-  numbered_rows(3);
-  open_it();
+  open_video("video/front.mkv", 3);
   for (int i = 0; i < 3; i++) expect_frame((uint64_t)i, 30 * i);
   expect_end();
   TEST_ASSERT_EQUAL_UINT64(1, wm_video_counted(video)->empty);
@@ -163,9 +165,7 @@ TEST(colour_is_its_luma) {
   avi_head(&file, "MJPG", W, H, 0);
   size_t size = make_colour_jpeg(W, H, jpeg, sizeof jpeg);
   avi_chunk(&file, "00dc", jpeg, size);
-  save("video/front.avi");
-  numbered_rows(1);
-  open_it();
+  open_video("video/front.avi", 1);
   wm_frame frame;
   TEST_ASSERT_EQUAL(WM_OK, wm_video_next(video, &frame, &err));
   TEST_ASSERT_INT_WITHIN(3, 95, frame.grey[100]);  // 0.299 * 200 + 0.701 * 50
@@ -210,9 +210,7 @@ TEST(a_damaged_container_ends_the_pictures) {
   add_jpeg(10);
   bytes_put(&file, "\0\1\2\3\4\5\6\7\10", 9);
   add_jpeg(20);
-  save("video/front.avi");
-  numbered_rows(2);
-  open_it();
+  open_video("video/front.avi", 2);
   expect_frame(0, 10);
   expect_end();
   TEST_ASSERT_EQUAL_UINT64(1, wm_video_counted(video)->damaged);
@@ -271,9 +269,7 @@ TEST(readers_share_what_is_decoded) {
       add_jpeg(2 * i);
     }
   }
-  save("video/front.avi");
-  numbered_rows(SHARED);
-  open_it();
+  open_video("video/front.avi", SHARED);
   TEST_ASSERT_EQUAL(WM_OK, wm_video_open(dir, &camera, 3, NULL, NULL, &other, &err));
   TEST_ASSERT_EQUAL(WM_OK, wm_video_share(other, video, &err));
   for (int i = 0; i < 30; i++)

@@ -6,6 +6,7 @@
 #include <memory>
 #include <vector>
 
+#include "common/drawn_walls.hpp"
 #include "common/suite.h"
 #include "events.hpp"
 #include "math/arc.hpp"
@@ -17,15 +18,7 @@ namespace edge_building {
 constexpr double kPixel_m = 0.02;
 constexpr int kWidth = 900, kHeight = 600;  // 18 x 12 m
 
-struct segment {
-  double ax, ay, bx, by;
-};
-// An L of corridors with recesses of different lengths, and a pillar.
-inline const segment kWalls[] = {{1, 1, 16, 1},        {16, 1, 16, 3},        {16, 3, 9, 3},  {9, 3, 9, 3.4},
-                                 {9, 3.4, 7.8, 3.4},   {7.8, 3.4, 7.8, 3},    {7.8, 3, 6, 3}, {6, 3, 6, 5},
-                                 {6, 5, 6.5, 5},       {6.5, 5, 6.5, 7},      {6.5, 7, 6, 7}, {6, 7, 6, 11},
-                                 {6, 11, 3.5, 11},     {3.5, 11, 3.5, 3},     {3.5, 3, 1, 3}, {1, 3, 1, 1},
-                                 {12, 1.6, 12.4, 1.6}, {12.4, 1.6, 12.4, 1.3}};
+inline const std::vector<segment> &kWalls = kCorridors;
 
 inline const wm_estimator *ops;
 inline std::vector<uint8_t> edges, drivable;
@@ -36,19 +29,6 @@ inline wm_setup setup;
 
 inline bool inside(double x, double y) {
   return (x > 1 && x < 16 && y > 1 && y < 3) || (x > 3.5 && x < 6 && y > 1 && y < 11);
-}
-
-// First wall along a ray, or a negative distance.
-inline double cast(double x, double y, double angle) {
-  double best = -1;
-  const double c = std::cos(angle), s = std::sin(angle);
-  for (const segment &w : kWalls) {
-    const double ex = w.bx - w.ax, ey = w.by - w.ay, det = ex * s - ey * c;
-    if (std::fabs(det) < 1e-9) continue;
-    const double t = (ex * (w.ay - y) - ey * (w.ax - x)) / det, u = (c * (w.ay - y) - s * (w.ax - x)) / det;
-    if (t > 0.05 && u >= 0 && u <= 1 && (best < 0 || t < best)) best = t;
-  }
-  return best;
 }
 
 inline void without_a_start() { setup.start.p_m[0] = setup.start.p_m[1] = setup.start.heading_rad = NAN; }
@@ -109,7 +89,7 @@ struct drive {
     wm_points &p = e.as.points;
     const double eye_x = truth.x_m + std::cos(truth.heading_rad), eye_y = truth.y_m + std::sin(truth.heading_rad);
     for (int i = 0; i < 140; i++) {
-      const double angle = -1.2 + 2.4 * i / 139, wall = cast(eye_x, eye_y, truth.heading_rad + angle);
+      const double angle = -1.2 + 2.4 * i / 139, wall = cast(kWalls, eye_x, eye_y, truth.heading_rad + angle);
       const double range = std::fmin((i < glass ? 1.5 * wall : wall) - thick_m, blocked_m / std::cos(angle));
       if (range < 0.3 || range > 5) continue;
       // Seen at an angle below the horizon of atan(h/r); believed to be pitched less, it seems farther.
@@ -169,14 +149,8 @@ struct drive {
 // Draws the building, for this estimator with the defaults of its parameters.
 inline void draw(const char *estimator) {
   ops = wm_estimator_find(estimator);
-  edges.assign((size_t)kWidth * kHeight, 0);
+  edges = drawn(kWalls, kWidth, kHeight, kPixel_m);
   drivable.assign((size_t)kWidth * kHeight, 0);
-  for (const segment &w : kWalls)
-    for (int i = 0; i <= 4000; i++) {
-      const int column = (int)((w.ax + (w.bx - w.ax) * i / 4000) / kPixel_m);
-      const int row = kHeight - 1 - (int)((w.ay + (w.by - w.ay) * i / 4000) / kPixel_m);
-      edges[(size_t)row * kWidth + (size_t)column] = 255;
-    }
   for (int row = 0; row < kHeight; row++)
     for (int column = 0; column < kWidth; column++)
       drivable[(size_t)row * kWidth + (size_t)column] =

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // edge_mcl in a small drawn building: tracking forwards and backwards, mending a camera's errors, being carried away,
 // starting anywhere, seeing nonsense.
+#include "common/block.hpp"
 #include "edge_building.hpp"
 #include "filters/edge_mcl/hypotheses.hpp"
 #include "filters/edge_mcl/odometry_check.hpp"
@@ -364,12 +365,6 @@ TEST(it_starts_without_being_told_where) {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.1, d.error());
   TEST_ASSERT_EQUAL(WM_STATE_TRACKING, d.published_state());
 }
-
-struct freed {
-  void operator()(void *memory) const { free(memory); }
-};
-using block = std::unique_ptr<void, freed>;
-block allocate(size_t bytes) { return block(aligned_alloc(64, (bytes + 63) / 64 * 64)); }
 
 // Sweeps over the drawn building after sixteen looks along a corridor.
 struct searching {

@@ -6,6 +6,7 @@
 
 #include "waymark/vectors.h"
 
+#include "common/block.hpp"
 #include "common/suite.h"
 #include "filters/pf_edges/particles.hpp"
 #include "math/lanes.hpp"
@@ -16,12 +17,6 @@ namespace {
 
 constexpr int kWidth = 500, kHeight = 400;
 constexpr double kPixel_m = 0.04;
-
-struct freed {
-  void operator()(void *memory) const { std::free(memory); }
-};
-using block = std::unique_ptr<void, freed>;
-block allocate(size_t bytes) { return block(std::aligned_alloc(64, (bytes + 63) / 64 * 64)); }
 
 std::vector<uint8_t> edges((size_t)kWidth *kHeight, 0);
 wm_raster raster = {kWidth, kHeight, kPixel_m, -3.0, 2.0, 0.4, edges.data(), nullptr, 0};

@@ -6,14 +6,12 @@
 
 #include "vision/edges_hough/polylines.hpp"
 
+#include "common/block.hpp"
 #include "common/suite.h"
 #include "waymark/random.h"
 
 namespace {
 
-struct freed {
-  void operator()(void *memory) const { std::free(memory); }
-};
 wm::polyline_limits limits;
 std::vector<wm::line_piece> pieces;
 std::vector<wm::line_vertex> vertices;
@@ -21,7 +19,7 @@ int lines;
 
 void join() {
   const auto count = static_cast<int32_t>(pieces.size());
-  const std::unique_ptr<void, freed> memory(std::aligned_alloc(64, wm::piece_graph_bytes(count)));
+  const block memory = allocate(wm::piece_graph_bytes(count));
   wm::piece_graph graph;
   wm::piece_graph_place(&graph, count, memory.get());
   vertices.resize(2 * pieces.size());

@@ -206,19 +206,35 @@ TEST(without_a_service_manager_nothing_happens) {
 
 // ── commands ────────────────────────────────────────────────────────────────────────────────────────────────────────
 
-TEST(poses_and_resets_that_are_told_become_events) {
-  wm_source *source;
-  wm_event event;
-  wm_error err;
-  uint8_t bytes[512];
-  wm_set_pose there = {.pose_map_base = {{1, -2, 0}, {0, 0, 0, 1}}, .sigma_xy_m = 0.5, .sigma_heading_rad = 0.1};
-  lcm_t *lcm = lcm_create("memq://");
+static lcm_t *lcm;
+static wm_source *source;
+static wm_event event;
+static wm_error err;
+static uint8_t bytes[4096];
+
+static void close_source(void) {
+  source->ops->close(source);
+  lcm_destroy(lcm);
+}
+
+static void open_commands(void) {
+  lcm = lcm_create("memq://");
   TEST_ASSERT_EQUAL(WM_OK, lcm_commands_open("memq://", "T_", lcm, &source, &err));
+}
+
+static void publish(const char *channel, size_t length) { lcm_publish(lcm, channel, bytes, (unsigned)length); }
+
+static void expect_refusal(const char *why) {
+  TEST_ASSERT_EQUAL(WM_AGAIN, source->ops->next(source, &event, &err));
+  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(source->counts.first_problem, why), source->counts.first_problem);
+}
+
+TEST(poses_and_resets_that_are_told_become_events) {
+  wm_set_pose there = {.pose_map_base = {{1, -2, 0}, {0, 0, 0, 1}}, .sigma_xy_m = 0.5, .sigma_heading_rad = 0.1};
+  open_commands();
   TEST_ASSERT_TRUE(source->is_live && source->event_driven);
   wm_time_ns before_ns = wm_monotonic_ns();
-  size_t length = wm_lcm_set_pose(&there, 0, bytes, sizeof bytes);
-  TEST_ASSERT_GREATER_THAN(0, length);
-  lcm_publish(lcm, "T_SET_POSE", bytes, (unsigned)length);
+  publish("T_SET_POSE", wm_lcm_set_pose(&there, 0, bytes, sizeof bytes));
   TEST_ASSERT_EQUAL(WM_OK, source->ops->next(source, &event, &err));
   TEST_ASSERT_EQUAL(WM_EVENT_SET_POSE, event.kind);
   TEST_ASSERT_GREATER_OR_EQUAL_INT64(before_ns, event.t_ns);
@@ -228,40 +244,30 @@ TEST(poses_and_resets_that_are_told_become_events) {
   TEST_ASSERT_EQUAL_DOUBLE(0.5, event.as.set_pose.sigma_xy_m);
 
   waymark_reset_t reset = {.t_ns = before_ns};
-  int reset_bytes = waymark_reset_t_encode(bytes, 0, sizeof bytes, &reset);
-  lcm_publish(lcm, "T_RESET", bytes, (unsigned)reset_bytes);
+  publish("T_RESET", (size_t)waymark_reset_t_encode(bytes, 0, sizeof bytes, &reset));
   TEST_ASSERT_EQUAL(WM_OK, source->ops->next(source, &event, &err));
   TEST_ASSERT_EQUAL(WM_EVENT_RESET, event.kind);
   TEST_ASSERT_EQUAL_INT64(before_ns, event.t_ns);
   TEST_ASSERT_EQUAL_UINT32(1, event.seq);
-  source->ops->close(source);
-  lcm_destroy(lcm);
+  close_source();
 }
 
 TEST(nonsense_that_is_told_is_refused) {
-  wm_source *source;
-  wm_event event;
-  wm_error err;
-  uint8_t bytes[512];
   const wm_set_pose wrong[] = {
       {.pose_map_base = {{NAN, 0, 0}, {0, 0, 0, 1}}, .sigma_xy_m = 1, .sigma_heading_rad = 1},
       {.pose_map_base = {{1, 0, 0}, {0, 0, 0, 0}}, .sigma_xy_m = 1, .sigma_heading_rad = 1},
       {.pose_map_base = {{1, 0, 0}, {0, 0, 0, 1}}, .sigma_xy_m = -1, .sigma_heading_rad = 1},
       {.pose_map_base = {{1, 0, 0}, {0, 0, 0, 1}}, .sigma_xy_m = 1, .sigma_heading_rad = NAN},
   };
-  lcm_t *lcm = lcm_create("memq://");
-  TEST_ASSERT_EQUAL(WM_OK, lcm_commands_open("memq://", "T_", lcm, &source, &err));
+  open_commands();
   for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
-    size_t length = wm_lcm_set_pose(&wrong[i], 0, bytes, sizeof bytes);
-    lcm_publish(lcm, "T_SET_POSE", bytes, (unsigned)length);
-    TEST_ASSERT_EQUAL(WM_AGAIN, source->ops->next(source, &event, &err));
+    publish("T_SET_POSE", wm_lcm_set_pose(&wrong[i], 0, bytes, sizeof bytes));
+    expect_refusal("");
     TEST_ASSERT_EQUAL_UINT64(i + 1, source->counts.malformed);
   }
   lcm_publish(lcm, "T_SET_POSE", "rubbish", 7);
-  TEST_ASSERT_EQUAL(WM_AGAIN, source->ops->next(source, &event, &err));
-  TEST_ASSERT_NOT_NULL(strstr(source->counts.first_problem, "T_SET_POSE: position_m is not finite"));
-  source->ops->close(source);
-  lcm_destroy(lcm);
+  expect_refusal("T_SET_POSE: position_m is not finite");
+  close_source();
 }
 
 TEST(commands_of_another_clock_are_refused) {
@@ -273,37 +279,24 @@ TEST(commands_of_another_clock_are_refused) {
                {-11 * WM_NS_PER_S, "11 s behind"}};
   const wm_set_pose there = {.pose_map_base = {.q_xyzw = {0, 0, 0, 1}}, .sigma_xy_m = 1, .sigma_heading_rad = 1};
   for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
-    wm_source *source;
-    wm_event event;
-    wm_error err;
-    uint8_t bytes[512];
-    lcm_t *lcm = lcm_create("memq://");
-    TEST_ASSERT_EQUAL(WM_OK, lcm_commands_open("memq://", "T_", lcm, &source, &err));
-    const size_t length = wm_lcm_set_pose(&there, wm_monotonic_ns() + wrong[i].off_ns, bytes, sizeof bytes);
-    lcm_publish(lcm, "T_SET_POSE", bytes, (unsigned)length);
-    TEST_ASSERT_EQUAL(WM_AGAIN, source->ops->next(source, &event, &err));
-    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(source->counts.first_problem, wrong[i].why), source->counts.first_problem);
-    source->ops->close(source);
-    lcm_destroy(lcm);
+    open_commands();
+    publish("T_SET_POSE", wm_lcm_set_pose(&there, wm_monotonic_ns() + wrong[i].off_ns, bytes, sizeof bytes));
+    expect_refusal(wrong[i].why);
+    close_source();
   }
 }
 
 static const wm_sensor kEyes[] = {{.name = "left"}, {.name = "right"}};
 
 TEST(sightings_of_another_program_become_events) {
-  wm_source *source;
-  wm_event event;
-  wm_error err;
-  uint8_t bytes[4096];
   const wm_time_ns t_ns = wm_monotonic_ns();
   wm_event seen[2] = {{.t_ns = t_ns}, {.t_ns = t_ns}};
   seen[0].as.sighting = (wm_sighting){
       .landmark_id = 3, .bearing_rad = 3.5, .range_m = NAN, .elevation_rad = -0.125, .elevation_sigma_rad = 0.01};
   seen[1].as.sighting = (wm_sighting){.landmark_id = -1, .bearing_rad = NAN, .range_m = 4};
-  lcm_t *lcm = lcm_create("memq://");
+  lcm = lcm_create("memq://");
   TEST_ASSERT_EQUAL(WM_OK, lcm_sightings_open("memq://", "T_", kEyes, 2, lcm, &source, &err));
-  size_t length = wm_lcm_observations("right", seen, 2, bytes, sizeof bytes);
-  lcm_publish(lcm, "T_SIGHTINGS", bytes, (unsigned)length);
+  publish("T_SIGHTINGS", wm_lcm_observations("right", seen, 2, bytes, sizeof bytes));
   for (uint32_t i = 0; i < 2; i++) {
     TEST_ASSERT_EQUAL(WM_OK, source->ops->next(source, &event, &err));
     TEST_ASSERT_EQUAL(WM_EVENT_SIGHTING, event.kind);
@@ -322,8 +315,7 @@ TEST(sightings_of_another_program_become_events) {
   }
   TEST_ASSERT_EQUAL(WM_AGAIN, source->ops->next(source, &event, &err));
   TEST_ASSERT_EQUAL_UINT64(2, source->counts.received);
-  source->ops->close(source);
-  lcm_destroy(lcm);
+  close_source();
 }
 
 TEST(sightings_that_cannot_be_are_refused) {
@@ -354,20 +346,14 @@ TEST(sightings_that_cannot_be_are_refused) {
       {"left", "below -1", {.t_ns = now_ns, .as.sighting = {.landmark_id = -2, .bearing_rad = 1, .range_m = 1}}},
   };
   for (size_t i = 0; i <= sizeof wrong / sizeof wrong[0]; i++) {
-    wm_source *source;
-    wm_event event;
-    wm_error err;
-    uint8_t bytes[4096] = "rubbish";
     int is_rubbish = i == sizeof wrong / sizeof wrong[0];
-    lcm_t *lcm = lcm_create("memq://");
+    lcm = lcm_create("memq://");
     TEST_ASSERT_EQUAL(WM_OK, lcm_sightings_open("memq://", "T_", kEyes, 2, lcm, &source, &err));
-    size_t length = is_rubbish ? 7 : wm_lcm_observations(wrong[i].sensor, &wrong[i].event, 1, bytes, sizeof bytes);
-    lcm_publish(lcm, "T_SIGHTINGS", bytes, (unsigned)length);
-    TEST_ASSERT_EQUAL(WM_AGAIN, source->ops->next(source, &event, &err));
+    (void)strcpy((char *)bytes, "rubbish");
+    publish("T_SIGHTINGS",
+            is_rubbish ? 7 : wm_lcm_observations(wrong[i].sensor, &wrong[i].event, 1, bytes, sizeof bytes));
+    expect_refusal(is_rubbish ? "observations_t" : wrong[i].why);
     TEST_ASSERT_EQUAL_UINT64(1, source->counts.malformed);
-    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(source->counts.first_problem, is_rubbish ? "observations_t" : wrong[i].why),
-                                 source->counts.first_problem);
-    source->ops->close(source);
-    lcm_destroy(lcm);
+    close_source();
   }
 }

@@ -5,6 +5,7 @@
 
 #include "calibrate/mounting.h"
 
+#include "common/drawn_walls.hpp"
 #include "common/failure.h"
 #include "common/suite.h"
 #include "made.h"
@@ -15,35 +16,15 @@ namespace {
 using wm::calibrate::MountingScan;
 
 constexpr double kPixel_m = 0.02, kDegree = 0.017453292519943295;
-constexpr uint32_t kWidth = 900, kHeight = 600;
+constexpr int kWidth = 900, kHeight = 600;
 
-struct Segment {
-  double ax, ay, bx, by;
-};
-const Segment kWalls[] = {{1, 1, 16, 1},      {16, 1, 16, 3},     {16, 3, 9, 3},  {9, 3, 9, 3.4},
-                          {9, 3.4, 7.8, 3.4}, {7.8, 3.4, 7.8, 3}, {7.8, 3, 6, 3}, {6, 3, 6, 5},
-                          {6, 5, 6.5, 5},     {6.5, 5, 6.5, 7},   {6.5, 7, 6, 7}, {6, 7, 6, 11},
-                          {6, 11, 3.5, 11},   {3.5, 11, 3.5, 3},  {3.5, 3, 1, 3}, {1, 3, 1, 1}};
-
-std::vector<uint8_t> edges(static_cast<size_t>(kWidth) * kHeight, 0);
+const std::vector<uint8_t> edges = drawn(kCorridors, kWidth, kHeight, kPixel_m);
 wm_raster map = {kWidth, kHeight, kPixel_m, 0, 0, 0, nullptr, nullptr, 1};
 wm_camera camera{};
 
 // What is true, beside what is believed: the camera looks 0.4 degrees lower and 0.3 to the left, hangs 1 cm higher.
 constexpr double kPitch = 0.4 * kDegree, kYaw = 0.3 * kDegree, kHigher_m = 0.01, kOlder_s = 0.03, kScale = 0.02,
                  kBias = 0.004;
-
-double cast(double x, double y, double angle) {
-  double best = -1;
-  const double c = std::cos(angle), s = std::sin(angle);
-  for (const Segment &w : kWalls) {
-    const double ex = w.bx - w.ax, ey = w.by - w.ay, det = ex * s - ey * c;
-    if (std::fabs(det) < 1e-9) continue;
-    const double t = (ex * (w.ay - y) - ey * (w.ax - x)) / det, u = (c * (w.ay - y) - s * (w.ax - x)) / det;
-    if (t > 0.05 && u >= 0 && u <= 1 && (best < 0 || t < best)) best = t;
-  }
-  return best;
-}
 
 struct Pose {
   double x, y, heading;
@@ -56,7 +37,7 @@ wm_points look(const Pose &then, uint64_t &draws) {
   const double eye_x = then.x + std::cos(then.heading), eye_y = then.y + std::sin(then.heading);
   for (int i = 0; i < 120; i++) {
     const double angle = -1.1 + 2.2 * i / 119;  // as the camera's own azimuth
-    const double range = cast(eye_x, eye_y, then.heading + angle + kYaw);
+    const double range = cast(kCorridors, eye_x, eye_y, then.heading + angle + kYaw);
     if (range < 0.3 || range > 5) continue;
     const double below = std::atan2(camera.mounting.xyz_m[2] + kHigher_m, range) - kPitch * std::cos(angle) +
                          0.001 * wm_random_normal(7, 1, draws++);
@@ -128,12 +109,6 @@ TEST(too_short_a_drive_is_refused) {
 }  // namespace
 
 int suite_begin(int, char **) {
-  for (const Segment &w : kWalls)
-    for (int i = 0; i <= 4000; i++) {
-      const auto column = static_cast<size_t>((w.ax + (w.bx - w.ax) * i / 4000) / kPixel_m);
-      const auto row = kHeight - 1 - static_cast<size_t>((w.ay + (w.by - w.ay) * i / 4000) / kPixel_m);
-      edges[row * kWidth + column] = 255;
-    }
   map.edges = edges.data();
   std::strcpy(camera.name, "front");
   camera.model = WM_CAMERA_EQUIDISTANT;
