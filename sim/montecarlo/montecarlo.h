@@ -3,6 +3,7 @@
 // covariance (consistency), and how near does it come to what is possible at all (efficiency)? docs/consistency.md.
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -21,6 +22,18 @@ struct Band {
   double low, high;
 };
 Band band_of(uint64_t drives);
+// Share of the steps whose mean is in the band; steps without one have NaN.
+template <class Steps, class Mean>
+double share_inside(const Steps &steps, Band band, Mean mean_of) {
+  size_t inside = 0, all = 0;
+  for (const auto &step : steps) {
+    const double mean = mean_of(step);
+    if (std::isnan(mean)) continue;
+    all++;
+    inside += mean >= band.low && mean <= band.high;
+  }
+  return all > 0 ? static_cast<double>(inside) / static_cast<double>(all) : 0;
+}
 
 // Means over the runs at one time of the drive.
 struct Step {

@@ -308,14 +308,8 @@ double Statistics6::nees_mean() const {
 }
 
 double Statistics6::nees_inside(Band band) const {
-  size_t inside = 0, all = 0;
-  for (const Step6 &s : steps) {
-    if (s.runs < runs) continue;
-    const double mean = s.nees / (6 * static_cast<double>(s.runs));
-    inside += mean >= band.low && mean <= band.high;
-    all++;
-  }
-  return all > 0 ? static_cast<double>(inside) / static_cast<double>(all) : 0;
+  return share_inside(steps, band,
+                      [&](const Step6 &s) { return s.runs < runs ? std::nan("") : s.nees / (6 * static_cast<double>(s.runs)); });
 }
 
 namespace {

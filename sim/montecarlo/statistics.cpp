@@ -44,25 +44,11 @@ double Statistics::bound_position_m(double from_s, double to_s) const {
 }
 
 double Statistics::nees_inside(Band band) const {
-  size_t inside = 0, all = 0;
-  for (const Step &s : steps) {
-    if (s.runs == 0) continue;
-    const double mean = s.nees / (3 * static_cast<double>(s.runs));
-    all++;
-    inside += mean >= band.low && mean <= band.high;
-  }
-  return all ? static_cast<double>(inside) / static_cast<double>(all) : 0;
+  return share_inside(steps, band, [](const Step &s) { return s.nees / (3 * static_cast<double>(s.runs)); });
 }
 
 double Statistics::nis_inside(Band band) const {
-  size_t inside = 0, all = 0;
-  for (const Step &s : steps) {
-    if (s.nis_dof == 0) continue;
-    const double mean = s.nis / static_cast<double>(s.nis_dof);
-    all++;
-    inside += mean >= band.low && mean <= band.high;
-  }
-  return all ? static_cast<double>(inside) / static_cast<double>(all) : 0;
+  return share_inside(steps, band, [](const Step &s) { return s.nis / static_cast<double>(s.nis_dof); });
 }
 
 double Statistics::nees_mean() const {

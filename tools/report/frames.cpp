@@ -24,21 +24,6 @@ constexpr int kWidth_px = 480, kQuality = 72;
 using Opened = std::unique_ptr<wm_recording, decltype(&wm_recording_close)>;
 using Video = std::unique_ptr<wm_video, decltype(&wm_video_close)>;
 
-// The mean of each block of `times` x `times` pixels, as a JPEG.
-std::string small_jpeg(const wm_frame &frame, uint32_t times) {
-  const uint32_t width = frame.width_px / times, height = frame.height_px / times;
-  std::vector<uint8_t> grey(static_cast<size_t>(width) * height);
-  for (uint32_t y = 0; y < height; y++)
-    for (uint32_t x = 0; x < width; x++) {
-      uint32_t sum = 0;
-      for (uint32_t j = 0; j < times; j++)
-        for (uint32_t i = 0; i < times; i++)
-          sum += frame.grey[static_cast<size_t>(y * times + j) * frame.stride_bytes + x * times + i];
-      grey[static_cast<size_t>(y) * width + x] = static_cast<uint8_t>(sum / (times * times));
-    }
-  return grey_jpeg(grey, static_cast<int>(width), static_cast<int>(height));
-}
-
 std::vector<uint8_t> grey_of(const wm_frame &frame) {
   std::vector<uint8_t> out;
   out.reserve(static_cast<size_t>(frame.width_px) * frame.height_px);
@@ -73,7 +58,7 @@ ReportFrame frame_of(const wm_camera &camera, const wm_frame &frame) {
           frame.t_ns,
           static_cast<int>(frame.width_px),
           static_cast<int>(frame.height_px),
-          small_jpeg(frame, times),
+          small_jpeg(frame.grey, frame.stride_bytes, frame.width_px, frame.height_px, times),
           {},
           {},
           {},
@@ -166,6 +151,19 @@ std::string drawn(const ReportData &data, const ReportFrame &frame) {
 }
 
 }  // namespace
+
+std::string small_jpeg(const uint8_t *grey, size_t stride, uint32_t width_px, uint32_t height_px, uint32_t times) {
+  const uint32_t width = width_px / times, height = height_px / times;
+  std::vector<uint8_t> small(static_cast<size_t>(width) * height);
+  for (uint32_t y = 0; y < height; y++)
+    for (uint32_t x = 0; x < width; x++) {
+      uint32_t sum = 0;
+      for (uint32_t j = 0; j < times; j++)
+        for (uint32_t i = 0; i < times; i++) sum += grey[(y * times + j) * stride + x * times + i];
+      small[static_cast<size_t>(y) * width + x] = static_cast<uint8_t>(sum / (times * times));
+    }
+  return grey_jpeg(small, static_cast<int>(width), static_cast<int>(height));
+}
 
 std::string grey_jpeg(const std::vector<uint8_t> &grey, int width, int height) {
   images::Jpeg jpeg;

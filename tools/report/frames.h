@@ -37,6 +37,8 @@ struct ReportFrame {
 
 // Grey bytes, row by row, as a JPEG. Empty where it can't be made.
 std::string grey_jpeg(const std::vector<uint8_t> &grey, int width, int height);
+// The same of the means of blocks of `times` x `times` pixels.
+std::string small_jpeg(const uint8_t *grey, size_t stride, uint32_t width_px, uint32_t height_px, uint32_t times);
 
 // `each` pictures of every camera that has a video, spread over what it filmed of the run's time; the data's film_notes
 // say when that was where it isn't all of it. What can't be read leaves its part empty and a line there, too. Passes

@@ -119,20 +119,10 @@ Json landmarks_expected(const std::vector<wm_landmark> &landmarks, const Pose &p
   return out;
 }
 
-// The mean of each block, so that at most about kWidth_px columns are left.
-std::string small_jpeg(const LookedAt &looked) {
+// So that at most about kWidth_px columns are left.
+std::string jpeg_of(const LookedAt &looked) {
   const uint32_t times = std::max<uint32_t>(1, (looked.head.width_px + kWidth_px / 2) / kWidth_px);
-  const uint32_t width = looked.head.width_px / times, height = looked.head.height_px / times;
-  std::vector<uint8_t> grey(static_cast<size_t>(width) * height);
-  for (uint32_t y = 0; y < height; y++)
-    for (uint32_t x = 0; x < width; x++) {
-      uint32_t sum = 0;
-      for (uint32_t j = 0; j < times; j++)
-        for (uint32_t i = 0; i < times; i++)
-          sum += looked.grey[static_cast<size_t>(y * times + j) * looked.head.width_px + x * times + i];
-      grey[static_cast<size_t>(y) * width + x] = static_cast<uint8_t>(sum / (times * times));
-    }
-  return grey_jpeg(grey, static_cast<int>(width), static_cast<int>(height));
+  return small_jpeg(looked.grey.data(), looked.head.width_px, looked.head.width_px, looked.head.height_px, times);
 }
 
 }  // namespace
@@ -183,7 +173,7 @@ std::string picture_json(const LookedAt &looked, const WebSite &site, const MapE
       out["map_dots"] = edges_expected(*edges, *around.pose, sketch, static_cast<int>(head.width_px));
     out["map_marks"] = landmarks_expected(around.landmarks, *around.pose, sketch);
   }
-  if (head.width_px > 0 && head.height_px > 0) out["jpeg"] = base64(small_jpeg(looked));
+  if (head.width_px > 0 && head.height_px > 0) out["jpeg"] = base64(jpeg_of(looked));
   return out.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 

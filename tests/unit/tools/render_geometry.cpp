@@ -141,29 +141,20 @@ Shot moving(int64_t exposure_ns) {
   return shot;
 }
 
-TEST(test_squares_standing) {
-  for (const NamedCamera &named : all_cameras()) {
-    int count = 0;
-    TEST_ASSERT_LESS_THAN_DOUBLE_MESSAGE(0.1, worst_square(named, standing(), 16, count), named.name);
-    TEST_ASSERT_GREATER_THAN_INT_MESSAGE(4, count, named.name);
-  }
-}
-
-TEST(test_squares_in_motion_at_the_middle_of_the_exposure) {
-  for (const NamedCamera &named : all_cameras()) {
-    int count = 0;
-    TEST_ASSERT_LESS_THAN_DOUBLE_MESSAGE(0.15, worst_square(named, moving(10000000), 16, count), named.name);
-    TEST_ASSERT_GREATER_THAN_INT_MESSAGE(4, count, named.name);
-  }
-}
-
-TEST(test_squares_with_rolling_shutter) {
-  for (NamedCamera named : all_cameras()) {
-    named.camera.readout_ns = 25000000;
-    int count = 0;
-    TEST_ASSERT_LESS_THAN_DOUBLE_MESSAGE(0.15, worst_square(named, moving(5000000), 16, count), named.name);
-    TEST_ASSERT_GREATER_THAN_INT_MESSAGE(4, count, named.name);
-  }
+// Standing; in motion, at the middle of the exposure; with a rolling shutter.
+TEST(test_squares) {
+  const struct {
+    Shot shot;
+    int64_t readout_ns;
+    double most_px;
+  } rows[] = {{standing(), 0, 0.1}, {moving(10000000), 0, 0.15}, {moving(5000000), 25000000, 0.15}};
+  for (const auto &row : rows)
+    for (NamedCamera named : all_cameras()) {
+      named.camera.readout_ns = row.readout_ns;
+      int count = 0;
+      TEST_ASSERT_LESS_THAN_DOUBLE_MESSAGE(row.most_px, worst_square(named, row.shot, 16, count), named.name);
+      TEST_ASSERT_GREATER_THAN_INT_MESSAGE(4, count, named.name);
+    }
 }
 
 double bilinear(const Image &image, const Vec2 &p) {

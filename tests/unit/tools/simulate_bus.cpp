@@ -39,34 +39,25 @@ TEST(test_every_quantity_is_bound) {
   TEST_ASSERT_EQUAL_HEX32(wanted, wm_can_decoder_quantities(decoder));
 }
 
-TEST(test_yaw_rate_signed_intel_and_limited) {
-  const double dps[] = {0, 0.002, -0.002, 12.346, -31.5, 65.534, -65.536};
-  for (int i = 0; i < 7; i++) {
-    wm_can_frame frame = frame_of(Bus_message::yaw_rate, i);
-    pack(message(Bus_message::yaw_rate).signals[0], dps[i], frame);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-9, dps[i] * 3.14159265358979323846 / 180, decoded(frame, WM_Q_YAW_RATE));
-  }
-  wm_can_frame frame = frame_of(Bus_message::yaw_rate, 7);
-  pack(message(Bus_message::yaw_rate).signals[0], 1000, frame);
-  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 65.534 * 3.14159265358979323846 / 180, decoded(frame, WM_Q_YAW_RATE));
-}
-
-TEST(test_actuator_motorola_in_metres) {
-  const double mm[] = {0, 8, 57.98, 112, 200};
-  for (int i = 0; i < 5; i++) {
-    wm_can_frame frame = frame_of(Bus_message::steering, i);
-    pack(message(Bus_message::steering).signals[0], mm[i], frame);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-9, mm[i] / 1000, decoded(frame, WM_Q_STEERING_ACTUATOR));
-  }
-}
-
-TEST(test_gear) {
-  const double gears[] = {1, 0, -1, 1};
-  for (int i = 0; i < 4; i++) {
-    wm_can_frame frame = frame_of(Bus_message::gear, i);
-    pack(message(Bus_message::gear).signals[0], gears[i], frame);
-    TEST_ASSERT_EQUAL_DOUBLE(gears[i], decoded(frame, WM_Q_GEAR));
-  }
+// Signed Intel with limits, Motorola, and gears: what is packed is decoded in SI units.
+TEST(test_values_arrive_in_si_units) {
+  constexpr double kDegree = 3.14159265358979323846 / 180, kBeyond = 1000;
+  const struct {
+    Bus_message message;
+    wm_quantity quantity;
+    double unit;
+    std::vector<double> values;
+  } rows[] = {
+      {Bus_message::yaw_rate, WM_Q_YAW_RATE, kDegree, {0, 0.002, -0.002, 12.346, -31.5, 65.534, -65.536, kBeyond}},
+      {Bus_message::steering, WM_Q_STEERING_ACTUATOR, 1e-3, {0, 8, 57.98, 112, 200}},
+      {Bus_message::gear, WM_Q_GEAR, 1, {1, 0, -1, 1}}};
+  for (const auto &row : rows)
+    for (size_t i = 0; i < row.values.size(); i++) {
+      wm_can_frame frame = frame_of(row.message, static_cast<int>(i));
+      pack(message(row.message).signals[0], row.values[i], frame);
+      const double value = row.values[i] == kBeyond ? 65.534 : row.values[i];
+      TEST_ASSERT_DOUBLE_WITHIN(1e-9, row.unit * value, decoded(frame, row.quantity));
+    }
 }
 
 TEST(test_ticks_wrap_at_16_bits_and_are_unwrapped) {
