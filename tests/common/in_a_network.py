@@ -52,6 +52,17 @@ def begin(*modules, multicast=True, **needed):
 
 
 @contextlib.contextmanager
+def small_disk(folder, size):
+    """A disk of this size for the time of a with; needs mounts of its own."""
+    folder.mkdir(exist_ok=True)
+    subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", folder], check=True)
+    try:
+        yield folder
+    finally:
+        subprocess.run(["umount", folder], check=True)
+
+
+@contextlib.contextmanager
 def work_folder(name):
     """A folder for the time of a with."""
     with tempfile.TemporaryDirectory(prefix=f"waymark-{name}-", ignore_cleanup_errors=True) as folder:

@@ -105,10 +105,7 @@ def main():
     p.add_argument("--cache", type=pathlib.Path, default=pathlib.Path("build/cells"))
     p.add_argument("--estimator", choices=list(TAKES))
     a = p.parse_args()
-    if not (a.bin / "waymark-simulate").exists():
-        print("skipped: no simulator was built")
-        sys.exit(77)
-    a.cache.mkdir(parents=True, exist_ok=True)
+    replays.need_simulator(a.bin, a.cache)
     folders = [recording(a, seed) for seed in range(1, a.seeds + 1)]
     short = []
     print("| estimator | source | place, m | heading, degrees | NEES | inside 95 %, % | lost, % |\n| --- | --- | --- | --- | --- | --- | --- |")

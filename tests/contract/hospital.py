@@ -12,12 +12,11 @@ import argparse
 import json
 import math
 import pathlib
-import shutil
 import subprocess
 import sys
 import tempfile
 
-from replays import rows as rows_of
+from replays import need_simulator, rows as rows_of
 from rooms import ELLIPSE_CHI2, POSE_95_CHI2, SAYS_SO, normalised, pose_of, truth_at, wrap
 
 # Part of the way: the least and largest x of truth, m, and the bar of its root mean square, m. A seam is where two meet.
@@ -155,10 +154,7 @@ def main():
     p.add_argument("--only", help="rows with one of these words")
     p.add_argument("--json", action="store_true")
     a = p.parse_args()
-    if not (a.bin / "waymark-simulate").exists():
-        print("skipped: no simulator was built")
-        sys.exit(77)
-    a.cache.mkdir(parents=True, exist_ok=True)
+    need_simulator(a.bin, a.cache)
     chosen = [n for n in SOURCES if not a.only or any(word in n for word in a.only.split(","))]
     table = {}
     for name in chosen:

@@ -6,6 +6,7 @@ import os
 import pathlib
 import re
 import subprocess
+import sys
 import tempfile
 
 WRONG_M = 0.5
@@ -30,6 +31,14 @@ def command(*words):
     if done.returncode != 0:
         raise Refused(done.stderr.strip() or f"{words[0]}: {done.returncode}")
     return done.stdout
+
+
+def need_simulator(bin_dir, cache):
+    """Makes the folder for simulated drives; skips (77) where no simulator was built."""
+    if not (bin_dir / "waymark-simulate").exists():
+        print("skipped: no simulator was built")
+        sys.exit(77)
+    cache.mkdir(parents=True, exist_ok=True)
 
 
 def has_causes(bin_dir):

@@ -108,9 +108,7 @@ def main():
     p.add_argument("--config", type=pathlib.Path, help="instead of the two")
     p.add_argument("--json", action="store_true")
     a = p.parse_args()
-    if not (a.bin / "waymark-simulate").exists():
-        sys.exit(77)
-    a.cache.mkdir(parents=True, exist_ok=True)
+    replays.need_simulator(a.bin, a.cache)
     alone = a.cache / "alone.yaml"
     alone.write_text(ALONE)
     out, missed = [], 0

@@ -7,7 +7,6 @@ are not there. Those whose source gives covariances are replayed with them.
 
     slips.py BIN_DIR SOURCE_DIR DATA_DIR [--only WORD[,WORD]] [--seed N] [--set KEY=VALUE] [--json]"""
 import math
-import pathlib
 import random
 import sys
 

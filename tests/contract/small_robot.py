@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A differential robot with a gyro and one sensor of bearings and ranges, written as a recording: the robot of a new user,
 whose files have one mistake each in mistakes.py. Units: m, rad, s; stamps in ns."""
-import bisect
 import math
 import random
 

@@ -5,7 +5,6 @@ pose is missing on LCM, what is lost is counted, and it is reported once. Needs 
 namespace (else 77).
 
     bad_disks.py LIBRARY        (tests/golden/slow_disk.c, to be preloaded)"""
-import contextlib
 import os
 import subprocess
 import sys
@@ -46,17 +45,6 @@ def show(name, run):
             print("   ", line)
 
 
-@contextlib.contextmanager
-def small_disk(work, size):
-    disk = work / "disk"
-    disk.mkdir(exist_ok=True)
-    subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", disk], check=True)
-    try:
-        yield disk
-    finally:
-        subprocess.run(["umount", disk], check=True)
-
-
 def make_read_only(disk):
     time.sleep(4)
     for _ in range(100):
@@ -89,12 +77,12 @@ def main():
         assert slow["said"].count("the map was not saved when it was due") == 1, slow["said"]
         assert restarts.check_files(work / "slow") >= 5
 
-        with small_disk(work, "120k") as disk:
+        with in_a_network.small_disk(work / "disk", "120k") as disk:
             full = drive(work, subscriber, disk, ["--out", disk / "run"])
         show("full", full)
         assert full["code"] == 1 and "No space left" in full["said"] and full["said"].count("the next start will not") <= 2
 
-        with small_disk(work, "4m") as disk:
+        with in_a_network.small_disk(work / "disk", "4m") as disk:
             read_only = drive(work, subscriber, disk, meanwhile=lambda: make_read_only(disk))
             restarts.check_files(disk)
         show("read-only", read_only)

@@ -7,7 +7,9 @@ import pathlib
 import re
 import subprocess
 import sys
-import tempfile
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "common"))
+import in_a_network  # noqa: E402
 
 ROOT = pathlib.Path(os.environ.get("WM_SOURCE_DIR", ".")).resolve()
 WAYMARK = pathlib.Path(os.environ.get("WM_BIN_DIR", ROOT / "build/bin")) / "waymark"
@@ -22,12 +24,11 @@ def run(work, out, expect):
     return done
 
 
-def inside(work):
-    try:
+def main():
+    in_a_network.begin(programs=("mount",), mounts=True)
+    with in_a_network.work_folder("disk-full") as work, in_a_network.small_disk(work / "small", "80k"):
         rec = work / "rec"
         rec.mkdir()
-        (work / "small").mkdir()
-        subprocess.run(["mount", "-t", "tmpfs", "-o", "size=80k", "tmpfs", work / "small"], check=True)
         (rec / "recording.yaml").write_text(
             "format: waymark-recording/1\nname: straight\nvehicle: {initial_pose: {t_ns: 0, x_m: 0, y_m: 0, heading_rad: 0}}\n")
         (rec / "motion.csv").write_text(
@@ -47,14 +48,7 @@ def inside(work):
         assert again.returncode == 0 and "no regular end" in again.stderr, again.stdout + again.stderr
         again = (work / "again/trajectory.csv").read_text().splitlines()
         assert len(again) > 10 and again == whole[:len(again)], "the log doesn't give the poses"
-    finally:
-        subprocess.run(["umount", work / "small"])
 
 
-if len(sys.argv) > 1:
-    sys.exit(inside(pathlib.Path(sys.argv[1])))
-if subprocess.run(["unshare", "-m", "true"], capture_output=True).returncode:
-    print("no right to a mount namespace: skipped")
-    sys.exit(77)
-with tempfile.TemporaryDirectory() as work:
-    sys.exit(subprocess.run(["unshare", "-m", sys.executable, __file__, work]).returncode)
+if __name__ == "__main__":
+    sys.exit(main())

@@ -147,4 +147,9 @@ TEST(test_statistics_by_hand) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 1, s.nis_inside({0.8, 2.5}));
 }
 
+TEST(test_the_share_inside_a_band_has_its_ends_and_no_absent_means) {
+  const double means[] = {0.7, 0.8, 1.0, 1.25, 1.3, std::nan("")};
+  TEST_ASSERT_EQUAL_DOUBLE(0.6, wm::montecarlo::share_inside(means, {0.8, 1.25}, [](double mean) { return mean; }));
+}
+
 }  // namespace
