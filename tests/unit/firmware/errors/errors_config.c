@@ -5,7 +5,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "../../drivers/folder.h"
+#include "common/folder.h"
 #include "config/config.h"
 #include "errors_case.h"
 #include "unity.h"
