@@ -14,6 +14,7 @@ from . import names
 from .can import CanLog
 from .clocks import GAP_NS, PAUSE_NS, SET_NS, Clock, excess, goes_on, once, seconds, settle, silences
 from .frames import Frames
+from .parts import Absent
 from .samples import Samples
 from .views import Sight
 
@@ -57,6 +58,7 @@ class Collection:
         self.clocks: dict[str, Clock] = {}
         self._stamps: dict[str, "array[int]"] = {}
         self._once: dict[str, Array] = {}
+        self.absent: list[Absent] = []  # parts of the bag of which nothing is read
 
     def sample(self, kind: str, topic: str, times: tuple[int, int], frames: tuple[str, str], values: Iterable[float]) -> Samples:
         """Adds a message as numbers: its stamp and log, its frame and child frame."""
@@ -93,6 +95,8 @@ class Collection:
     def _silence(self, begin_ns: int, end_ns: int, poses: list[tuple[Array, Array, Array]]) -> tuple[int, int] | None:
         """A span without any message: a pause (None), or, where poses go on as if nothing was, a clock that was set: when, by how much."""
         text = f"no topic has a message for {seconds(end_ns - begin_ns)} from {(begin_ns - self._first_ns()) / 1e9:.2f} s on"
+        if any((a.begin_ns or 0) < end_ns and (a.end_ns or end_ns) > begin_ns for a in self.absent):
+            return None  # the bag's files are named with what they lack
         moved = [by for t_ns, _, values in poses if goes_on(t_ns, values[:, :3], end_ns) and (by := excess(t_ns, end_ns)) > GAP_NS]
         if not moved and end_ns - begin_ns <= SET_NS:
             if end_ns - begin_ns > PAUSE_NS:

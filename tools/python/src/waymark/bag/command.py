@@ -69,6 +69,7 @@ def import_bag(path: Path, out: Path, given: argparse.Namespace, progress: Progr
     with RecordingWriter(out) as writer, Bag(path, out) as bag:
         into = Collection(writer)
         own = read(bag, into, progress)
+        into.absent = bag.absent()
         ours = write_attachments(bag, writer)
         for topic, rows in sorted(own.items()):
             columns = [name for name in rows[0].__dataclass_fields__ if name not in ("header", "__msgtype__")]

@@ -12,11 +12,11 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import lz4.frame  # type: ignore[import-untyped]
-import yaml
 import zstandard
 
 from . import mcap_file, ros1_file, sqlite_file
 from .decoding import Topic
+from .parts import Absent, Part, listed, natural, numbered, spans
 
 _KINDS: tuple[tuple[bytes, Callable[[Path], "BagFile"]], ...] = (
     (mcap_file.MAGIC, mcap_file.McapFile), (sqlite_file.MAGIC, sqlite_file.SqliteFile), (ros1_file.MAGIC, ros1_file.Ros1File))
@@ -63,20 +63,23 @@ class Bag:
         self._scratch = scratch
         self._folder: tempfile.TemporaryDirectory[str] | None = None
         self.files: list[BagFile] = []
-        problems: list[str] = []
+        self._parts: list[tuple[Part, str]] = []  # with the reason why it isn't read, "" where it is
+        self._logs: dict[int, tuple[int, int]] = {}  # first and last time of the log, by the file's number
         try:
-            for file in _files_of(path, self.notes):
+            for part in _files_of(path, self.notes):
                 try:
-                    self.files.append(self._open(file))
+                    if not part.path.is_file():
+                        raise Unreadable(f"{part.name} is not there")
+                    self.files.append(self._open(part.path))
+                    self._parts.append((part, ""))
                 except Unreadable as problem:
-                    problems.append(str(problem))
+                    self._parts.append((part, str(problem)))
         except BaseException:
             self.__exit__()
             raise
         if not self.files:
             self.__exit__()
-            raise Unreadable("; ".join(problems))
-        self.notes += [f"left out: {problem}" for problem in problems]
+            raise Unreadable("; ".join(why for _, why in self._parts))
 
     def _open(self, path: Path) -> BagFile:
         if not path.stat().st_size:
@@ -127,8 +130,16 @@ class Bag:
 
     def messages(self, wanted: Callable[[Topic], bool]) -> Iterator[tuple[Topic, int, Any]]:
         """Messages of the wanted topics, file by file."""
-        for file in self.files:
-            yield from file.messages(wanted)
+        for number, file in enumerate(self.files):
+            for topic, log_ns, raw in file.messages(wanted):
+                first, last = self._logs.get(number, (log_ns, log_ns))
+                self._logs[number] = min(first, log_ns), max(last, log_ns)
+                yield topic, log_ns, raw
+
+    def absent(self) -> list[Absent]:
+        """Parts of which nothing is read, once all messages were."""
+        numbers = iter(range(len(self.files)))
+        return spans(self._parts, [None if why else self._logs.get(next(numbers)) for _, why in self._parts])
 
     @property
     def done(self) -> float:
@@ -143,7 +154,8 @@ class Bag:
 
     def all_notes(self) -> list[str]:
         """What was wrong with the files, each once."""
-        said = self.notes + [f"{file.path.name}: {note}" for file in self.files for note in file.notes]
+        first_ns = min((first for first, _ in self._logs.values()), default=0)
+        said = self.notes + [absent.text(first_ns) for absent in self.absent()] + [f"{file.path.name}: {note}" for file in self.files for note in file.notes]
         return list(dict.fromkeys(said))
 
     def __enter__(self) -> "Bag":
@@ -177,30 +189,35 @@ def _said(head: bytes) -> str:
     return f"'{text}'" if text.isprintable() else head.hex(" ")
 
 
-def _natural(path: Path) -> list[tuple[int, str]]:
-    """Order of split files: drive_2 before drive_10."""
-    return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", path.name)]
-
-
-def _files_of(path: Path, notes: list[str]) -> list[Path]:
-    """The files of a bag in their order."""
+def _files_of(path: Path, notes: list[str]) -> list[Part]:
+    """The files of a bag in their order, with those that are missing."""
     if path.is_file():
-        return [path]
+        return [Part(path)]
     if not path.is_dir():
         raise Unreadable("there is no such file or folder")
-    if listed := _listed(path, notes):
-        return listed
-    found = [file for file in sorted(path.iterdir(), key=_natural) if file.is_file() and _looks_like_a_bag(file)]
+    stated = listed(path, notes)
+    found = [file for file in sorted(path.iterdir(), key=natural) if file.is_file() and _looks_like_a_bag(file)]
     names = {file.name for file in found}
     found = [file for file in found if not (_is_packed(file) and file.stem in names)]  # both are one
+    missing = [part for part in stated if not part.path.is_file()]
+    extra = [file for file in found if file not in [part.path for part in stated]]
+    if len(missing) < len(stated) and not (missing and extra):
+        return stated
     if found:
-        return found
+        if missing:
+            names_said = ", ".join(part.name for part in missing[:3])
+            notes.append(f"metadata.yaml lists {names_said}, which {'is' if len(missing) == 1 else 'are'} not there: all bags of the folder are read")
+            return sorted([*missing, *([part for part in stated if part not in missing]), *map(Part, extra)], key=lambda part: natural(part.path))
+        if not (path / "metadata.yaml").is_file():
+            notes.append("the folder has no metadata.yaml, as of a recorder that was killed: its files are read as they are")
+        return numbered(found)
     inside = [folder for folder in sorted(path.iterdir()) if folder.is_dir() and any(_looks_like_a_bag(f) for f in folder.iterdir() if f.is_file())]
     if len(inside) == 1:
         return _files_of(inside[0], notes)
     if inside:
         raise Unreadable(f"it holds {len(inside)} bags ({', '.join(folder.name for folder in inside[:5])} ...): give one of them")
-    raise Unreadable("no file in this folder is a bag (.mcap, .db3 or .bag, also compressed)")
+    raise Unreadable("no file in this folder is a bag (.mcap, .db3 or .bag, also compressed)"
+                     + (f"; metadata.yaml lists {', '.join(part.name for part in missing[:3])}" if missing else ""))
 
 
 def _is_packed(path: Path) -> bool:
@@ -212,29 +229,3 @@ def _looks_like_a_bag(path: Path) -> bool:
         return False
     head = _head(path)
     return bool(_BAG_NAME.search(path.name)) or any(head.startswith(magic) for magic, _ in _KINDS)
-
-
-def _listed(folder: Path, notes: list[str]) -> list[Path]:
-    """The files that metadata.yaml lists, as far as they are there; [] where it lists none that is."""
-    path = folder / "metadata.yaml"
-    if not path.is_file():
-        notes.append("the folder has no metadata.yaml, as of a recorder that was killed: its files are read as they are")
-        return []
-    try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8", errors="replace"))
-        names = content["rosbag2_bagfile_information"]["relative_file_paths"]
-        names = [name for name in names if isinstance(name, str)]
-    except (yaml.YAMLError, KeyError, TypeError, ValueError):
-        notes.append("metadata.yaml can't be read: the folder's files are read as they are")
-        return []
-    found: list[Path] = []
-    missing: list[Path] = []
-    for name in names:
-        whole = folder / Path(name).name
-        packed = [whole.with_name(whole.name + ending) for ending in (".zstd", ".zst")]
-        there = [file for file in (whole, *packed) if file.is_file()]
-        (found if there else missing).append(there[0] if there else whole)
-    if missing:
-        names_said = ", ".join(file.name for file in missing[:3])
-        notes.append(f"metadata.yaml lists {names_said}, which {'is' if len(missing) == 1 else 'are'} not there: all bags of the folder are read")
-    return [] if missing else found
