@@ -3,6 +3,7 @@
 #include <math.h>
 
 #include "decoder.h"
+#include "sender.h"
 #include "waymark/event.h"
 
 // ── one signal ──────────────────────────────────────────────────────────────────────────────────────────────────────
@@ -173,26 +174,6 @@ static int watch_counter(bound_message *m, const payload *data, unsigned length,
   return 1;
 }
 
-// A sender that is silent for so long has gone, and another one may take its place.
-#define SENDER_GONE_NS (3 * WM_NS_PER_S)
-
-// Of a message that comes from several buses or J1939 addresses, the first sender's frames are taken: two wheels'
-// counts must not be mixed. The DBC's own id goes before the others.
-static int is_of_sender(bound_message *m, const wm_can_frame *frame) {
-  if (m->bus[0] && strncmp(m->bus, frame->iface, WM_CAN_BUS_MAX) != 0) return 0;
-  const int is_same = m->frames > 0 && same_sender(frame->id, frame->iface, m->sender.id, m->sender.iface);
-  const int is_gone = m->frames == 0 || frame->t_ns - m->sender.last_ns > SENDER_GONE_NS;
-  const int is_named = frame->id == m->match.id && m->sender.id != m->match.id;
-  if (!is_same && !is_gone && !is_named) return 0;
-  if (!is_same) {
-    m->sender.id = frame->id;
-    memcpy(m->sender.iface, frame->iface, sizeof m->sender.iface);
-  }
-  m->sender.last_ns = frame->t_ns;
-  m->frames++;
-  return 1;
-}
-
 static wm_status bad_frame(const bound_message *m, const wm_can_frame *frame, const char *what, wm_error *err) {
   return wm_fail(err, WM_BAD_DATA, "%.15s: %s (id %X, %u bytes): %s", frame->iface, m->name, frame->id, frame->length,
                  what);
@@ -223,8 +204,11 @@ static wm_status decode_message(wm_can_decoder *self, bound_message *m, const wm
     out->value[out->count++] = value;
     given++;
   }
-  counts->not_finite += (uint64_t)refused;
-  if (refused > 0 && given == 0) return bad_frame(m, frame, "its signals mark that there is no value", err);
+  counts->not_finite += refused > 0;  // a frame, not each of its values
+  if (refused > 0)
+    (void)bad_frame(m, frame, given ? "a signal marks that it has no value" : "its signals mark that there is no value",
+                    err);
+  if (refused > 0 && given == 0) return WM_BAD_DATA;
   if (given == 0) counts->ignored++;  // none of this frame's multiplexed signals is bound
   return given > 0 ? WM_OK : WM_AGAIN;
 }
@@ -241,7 +225,15 @@ wm_status wm_can_decode(wm_can_decoder *self, const wm_can_frame *frame, wm_quan
   wm_status status = WM_AGAIN;
   for (size_t i = 0; i < self->message_count && !frame->is_remote; i++) {
     bound_message *m = &self->messages[i];
-    if (!wm_can_matches(&m->match, frame->id, frame->is_extended) || !is_of_sender(m, frame)) continue;
+    if (!wm_can_matches(&m->match, frame->id, frame->is_extended)) continue;
+    const sender_verdict verdict = sender_take(m, frame, counts);
+    if (verdict == SENDER_AWAITED) {
+      counts->malformed++;
+      counts->first_problem_kind = counts->first_problem[0] ? counts->first_problem_kind : WM_ROW_SENDER;
+      status = bad_frame(m, frame, "another unit's, while the one that is taken is silent", err);
+      is_bound = 1;
+    }
+    if (verdict != SENDER_TAKEN) continue;
     if (!is_bound) payload_set(&data, frame->data, frame->length);
     is_bound = 1;
     wm_status here = decode_message(self, m, frame, &data, out, counts, err);

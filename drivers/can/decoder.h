@@ -56,8 +56,10 @@ typedef struct bound_message {
   struct {  // whose frames are taken
     char iface[WM_CAN_BUS_MAX];
     uint32_t id;
-    wm_time_ns last_ns;
-  } sender;
+    wm_time_ns last_ns, period_ns;  // of the newest frame; the longest lately from one to the next, 0: unknown
+  } sender, sender_before;
+  // A bit for each source address: it sent since the newest frame of the one that is taken; it sent beside that one.
+  uint32_t since[8], beside[8];
   char bus[WM_CAN_BUS_MAX];
   char name[64];
   uint32_t first_quantity, quantity_count;

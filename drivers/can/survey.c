@@ -24,11 +24,12 @@ int wm_can_survey_take(wm_can_survey *self, const wm_can_frame *frame) {
   if (i == WM_CAN_SURVEY_IDS) return 1;
   wm_can_seen *seen = &self->seen[i];
   if (i == self->count) {
-    *seen = (wm_can_seen){.id = frame->id, .is_extended = frame->is_extended};
+    *seen = (wm_can_seen){.id = frame->id, .is_extended = frame->is_extended, .first_ns = frame->t_ns};
     memcpy(seen->iface, frame->iface, sizeof seen->iface);
     self->count++;
   }
   seen->frames++;
+  seen->last_ns = frame->t_ns;
   return 1;
 }
 
@@ -166,6 +167,11 @@ static const wm_can_seen *next_sender(const bound_message *m, const wm_can_surve
   return NULL;
 }
 
+// Whether one begins behind the end of the other: a unit with another address (sender.h).
+static int is_in_turn(const wm_can_seen *a, const wm_can_seen *b) {
+  return a->first_ns > b->last_ns || b->first_ns > a->last_ns;
+}
+
 // The first of several senders of a message is the one that is taken, or the one that has the DBC's id.
 static void say_senders(sink *s, const bound_message *m, const wm_can_survey *seen) {
   const wm_can_seen *here, *taken = NULL;
@@ -173,7 +179,9 @@ static void say_senders(sink *s, const bound_message *m, const wm_can_survey *se
   int is_other_bus = 0;
   for (size_t i = 0; (here = next_sender(m, seen, &i)); count++)
     if (!taken || (here->id == m->match.id && taken->id != m->match.id)) taken = here;
-  if (count < 2) return;
+  size_t beside = 0;
+  for (size_t i = 0; (here = next_sender(m, seen, &i));) beside += here != taken && !is_in_turn(here, taken);
+  if (beside == 0) return;
   say(s, "%s%s is sent by %zu:", s->used ? "; " : "", m->name, count);
   for (size_t i = 0, named = 0; named < NAMED_IDS && (here = next_sender(m, seen, &i));) {
     say(s, named++ ? ", " : " ");

@@ -100,7 +100,7 @@ static wm_status read_ahead(play_file *self, wm_error *err) {
   return status;
 }
 
-// Into self->now. A stamp far ahead of the one after it is corrupt, and left out.
+// Into self->now. A stamp far ahead of the one after it, or far behind both, is corrupt, and left out.
 static wm_status fill(play_file *self, wm_error *err) {
   if (self->has_now || self->ended) return WM_OK;
   wm_status status = self->has_ahead ? WM_OK : read_ahead(self, err);
@@ -115,7 +115,7 @@ static wm_status fill(play_file *self, wm_error *err) {
       self->has_now = 1;
       return WM_OK;
     }
-    play_file_count(self, "a stamp is more than 10 s after the next one; the datum is skipped");
+    play_file_count(self, "a stamp is more than 10 s off the next one; the datum is skipped");
   }
   self->ended = status == WM_END;
   return status == WM_END ? WM_OK : status;

@@ -76,9 +76,9 @@ static wm_status next_frame(can_stream *self, wm_error *err) {
     wm_time_ns here_ns = self->frame.can.t_ns, next_ns = self->has_ahead ? self->ahead.can.t_ns : here_ns;
     if (!arrival_order_leaps(&self->order, here_ns, next_ns)) return WM_OK;
     char why[96];
-    snprintf(why, sizeof why, "the stamp lies %.0f s after the next line's; the frame is skipped",
-             wm_seconds_between(next_ns, here_ns));
+    arrival_leap_text("the stamp", here_ns, next_ns, "line", why, sizeof why);
     self->base.counts.not_finite++;
+    if (!self->base.counts.first_problem[0]) self->base.counts.first_problem_kind = WM_ROW_STAMP_APART;
     keep_problem(self, self->frame.line, why);
   }
 }
@@ -105,10 +105,8 @@ static wm_status next_event(wm_source *base, wm_event *out, wm_error *err) {
     if (status != WM_OK) return status;
     const wm_can_frame *frame = &self->frame.can;
     status = wm_can_event(self->decoder, self->part, &self->gnss, frame, out, &base->counts, &why);
-    if (status != WM_OK) {
-      if (why.text[0]) keep_problem(self, self->frame.line, why.text);
-      continue;
-    }
+    if (why.text[0]) keep_problem(self, self->frame.line, why.text);
+    if (status != WM_OK) continue;
     out->source = base->index;
     out->arrival_ns = arrival_order_next(&self->order, frame->t_ns, &base->counts);
     out->seq = self->seq++;

@@ -86,10 +86,10 @@ static void count_bad(stream *self, wm_status status, wm_row_problem kind, const
   counts->first_problem_kind = (uint8_t)kind;
 }
 
-static void count_bad_row(stream *self, wm_status status, const csv_row *row, const char *why) {
+static void count_bad_row(stream *self, wm_status status, wm_row_problem kind, const csv_row *row, const char *why) {
   char text[WM_PATH_MAX + 128];
   snprintf(text, sizeof text, "%s:%ld: %s", self->csv.lines.path, row->line, why);
-  count_bad(self, status, WM_ROW_OTHER, text);
+  count_bad(self, status, kind, text);
 }
 
 // The next readable row of this source; others are counted.
@@ -123,8 +123,8 @@ static wm_status next_row(stream *self, wm_error *err) {
     wm_time_ns here_ns = arrival_of(&self->row), next_ns = self->has_ahead ? arrival_of(&self->ahead) : here_ns;
     if (!arrival_order_leaps(&self->order, here_ns, next_ns)) return WM_OK;
     char why[96];
-    snprintf(why, sizeof why, "t_ns: lies %.0f s after the next row's", wm_seconds_between(next_ns, here_ns));
-    count_bad_row(self, WM_NOT_FINITE, &self->row, why);
+    arrival_leap_text("t_ns:", here_ns, next_ns, "row", why, sizeof why);
+    count_bad_row(self, WM_NOT_FINITE, WM_ROW_STAMP_APART, &self->row, why);
   }
 }
 
@@ -165,7 +165,7 @@ static wm_status next_single(wm_source *base, wm_event *out, wm_error *err) {
       hand_out(self, arrival_of(&self->row), out);
       return WM_OK;
     }
-    count_bad_row(self, WM_BAD_DATA, values, problem);
+    count_bad_row(self, WM_BAD_DATA, WM_ROW_OTHER, values, problem);
   }
 }
 

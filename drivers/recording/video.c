@@ -146,8 +146,9 @@ static wm_status next_row(wm_video *self, wm_error *err) {
       self->rows_ended = !self->has_ahead;
       return WM_OK;
     }
-    count(self, &self->counts.malformed, "%s:%ld: t_ns: lies %.0f s after the next row's; the row is skipped",
-          self->csv.lines.path, self->row.line, wm_seconds_between(next_ns, here_ns));
+    char why[96];
+    arrival_leap_text("t_ns:", here_ns, next_ns, "row", why, sizeof why);
+    count(self, &self->counts.malformed, "%s:%ld: %s; the row is skipped", self->csv.lines.path, self->row.line, why);
   }
   if (status == WM_END) self->rows_ended = 1;
   return status;

@@ -110,6 +110,9 @@ const wm_finding_kind kFindingKinds[WM_FOUND_COUNT] = {
                                    "raise slam.landmarks.capacity"},
     [WM_FOUND_SOURCE_SILENT] = {"source-silent", "unplugged, switched off, or its program has ended",
                                 "look at its cable, its power and its program"},
+    [WM_FOUND_SENDER_CHANGED] =
+        {"sender-changed", "a unit of the bus claimed another address, or another one took over",
+         "nothing, where it is the same unit; else bind the right one by its whole id (docs/can.md, J1939)"},
     [WM_FOUND_DEVICE_TROUBLE] = {"device-trouble", "a device that is absent, down or stalled",
                                  "`waymark doctor CONFIG` looks at each device"},
     [WM_FOUND_MOTION_SENSOR] = {"motion-sensor", "an encoder or a gyro that is dead, stuck or implausible",

@@ -213,6 +213,34 @@ def both(**files):
     return {"motion.csv": motion(), "imu.csv": imu(), **{k.replace("_csv", ".csv").replace("_yaml", ".yaml"): v for k, v in files.items()}}
 
 
+def spoilt(text, change):
+    """A table or a log of which each 30th line is changed, 3 %."""
+    return "".join(change(line) if k % 30 == 17 else line for k, line in enumerate(text.splitlines(keepends=True)))
+
+
+def field(at, value):
+    return lambda line: ",".join(value if k == at else part for k, part in enumerate(line.rstrip("\n").split(","))) + "\n"
+
+
+def spoilt_rows():
+    """3 % of a stream's rows that are dropped, in each way: never good, and the fix is of that way."""
+    columns, unit, stamp = "its columns differ", "unit of the column's name", "its stamp is damaged"
+    ways = (("no number", field(1, "nan"), columns), ("text", field(1, "x"), columns), ("a field less", lambda line: line.rpartition(",")[0] + "\n", columns),
+            ("beyond what can be", field(1, "1e12"), unit), ("a stamp of 0", field(0, "0"), stamp), ("a stamp an hour ahead", field(0, str(ns(3600))), stamp))
+    for name, change, fix in ways:
+        for stream, make in (("motion", motion), ("imu", imu)):
+            files = both(**{f"{stream}_csv": spoilt(make(), change)})
+            yield f"3 % of {stream}: {name}", files, ("bad", "rows-skipped", stream), f"{stream}.csv:18: ", fix
+    log = can()
+    absent = {**log, "vehicle.dbc": log["vehicle.dbc"] + 'VAL_ 256 YAW 2143289344 "SNA";\n'}
+    for name, change, words in (("a signal without a value", lambda line: line[:-9] + "0000C07F\n", "a signal marks that it has no value"),
+                                ("cut frames", lambda line: line[:-9] + "\n", "shorter than the signals"), ("no frames", lambda line: "line\n", "begins with its time")):
+        yield f"3 % of can.log: {name}", {**absent, "can.log": spoilt(absent["can.log"], change)}, ("bad", "rows-skipped", "can"), words, "the DBC and what is on the bus"
+    yield ("3 % of can.log: a stamp of 0", {**log, "can.log": spoilt(log["can.log"], lambda line: "(0.000000)" + line[line.index(")") + 1:])},
+           ("bad", "rows-skipped", "can"), "before the next line's", stamp)
+
+
+
 DISAGREE, STAMPS = "sensors-disagree", "clock-jumped"
 BROKEN = ("counter-restarts", "motion-sensor", "clock-drifts", "clock-coarse", STAMPS)
 # name, files, finding (severity, identifier, about), words of its text, words of its fix
@@ -283,7 +311,8 @@ FAULTS = [
     ("stamps of whole seconds", both(motion_csv=motion(stamp=grid(1.0))), ("bad", "clock-coarse", "motion"), "have the stamp of the one before", "grid of about 1 s"),
     ("stamps of 16 ms at 200 Hz", both(imu_csv=imu(200, stamp=grid(0.016))), ("bad", "clock-coarse", "imu"), "have the stamp", "0.016 s"),
     ("stamps of 10 ms at 200 Hz", both(imu_csv=imu(200, stamp=grid(0.01))), ("note", "clock-coarse", "imu"), "have the stamp", "0.01 s"),
-    ("rows that come twice", both(motion_csv="\n".join(line for row in motion().splitlines() for line in ([row, row] if row[0] == "1" else [row])) + "\n"), ("note", "rows-disordered", "motion"), "come twice", "two programs"),
+    ("rows that come twice", both(motion_csv="\n".join(line for row in motion().splitlines() for line in ([row, row] if row[0] == "1" else [row])) + "\n"), ("bad", "rows-disordered", "motion"), "come twice", "two programs"),
+    *spoilt_rows(),
     ("rows in disorder, 1 of 20 is half a second late", both(motion_csv=(lambda rows: "\n".join(rows[:1] + [r for k in range(1, len(rows) - 25) for r in ([rows[k]] if k % 20 else []) + ([rows[k - 25]] if k > 25 and (k - 25) % 20 == 0 else [])]) + "\n")(motion().splitlines())), ("bad", "rows-unused", "motion"), "rows are not used", ""),
     ("floats without their type", can(valtype=False), ("bad", "value-implausible", "can"), "as a float", "SIG_VALTYPE_ ID SIGNAL : 1;"),
     ("floats without their type, unsigned", can(valtype=False, signed="+"), ("bad", "value-implausible", "can"), "as a float", "SIG_VALTYPE_"),

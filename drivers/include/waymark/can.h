@@ -44,6 +44,7 @@ typedef struct wm_can_seen {
   uint8_t is_extended;
   char iface[WM_CAN_BUS_MAX];
   uint64_t frames;
+  wm_time_ns first_ns, last_ns;  // stamps of the first and of the newest one
 } wm_can_seen;
 typedef struct wm_can_survey {
   wm_can_seen seen[WM_CAN_SURVEY_IDS];  // in the order of their first frames; error and remote frames are left out

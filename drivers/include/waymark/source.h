@@ -22,7 +22,9 @@ typedef enum wm_row_problem {
   WM_ROW_OTHER = 0,
   WM_ROW_STAMP_OF_SECONDS,  // a stamp with a fraction: nanoseconds are whole
   WM_ROW_ANGLE,             // an angle outside of what can be: degrees
-  WM_ROW_VALUE              // another number outside of what can be
+  WM_ROW_VALUE,             // another number outside of what can be
+  WM_ROW_STAMP_APART,       // a single stamp far from those before and after it
+  WM_ROW_SENDER             // of another unit on the bus than the one that is taken, which is silent
 } wm_row_problem;
 
 // Counts of a source: every datum that doesn't become an event is in one of these.

@@ -214,11 +214,12 @@ static void judge_unused(const wm_source_health *s, int is_motion, wm_findings *
 }
 
 static void judge_twice(const wm_source_health *s, wm_findings *out) {
-  if ((double)s->duplicates <= TWICE_NOTE * (double)s->received || s->received < EVENTS_MIN) return;
-  wm_find(out, WM_FOUND_ROWS_DISORDERED, WM_SEVERITY_NOTE, s->name,
+  const double share = (double)s->duplicates / (double)s->received;
+  if (s->received < EVENTS_MIN || share <= TWICE_NOTE) return;
+  wm_find(out, WM_FOUND_ROWS_DISORDERED, share > UNUSED_BAD ? WM_SEVERITY_BAD : WM_SEVERITY_NOTE, s->name,
           "look for two programs that send or record the same data; each is used once",
           "%" PRIu64 " of %" PRIu64 " rows come twice", s->duplicates, s->received)
-      ->size = (double)s->duplicates / (double)s->received;
+      ->size = share;
 }
 
 void clock_data_judge(const clock_data *self, const wm_health *health, wm_findings *out) {

@@ -47,10 +47,14 @@ static const char *mend_rows(const wm_source *source) {
     return "are the stamps in seconds? t_ns and arrival_ns are whole nanoseconds: multiply by 1e9";
   if (c->first_problem_kind == WM_ROW_ANGLE && c->not_finite > c->malformed)
     return "are the angles in degrees? The column is in radians: multiply by 0.0174533 (pi/180)";
+  if (c->first_problem_kind == WM_ROW_STAMP_APART)
+    return "its stamp is damaged, or was not set: look at what writes it";
+  if (c->first_problem_kind == WM_ROW_SENDER)
+    return "several units send it: for a certain one write its whole id into the DBC's BO_ line (docs/can.md, J1939)";
   if (c->first_problem_kind == WM_ROW_VALUE || c->first_problem_kind == WM_ROW_ANGLE)
     return "is it in the unit of the column's name? Leave a field empty where nothing was measured";
-  return source->is_motion ? "the DBC and what is on the bus are not the same; or the file is damaged"
-                           : "the file is damaged, or its columns differ from its first line";
+  return source->is_bus ? "the DBC and what is on the bus are not the same; or the file is damaged"
+                        : "the file is damaged, or its columns differ from its first line";
 }
 
 static void counted(const wm_assembled_source *s, const source_facts *facts, wm_findings *out) {
@@ -62,6 +66,10 @@ static void counted(const wm_assembled_source *s, const source_facts *facts, wm_
     wm_find(out, WM_FOUND_ROWS_SKIPPED, of_hundred(skipped, all) >= 2 ? WM_SEVERITY_BAD : WM_SEVERITY_NOTE, s->name,
             mend_rows(s->source), "%s (%" PRIu64 " like it, %" PRIu64 " of 100)", c->first_problem, skipped,
             of_hundred(skipped, all));
+  if (c->news > 0 && c->device_note[0])
+    wm_find(out, WM_FOUND_SENDER_CHANGED, WM_SEVERITY_NOTE, s->name, NULL, "%s%s", c->device_note,
+            c->news > 1 ? "; it is the last of several changes" : "")
+        ->size = c->news;
   if (of_hundred(c->lost, facts->events + c->lost) >= 1)
     wm_find(out, WM_FOUND_DATA_MISSING, WM_SEVERITY_NOTE, s->name,
             "a bus or a recorder that is too slow: look at its load and at `waymark doctor`",

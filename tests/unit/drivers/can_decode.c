@@ -363,6 +363,22 @@ TEST(one_quantity_alone) {
 
 // ── what is no value, what is no frame ──────────────────────────────────────────────────────────────────────────────
 
+// A frame is one datum: of its values that are absent it counts once, whether others are there or not.
+TEST(absent_values_count_by_the_frame) {
+  const wm_can_binding b[] = {binding(WM_Q_WHEEL_SPEED_REAR_LEFT, "W", "L"),
+                              binding(WM_Q_WHEEL_SPEED_REAR_RIGHT, "W", "R")};
+  TEST_ASSERT_EQUAL(WM_OK, open_with(&f,
+                                     "BO_ 257 W: 4 X\n SG_ L : 0|16@1+ (0.01,0) [0|100] \"m/s\" X\n"
+                                     " SG_ R : 16|16@1+ (0.01,0) [0|100] \"m/s\" X\n",
+                                     b, 2));
+  TEST_ASSERT_EQUAL(WM_BAD_DATA, feed(&f, "c 101#FFFFFFFF"));
+  TEST_ASSERT_EQUAL_UINT64(1, f.counts.not_finite);
+  TEST_ASSERT_EQUAL(WM_OK, feed(&f, "c 101#6400FFFF"));
+  TEST_ASSERT_EQUAL(1, f.got.count);
+  TEST_ASSERT_EQUAL_UINT64(2, f.counts.not_finite);
+  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(f.err.text, "a signal marks that it has no value"), f.err.text);
+}
+
 TEST(no_value) {
   open_one(&f,
            "BO_ 257 W: 3 X\n SG_ V : 0|16@1+ (0.01,0) [0|100] \"m/s\" X\n"

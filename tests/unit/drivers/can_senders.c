@@ -105,7 +105,9 @@ TEST(one_of_several_senders_is_taken) {
       "another one write `bus:` in can-signals.yaml",
       text);
   // A sender that is silent for more than 3 s has gone.
-  TEST_ASSERT_EQUAL(WM_AGAIN, feed_at(&f, 3.0, "can0 18FEF100#F30002FFFFFFFFFF"));
+  TEST_ASSERT_EQUAL(WM_BAD_DATA, feed_at(&f, 3.0, "can0 18FEF100#F30002FFFFFFFFFF"));
+  TEST_ASSERT_EQUAL_UINT64(1, f.counts.malformed);
+  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(f.err.text, "another unit's, while the one that is taken is silent"), f.err.text);
   TEST_ASSERT_EQUAL(WM_OK, feed_at(&f, 3.1, "can0 18FEF100#F30002FFFFFFFFFF"));
   TEST_ASSERT_EQUAL(WM_AGAIN, feed_at(&f, 3.2, "can0 18FEF10B#F30001FFFFFFFFFF"));
 }
@@ -117,6 +119,64 @@ TEST(the_dbcs_own_address_goes_before_others) {
   TEST_ASSERT_EQUAL(2, feed_all(frames, 3));
   (void)wm_can_decoder_senders(f.decoder, survey, text, sizeof text);
   TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "Taken is 18FEF100 on can0; for another one write its whole id"), text);
+}
+
+// Who sends a message each 100 ms: addresses by their letters, '.' none. `taken`: whose frame has to be taken then.
+typedef struct turn_row {
+  const char *about, *sends[2], *taken;
+  unsigned changes, awaited;
+} turn_row;
+static const turn_row kTurns[] = {
+    {"one unit", {"aaaaaaaa", ""}, "aaaaaaaa", 0, 0},
+    {"another address at once", {"aaaabbbb", ""}, "aaaa.bbb", 1, 0},
+    {"another address after its claim", {"aaaa...bbbb", ""}, "aaaa...bbbb", 1, 0},
+    {"and back, much later",
+     {"aaaabbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbaaaa", ""},
+     "aaaa.bbbbbbbbbbbbbbbbbbbbbbbbbbbbbbb.aaa",
+     2,
+     0},
+    {"two units", {"aaaaaaaa", "bbbbbbbb"}, "aaaaaaaa", 0, 0},
+    {"two units, the first begins later", {".aaaaaaa", "bbbbbbbb"}, "bbbbbbbb", 0, 0},
+    {"two units, the first misses one", {"aaaa.aaaa", "bbbbbbbbb"}, "aaaa.aaaa", 0, 0},
+    {"two units, a pause of the first", {"aaaa....aaaa", "bbbbbbbbbbbb"}, "aaaa....aaaa", 0, 3},
+    {"the second begins in a pause", {"aaaa....aaaa", ".....bbbbbbb"}, "aaaa.bbbaaaa", 2, 0},
+    {"the first of two falls silent",
+     {"aaaa................................", "bbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbb"},
+     "aaaa.............................bb",
+     1,
+     28},
+};
+
+TEST(a_unit_that_claims_another_address_is_followed) {
+  for (size_t i = 0; i < sizeof kTurns / sizeof *kTurns; i++) {
+    const turn_row *row = &kTurns[i];
+    open_speed("BO_ 2566844926 CCVS1: 8 X\n" SPEED, "");
+    char taken[64] = "";
+    for (size_t k = 0; row->sends[0][k]; k++) {
+      taken[k] = '.';
+      for (size_t who = 0; who < 2; who++) {
+        const char sender = strlen(row->sends[who]) > k ? row->sends[who][k] : '.';
+        char frame[64];
+        (void)snprintf(frame, sizeof frame, "can0 18FEF1%02X#F30001FFFFFFFFFF", sender == 'a' ? 0x00 : 0x25);
+        if (sender != '.' && feed_at(&f, 1.0 + 0.1 * (double)k + 0.03 * (double)who, frame) == WM_OK) taken[k] = sender;
+      }
+    }
+    TEST_ASSERT_EQUAL_STRING_LEN_MESSAGE(row->taken, taken, strlen(row->taken), row->about);
+    TEST_ASSERT_EQUAL_MESSAGE(row->changes, f.counts.news, row->about);
+    TEST_ASSERT_EQUAL_UINT64_MESSAGE(row->awaited, f.counts.malformed, row->about);
+  }
+  TEST_ASSERT_EQUAL_STRING(
+      "CCVS1 is taken from 18FEF125 on can0 since 4.330 s, 3.03 s after the last one of 18FEF100 on can0",
+      f.counts.device_note);
+}
+
+TEST(addresses_in_turn_are_not_told_as_two_units) {
+  open_speed("BO_ 2566844926 CCVS1: 8 X\n" SPEED, "");
+  const char *const frames[] = {
+      "can0 18FEF100#F30001FFFFFFFFFF", "can0 18FEF100#F30002FFFFFFFFFF", "can0 101#00", "can0 101#00",
+      "can0 18FEF125#F30001FFFFFFFFFF", "can0 18FEF125#F30003FFFFFFFFFF"};
+  (void)feed_all(frames, 6);
+  TEST_ASSERT_EQUAL(0, wm_can_decoder_senders(f.decoder, survey, text, sizeof text));
 }
 
 TEST(a_message_on_two_buses) {

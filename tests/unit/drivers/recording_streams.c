@@ -239,12 +239,12 @@ TEST(leaping_stamps) {
   folder_write(
       "motion.csv",
       "t_ns,v_mps,w_radps\n900000000000000,1,0\n0,1,0\n100,2,0\n3000000000000000000,3,0\n300,4,0\n60000000300,5,0\n"
-      "60000000200,6,0\n");
+      "60000000200,6,0\n0,7,0\n60000000400,8,0\n");
   wm_source *motion = source("motion");
-  static const int64_t kStamps[] = {0, 100, 300, 60000000300, 60000000200};
-  for (int i = 0; i < 5; i++) TEST_ASSERT_EQUAL_INT64(kStamps[i], next(motion).t_ns);
+  static const int64_t kStamps[] = {0, 100, 300, 60000000300, 60000000200, 60000000400};
+  for (int i = 0; i < 6; i++) TEST_ASSERT_EQUAL_INT64(kStamps[i], next(motion).t_ns);
   at_end(motion);
-  TEST_ASSERT_EQUAL(2, motion->counts.not_finite);
+  TEST_ASSERT_EQUAL(3, motion->counts.not_finite);    // two ahead of their neighbours, one far behind
   TEST_ASSERT_EQUAL(1, motion->counts.out_of_order);  // a tenth of a microsecond back is no leap
   TEST_ASSERT_NOT_NULL_MESSAGE(strstr(motion->counts.first_problem,
                                       "motion.csv:2: t_ns: lies 900000 s after the next row's; the row is skipped"),
