@@ -31,8 +31,8 @@ static void take_over(bound_message *m, const wm_can_frame *frame, wm_source_cou
   if (m->frames > 0) {
     counts->news++;
     (void)snprintf(counts->device_note, sizeof counts->device_note,
-                   "%.40s is taken from %.8X on %.15s since %.3f s, %.2f s after the last one of %.8X on %.15s", m->name,
-                   frame->id, frame->iface, (double)frame->t_ns * 1e-9,
+                   "%.40s is taken from %.8X on %.15s since %.3f s, %.2f s after the last one of %.8X on %.15s",
+                   m->name, frame->id, frame->iface, (double)frame->t_ns * 1e-9,
                    (double)(frame->t_ns - m->sender.last_ns) * 1e-9, m->sender.id, m->sender.iface);
   }
   m->sender_before = m->sender;

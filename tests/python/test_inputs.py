@@ -219,5 +219,50 @@ class CanLogs(Folder):
         self.assertEqual([frame.t_ns for frame in got], [10_000_000 * i for i in range(20)])
 
 
+class FirstDrives(Folder):
+    """`waymark init` of a boat's log: what it writes drives that log, or it states what is missing."""
+
+    def log(self, rate=False, positions=False):
+        """20 s of heading and speed through the water by NMEA 2000, with a rate of turn and positions."""
+        word = lambda value, size=2: int(round(value)).to_bytes(size, "little", signed=size == 4).hex().upper()  # noqa: E731
+        lines = []
+        for k in range(200):
+            at = f"({T_S + k / 10:.6f}) can0 "
+            lines += [f"{at}09F11223#00{word(10000 + 20 * k)}FF7FFF7FFD", f"{at}09F50323#00{word(200 + 50 * np.sin(k / 20))}FFFF00FFFF"]
+            lines += [f"{at}09F11323#00{word(-0.1 * np.sin(k / 30) / 3.125e-8, 4)}FFFFFF"] if rate else []
+            lines += [f"{at}09F80101#{word(525000000 + 20 * k, 4)}{word(133000000 + 5 * k, 4)}"] if positions else []
+        path = self.folder / "boat.log"
+        path.write_text("\n".join(lines) + "\n")
+        return path
+
+    def init(self, *options, **of_log):
+        done = subprocess.run([BIN / "waymark-init", self.folder / "boat", "--can-log", self.log(**of_log), "--yes", "--force", *options],
+                              capture_output=True, text=True, check=False)
+        return done.returncode, done.stdout + done.stderr
+
+    def drives(self):
+        return subprocess.run([BIN / "waymark", "replay", self.folder / "boat/first-drive", "--config", self.folder / "boat/robot.yaml", "--out", self.folder / "run"],
+                              capture_output=True, text=True, check=False)
+
+    def test_a_drive_that_lacks_something_is_named_at_once(self):
+        for options in ((), ("--imu",)):  # an IMU that sends live is not in the log
+            code, said = self.init(*options)
+            self.assertEqual(code, 1, said)
+            self.assertRegex(said, "the drive can't be driven with them: .*yaw_rate.*--stream")
+        gyro = self.folder / "imu.csv"
+        gyro.write_text("t_ns,wx_radps,wy_radps,wz_radps\n" + "".join(f"{T_S * 10**9 + k * 10**8},0,0,0.01\n" for k in range(200)))
+        code, said = self.init("--imu", "--stream", gyro)
+        self.assertEqual((code, self.drives().returncode), (0, 0), said)
+
+    def test_positions_drive_where_nothing_turns(self):
+        for rate in (False, True):
+            code, said = self.init(rate=rate, positions=True)
+            self.assertEqual(code, 0, said)
+            self.assertEqual("motion.model constant_velocity" in said, not rate)
+            done = self.drives()
+            self.assertEqual(done.returncode, 0, done.stderr)
+            shutil.rmtree(self.folder / "run")
+
+
 if __name__ == "__main__":
     unittest.main()

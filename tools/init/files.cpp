@@ -171,6 +171,8 @@ std::string config_text(const Robot &robot) {
   if (!sources.empty()) out += "\nsources:\n" + sources;
   if (w.motion == "twist")
     out += "\nmotion: {twist: measured}   # commands: where the rows are what a controller asked for\n";
+  if (robot.lacks_turn() && std::string(sight.estimator) != "odometry")
+    out += "\nmotion: {model: constant_velocity}   # nothing measures the turn: what is observed moves the pose\n";
   if (is_slam || std::string(sight.estimator) == "odometry" || std::string(sight.estimator) == "stereo_ekf")
     out += "\ninitial_pose: {x_m: 0, y_m: 0, heading_rad: 0}   # the map begins where the robot stands\n";
   out += "\n# A restart continues where the last run ended.\nstart: {saved_pose: pose.yaml" +

@@ -23,6 +23,10 @@ void name_motion(Robot &robot) {
     robot.unknown.emplace_back("motion: the pose is predicted by constant velocity; wheels or an IMU would improve it");
   if (w.motion == "speeds" && !w.imu)
     robot.unknown.emplace_back("turn rate: two wheels' speeds have none here; give --imu, or --motion ticks or twist");
+  if (robot.lacks_turn() && (w.sees != "nothing" || w.gnss || robot.binds(WM_CAN_LATITUDE)))
+    robot.guesses.emplace_back(
+        "motion.model constant_velocity: the speed is not used, since nothing measures the turn; with a turn rate (an "
+        "IMU by --imu, or a signal) leave the line out");
   if (w.motion != "can") return;
   if (w.can_interface.empty()) {
     w.can_interface = "can0";
@@ -30,7 +34,8 @@ void name_motion(Robot &robot) {
   }
   const bool ticks = robot.binds(WM_Q_WHEEL_TICKS_LEFT);
   const bool speed = ticks || has(WM_Q_WHEEL_SPEED_FRONT_LEFT, WM_Q_VEHICLE_SPEED);
-  const bool steering = robot.binds(WM_Q_STEERING_WHEEL) || robot.binds(WM_Q_ROAD_WHEEL);
+  const bool steering =
+      robot.binds(WM_Q_STEERING_WHEEL) || robot.binds(WM_Q_ROAD_WHEEL) || robot.binds(WM_Q_STEERING_ACTUATOR);
   if (!speed) robot.unknown.emplace_back("speed: no signal of the DBC is bound to it; add one to can-signals.yaml");
   if (!ticks && !w.imu && !robot.binds(WM_Q_YAW_RATE) && !steering)
     robot.unknown.emplace_back(

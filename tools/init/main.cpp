@@ -6,6 +6,7 @@
 #include "common/failure.h"
 #include "common/program.h"
 #include "init/files.h"
+#include "init/first_drive.h"
 #include "init/questions.h"
 #include "init/robot.h"
 
@@ -116,6 +117,12 @@ int run(Wish &wish) {
   print_list("Unknown:", robot.unknown);
   const char *dir = wish.out.c_str();
   const bool has_drive = !wish.can_log.empty() || !wish.streams.empty();
+  wm_error lacks{};
+  if (has_drive &&
+      init_first_drive((wish.out + "/robot.yaml").c_str(), (wish.out + "/first-drive").c_str(), &lacks) != WM_OK)
+    throw Failure(
+        "the files are written, but the drive can't be driven with them: " + std::string(lacks.text) +
+        ". Give what it lacks (a CSV of the same drive by --stream), or record another one: `waymark record`");
   std::printf("Next:\n  waymark check %s/robot.yaml%s\n", dir,
               has_drive ? (" " + wish.out + "/first-drive").c_str() : "");
   if (!has_drive)

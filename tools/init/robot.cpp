@@ -266,6 +266,19 @@ bool Robot::binds(unsigned quantity) const {
   return std::any_of(signals.begin(), signals.end(), [&](const Candidate &c) { return c.quantity == quantity; });
 }
 
+bool Robot::lacks_turn() const {
+  if (wish.imu) return false;
+  if (wish.motion == "speeds") return true;
+  const auto is_turn = [](const Candidate &c) {
+    return c.quantity == WM_Q_WHEEL_TICKS_LEFT || c.quantity == WM_Q_YAW_RATE || c.quantity == WM_Q_STEERING_WHEEL ||
+           c.quantity == WM_Q_ROAD_WHEEL || c.quantity == WM_Q_STEERING_ACTUATOR;
+  };
+  const auto is_speed = [](const Candidate &c) {
+    return c.quantity >= WM_Q_WHEEL_SPEED_FRONT_LEFT && c.quantity <= WM_Q_VEHICLE_SPEED;
+  };
+  return std::any_of(signals.begin(), signals.end(), is_speed) && std::none_of(signals.begin(), signals.end(), is_turn);
+}
+
 static void read_nmea2000(Robot &robot) {
   const Wish &wish = robot.wish;
   Nmea2000 found;

@@ -84,6 +84,8 @@ struct Robot {
   std::vector<std::string> unknown;              // what no file and no answer gave, and how to find it
 
   [[nodiscard]] bool binds(unsigned quantity) const;
+  // Whether speeds come, and nothing from which the robot's turn follows.
+  [[nodiscard]] bool lacks_turn() const;
 };
 
 // Reads the files of the wish. Throws tools::Failure.
