@@ -81,9 +81,32 @@ static int take_date(cursor *in, uint64_t *seconds) {
   return 1;
 }
 
+// How logs of other programs begin. Those that python-can reads become candump's by its logconvert.
+#define CONVERTS "`python -m can.logconvert LOG can.log` makes one of it (python-can)"
+static const struct {
+  const char *begin, *is;
+} kOthers[] = {
+    {"date ", "a log of Vector (ASC); " CONVERTS},
+    {"LOGG", "a log of Vector (BLF); " CONVERTS},
+    {";$FILEVERSION", "a trace of PEAK (TRC); " CONVERTS},
+    {"MDF ", "a measurement in ASAM's MDF; " CONVERTS},
+    {"timestamp,", "a table of python-can; " CONVERTS},
+    {"Time Stamp,", "a table of SavvyCAN: save it there as candump's log"},
+    {"\xFF\xFE", "in UTF-16, as a PowerShell's `>` writes: write it by `candump -l any`, or save it in UTF-8"},
+};
+
+static wm_status no_time(const cursor *in, wm_error *err) {
+  for (size_t i = 0; i < sizeof kOthers / sizeof *kOthers; i++) {
+    const size_t length = strlen(kOthers[i].begin);
+    if ((size_t)(in->end - in->at) >= length && memcmp(in->at, kOthers[i].begin, length) == 0)
+      return wm_fail(err, WM_BAD_DATA, "this is no log of candump, but %s", kOthers[i].is);
+  }
+  return wm_fail(err, WM_BAD_DATA, "a line begins with its time, (SECONDS.MICROS)");
+}
+
 // "(SECONDS[.FRACTION])" or "(DATE TIME[.FRACTION])" into nanoseconds, exactly: no floating point.
 static wm_status parse_time(cursor *in, wm_time_ns *out, wm_error *err) {
-  if (peek(in) != '(') return wm_fail(err, WM_BAD_DATA, "a line begins with its time, (SECONDS.MICROS)");
+  if (peek(in) != '(') return no_time(in, err);
   in->at++;
   const char *from = in->at;
   const char *close = memchr(in->at, ')', (size_t)(in->end - in->at));

@@ -28,7 +28,7 @@ static inline wm_time_ns arrival_order_next(arrival_order *self, wm_time_ns arri
 #define ARRIVAL_LEAP_NS (10 * WM_NS_PER_S)  // above any lateness, below gaps between recordings
 static inline int arrival_order_leaps(const arrival_order *self, wm_time_ns arrival_ns, wm_time_ns next_ns) {
   if (arrival_ns - next_ns > ARRIVAL_LEAP_NS) return !self->started || next_ns >= self->newest_ns - ARRIVAL_LEAP_NS;
-  return self->started && self->newest_ns - arrival_ns > ARRIVAL_LEAP_NS &&
+  return self->started && self->newest_ns - arrival_ns > ARRIVAL_LEAP_NS && next_ns - arrival_ns > ARRIVAL_LEAP_NS &&
          next_ns >= self->newest_ns - ARRIVAL_LEAP_NS;
 }
 // How a leaping stamp lies to the next one: "t_ns: lies 3600 s after the next row's".

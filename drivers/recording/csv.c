@@ -252,7 +252,8 @@ static wm_row_problem problem_of(const csv_column *column, csv_field field, wm_s
   const size_t length = strlen(column->name);
   if (wm_text_to_f64(field.text, field.length, &value) != WM_TEXT_OK) return WM_ROW_OTHER;
   if (status == WM_BAD_DATA) return column->type == CSV_TIME ? WM_ROW_STAMP_OF_SECONDS : WM_ROW_OTHER;
-  return length > 4 && strcmp(column->name + length - 4, "_rad") == 0 ? WM_ROW_ANGLE : WM_ROW_VALUE;
+  const int is_angle = length > 4 && strcmp(column->name + length - 4, "_rad") == 0 && fabs(value) > column->max;
+  return is_angle ? WM_ROW_ANGLE : WM_ROW_VALUE;
 }
 
 wm_status csv_read(csv_reader *self, csv_row *row, wm_error *err) {

@@ -191,6 +191,31 @@ class Corners(BagTest):
                                  - pixels(*POSES[i], OURS * TAG_M / 2).mean(0) for i in range(3)], axis=0)
                 self.assertLess(np.abs(shift).max(), 0.12)  # no half pixel is left
 
+    def test_corners_that_begin_elsewhere(self):
+        """Nodes that turn the list of corners: the homography beside it, which maps (-1, 1) to the library's first one, has the print's way up."""
+        square, want = np.array([(-1, 1), (1, 1), (1, -1), (-1, -1.0)]), None
+        library_order = OURS[::-1] * TAG_M / 2  # of the families that are drawn as OpenCV's readers see them
+        for first, filled in ((0, True), (1, True), (2, True), (3, True), (0, False), (2, "other")):
+            events = with_lens()
+            for i in range(3):
+                corners = pixels(*POSES[i], library_order) + 0.5
+                rows = [row for (x, y), (u, v) in zip(square, corners) for row in ((x, y, 1, 0, 0, 0, -u * x, -u * y, -u), (0, 0, 0, x, y, 1, -v * x, -v * y, -v))]
+                h = np.linalg.svd(np.array(rows))[2][-1] * (filled is not False)
+                h = np.linalg.inv(h.reshape(3, 3)).ravel() if filled == "other" else h
+                tag = M.make("AprilTagDetection", family="tagStandard41h12", id=7, homography=h,
+                             corners=[M.make("apriltag_msgs/Point", x=float(x), y=float(y)) for x, y in np.roll(corners, first, axis=0)])
+                t_ns = START_NS + i * STEP_NS
+                events.put("/cam/detections", "AprilTagDetectionArray", t_ns,
+                           M.make("AprilTagDetectionArray", header=M.header(t_ns, "cam_optical"), detections=[tag]))
+            text, folder = self.take(events.mcap(self.folder / f"{first}{filled}.mcap"), out=f"out-{first}{filled}")
+            table = waymark.Recording(folder).table("marker-corners.csv")
+            got = np.array([table[f"{axis}{k}_px"] for k in range(4) for axis in "uv"])
+            want = got if want is None else want
+            with self.subTest(first=first, filled=filled):
+                self.assertEqual("corners begin" in text, first > 0 and filled is True, text)
+                if filled != "other":
+                    np.testing.assert_allclose(got, want, atol=1e-6)
+
     def test_nvidia_s(self):
         """The library's corners the other way round, and a pose whose z axis is in the print; corners that its pose contradicts are none."""
         library, kind = AprilTag(), "isaac_ros_apriltag_interfaces"

@@ -73,7 +73,9 @@ typedef struct course_data {
   wm_time_ns from_ns;                         // of that position
   double from_m[2];
   double last_course_rad, last_turn_rad, last_way_m;  // of the step before
-  agreement way, turn;                                // of the positions against the motion's
+  uint64_t within, stood;  // positions since the last step; times without a step while the motion goes on
+  double stood_m;          // its way meanwhile
+  agreement way, turn;     // of the positions against the motion's
   double heading_less[2], heading_plus[2];  // sums of cos and sin of the heading less and plus the way's direction
   uint64_t headings;
 } course_data;

@@ -20,6 +20,7 @@
 #define UNUSED_BAD 0.02            // share of a source that a run drops or ignores
 #define LATE_OBSERVATIONS_BAD 0.1  // of observations that a slow transport brings too late: the rest is right
 #define STAMP_MAX_NS (INT64_MAX / 4)
+#define DIFFERENCE_MAX_NS (60 * WM_NS_PER_S)  // differences of stamps are below it
 
 void clock_data_init(clock_data *self, const wm_assembly *assembly) {
   memset(self, 0, sizeof *self);
@@ -105,6 +106,8 @@ static int contradicts_arrival(const clock_facts *f) {
   return f->forward_arrival_ns > 0 && f->forward_arrival_ns < f->forward_ns / 4;
 }
 
+static int is_gap(const clock_facts *f) { return f->forward_ns <= PAUSE_NS && !contradicts_arrival(f); }
+
 static int jumps_forward(const clock_facts *f, int is_motion) {
   if (f->events < EVENTS_MIN || f->forward_ns == 0) return 0;
   if (f->forward_ns > PAUSE_NS || contradicts_arrival(f)) return 1;
@@ -166,15 +169,17 @@ static void judge_grid(const clock_facts *f, uint64_t twice, const char *name, w
   const double span_s = wm_seconds_between(f->first_ns, f->newest_ns);
   char fix[WM_FINDING_FIX_MAX];
   // Differences are a period each: their span is the jitter of the period.
-  const int are_differences = f->stamps * 4 < f->measured && span_s < 0.001 * (double)f->measured;
+  const int are_differences =
+      f->stamps * 4 < f->measured && span_s < 0.001 * (double)f->measured && f->first_ns < DIFFERENCE_MAX_NS;
   const uint64_t same = are_differences || f->same_stamp < twice ? f->same_stamp : f->same_stamp - twice;
   const double share = (double)same / (double)f->measured;
   if (share < SAME_STAMP_NOTE) return;
-  (void)snprintf(fix, sizeof fix,
-                 are_differences
-                     ? "are they differences to the row before (candump -td)? Add them up, or record again with -ta"
-                     : "its stamps have a grid of about %.3g s: stamp with a finer clock, in nanoseconds",
-                 f->stamps > 1 ? span_s / (double)(f->stamps - 1) : span_s);
+  (void)snprintf(
+      fix, sizeof fix,
+      are_differences ? "are they differences to the row before (candump -td)? Add them up, or record again with -ta"
+      : span_s == 0   ? "did its clock stand, or were they written with too few digits? Write whole nanoseconds"
+                      : "its stamps have a grid of about %.3g s: stamp with a finer clock, in nanoseconds",
+      f->stamps > 1 ? span_s / (double)(f->stamps - 1) : span_s);
   wm_find(out, WM_FOUND_CLOCK_COARSE, share > SAME_STAMP_BAD ? WM_SEVERITY_BAD : WM_SEVERITY_NOTE, name, fix,
           "%" PRIu64 " of %" PRIu64 " rows have the stamp of the one before; all are within %.4g s", same, f->measured,
           span_s)
@@ -228,7 +233,9 @@ void clock_data_judge(const clock_data *self, const wm_health *health, wm_findin
     const wm_assembled_source *s = &self->assembly->sources[i];
     if (f->events == 0 || s->source->is_live) continue;
     if (jumps_back(f)) judge_back(f, s->name, out);
-    if (jumps_forward(f, (s->kinds & WM_MOTION_EVENTS) != 0)) judge_forward(f, s->name, out);
+    const double skipped = (double)(s->source->counts.malformed + s->source->counts.not_finite);
+    const int is_skipped = is_gap(f) && skipped > UNUSED_BAD * (double)f->events;  // the rows of the gap: found as such
+    if (jumps_forward(f, (s->kinds & WM_MOTION_EVENTS) != 0) && !is_skipped) judge_forward(f, s->name, out);
     judge_grid(f, health->sources[i].duplicates, s->name, out);
     if (!wm_findings_has(out, WM_FOUND_CLOCK_COARSE, s->name)) judge_twice(&health->sources[i], out);
   }

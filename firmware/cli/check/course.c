@@ -9,6 +9,8 @@
 #define STEP_SIGMAS 6.0  // a step between two positions is this many of their sigmas, so that its direction is known
 #define STEP_MIN_M 1.0
 #define STEP_MAX_S 5.0    // longer, a way is not straight
+#define WITHIN_MIN 3      // positions of such a time, which therefore is no silence of the receiver
+#define STOOD_MIN 3       // such times, in which the positions stand and the motion goes on
 #define STEPS_MIN 30      // of a judgement
 #define TURN_MIN_RAD 0.1  // root mean square of the turns: a straight drive has no information
 // A receiver, wheels and a map agree within some per cent; units differ by 1.6 (miles), 3.6 (km/h) and more.
@@ -90,9 +92,15 @@ static void take_position(course_data *self, const wm_event *event) {
   const double after_s = self->from_ns == WM_TIME_NONE ? HUGE_VAL : wm_seconds_between(self->from_ns, event->t_ns);
   const double step_m[2] = {p->p_m[0] - self->from_m[0], p->p_m[1] - self->from_m[1]};
   const double sigma_m = isfinite(p->sigma_xy_m) ? p->sigma_xy_m : 0;
+  const double least_m = fmax(STEP_MIN_M, STEP_SIGMAS * sigma_m);
+  self->within++;
   if (after_s > STEP_MAX_S) {
     self->last_course_rad = (double)NAN;
-  } else if (hypot(step_m[0], step_m[1]) < fmax(STEP_MIN_M, STEP_SIGMAS * sigma_m)) {
+    if (isfinite(after_s) && self->within >= WITHIN_MIN && fabs(self->way_m) > 2 * least_m) {
+      self->stood++;
+      self->stood_m += fabs(self->way_m);
+    }
+  } else if (hypot(step_m[0], step_m[1]) < least_m) {
     return;  // the step grows until the next position
   } else {
     take_step(self, step_m);
@@ -101,6 +109,7 @@ static void take_position(course_data *self, const wm_event *event) {
   self->from_m[0] = p->p_m[0];
   self->from_m[1] = p->p_m[1];
   self->way_m = self->turn_rad = 0;
+  self->within = 0;
 }
 
 void course_data_take(course_data *self, const wm_event *event) {
@@ -153,5 +162,12 @@ void course_data_judge(const course_data *self, wm_findings *out) {
             "swapped or mirrored",
             "it turns left where the way of the positions turns right (correlation %.2f)", agreement_correlation(t))
         ->size = agreement_correlation(t);
+  if (self->stood >= STOOD_MIN && w->count == 0)
+    wm_find(out, WM_FOUND_SENSORS_DISAGREE, WM_SEVERITY_BAD, "positions",
+            "are they degrees of latitude and longitude? x_m and y_m are metres east and north of the map's origin; or "
+            "the receiver repeats a place",
+            "no position is a metre, or %.0f of its sigmas, from the one before, while the robot drives %.0f m",
+            STEP_SIGMAS, self->stood_m)
+        ->size = self->stood_m;
   judge_heading(self, out);
 }

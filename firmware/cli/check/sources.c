@@ -66,6 +66,11 @@ static void counted(const wm_assembled_source *s, const source_facts *facts, wm_
     wm_find(out, WM_FOUND_ROWS_SKIPPED, of_hundred(skipped, all) >= 2 ? WM_SEVERITY_BAD : WM_SEVERITY_NOTE, s->name,
             mend_rows(s->source), "%s (%" PRIu64 " like it, %" PRIu64 " of 100)", c->first_problem, skipped,
             of_hundred(skipped, all));
+  if (c->bus_errors > 0)
+    wm_find(out, WM_FOUND_DEVICE_TROUBLE, WM_SEVERITY_NOTE, s->name,
+            "look at wiring, termination (60 ohms) and bit rate: frames are lost or delayed by them",
+            "%" PRIu64 " error frames on the bus", c->bus_errors)
+        ->size = (double)c->bus_errors;
   if (c->news > 0 && c->device_note[0])
     wm_find(out, WM_FOUND_SENDER_CHANGED, WM_SEVERITY_NOTE, s->name, NULL, "%s%s", c->device_note,
             c->news > 1 ? "; it is the last of several changes" : "")

@@ -312,13 +312,14 @@ class RecordingWriter:
         """Names of the cameras that have pictures so far."""
         return sorted(self._videos)
 
-    def restamp(self, camera: str, clock: Callable[[Array, Array], tuple[Array, Array]]) -> None:
-        """Replaces stamps and arrivals of a camera's pictures so far by what `clock` makes of both."""
+    def restamp(self, camera: str, clock: Callable[[Array, Array], tuple[Array, Array]]) -> int:
+        """Replaces stamps and arrivals of a camera's pictures so far by what `clock` makes of both; how many have the stamp of another one then."""
         if camera not in self._videos:
-            return
+            return 0
         rows = self._videos[camera][1]
         t_ns, arrival_ns = clock(np.array([t for t, _ in rows], dtype=np.int64), np.array([t if a is None else a for t, a in rows], dtype=np.int64))
         rows[:] = [(int(t), int(a)) for t, a in zip(t_ns, arrival_ns)]
+        return len(rows) - len(np.unique(t_ns))
 
     def streams(self) -> list[str]:
         """Names of the tables that were written so far."""

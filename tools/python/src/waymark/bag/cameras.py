@@ -122,8 +122,8 @@ class Cameras:
         cameras = [camera for camera in sorted(self.by_topic.values(), key=lambda camera: camera.name) if camera.size]
         for camera in cameras:
             info = self._info_of(camera, cameras)
-            if info is None:
-                text = "without camera_info; calibrate it (`waymark calibrate camera`), or write its lens into calibration.yaml"
+            if not isinstance(info, Info):
+                text = f"{info or 'without camera_info'}; calibrate it (`waymark calibrate camera`), or write its lens into calibration.yaml"
                 out.append(Found(camera.name, Lens(None, [text]), camera.frame, camera.topic.folder))
                 continue
             used.add(info.topic.topic)
@@ -153,8 +153,8 @@ class Cameras:
             found.lens.notes.append(f"its camera_info changes at {info.changed_ns / 1e9:.3f} s: the first one is taken")
         return found
 
-    def _info_of(self, camera: Camera, cameras: list[Camera]) -> Info | None:
-        """By the namespace, else by the frame, else the only one that is left."""
+    def _info_of(self, camera: Camera, cameras: list[Camera]) -> Info | str | None:
+        """By the namespace, else by the frame, else the only one that is left; why it is not known which, where several are alike."""
         infos = list(self.infos.values())
         name = camera.topic
         beside = [info for info in infos if info.topic.folder in (name.folder, (*name.folder, name.topic.rsplit("/", 1)[-1]), name.group[:-1])]
@@ -169,7 +169,10 @@ class Cameras:
         fitting = [info for info in same if info.message is not None and (int(info.message.width), int(info.message.height)) == camera.size]
         for choice in (fitting, same):
             if choice:
-                return max(choice, key=lambda info: (names.common(info.topic.folder, name.folder), info.topic.topic))
+                near = max(names.common(info.topic.folder, name.folder) for info in choice)
+                nearest = sorted((info for info in choice if names.common(info.topic.folder, name.folder) == near), key=lambda info: info.topic.topic)
+                others = [info for info in nearest[:-1] if info.message is not None and nearest[-1].message is not None and _differ(info.message, nearest[-1].message)]
+                return f"{others[0].topic.topic} and {nearest[-1].topic.topic} both have its frame and size, and other lenses" if others else nearest[-1]
         alone = len(cameras) == 1 and len(infos) == 1 and not (infos[0].frame and camera.frame)
         return infos[0] if alone else None
 

@@ -74,6 +74,9 @@ class Clock:
 _LOST_NS = 3600 * 10**9  # farther apart than the bag is long and an hour, stamps and log have nothing in common
 
 
+_CONSTANT_MIN = 4  # messages with one stamp, and at several times of the log: it is none
+
+
 def _spread(t: Array, log: Array) -> Array:
     """Messages of one stamp evenly from it to the next stamp, or, where they were logged between both, from the stamp before to theirs: they
     waited and were read at once. Those of the last or first stamp have the usual distance."""
@@ -128,6 +131,8 @@ def _steps(stamp: Array, log: Array) -> list[int]:
 def _look(name: str, times: Array) -> _Topic:
     stamp, log = times[:, 0], times[:, 1]
     known = stamp != 0
+    if len(stamp) >= _CONSTANT_MIN and np.ptp(stamp) == 0 < np.ptp(log):
+        known[:] = False
     s, lg = stamp[known], log[known]
     if not len(s):
         return _Topic(name, stamp, log, [], [0], known)
@@ -295,7 +300,7 @@ def settle(stamps: dict[str, Array], note: Say) -> dict[str, Clock]:
     stamped = [topic for topic in topics if topic.known.any()]
     for topic in topics:
         if not topic.known.any():
-            note(topic.name, "its messages have no stamp: the times of the log are used")
+            note(topic.name, f"its {'stamps never change' if topic.stamp.any() else 'messages have no stamp'}: the times of the log are used")
     if not stamped:
         return {topic.name: Clock(by_log=True) for topic in topics}
     reference, reference_ns = _reference(stamped)

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..geometry import rotation_vectors, rotations, turned
 from ..tables import Array, Table
-from . import compare
+from . import compare, course
 from .collection import Collection, NoSuchTopic
 from .frames import is_world, named_axes
 from .samples import Samples
@@ -357,8 +357,9 @@ def choose(into: Collection, given: argparse.Namespace, base: str) -> Motion | N
     return best
 
 
-def _increments(motion: Motion) -> Table:
-    """Differences of consecutive poses in the plane on which the robot stands. A pose that repeats the one before is no new one."""
+def _level(motion: Motion) -> tuple[Array, Array, Array, Array]:
+    """Stamps, arrivals, places (n, 3) and headings of the poses in the plane on which the robot stands. A pose that repeats the one before is no
+    new one."""
     assert motion.poses is not None
     places, turns = motion.poses
     ok: Array = np.asarray(np.isfinite(places).all(axis=1) & np.isfinite(turns).all(axis=(1, 2)))
@@ -368,7 +369,11 @@ def _increments(motion: Motion) -> Table:
     if len(t) and up[2] < _UPRIGHT * np.linalg.norm(up):  # a world on the axes of a camera
         level = turned(up, np.array([0.0, 0.0, 1.0]))
         places, turns = places @ level.T, level @ turns
-    heading = np.arctan2(turns[:, 1, 0], turns[:, 0, 0])
+    return t, arrival, places, np.arctan2(turns[:, 1, 0], turns[:, 0, 0])
+
+
+def _increments(t: Array, arrival: Array, places: Array, heading: Array) -> Table:
+    """Differences of consecutive poses."""
     c, s, (dx, dy) = np.cos(heading[:-1]), np.sin(heading[:-1]), np.diff(places[:, :2], axis=0).T
     turn = np.remainder(np.diff(heading) + np.pi, 2 * np.pi) - np.pi
     return {"t_ns": t[1:], "from_ns": t[:-1], "dx_m": c * dx + s * dy, "dy_m": c * dy - s * dx, "dheading_rad": turn, "arrival_ns": arrival[1:]}
@@ -395,8 +400,11 @@ def write(into: Collection, motion: Motion, has_gyro: bool) -> None:
     if missing and not motion.by_poses:
         into.note(motion.topic, f"{missing} of its {len(motion.t_ns)} messages have no number as speed or turn rate: left out")
     usual = np.median(np.diff(motion.t_ns)) if len(motion.t_ns) > 1 else 0
-    if motion.by_poses and motion.poses is not None and not (has_gyro and usual <= _LATE_MAX_NS):
-        into.writer.table("increments.csv", without_arrival(_increments(motion)))
+    t, arrival, places, heading = _level(motion) if motion.by_poses and motion.poses is not None else (motion.t_ns[:0],) * 4
+    if len(t) > 1 and (said := course.contradiction(t, places[:, :2], heading)):
+        into.find(motion.topic, said)
+    if len(t) and not (has_gyro and usual <= _LATE_MAX_NS):
+        into.writer.table("increments.csv", without_arrival(_increments(t, arrival, places, heading)))
         into.note(motion.topic, "increments.csv has the differences of its poses" + (", beside which the gyro is not used" if has_gyro else ""))
         return
     if motion.by_poses:

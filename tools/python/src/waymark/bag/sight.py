@@ -96,6 +96,8 @@ def detections(kind: str) -> Callable[[Collection, str, Any, int], None]:
             rows = into.sight.tags.setdefault(topic, TagRows(kind, tags.frame_of(message), seen.corners is not None))
             rows.whole.extend((t_ns, arrival_ns, seen.id))
             rows.values.extend(seen.corners or seen.place or [])
+            if seen.remark:
+                into.find(topic, seen.remark)
         if bad:
             raise bad
         if reader.families:
@@ -124,7 +126,9 @@ def problem_of(topic: Topic, raw: Any) -> str | None:
 def write(into: Collection, base: str, rectified_tags: bool | None) -> None:
     """Writes the tables of tags, and cameras into calibration.yaml."""
     for name, topic in into.sight.topics.items():
-        into.writer.restamp(name, into.clocks[topic])
+        twice = into.writer.restamp(name, into.clocks[topic])
+        if twice:
+            into.note(topic, f"{twice} of its pictures have the stamp of another one: a run takes the first")
     found = into.sight.cameras.found()
     seeing = {id(cameras.of_detections(found, topic, rows.frame)) for topic, rows in into.sight.tags.items()}
     found = [camera for camera in found if not camera.is_spare or id(camera) in seeing]

@@ -34,6 +34,9 @@ _FAMILY = re.compile(r"(\d+)[h_](\d+)$", re.ASCII)  # how users spell it, too: t
 _UPRIGHT = ("standard", "circle", "custom")  # in the names of the families that the library draws as OpenCV's readers see them
 _UPRIGHT_ORDER, _HALF_TURNED_ORDER = (3, 2, 1, 0), (1, 0, 3, 2)
 _HALF_PX = 0.5
+_SQUARE = np.array([(-1.0, 1.0, 1.0), (1.0, 1.0, 1.0), (1.0, -1.0, 1.0), (-1.0, -1.0, 1.0)])  # apriltag.c: corners of a tag, first to last, x y 1
+_SAME_CORNER = 0.1  # of the tag's size in the picture: the library makes the corners of the homography
+_SINGULAR = 1e-12
 _ALIKE = 0.7  # cosine of the upper edge by the corners and by the pose
 _NO_IDENTITY = re.compile(r"[a-z]*\d+h\d+|\d+x\d+(_\d+)?|\d*\.\d+")  # of a class: a family, a dictionary, a length
 _NUMBER = re.compile(r"(\d+)\D*$")
@@ -45,11 +48,12 @@ _FACING_MIN = 0.05  # cosine; a print seen more askew than that, 87 degrees, isn
 
 class Seen(NamedTuple):
     """A tag with its four corners in pixels, u0 v0 ... u3 v3 in our order, or with its pose: its place in m and the direction of its upper
-    edge from left to right, both in the camera's body frame."""
+    edge from left to right, both in the camera's body frame. `remark`: what was corrected, for the topic."""
 
     id: int
     corners: list[float] | None
     place: list[float] | None = None
+    remark: str = ""
 
 
 def family_of(name: str) -> str:
@@ -101,11 +105,25 @@ def _pose(identity: int, place: Any, turn: Any, half_turned: bool = False) -> Se
     return Seen(identity, None, [*map(float, OPTICAL @ p), *map(float, OPTICAL @ right)])
 
 
+def _first_by(homography: Any, points: list[tuple[float, float]]) -> int:
+    """Which of four corners is the library's first one, by the tag's homography; 0 where that is not filled, or fits none."""
+    h, seen = np.array(homography, dtype=float).reshape(3, 3), np.array(points)
+    if not np.isfinite(h).all() or abs(np.linalg.det(h)) <= _SINGULAR * np.abs(h).max() ** 3:
+        return 0
+    there = _SQUARE @ h.T
+    off = [float(np.abs(np.roll(seen, -k, axis=0) - there[:, :2] / there[:, 2:]).max()) for k in range(4)]
+    first = int(np.argmin(off))
+    return first if off[first] < _SAME_CORNER * np.ptp(seen, axis=0).max() else 0
+
+
 def apriltag(message: Any) -> Iterator[Seen]:
     """apriltag_msgs/AprilTagDetectionArray."""
     for tag in message.detections:
         order = _HALF_TURNED_ORDER if _is_half_turned(tag.family) else _UPRIGHT_ORDER
-        yield Seen(int(tag.id), _corners([(c.x, c.y) for c in tag.corners], order, _HALF_PX))
+        points = [(c.x, c.y) for c in tag.corners]
+        first = _first_by(tag.homography, points)
+        remark = f"its corners begin {first} later than those of AprilTag's library, by their homography: they are taken in its order" if first else ""
+        yield Seen(int(tag.id), _corners(points[first:] + points[:first], order, _HALF_PX), remark=remark)
 
 
 def isaac(message: Any) -> Iterator[Seen]:
