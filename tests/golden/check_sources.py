@@ -222,6 +222,16 @@ def field(at, value):
     return lambda line: ",".join(value if k == at else part for k, part in enumerate(line.rstrip("\n").split(","))) + "\n"
 
 
+EKF = {"config.yaml": "format: waymark-config/1\nestimator: landmark_ekf\n"}
+
+
+def addressed(later):
+    """The drive of can() as a J1939 message; its unit has another address from the middle on."""
+    lines = can()["can.log"].splitlines(keepends=True)
+    ids = [f" 18FEF1{later if k > len(lines) / 2 else 0:02X}#" for k in range(len(lines))]
+    return {"can.log": "".join(line.replace(" 100#", sent) for line, sent in zip(lines, ids)), "vehicle.dbc": can()["vehicle.dbc"].replace("256", str(0x98FEF1FE))}
+
+
 def spoilt_rows():
     """3 % of a stream's rows that are dropped, in each way: never good, and the fix is of that way."""
     columns, unit, stamp = "its columns differ", "unit of the column's name", "its stamp is damaged"
@@ -313,6 +323,11 @@ FAULTS = [
     ("stamps of 10 ms at 200 Hz", both(imu_csv=imu(200, stamp=grid(0.01))), ("note", "clock-coarse", "imu"), "have the stamp", "0.01 s"),
     ("rows that come twice", both(motion_csv="\n".join(line for row in motion().splitlines() for line in ([row, row] if row[0] == "1" else [row])) + "\n"), ("bad", "rows-disordered", "motion"), "come twice", "two programs"),
     *spoilt_rows(),
+    ("error frames among the others", {**can(), "can.log": "".join(line + (f"{line.split(' ')[0]} can0 20000004#0001000000000000\n" if k % 30 == 17 else "") for k, line in enumerate(can()["can.log"].splitlines(keepends=True)))}, ("note", "device-trouble", "can"), "error frames", "termination"),
+    ("a unit that claims another address", {**can(), **addressed(0x25)}, ("note", "sender-changed", "can"), "is taken from 18FEF125 on can0 since", "same unit"),
+    ("stamps with too few digits", {"motion.csv": motion(stamp=lambda t: f"{ns(t):.6e}")}, ("bad", "clock-coarse", "motion"), "have the stamp", "too few digits"),
+    ("sigmas of 0", {"motion.csv": motion(), "heading.csv": table("t_ns,heading_rad,sigma_rad", [[ns(t), 0, 0] for t in times(10)]), **EKF}, ("bad", "no-data", "heading"), "sigma_rad: '0'", "the unit of the column's name"),
+    ("positions in degrees", {"motion.csv": motion(), "gnss.csv": table("t_ns,x_m,y_m,z_m,sigma_xy_m,sigma_z_m", [[ns(t), 13.4 + 1e-5 * t, 52.5, 0, 0.1, 0.2] for t in times(5)]), **EKF}, ("bad", "sensors-disagree", "positions"), "while the robot drives", "degrees"),
     ("rows in disorder, 1 of 20 is half a second late", both(motion_csv=(lambda rows: "\n".join(rows[:1] + [r for k in range(1, len(rows) - 25) for r in ([rows[k]] if k % 20 else []) + ([rows[k - 25]] if k > 25 and (k - 25) % 20 == 0 else [])]) + "\n")(motion().splitlines())), ("bad", "rows-unused", "motion"), "rows are not used", ""),
     ("floats without their type", can(valtype=False), ("bad", "value-implausible", "can"), "as a float", "SIG_VALTYPE_ ID SIGNAL : 1;"),
     ("floats without their type, unsigned", can(valtype=False, signed="+"), ("bad", "value-implausible", "can"), "as a float", "SIG_VALTYPE_"),

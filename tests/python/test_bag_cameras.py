@@ -228,6 +228,32 @@ NO_LENS = {
 }
 
 
+class Unclear(BagTest):
+    """What could be one thing or another is named, and not guessed."""
+
+    def test_two_camera_infos_that_are_alike(self):
+        for focal, clear in ((80, False), (50, True)):
+            events = Events()
+            for i in range(4):
+                t_ns = START_NS + i * STEP_NS
+                events.put("/left/image_raw", "sensor_msgs/Image", t_ns, image(t_ns, "cam", RAMP, "mono8"))
+                for topic, f in (("/l/camera_info", 50), ("/r/camera_info", focal)):
+                    events.put(topic, "CameraInfo", t_ns, camera_info(t_ns, "cam", size=RAMP.shape[::-1], k=(f, f, 32, 24)))
+            text, folder = self.take(events.mcap(self.folder / "a.mcap"), out=f"out{focal}")
+            entries = waymark.Recording(folder).calibration.get("cameras", {})
+            self.assertEqual("/l/camera_info and /r/camera_info both have its frame and size, and other lenses" in text, not clear, text)
+            self.assertEqual("left" in entries, clear, entries)
+
+    def test_pictures_of_one_stamp(self):
+        events = Events()
+        for i in range(40):
+            t_ns = START_NS + i * STEP_NS
+            for k in range(2 if i == 17 else 1):
+                events.put("/cam/image_raw", "sensor_msgs/Image", t_ns, image(t_ns, "cam", RAMP, "mono8"), 3_000_000 + k)
+        text, _ = self.take(events.mcap(self.folder / "a.mcap"))
+        self.assertIn("note: /cam/image_raw: 1 of its pictures have the stamp of another one: a run takes the first", text)
+
+
 class Lenses(BagTest):
     def test_lenses(self):
         for name, (events, model, intrinsics, distortion) in LENSES.items():

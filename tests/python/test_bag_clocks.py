@@ -306,6 +306,18 @@ class Coarse(BagTest):
         self.assertIn("note: /odom: its messages have no stamp: the times of the log are used", said)
         self.assert_end(recording, said)
 
+    def test_stamps_that_never_change_are_none(self):
+        bag = self.bag()
+        for t in times():
+            bag.odometry(ns(0), ns(t) + 2_000_000, place(t), (SPEED, 0, 0), (0, 0, turn_rate(t)))
+            bag.put("/cam/image_raw", "sensor_msgs/Image", ns(t) + 2_000_000, bag.m.make(
+                "sensor_msgs/Image", header=bag.m.header(ns(0), "cam"), height=8, width=8, encoding="mono8", step=8, data=np.zeros(64, np.uint8)))
+        recording, said = self.take(bag)
+        for topic in ("/odom", "/cam/image_raw"):
+            self.assertIn(f"note: {topic}: its stamps never change: the times of the log are used", said)
+        self.assertEqual([frame.t_ns for frame in recording.frames("cam")], [ns(t) + 2_000_000 for t in times()])
+        self.assert_end(recording, said)
+
 
 if __name__ == "__main__":
     unittest.main()

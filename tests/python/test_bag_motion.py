@@ -7,7 +7,7 @@
 import unittest
 
 import numpy as np
-from bag_drives import DRIVE_S, SPEED, BagTest, matrix, ns, place, times, turn_rate
+from bag_drives import DRIVE_S, END, SPEED, BagTest, matrix, ns, place, times, turn_rate
 
 from waymark.geometry import OPTICAL, from_rpy
 
@@ -71,6 +71,25 @@ class EmptyParts(BagTest):
         recording, said = self.take(bag)
         self.assertIn("linear.y", said)
         self.assert_end(recording, said, end=(DRIVE_S, 0.5 * DRIVE_S, 0))
+
+    def test_headings_that_do_not_turn_as_the_way_does_are_named(self):
+        """Poses alone: a quaternion with w first, or made of degrees; begun anywhere, and driven backwards, it is none of these."""
+        def spoil(message, heading):
+            return {"w first": (np.cos(heading / 2), 0, 0, np.sin(heading / 2)), "of degrees": (0, 0, np.sin(np.degrees(heading) / 2), np.cos(np.degrees(heading) / 2))}[message]
+
+        for name in ("right", "backwards", "w first", "of degrees"):
+            bag, back = self.bag(), -1 if name == "backwards" else 1
+            for t in times():
+                x, y, heading = place(t)
+                bag.odometry(ns(t), ns(t), (5 + back * x, y - 3, back * heading), (0, 0, 0), (0, 0, 0))
+                if name in ("w first", "of degrees"):
+                    q = bag._rows[-1][4].pose.pose.orientation
+                    q.x, q.y, q.z, q.w = map(float, spoil(name, heading))
+            with self.subTest(name):
+                recording, said = self.take(bag)
+                self.assertEqual("finding: /odom: its way turns by 8" in said, name in ("w first", "of degrees"), said)
+                if name in ("right", "backwards"):
+                    self.assert_end(recording, said, end=(back * END[0], END[1], back * END[2]))
 
     def test_rows_of_no_number_are_the_poses_differences(self):
         for is_none, count in ((lambda i: i % 50 == 7, 6), (lambda i: i < 20, 20)):

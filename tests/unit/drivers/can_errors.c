@@ -37,6 +37,11 @@ static const char kCar[] =
 #define SG "BO_ 1 M: 8 X\n SG_ "
 static const bad_input kTable[] = {
     {"no time", CANDUMP, "can0 123#00", "a line begins with its time, (SECONDS.MICROS)"},
+    {"a log of another program", CANDUMP, "date Mon May 1 10:00:00.000 am 2026",
+     "this is no log of candump, but a log of Vector (ASC); `python -m can.logconvert LOG can.log` makes one of it "
+     "(python-can)"},
+    {"a table of another program", CANDUMP, "Time Stamp,ID,Extended,Dir,Bus,LEN,D1",
+     "this is no log of candump, but a table of SavvyCAN: save it there as candump's log"},
     {"screen output of candump", CANDUMP, "  can0  123   [2]  11 22",
      "this is what candump shows on the screen (no time, ID [LENGTH] BYTES), not a log; record with `candump -l any`, "
      "or `candump -L any > can.log`, which give (SECONDS.MICROS) IFACE ID#DATA"},
