@@ -85,6 +85,17 @@ class Ground {
   [[nodiscard]] bool found() const { return found_; }
   [[nodiscard]] double track_m() const { return left_.centre_m.y() - right_.centre_m.y(); }
   [[nodiscard]] double radius_m() const { return 0.5 * (left_.radius_m + right_.radius_m); }
+  // What of the driven wheels contradicts itself; "": nothing.
+  [[nodiscard]] std::string contradiction() const {
+    if (std::abs(left_.radius_m - right_.radius_m) > kSameRadius * radius_m())
+      return format("wheels.radius_m: the driven wheels have %.4g and %.4g m in the URDF", left_.radius_m,
+                    right_.radius_m) +
+             "; their mean is taken, measure both";
+    if (left_.link.find("right") != std::string::npos && right_.link.find("left") != std::string::npos)
+      return "wheels: " + left_.link + " is on the left side of the URDF (y above 0), " + right_.link +
+             " on the right one: is y to the left, or are the counters exchanged?";
+    return "";
+  }
   [[nodiscard]] std::optional<double> wheelbase_m() const {
     return front_x_ ? std::optional(*front_x_ - rear_x_) : std::nullopt;
   }
@@ -95,6 +106,7 @@ class Ground {
 
  private:
   static constexpr double kSameAxle_m = 0.02;
+  static constexpr double kSameRadius = 0.02;  // tyres of one kind differ by less
   bool found_ = false;
   double rear_x_ = 0;
   std::optional<double> front_x_;
@@ -119,6 +131,7 @@ class Mountings {
     wheel("track_m", w.track_m, ground.track_m());
     wheel("radius_m", w.radius_m, ground.radius_m());
     wheel("wheelbase_m", w.wheelbase_m, ground.wheelbase_m());
+    if (const std::string said = ground.contradiction(); !said.empty()) robot.guesses.push_back(said);
     if (ground.origin().norm() > 1e-3)
       robot.guesses.push_back(
           format("base_link: on the ground between the driven (rear) wheels, at (%.3f, %.3f, %.3f) m in the URDF's ",

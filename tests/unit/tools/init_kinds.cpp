@@ -156,6 +156,39 @@ TEST(test_a_wheel_in_centimetres) {
   TEST_ASSERT_TRUE(names(noted(urdf), "<link name=\"wheel\">: its radius is taken in metres"));
 }
 
+TEST(test_driven_wheels_that_contradict_each_other) {
+  if (!can_read_urdf()) TEST_IGNORE_MESSAGE("this build reads no URDF");
+  const struct {
+    double left_y_m, right_radius_m;
+    const char *says;
+  } kRows[] = {{0.2, 0.1, ""},
+               {0.2, 0.12, "the driven wheels have 0.1 and 0.12 m in the URDF"},
+               {-0.2, 0.1, "right_wheel is on the left side of the URDF"}};
+  for (const auto &row : kRows) {
+    std::string urdf = "<robot name=\"r\"><link name=\"base_link\"/>";
+    const auto wheel = [&](const char *name, double y_m, double radius_m) {
+      urdf += made::format(
+          "<link name=\"%s\"><collision><geometry><cylinder radius=\"%g\" "
+          "length=\"0.1\"/></geometry></collision></link>"
+          "<joint name=\"%s_joint\" type=\"continuous\"><parent link=\"base_link\"/><child link=\"%s\"/>"
+          "<origin xyz=\"0 %g 0.1\"/></joint>",
+          name, radius_m, name, name, y_m);
+    };
+    wheel("left_wheel", row.left_y_m, 0.1);
+    wheel("right_wheel", -row.left_y_m, row.right_radius_m);
+    const made::Folder folder;
+    folder.write("robot.urdf", urdf + "</robot>");
+    Robot robot;
+    robot.wish.urdf = (folder.path() / "robot.urdf").string();
+    read_geometry(robot);
+    const std::string all = joined(robot.guesses);
+    if (*row.says != '\0')
+      TEST_ASSERT_TRUE_MESSAGE(names(robot.guesses, row.says), all.c_str());
+    else
+      TEST_ASSERT_FALSE_MESSAGE(names(robot.guesses, "in the URDF;"), all.c_str());
+  }
+}
+
 TEST(test_what_is_no_urdf) {
   if (!can_read_urdf()) TEST_IGNORE_MESSAGE("this build reads no URDF");
   const auto refused = [](const std::string &urdf) -> std::string {
