@@ -50,7 +50,7 @@ struct wm_video {
   int64_t newest_row;
   arrival_order order;
   located next;
-  wm_time_ns last_ns, interval_ns[INTERVALS];
+  wm_time_ns last_ns, newest_ns, interval_ns[INTERVALS];
   size_t intervals;
   wm_video_counts counts;
 };
@@ -114,25 +114,29 @@ static wm_time_ns arrival_of(const csv_row *row) {
   return row->whole[ARRIVAL] == WM_TIME_NONE ? row->whole[T] : row->whole[ARRIVAL];
 }
 
+static void skip_frame(wm_video *self, const csv_row *row, const char *how, int64_t other) {
+  count(self, &self->counts.malformed, "%s:%ld: frame: %" PRId64 " %s %" PRId64 "; the row is skipped",
+        self->csv.lines.path, row->line, row->whole[FRAME], how, other);
+}
+
+// The next row whose picture comes behind those of the rows so far, and is not that of self->row.
 static wm_status read_row(wm_video *self, csv_row *row, wm_error *err) {
   for (;;) {
     wm_error why;
     wm_status status = csv_next(&self->csv, err);
     if (status != WM_OK) return status;
     status = csv_read(&self->csv, row, &why);
-    if (status == WM_OK && row->whole[FRAME] > self->newest_row) {
-      self->newest_row = row->whole[FRAME];
+    if (status == WM_OK && row->whole[FRAME] > self->newest_row && row->whole[FRAME] != self->row.whole[FRAME])
       return WM_OK;
-    }
     if (status == WM_OK)
-      count(self, &self->counts.malformed, "%s:%ld: frame: %" PRId64 " after %" PRId64 "; the row is skipped",
-            self->csv.lines.path, row->line, row->whole[FRAME], self->newest_row);
+      skip_frame(self, row, "after", self->row.whole[FRAME]);
     else
       count(self, &self->counts.malformed, "%.200s; the row is skipped", why.text);
   }
 }
 
-// The next good row, into self->row. One row is read ahead: a stamp is checked against the one after it.
+// The next good row, into self->row. One row is read ahead: a stamp, and the number of a picture, are checked against
+// those after them.
 static wm_status next_row(wm_video *self, wm_error *err) {
   if (self->rows_ended) return WM_END;
   wm_status status = self->has_ahead ? WM_OK : read_row(self, &self->ahead, err);
@@ -141,9 +145,14 @@ static wm_status next_row(wm_video *self, wm_error *err) {
     status = read_row(self, &self->ahead, err);
     if (status != WM_OK && status != WM_END) return status;
     self->has_ahead = status == WM_OK;
+    if (self->has_ahead && self->ahead.whole[FRAME] < self->row.whole[FRAME]) {
+      skip_frame(self, &self->row, "before", self->ahead.whole[FRAME]);
+      continue;
+    }
     wm_time_ns here_ns = arrival_of(&self->row), next_ns = self->has_ahead ? arrival_of(&self->ahead) : here_ns;
     if (!arrival_order_leaps(&self->order, here_ns, next_ns)) {
       self->rows_ended = !self->has_ahead;
+      self->newest_row = self->row.whole[FRAME];
       return WM_OK;
     }
     char why[96];
@@ -210,8 +219,8 @@ static int by_length(const void *a, const void *b) {
 
 // Counts gaps against the usual period, the median of the last few. A gap of an hour is a joint of two recordings.
 static void count_gap(wm_video *self, wm_time_ns t_ns) {
-  if (self->last_ns == WM_TIME_NONE) return;
-  wm_time_ns gap_ns = t_ns - self->last_ns;
+  if (self->newest_ns == WM_TIME_NONE) return;
+  wm_time_ns gap_ns = t_ns - self->newest_ns;
   if (gap_ns <= 0 || gap_ns > 3600 * WM_NS_PER_S) return;
   wm_time_ns sorted[INTERVALS];
   size_t n = self->intervals < INTERVALS ? self->intervals : INTERVALS;
@@ -251,6 +260,7 @@ static wm_status locate(wm_video *self, wm_error *err) {
       continue;
     }
     count_gap(self, t_ns);
+    if (self->newest_ns == WM_TIME_NONE || t_ns > self->newest_ns) self->newest_ns = t_ns;
     self->last_ns = t_ns;
     wm_source_counts order = {0};
     self->next.head = (wm_frame){.t_ns = t_ns,
@@ -511,8 +521,8 @@ wm_status wm_video_open(const char *recording_dir, const wm_camera *camera, int3
   self->base.ops = &kFrames;
   self->file.fd = -1;
   self->camera = index;
-  self->newest_row = -1;
-  self->last_ns = WM_TIME_NONE;
+  self->newest_row = self->row.whole[FRAME] = -1;
+  self->last_ns = self->newest_ns = WM_TIME_NONE;
   const warner told = {warn, context};
   wm_status status = open_all(self, recording_dir, camera, &told, err);
   if (status != WM_OK) {

@@ -77,6 +77,18 @@ class Fixes(BagTest):
             _, said = self.take(bag, "--motion-by", "twists")
             self.assertNotIn("latitude and longitude are", said)
 
+    def test_a_way_of_another_size_is_named(self):
+        for size in (1.2, 3.6, 1 / 3.6, 100.0):
+            bag = self.drive()
+            for _, _, _, _, message in bag._rows:
+                if hasattr(message, "twist"):
+                    message.twist.twist.linear.x *= size
+                    message.pose.pose.position.x *= size
+                    message.pose.pose.position.y *= size
+            _, said = self.take(bag)
+            with self.subTest(size=size):
+                self.assertEqual(f"finding: /fix: its way is {1 / size:.3g} times as long as that of /odom" in said, size != 1.2, said)
+
     def test_a_latitude_without_its_sign_is_named(self):
         recording, said = self.take(self.drive(lambda i, w, a: ((-w[0], w[1]), a, 0)))
         self.assertIn("finding: /fix: its way is the mirror image of that of /odom", said)

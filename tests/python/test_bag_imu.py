@@ -79,6 +79,15 @@ class Comparison(ImuTest):
                     np.testing.assert_allclose(turn[2], up, atol=1e-6)
         self.assert_end(recording, said, 0.02)
 
+    def test_a_transform_whose_values_are_none_is_named(self):
+        for words, spoil in (("a quaternion of zeros", lambda it: setattr(it.rotation, "w", 0.0)), ("values that are no numbers", lambda it: setattr(it.translation, "x", np.nan))):
+            bag = self.with_imu(tf=False)
+            bag.tf("base_link", "imu_link", np.eye(4))
+            spoil(bag._rows[-1][4].transforms[0].transform)
+            _, said = self.take(bag)
+            self.assertIn(f"note: tf: 'imu_link' in 'base_link' comes with {words}: it is left out", said)
+            self.assertNotIn("the bag has no tf", said)
+
     def test_tf_that_gravity_and_turns_contradict(self):
         bag = self.with_imu(lambda t, w, a: (np.roll(w, -1), np.roll(a, -1)), mounted=np.eye(3))
         self.assert_imu(bag, ("finding: /imu/data: its gyro and its accelerometer show its +y axis upwards", "'imu_link'"))

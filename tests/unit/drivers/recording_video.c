@@ -205,6 +205,29 @@ TEST(what_is_not_right_is_counted) {
   TEST_ASSERT_NOT_NULL_MESSAGE(strstr(c->first_problem, "frame 1 is the one before"), c->first_problem);
 }
 
+TEST(a_row_of_a_wrong_number_or_stamp_costs_itself) {
+  avi_head(&file, "MJPG", W, H, 0);
+  for (int i = 0; i < 11; i++) add_jpeg(10 * i + 10);
+  save("video/front.avi");
+  char text[512] = "frame,t_ns,exposure_ns\n", row[64];
+  for (int i = 0; i < 11; i++) {
+    (void)snprintf(row, sizeof row, "%d,%d,\n", i == 5 ? 99999 : i, (i == 8 ? 1 : i + 1) * 100000000 + (i == 8));
+    strcat(text, row);
+  }
+  rows(text);
+  open_it();
+  for (int i = 0; i < 11; i++)
+    if (i != 5) expect_frame((uint64_t)i, 10 * i + 10);
+  expect_end();
+  const wm_video_counts *c = wm_video_counted(video);
+  TEST_ASSERT_EQUAL_UINT64(1, c->malformed);
+  TEST_ASSERT_EQUAL_UINT64(1, c->without_stamp);
+  TEST_ASSERT_EQUAL_UINT64(1, c->out_of_order);
+  TEST_ASSERT_EQUAL_UINT64(2, c->lost);  // those two
+  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(c->first_problem, "front.csv:7: frame: 99999 before 6; the row is skipped"),
+                               c->first_problem);
+}
+
 TEST(a_damaged_container_ends_the_pictures) {
   avi_head(&file, "MJPG", W, H, 0);
   add_jpeg(10);

@@ -39,6 +39,8 @@ def _write_moving(into: Collection, given: argparse.Namespace) -> str:
         into.note("tf", f"it has no '{given.base}': '{base}' is taken as the robot's frame; --base names another")
     for parent, child in sorted(into.frames.replaced):
         into.note("tf", f"tf_static has '{child}' in '{parent}' with other values later: the last ones are taken")
+    for (parent, child), why in sorted(into.frames.broken.items()):
+        into.note("tf", f"'{child}' in '{parent}' comes with {why}: {'such messages are' if into.frames.has(parent, child) else 'it is'} left out")
     for parent, child in sorted(into.frames.moving):
         if not is_world(parent):
             into.note("tf", f"'{child}' moves in '{parent}': what is mounted on it has no place that stands still")

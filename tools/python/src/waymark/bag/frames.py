@@ -42,6 +42,7 @@ class Frames:
         self._edges: dict[tuple[str, str], Array] = {}
         self.moving: set[tuple[str, str]] = set()
         self.replaced: set[tuple[str, str]] = set()  # static transforms that were sent anew with other values: the last ones count
+        self.broken: dict[tuple[str, str], str] = {}  # transforms whose values are none, and why
         self.topics: set[str] = set()
         self._seen: set[bytes] = set()
         self._decoded = 0
@@ -52,7 +53,10 @@ class Frames:
             where, turn = item.transform.translation, item.transform.rotation
             values = np.array([where.x, where.y, where.z, turn.x, turn.y, turn.z, turn.w])
             key = (item.header.frame_id.lstrip("/"), item.child_frame_id.lstrip("/"))
-            if not np.isfinite(values).all() or not values[3:].any() or key in self.moving:
+            if not np.isfinite(values).all() or not values[3:].any():
+                self.broken[key] = "a quaternion of zeros" if np.isfinite(values).all() else "values that are no numbers"
+                continue
+            if key in self.moving:
                 continue
             matrix, old = pose(values[:3], values[3:]), self._edges.get(key)
             if old is None:
@@ -125,13 +129,17 @@ class Frames:
             matrix = (step if up else np.linalg.inv(step)) @ matrix
         return matrix
 
+    def has(self, parent: str, child: str) -> bool:
+        """Whether a transform with values came."""
+        return (parent, child) in self._edges
+
     def why_not(self, frame: str, base: str) -> str:
         """Why `transform` is None, as the end of a sentence."""
         way = self._way(frame.lstrip("/"), base.lstrip("/"), also_moving=True)
         joints = [f"'{child}' moves in '{parent}'" for parent, child, _ in way or [] if (parent, child) in self.moving]
         if joints:
             return f"the way from '{frame}' to '{base}' has a joint that moves ({joints[0]})"
-        return f"tf has no way from '{frame}' to '{base}'" if self._edges else f"the bag has no tf, '{frame}' is not placed in '{base}'"
+        return f"tf has no way from '{frame}' to '{base}'" if self._edges or self.broken else f"the bag has no tf, '{frame}' is not placed in '{base}'"
 
     def base(self, wanted: str) -> str:
         """The robot's frame: the wanted one where tf has it, else one of the usual names, else the wanted one."""

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..geometry import place_of, tangent_plane
 from ..tables import Array
+from . import compare
 from .collection import Collection, NoSuchTopic
 from .frames import bare, mounting
 from .motion import Motion
@@ -196,9 +197,19 @@ def _read(into: Collection, topic: str, motion: Motion | None, t_ns: Array, valu
             elif rests[k] > limit and (rest := _laid(way * (1, -1), _plane(best[seen])[:, :2])[1]) <= limit and rests[k] > 3 * rest:
                 into.find(topic, f"its way is the mirror image of that of {motion.topic} ({rest:.2g} m off it, and {rests[k]:.3g} m off that way itself): a latitude "
                                  f"or longitude without its sign (south, west), or the turns of {motion.topic} have the other sign. It is kept as it is")
+            elif rests[k] > limit:
+                _find_size(into, topic, motion.topic, way, _plane(best[seen])[:, :2], sigma)
     if said:
         into.find(topic, f"its latitude and longitude are {said}: mended")
     return np.hstack([best, values[:, 2:]])
+
+
+def _find_size(into: Collection, topic: str, motion: str, way: Array, places: Array, sigma_m: float) -> None:
+    """Names a way of the fixes that is the motion's in another size: a speed in another unit."""
+    a, b = (np.sqrt(np.mean((points - points.mean(axis=0)) ** 2)) for points in (way, places))
+    size = float(b / a) if a > 0 else 1.0
+    if max(size, 1 / max(size, 1e-9)) > compare.SAME and _laid(size * way, places)[1] <= _fits_within(size * way, sigma_m):
+        into.find(topic, f"its way is {size:.3g} times as long as that of {motion}: is the speed there in another unit (km/h are 3.6 times m/s)? Both are kept")
 
 
 def _plane(read: Array) -> Array:
