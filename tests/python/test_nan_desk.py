@@ -209,6 +209,7 @@ WITHOUT = {
                                  "mcapio.estimates.hypotheses mcapio.place.landmarks",
         "of calibrations and transforms, which are refused where one is NaN": "bag.frames.is_optical bag.tags.to_raw",
         "corners, whose reader refuses NaN": "bag.tags.of_another_picture",
+        "poses, of which those of NaN are left out before": "bag.course.contradiction",
         "written by the table of mistakes": "causes.fault.discrete",
         "limits of time, whose options are read by numbers.finite": "avi.AviWriter.__init__ causes.search.Search.__init__ causes.search.Search.part_s causes.trial.Blocks.part "
                                  "causes.trial.Trials.run foxglove_server.serve live.Live.next mavlink.Bridge.run pool.Pool.run suggest.search.Search.__init__",
