@@ -11,7 +11,7 @@
 #define OVERDUE_LEAST_NS (20 * WM_NS_PER_MS)
 #define OVERDUE_UNKNOWN_NS (250 * WM_NS_PER_MS)  // what J1939-81 has a unit wait after its claim
 // The longest period is forgotten by this share with each frame: bursts of an adapter are shorter.
-#define FORGOTTEN 8
+#define FORGOTTEN 64
 #define PERIODS_MOST 3  // a longer silence is none of its periods
 
 static void note_frame(bound_message *m, const wm_can_frame *frame) {
@@ -58,7 +58,7 @@ static sender_verdict judge_other(bound_message *m, const wm_can_frame *frame, w
                       frame->t_ns - m->sender_before.last_ns < GONE_NS;
   if (!is_gone && !is_named && !is_back) {
     *word_of(m->since, frame->id) |= bit_of(frame->id);
-    return is_overdue ? SENDER_AWAITED : SENDER_OTHER;
+    return is_overdue && silent_ns > OVERDUE_UNKNOWN_NS ? SENDER_AWAITED : SENDER_OTHER;
   }
   if (is_back && !is_overdue) *word_of(m->beside, m->sender.id) |= bit_of(m->sender.id);
   take_over(m, frame, counts);

@@ -138,13 +138,13 @@ static const turn_row kTurns[] = {
     {"two units", {"aaaaaaaa", "bbbbbbbb"}, "aaaaaaaa", 0, 0},
     {"two units, the first begins later", {".aaaaaaa", "bbbbbbbb"}, "bbbbbbbb", 0, 0},
     {"two units, the first misses one", {"aaaa.aaaa", "bbbbbbbbb"}, "aaaa.aaaa", 0, 0},
-    {"two units, a pause of the first", {"aaaa....aaaa", "bbbbbbbbbbbb"}, "aaaa....aaaa", 0, 3},
+    {"two units, a pause of the first", {"aaaa....aaaa", "bbbbbbbbbbbb"}, "aaaa....aaaa", 0, 2},
     {"the second begins in a pause", {"aaaa....aaaa", ".....bbbbbbb"}, "aaaa.bbbaaaa", 2, 0},
     {"the first of two falls silent",
      {"aaaa................................", "bbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbb"},
      "aaaa.............................bb",
      1,
-     28},
+     27},
 };
 
 TEST(a_unit_that_claims_another_address_is_followed) {
