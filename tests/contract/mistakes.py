@@ -3,11 +3,12 @@
 """Typical mistakes of a first drive, one at a time, in the files of small_robot.py and of recordings of others: `check`
 has to name each with its fix, and no replay may follow a pose that its sensors contradict.
 
-    mistakes.py BIN_DIR SOURCE_DIR DATA_DIR [--only WORD[,WORD]] [--named | --followed] [--json]
+    mistakes.py BIN_DIR SOURCE_DIR DATA_DIR [--only WORD[,WORD]] [--named | --followed] [--jobs N] [--json]
 
 A row a mistake: verdict of `check`, whether its findings contain the fix, and of a replay the largest error while the
 state is tracking and the longest time for which the error is above 0.5 m and above 3.5 sigma while it is. --named leaves
 the replays out, --followed leaves check out."""
+import concurrent.futures
 import json
 import math
 import pathlib
@@ -152,7 +153,7 @@ SIGHTINGS = [
     ("sensor's name misspelt", sensor_rows(lambda w: w.replace(",front,", ",frnt,")), r"did you mean .?front", "bad"),
     ("column bearing for bearing_rad", sensor_rows(renamed("bearing_rad", "bearing")), r"did you mean .?bearing_rad", "bad"),
     ("column sensor is missing", sensor_rows(without("sensor")), r"sensor", "bad"),
-    ("rows not in order", sensor_rows(unsorted), r"order|sort", "bad"),
+    ("rows not in order", sensor_rows(unsorted), r"\border of time.*\bsort\b", "bad"),
 ]
 ROBOT = [
     ("gyro in degrees", {"vehicle.dbc": text("(0.0002,0) [-6.5|6.5]", "(0.0114592,0) [-372|372]")}, r"unit: deg/s", "bad"),
@@ -327,6 +328,7 @@ def main():
     parser = replays.parser(__doc__, "rows whose title contains one of the words")
     parser.add_argument("--named", action="store_true", help="of check alone, without replays")
     parser.add_argument("--followed", action="store_true", help="replays alone: whether a pose is followed that the sensors contradict")
+    parser.add_argument("--jobs", type=int, default=1, help="rows at once; the search for causes takes all processors by itself")
     options = parser.parse_args()
     if not options.followed and not replays.has_causes(options.bin_dir):
         return 77
@@ -341,11 +343,15 @@ def main():
             else:
                 print(f"skipped: {options.data_dir / name} is not there", file=sys.stderr)
         titled = [(r, c, m, m[0] if r == base else f"{r.name}: {m[0]}") for r, c, list_of in sets for m in list_of]
-        for recording, config, mistake, title in replays.fewer([row for row in titled if replays.is_chosen(options, row[3])]):
+        def judged(case):
+            recording, config, mistake, title = case
             with tempfile.TemporaryDirectory() as folder:
-                row = judge(options, recording, options.source_dir / "config" / config, mistake, pathlib.Path(folder))
-            rows.append(row | {"mistake": title})
-            show(options, rows[-1])
+                return judge(options, recording, options.source_dir / "config" / config, mistake, pathlib.Path(folder)) | {"mistake": title}
+        chosen = replays.fewer([row for row in titled if replays.is_chosen(options, row[3])])
+        with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:  # of programs
+            for row in pool.map(judged, chosen):
+                rows.append(row)
+                show(options, row)
     missed = [] if options.followed else [r["mistake"] for r in rows if not r["right"]]
     wrong = [r["mistake"] for r in rows if r["wrong_s"] > LONGEST_WRONG_S]
     wrong += [r["mistake"] for r in rows if r["mistake"] == "no mistake" and ("degraded" in r["state"] or "lost" in r["state"])]

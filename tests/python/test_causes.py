@@ -32,7 +32,7 @@ from waymark.causes.faults import all_faults  # noqa: E402
 from waymark.causes.features import with_points  # noqa: E402
 from waymark.causes.fault import Clock, Fault, discrete, factor_words  # noqa: E402
 from waymark.causes.robot import Robot  # noqa: E402
-from waymark.causes.trial import Drive, Undo, likelihoods  # noqa: E402
+from waymark.causes.trial import Blocks, Drive, Undo, likelihoods  # noqa: E402
 from waymark.maps import FloorPlan, write_floor_plan  # noqa: E402
 from waymark.replaying import replay  # noqa: E402
 
@@ -111,6 +111,12 @@ class Rows(unittest.TestCase):
         self.assertFalse([name for name in alone if name.startswith(("clock of", "drift of"))])
         self.assertTrue({"drift of imu", "clock of imu", "drift of ticks", "clock of ticks"} <= set(both))
 
+    def test_rows_in_disorder_are_a_fact_and_a_late_one_is_none(self):
+        def stamped(order):
+            turns = ["t_ns,wx_radps,wy_radps,wz_radps", *(f"{10**9 + k * 10**8},0,0,0.1" for k in order)]
+            return [row.is_fact for name, row in self.rows_of(imu=turns, ticks=self.ticks(range(9))).items() if name == "order of imu"]
+        self.assertEqual((stamped([*range(20, 40), *range(20)]), stamped([0, 2, 1, 3, 4])), ([True], []))
+
     def test_counters_of_fewer_bits_are_a_fact_and_a_restart_is_none(self):
         counters = [name for name in self.rows_of(ticks=self.ticks(20 * k % 256 for k in range(60))) if name.startswith("counters")]
         self.assertEqual(counters, ["counters of 8 bits"])
@@ -149,6 +155,32 @@ class Judgement(unittest.TestCase):
         size, step = search._parabola(fault, (3.0,), 0, 1.0, [-(2.0 - 3.4) ** 2, -(3.0 - 3.4) ** 2, -(4.0 - 3.4) ** 2])
         self.assertAlmostEqual(size[0], 3.4)
         self.assertLess(step, 1.0)
+
+    def scaled_ranges(self):
+        """Ranges in mm whose stated sigma is too large: a larger factor predicts better, and the filter's own scale of ranges takes it up."""
+        ranges = Fault("ranges", ((0.001,),), lambda _: [], lambda _: "", step=(0.03,), smallest=(0.003,), is_log=True, named=(0.001, 0.01),
+                       settled=lambda size, states: (size[0] / states["range_scale"],))
+
+        def driven(jobs, *_, **__):
+            far = [math.log(jobs[k][-1][1][0] / 0.001) for k in range(len(jobs))]
+            return [dataclasses.replace(drive(2.0 + 0.4 * x), states={"range_scale": math.exp(x)}, unusual=min(12.0, 0.5 * (x / 0.02)**2), far_states=0.5 * (x / 0.02)**2) for x in far]
+        self.search.trials = SimpleNamespace(run=driven, blocks=Blocks(0, 1.0, 40))
+        self.search._drives = lambda jobs, *_, **__: driven([[job] for job in jobs])
+        return ranges, driven
+
+    def test_a_size_that_a_state_takes_up_is_near_the_state_s_start(self):
+        ranges, driven = self.scaled_ranges()
+        (_, (size,)), = self.search._fitted([search.Candidate(ranges, (0.001,), driven([[(ranges, (0.001,))]])[0])], [], 0.0)
+        self.assertLess(abs(math.log(size / 0.001)), 0.1)
+
+    def test_a_unit_is_named_in_place_of_a_factor_near_it(self):
+        ranges, driven = self.scaled_ranges()
+        near, far = (search.Candidate(ranges, (f,), driven([[(ranges, (f,))]])[0]) for f in (0.00106, 0.0016))
+        self.assertEqual(self.search._settled(near, []).size, (0.001,))
+        self.assertNotEqual(self.search._as_unit(far, []).size, (0.001,))  # that is no unit's
+        worse = dataclasses.replace(near.drive, unusual=0.0)  # the states say that it is no mm
+        self.search.trials.run = lambda jobs, **_: [dataclasses.replace(drive(2.0), unusual=6.0)]
+        self.assertEqual(self.search._as_unit(search.Candidate(ranges, (0.00106,), worse), []).size, (0.00106,))
 
     def test_a_size_takes_what_a_state_took_of_it_where_the_drive_is_as_good(self):
         clock = Fault("clock", ((0.0,),), lambda _: [], lambda _: "", step=(0.25,), smallest=(0.01,), settled=lambda size, states: (size[0] - states["offset"],))

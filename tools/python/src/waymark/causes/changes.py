@@ -208,6 +208,9 @@ class Sorted(Edit):
         lines.sort(key=lambda line: int(line.split(",")[at]))
         return ("\n".join([head, *lines]) + "\n").encode()
 
+    def place(self, before: bytes, after: bytes) -> Place:
+        return Place(self.file, 0, "", self.words())
+
 
 # ── YAML ─────────────────────────────────────────────────────────────────────────────────────────────────────────────
 

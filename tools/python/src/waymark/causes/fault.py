@@ -13,6 +13,7 @@ LENGTHS = (0.001, 0.01, 0.0254, 0.3048, 0.1, 1000.0)
 NEAR = (0.8, 0.9, 0.95, 1.05, 1.1, 1.25)
 """Factors of a scale that is some per cent off; between them its size is fitted."""
 NAMED = 0.04  # of a factor: within it of a unit's, it is that unit
+UNIT_REACH = 1.5  # within it a unit is tried in place of a fitted factor
 _UNITS = {0.001: "in mm", 0.01: "in cm", 0.0254: "in inches", 0.3048: "in feet", 0.1: "in dm", 1000.0: "in km", DEG: "in degrees", 1 / DEG: "in rad",
           1 / 3.6: "in km/h", 0.44704: "in mph"}
 
@@ -84,6 +85,11 @@ class Fault:
     def moved(self, size: Size, axis: int, way: float) -> Size:
         """A size `way` further on one axis."""
         return tuple((s * math.exp(way) if self.is_log else s + way) if k == axis else s for k, s in enumerate(size))
+
+    def unit(self, size: Size) -> Size | None:
+        """The size of the nearest unit within UNIT_REACH; None: there is none, or this is it."""
+        near = sorted((abs(math.log(size[0] / factor)), factor) for factor in self.named) if self.is_log and size[0] > 0 else []
+        return (near[0][1], *size[1:]) if near and 0 < near[0][0] < math.log(UNIT_REACH) else None
 
     def neat(self, size: Size) -> Size:
         """The size of a unit, where it is nearly one."""

@@ -25,6 +25,7 @@ CLOCKS_S = tuple(sign * s for s in (0.15, 0.4, 0.8, 1.2, 1.6, 2.0, 2.5, 3.0, 3.5
 """The last ones: leap seconds of GPS, of TAI."""
 CLOCKS_FEWER_S = (-4.0, -1.6, -0.8, -0.3, 0.3, 0.8, 1.6, 4.0)  # of scans, with which a drive is slow to begin, and of motion
 STAMPS = ("t_ns", "from_ns", "arrival_ns")
+DISORDER_MIN_NS = 500_000_000  # of a step back: a smaller one is a late datum
 DRIFTS = (-0.01, 0.01, 0.02, 0.03, 0.04, 0.05)  # of a clock that is too fast, or of a lag that grows, s/s
 CRUMB = 0.03  # of a map's breadth
 SETTING_FAR = 4.0  # times a default, or a part of it: nearer ones are a matter of tuning, which `waymark suggest` does
@@ -74,8 +75,8 @@ def _clocks(robot: Robot, source: Source) -> Iterator[Fault]:
         return
     name, span = source.name, robot.motion_span
     arrivals = robot.rows(source).get("arrival_ns", stamps)
-    if (np.diff(arrivals) < 0).any():
-        yield discrete(f"order of {name}", lambda _: [Sorted(source.file)], lambda _: f"the rows of {name} are not in the order of their stamps")
+    if (np.diff(arrivals) < -DISORDER_MIN_NS).any():
+        yield discrete(f"order of {name}", lambda _: [Sorted(source.file)], lambda _: f"the rows of {name} are not in the order of their stamps", is_fact=True)
 
     def shift(size: Sequence[float]) -> list[Edit]:
         return _stamps(source, 1, round(size[0] * 1e9))

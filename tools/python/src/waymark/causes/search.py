@@ -30,6 +30,7 @@ GAIN_MIN = 0.1  # nats an update, over no mistake
 APART_MIN = 0.02  # nats an update, over another cause: below, the drive does not tell them apart
 # A drive is right with: 14 % of the updates refused, a mean square of 1.34, lost for 0.5 %: the most of 29 good drives.
 EXPLAINED_MIN, SQUARES_MOST, LOST_MOST, DEGRADED_MOST = 0.85, 1.7, 0.02, 0.2
+LOST_STATES = 0.8  # share of the time for which a drive's pose is lost, whose states tell nothing: they took nothing up
 STATES_APART = math.log(NAMED_FROM / (1 - NAMED_FROM))  # nats of calibration states
 # Gain, in nats, from which a mistake that few observations show is named. By chance a gain of g nats has odds of exp(-g). The number of
 # pairs that are tried, and errors that last, use up a part of it.
@@ -139,6 +140,8 @@ class Search:
         if not self._is_right(now) and not verdict.undecided:
             fixed, now = self._pairs(firsts, before, verdict) or (fixed, now)
         if fixed and self._is_right(now) and not verdict.undecided and self._are_needed(fixed, now):
+            if len(fixed) > 1:
+                fixed, now = self._together(fixed, now)
             verdict.causes, verdict.after, verdict.gain = fixed, now, self._gain(now, before)
         verdict.drives = self.trials.drives
         return verdict
@@ -200,7 +203,7 @@ class Search:
 
     def _by_states(self, rows: list[Fault], now: Drive) -> list[Change]:
         """Rows that a calibration state took up: their sizes are what the state says."""
-        if now.unusual < STATES_APART:
+        if now.unusual < STATES_APART or now.lost > LOST_STATES:
             return []
         sizes = [(row, row.by_states(now.states)) for row in rows if row.step and row.smallest]
         nothing = {row.name: row.by_states({}) for row, _ in sizes}
@@ -241,7 +244,8 @@ class Search:
         return [candidate for _, candidate in sorted(best.values(), key=lambda pair: -pair[0])]
 
     def _fitted(self, candidates: Sequence[Candidate], fixed: list[Change], until_s: float, begin: float = 1.0) -> list[Change]:
-        """Sizes of the largest likelihood, by a parabola through three sizes on each axis, with ever smaller steps; `begin`: of the rows' steps."""
+        """Sizes of the largest posterior density of the observations and of the calibration's states, which else take a part of a size up: by a
+        parabola through three sizes on each axis, with ever smaller steps; `begin`: of the rows' steps."""
         state = [_Fit(c.fault, c.size, [begin * step for step in c.fault.step]) for c in candidates]
         known: dict[tuple[str, Size], float] = {}
         axes = max((len(c.fault.step) for c in candidates), default=0)
@@ -249,8 +253,8 @@ class Search:
             active = [f for f in state if axis < len(f.steps) and f.steps[axis] >= f.fault.smallest[axis]]
             threes = [[f.fault.moved(f.size, axis, way) for way in (-f.steps[axis], 0.0, f.steps[axis])] for f in active]
             jobs = {(f.fault.name, size): (f.fault, size) for f, three in zip(active, threes) for size in three if (f.fault.name, size) not in known}
-            for key, drive in zip(jobs, self._drives(list(jobs.values()), fixed, until_s)):
-                known[key] = self._score(drive, until_s) if drive else -math.inf
+            for key, drive in zip(jobs, self._drives(list(jobs.values()), fixed, until_s, has_states=True)):
+                known[key] = self._score(drive, until_s) - drive.far_states if drive else -math.inf
             for f, three in zip(active, threes):
                 f.size, f.steps[axis] = _parabola(f.fault, f.size, axis, f.steps[axis], [known[f.fault.name, size] for size in three])
         return [(f.fault, f.fault.neat(f.size) if f.steps else f.size) for f in state]
@@ -329,6 +333,22 @@ class Search:
             if not again or _worth(again) < _worth(best.drive) - STATES_APART or not self._is_right(again):
                 break
             best = Candidate(best.fault, size, again)
+        return self._as_unit(best, fixed)
+
+    def _together(self, fixed: list[Change], now: Drive) -> tuple[list[Change], Drive]:
+        """Sizes that were fitted while another mistake was there, settled again."""
+        for k, (fault, size) in enumerate(fixed):
+            best = self._settled(Candidate(fault, size, now), [*fixed[:k], *fixed[k + 1:]])
+            fixed, now = [*fixed[:k], (fault, best.size), *fixed[k + 1:]], best.drive
+        return fixed, now
+
+    def _as_unit(self, best: Candidate, fixed: list[Change]) -> Candidate:
+        """A unit in place of the factor near it, which with stated sigmas that are too large predicts better than the right one: where the drive is
+        right with it, and the calibration's states are no further."""
+        size = best.fault.unit(best.size)
+        drive = self.trials.run([[*fixed, (best.fault, size)]], has_states=True)[0] if size else None
+        if size and drive and self._is_right(drive) and drive.unusual < best.drive.unusual + STATES_APART and self._gain(best.drive, drive) < GAIN_MIN:
+            return Candidate(best.fault, size, drive)
         return best
 
     # ── judgement ────────────────────────────────────────────────────────────────────────────────────────────────────

@@ -59,7 +59,8 @@ class Drive:
     estimate: Estimate | None = None
     sources: tuple[str, ...] = ()  # by their numbers
     states: dict[str, float] = field(default_factory=dict)  # calibration states at the end, by their names
-    unusual: float = 0.0  # nats that their distance from where they began costs by their sigmas
+    unusual: float = 0.0  # nats that their distance from where they began costs by their sigmas, of each no more than UNUSUAL_MOST
+    far_states: float = 0.0  # the same without a limit, for fitting
     is_local: bool = False  # what was changed touches few observations
 
 
@@ -199,8 +200,9 @@ def _driven(job: Job) -> Drive | None:
         if sigma > 0 and not name.startswith("noise."):
             sigmas[name] = (value - 1) / usual if usual else (value - at) / sigma
     remove(began)
+    nats = [0.5 * sigma**2 for sigma in sigmas.values()]
     return dataclasses.replace(drive, sources=sources, states={name: value for name, (value, _) in ended.items()},
-                               unusual=sum(min(UNUSUAL_MOST, 0.5 * sigma**2) for sigma in sigmas.values()))
+                               unusual=sum(min(UNUSUAL_MOST, value) for value in nats), far_states=sum(nats))
 
 
 def ended_states(run: Path) -> tuple[dict[str, tuple[float, float]], tuple[str, ...]]:
