@@ -203,6 +203,19 @@ def stuck(table, since_s):
     return "\n".join(",".join(row) for row in [head, *rows[:last], *([row[0], *rows[last][1:]] for row in rows[last:])]) + "\n"
 
 
+def cut(table, share=(0.3, 0.6)):
+    """A table whose parts change places: the first one stands between the others."""
+    head, *rows = table.splitlines()
+    a, b = (round(part * len(rows)) for part in share)
+    return "\n".join([head, *rows[a:b], *rows[:a], *rows[b:]]) + "\n"
+
+
+def limited(table, most, columns=(1, 2, 3)):
+    """A table whose values end at a limit."""
+    head, *rows = (row.split(",") for row in table.splitlines())
+    return "\n".join(",".join(row) for row in [head, *([f"{max(-most, min(most, float(c)))}" if k in columns else c for k, c in enumerate(row)] for row in rows)]) + "\n"
+
+
 def backwards(left, right):
     """Ticks of which one wheel's count falls where it drives forwards."""
     return table("t_ns,left,right", [[t, left * int(a), right * int(b)] for t, a, b in (row.split(",") for row in ticks().splitlines()[1:])])
@@ -250,9 +263,14 @@ def spoilt_rows():
            ("bad", "rows-skipped", "can"), "before the next line's", stamp)
 
 
+def weaving(bias=0.0, **changes):
+    """Twist and gyro of a drive that turns to both sides, and what changes their tables."""
+    files = {"motion.csv": motion(seconds=80, turn=weave), "imu.csv": imu(seconds=80, turn=weave, bias=bias)}
+    return {name: changes.get(name.replace(".", "_"), str)(text) for name, text in files.items()}
+
 
 DISAGREE, STAMPS = "sensors-disagree", "clock-jumped"
-BROKEN = ("counter-restarts", "motion-sensor", "clock-drifts", "clock-coarse", STAMPS)
+BROKEN = ("counter-restarts", "rows-disordered", "motion-sensor", "clock-drifts", "clock-coarse", STAMPS)
 # name, files, finding (severity, identifier, about), words of its text, words of its fix
 FAULTS = [
     ("gyro of the other sign", both(imu_csv=imu(factor=-1)), ("bad", DISAGREE, "imu"), "-1.00 times", "wz_radps times -1"),
@@ -296,6 +314,9 @@ FAULTS = [
     ("gyro that repeats its last value", both(imu_csv=stuck(imu(), 10)), ("bad", "motion-sensor", "imu"), "repeats 0.29", "must not send the last value"),
     ("gyro that repeats its last value for 4 s", both(imu_csv=(lambda s: "\n".join(s.splitlines()[:1401] + imu().splitlines()[1401:]) + "\n")(stuck(imu(), 10))), ("bad", "motion-sensor", "imu"), "from 10.00 to 13.99 s", "last value"),
     ("twist that repeats its last value", both(motion_csv=stuck(motion(), 10)), ("bad", "motion-sensor", "motion"), "w_radps of motion repeats", "last value"),
+    ("gyro that saturates", weaving(imu_csv=lambda t: limited(t, 0.15)), ("bad", "motion-sensor", "imu"), "stays at its largest value, 0.15 rad/s, for 3", "larger range"),
+    ("gyro that saturates, a zero that is off", weaving(0.02, imu_csv=lambda t: limited(t, 0.15)), ("bad", "motion-sensor", "imu"), "stays at its largest value, 0.15 rad/s, for", "larger range"),
+    ("twist that saturates", weaving(motion_csv=lambda t: limited(t, 0.1, (2,))), ("bad", "motion-sensor", "motion"), "w_radps of motion stays at its largest value, 0.1 rad/s", "larger range"),
     ("track of half the length", {"ticks.csv": ticks(track_m=1.0), "imu.csv": imu(), "calibration.yaml": WHEELS}, ("bad", DISAGREE, "*"), "times", ""),
     ("counter that starts anew at 3000", {"ticks.csv": ticks(wraps_at=3000), "imu.csv": imu(), "calibration.yaml": WHEELS}, ("bad", "counter-restarts", "ticks"), "anew at about 30", "ticks.csv"),
     *[(f"counter of {bits} bits in a table", {"ticks.csv": ticks(wraps_at=2**bits, rate_hz=200, begin=50000), "imu.csv": imu(), "calibration.yaml": WHEELS}, ("bad", "counter-restarts", "ticks"), f"anew after {2**bits} counts", f"plus {2**bits} from") for bits in (8, 12, 16)],
@@ -316,6 +337,10 @@ FAULTS = [
     ("clock set forwards by 20 s while data arrive", both(motion_csv=motion(stamp=jump(9, 20), arrival=lambda t: ns(t) + (21 * 10**9 if t >= 9 else 20 * 10**9 + 1))), ("bad", STAMPS, "motion"), "forwards by 20.02 s", "subtract 20.02 s"),
     ("from 1970 to now on CAN", can(lambda t: f"{t + (START_NS / 1e9 if t > 5 else 0):.6f}"), ("bad", STAMPS, "can"), "1970", "leave the first 501 rows out"),
     ("first stamps of 0", {"motion.csv": motion(stamp=lambda t: ns(t) if t > 2 else round(t * 1e6))}, ("bad", STAMPS, "motion"), "1970", "leave the first 101 rows out"),
+    ("rows of two halves, the second first", both(motion_csv=cut(motion(), (0.5, 1.0))), ("bad", "rows-disordered", "motion"), "500 of 1000 are older", "sort the rows by t_ns"),
+    ("rows of three parts", both(motion_csv=cut(motion())), ("bad", "rows-disordered", "motion"), "300 of 1000 are older", "sort the rows by t_ns"),
+    ("gyro's rows from the last to the first", both(imu_csv="\n".join([imu().splitlines()[0], *imu().splitlines()[:0:-1]]) + "\n"), ("bad", "rows-disordered", "imu"), "older", "sort the rows by t_ns"),
+    ("rows in the order of another column", both(imu_csv="\n".join([imu().splitlines()[0], *sorted(imu().splitlines()[1:], key=lambda row: row.split(",")[3])]) + "\n"), ("bad", "rows-disordered", "imu"), "older", "sort the rows by t_ns"),
     ("gyro of another clock", both(imu_csv=imu(stamp=lambda t: ns(t) + 3600 * 10**9)), ("bad", "clocks-apart", "imu"), "3600.000 s after", "difference"),
     ("gyro of the time since boot", both(imu_csv=imu(stamp=lambda t: round((t + 85) * 1e9))), ("bad", "clocks-apart", "imu"), "don't overlap", "one clock"),
     ("stamps of whole seconds", both(motion_csv=motion(stamp=grid(1.0))), ("bad", "clock-coarse", "motion"), "have the stamp of the one before", "grid of about 1 s"),

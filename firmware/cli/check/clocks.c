@@ -12,7 +12,7 @@
 #define GAP_MIN_NS (2 * WM_NS_PER_S)
 #define GAP_PERIODS 50.0              // a gap is so many of the source's mean periods
 #define PAUSE_NS (600 * WM_NS_PER_S)  // longer: a clock was set, or recordings were put together
-#define BACKS_MAX 5                   // more steps back are rows in disorder
+#define OVERLAP_MAX_S 0.25            // of two parts of rows in disorder: late rows at their ends
 #define EVENTS_MIN 20
 #define SAME_STAMP_NOTE 0.2  // share of the rows that have the stamp of the one before
 #define SAME_STAMP_BAD 0.5
@@ -79,16 +79,31 @@ static void take_step(clock_facts *f, const wm_event *event) {
   }
 }
 
+static void take_part(clock_facts *f, wm_time_ns t_ns) {
+  const size_t most = sizeof f->part / sizeof f->part[0];
+  const int goes_back = f->events > 0 && t_ns - f->before_ns < -JUMP_MIN_NS;
+  const int is_newest_again = f->newest_ns - f->before_ns > JUMP_MIN_NS && t_ns >= f->newest_ns;
+  if (f->events == 0 || goes_back || is_newest_again) {
+    if (f->parts < most) f->part[f->parts].oldest_ns = f->part[f->parts].newest_ns = t_ns;
+    f->parts++;
+  }
+  if (f->parts > most) return;
+  if (t_ns < f->part[f->parts - 1].oldest_ns) f->part[f->parts - 1].oldest_ns = t_ns;
+  if (t_ns > f->part[f->parts - 1].newest_ns) f->part[f->parts - 1].newest_ns = t_ns;
+}
+
 void clock_data_take(clock_data *self, const wm_event *event) {
   clock_facts *f = &self->at[event->source];
   if (event->source >= WM_SOURCES_MAX || llabs(event->t_ns) > STAMP_MAX_NS || llabs(event->arrival_ns) > STAMP_MAX_NS)
     return;
+  take_part(f, event->t_ns);
   if (f->events == 0)
     f->first_ns = f->newest_ns = event->t_ns;
   else
     take_step(f, event);
   take_grid(f, event);
   f->behind += event->t_ns < f->newest_ns;
+  if (f->newest_ns - event->t_ns > f->behind_ns) f->behind_ns = f->newest_ns - event->t_ns;
   if (event->t_ns > f->newest_ns) f->newest_ns = event->t_ns;
   f->events++;
   f->before_ns = event->t_ns;
@@ -97,8 +112,36 @@ void clock_data_take(clock_data *self, const wm_event *event) {
 
 static double period_s(const clock_facts *f) { return f->events > 1 ? f->covered_s / (double)(f->events - 1) : 0; }
 
+// Whether the parts, in the order of time, follow each other without an overlap or a gap. Where a clock was set back
+// the stamps of some time come twice.
+static int parts_follow(const clock_facts *f) {
+  const double gap_s = fmax(GAP_MIN_NS * 1e-9, GAP_PERIODS * period_s(f));
+  if (f->parts > sizeof f->part / sizeof f->part[0]) return 0;
+  for (size_t i = 0; i < f->parts; i++) {
+    const wm_time_ns end_ns = f->part[i].newest_ns;
+    if (end_ns == f->newest_ns) continue;  // the last one
+    size_t followers = 0;
+    for (size_t k = 0; k < f->parts; k++) {
+      if (k == i) continue;
+      const double after_s = wm_seconds_between(end_ns, f->part[k].oldest_ns);
+      const double before_s = wm_seconds_between(f->part[k].newest_ns, f->part[i].oldest_ns);
+      if (after_s < -OVERLAP_MAX_S && before_s < -OVERLAP_MAX_S) return 0;
+      followers += after_s >= -OVERLAP_MAX_S && after_s <= gap_s;
+    }
+    if (followers == 0) return 0;
+  }
+  return 1;
+}
+
+// `out_of_order`: rows whose arrival is before that of the row above, of the whole file. A clock makes a few steps, and
+// no small ones that go back together.
+static int is_disordered(const clock_facts *f, uint64_t out_of_order) {
+  if (f->events < EVENTS_MIN || out_of_order == 0 || f->behind_ns <= JUMP_MIN_NS) return 0;
+  return f->backs == 0 || f->backs > CLOCK_BACKS_MAX || parts_follow(f);
+}
+
 static int jumps_back(const clock_facts *f) {
-  return f->backs > 0 && f->backs <= BACKS_MAX && f->behind > f->backs * 2 && f->events >= EVENTS_MIN;
+  return f->backs > 0 && f->backs <= CLOCK_BACKS_MAX && f->behind > f->backs * 2 && f->events >= EVENTS_MIN;
 }
 
 // A step of the stamps that the arrivals don't make.
@@ -115,7 +158,9 @@ static int jumps_forward(const clock_facts *f, int is_motion) {
 }
 
 int clock_data_jumps(const clock_data *self, size_t source) {
-  return jumps_back(&self->at[source]) || self->at[source].forward_ns > PAUSE_NS;
+  const clock_facts *f = &self->at[source];
+  return is_disordered(f, self->assembly->sources[source].source->counts.out_of_order) || jumps_back(f) ||
+         f->forward_ns > PAUSE_NS;
 }
 
 // ── findings ────────────────────────────────────────────────────────────────────────────────────────────────────────
@@ -161,6 +206,16 @@ static void judge_back(const clock_facts *f, const char *name, wm_findings *out)
           " rows are older than rows before them",
           size_s, f->back_s, f->backs > 1 ? " (the largest of several)" : "", f->behind, f->events)
       ->size = -size_s;
+}
+
+static void judge_disorder(const clock_facts *f, const char *name, wm_findings *out) {
+  const double share = (double)f->behind / (double)f->events;
+  wm_find(out, WM_FOUND_ROWS_DISORDERED, share > UNUSED_BAD ? WM_SEVERITY_BAD : WM_SEVERITY_NOTE, name,
+          "sort the rows by t_ns",
+          "its rows are not in the order of time: %" PRIu64 " of %" PRIu64
+          " are older than rows before them, by up to %.9g s",
+          f->behind, f->events, (double)f->behind_ns * 1e-9)
+      ->size = share;
 }
 
 // `twice`: rows that are the one before again, which a coarse clock does not make.
@@ -232,6 +287,10 @@ void clock_data_judge(const clock_data *self, const wm_health *health, wm_findin
     const clock_facts *f = &self->at[i];
     const wm_assembled_source *s = &self->assembly->sources[i];
     if (f->events == 0 || s->source->is_live) continue;
+    if (is_disordered(f, s->source->counts.out_of_order)) {
+      judge_disorder(f, s->name, out);
+      continue;
+    }
     if (jumps_back(f)) judge_back(f, s->name, out);
     const double skipped = (double)(s->source->counts.malformed + s->source->counts.not_finite);
     const int is_skipped = is_gap(f) && skipped > UNUSED_BAD * (double)f->events;  // the rows of the gap: found as such

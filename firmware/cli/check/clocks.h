@@ -11,6 +11,9 @@
 #include "waymark/event.h"
 #include "waymark/health.h"
 
+// A clock that is set back is set a few times; more steps back are rows in disorder.
+#define CLOCK_BACKS_MAX 5
+
 typedef struct clock_facts {
   uint64_t events, since_1970;  // since_1970: of the first rows, with stamps of before the clock was set
   wm_time_ns first_ns, before_ns, newest_ns, arrived_ns;  // stamps: of the first, the last, the newest; its arrival
@@ -18,7 +21,13 @@ typedef struct clock_facts {
   wm_time_ns forward_ns, forward_arrival_ns, back_ns;
   double forward_s, back_s;
   uint64_t forwards, backs, behind;  // behind: rows older than the newest one
+  wm_time_ns behind_ns;              // at most by so much
   double covered_s;                  // sum of the other steps
+  // Parts of the rows: each begins with a step back, or where the stamps reach the newest one again.
+  struct {
+    wm_time_ns oldest_ns, newest_ns;
+  } part[2 * CLOCK_BACKS_MAX + 1];
+  size_t parts;
   // Rows of the same quantity at the stamp of the one before: of a source that measures once a stamp.
   wm_time_ns stamp_ns[WM_EVENT_KIND_COUNT + WM_Q_COUNT];
   uint64_t measured, same_stamp, stamps;
@@ -36,7 +45,7 @@ void clock_data_take(clock_data *self, const wm_event *event);
 void clock_data_judge(const clock_data *self, const wm_health *health, wm_findings *out);
 // Sources of which more is dropped or ignored than a drive can be without, where no other finding reports it.
 void clock_data_judge_unused(const clock_data *self, const wm_health *health, wm_findings *out);
-// Whether the stamps of a source jump: its rows in disorder and its lateness are consequences.
+// Whether the stamps of a source jump, or its rows are not in the order of time: its lateness is a consequence.
 int clock_data_jumps(const clock_data *self, size_t source);
 
 #endif

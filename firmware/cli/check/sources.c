@@ -86,7 +86,7 @@ static void counted(const wm_assembled_source *s, const source_facts *facts, wm_
             "%" PRIu64 " of 100 equal the one before, which noise makes impossible", of_hundred(c->frozen, all));
   if (of_hundred(c->out_of_order, all) >= 1 && !facts->jumps)
     wm_find(out, WM_FOUND_ROWS_DISORDERED, WM_SEVERITY_NOTE, s->name,
-            "the recorder's clock was set, or two recordings were put together",
+            "sort the rows by t_ns; or state arrival_ns, where the transport changes their order",
             "%" PRIu64 " of 100 are older than the one before", of_hundred(c->out_of_order, all));
   if (of_hundred(facts->ahead, all) >= 1)
     wm_find(out, WM_FOUND_CLOCKS_APART, of_hundred(facts->ahead, all) >= 5 ? WM_SEVERITY_BAD : WM_SEVERITY_NOTE,
@@ -281,7 +281,7 @@ void source_data_judge(source_data *self, uint32_t bound, const wm_health *healt
     if (facts->events > 0) facts->latest_ns += facts->look_ns;
     judge(self->assembly, s, facts, out);
     kinds |= s->kinds;
-    if (is_motion(s) && facts->events > 1 && !motion) motion = facts;
+    if (is_motion(s) && facts->events > 1 && !facts->jumps && !motion) motion = facts;
   }
   for (size_t i = 0; motion && i < self->assembly->source_count; i++)
     if (self->facts[i].events > 1 && &self->facts[i] != motion && !self->facts[i].jumps) spans(self, i, motion, out);
