@@ -133,6 +133,42 @@ class Comparison(ImuTest):
         self.assertIn("shows gravity downwards", said)
         self.assertAlmostEqual(recording.table("imu.csv")["az_mps2"][0], 9.81)
 
+    def weaving(self, change):
+        """A drive that turns to both sides, 0.4 rad/s at most, and a gyro of its own zero and noise that is changed at a time, s."""
+        bag, x, heading, chance = self.bag(), np.zeros(2), 0.0, np.random.default_rng(3)
+        for i, t in enumerate(np.arange(0, 30, 0.02)):
+            turn = 0.4 * np.sin(0.4 * t)
+            if i % 2 == 0:
+                bag.odometry(ns(t), ns(t), (*x, heading), (1, 0, 0), (0, 0, turn))
+            bag.imu(ns(t), ns(t), *change(t, np.array([0.0, 0.0, turn]) + 0.003 * chance.normal(size=3), STILL + 0.02 * chance.normal(size=3)))
+            x, heading = x + 0.02 * np.array([np.cos(heading), np.sin(heading)]), heading + 0.02 * turn
+        return self.take(bag)
+
+    def test_a_gyro_that_repeats_its_last_value(self):
+        for begin_s, end_s in ((9.0, 30.0), (12.0, 18.0)):
+            with self.subTest(end_s):
+                held = []
+
+                def change(t, gyro, acceleration, begin_s=begin_s, end_s=end_s, held=held):
+                    held[:] = held if begin_s <= t < end_s and held else [gyro, acceleration]
+                    return held
+                recording, said = self.weaving(change)
+                findings = [line for line in said.splitlines() if "/imu/data: its" in line]
+                self.assertEqual(len(findings), 1, said)
+                self.assertRegex(findings[0], rf"its gyro repeats \(.*\) from {begin_s - 0.02:.2f} to {end_s - 0.02:.2f} s after its first message \(at most 1 in a row else\)")
+                self.assertEqual(len(recording.table("imu.csv")["t_ns"]), 1500 - round(50 * (end_s - begin_s)))
+
+    def test_a_gyro_that_saturates(self):
+        for most in (0.15, 0.3):
+            with self.subTest(most):
+                recording, said = self.weaving(lambda t, gyro, acceleration, most=most: (np.clip(gyro, -most, most), acceleration))
+                findings = [line for line in said.splitlines() if "/imu/data: its" in line]
+                self.assertEqual(len(findings), 1, said)
+                self.assertRegex(findings[0], rf"its gyro stays at its largest rate, {most} rad/s, for .* s in which the turn rate of /odom is 0.3\d* rad/s")
+                self.assertLess(np.abs(recording.table("imu.csv")["wz_radps"]).max(), most)
+        _, said = self.weaving(lambda t, gyro, acceleration: (gyro, acceleration))
+        self.assertNotIn("/imu/data: its", said)
+
     def test_zeros(self):
         _, said = self.take(self.with_imu(lambda t, w, a: (np.zeros(3), a)))
         self.assertIn("zeros in all of its 751 messages", said)

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..geometry import from_rpy, rotation_vectors, rotations, turned
 from ..tables import Array, Table
-from . import compare
+from . import compare, stuck
 from .collection import Collection, NoSuchTopic
 from .frames import mounting
 from .motion import Motion
@@ -51,6 +51,11 @@ class Imu:
     def say(self, text: str, finding: bool = True) -> None:
         self.said.append((finding, text))
 
+    def leave_out(self, rows: Array) -> None:
+        """Messages that are no data."""
+        for name in ("t_ns", "arrival_ns", "gyro", "accelerometer", "sigmas"):
+            setattr(self, name, getattr(self, name)[~rows])
+
 
 def _is_there(values: Array) -> bool:
     return bool(np.isfinite(values).all(axis=1).mean() > 0.5 and np.nan_to_num(values).any())
@@ -82,8 +87,7 @@ def _without_zeros(imu: Imu) -> None:
     turning = int((imu.gyro.any(axis=1)).sum())
     if zero.sum() > _ZEROS * (zero.sum() + turning):
         imu.say(f"{100 * zero.mean():.0f} % of its messages have a gyro of zeros between others that have not: left out")
-        for name in ("t_ns", "arrival_ns", "gyro", "accelerometer", "sigmas"):
-            setattr(imu, name, getattr(imu, name)[~zero])
+        imu.leave_out(zero)
 
 
 def _candidate(into: Collection, topic: str, base: str) -> Imu:
@@ -189,6 +193,36 @@ def _fit(imu: Imu, motion: Motion) -> _Fit | str:
     still = next((fit for fit in fits if fit.lag == 0), fits[0])
     best = max(fits, key=lambda fit: fit.r)
     return best if best.r > still.r + 0.02 else still
+
+
+def _without_repeats(imu: Imu, motion: Motion, words: str) -> None:
+    """Leaves messages out that repeat one value while the motion turns otherwise."""
+    borders = compare.grid(imu.t_ns, motion.t_ns)
+    found = stuck.repeats(imu.t_ns, imu.gyro, borders, compare.held(motion.t_ns, motion.twist[:, 5], borders)[:, 0])
+    if found is None:
+        return
+    run, second, off = found
+    begin_s, end_s = ((int(imu.t_ns[k]) - int(imu.t_ns[0])) / 1e9 for k in (run.start, run.stop - 1))
+    imu.say(f"its gyro repeats ({', '.join(f'{v:.4g}' for v in imu.gyro[run.start])}) from {begin_s:.2f} to {end_s:.2f} s after its first message (at most {second} "
+            f"in a row else), while {words} turns by {off:.1f} rad more or less: a driver that receives nothing must not send its last value on; left out")
+    rows = np.zeros(len(imu.t_ns), dtype=bool)
+    rows[run.start + 1:run.stop] = True
+    imu.leave_out(rows)
+
+
+def _without_limit(imu: Imu, motion: Motion, words: str) -> None:
+    """Leaves messages out at the gyro's largest rate, where the motion turns faster."""
+    fit = _fit(imu, motion)
+    if isinstance(fit, str):
+        return
+    borders, axis = compare.grid(imu.t_ns, motion.t_ns), int(np.abs(fit.vector).argmax())
+    found = stuck.limit(compare.held(imu.t_ns, imu.gyro[:, axis], borders, fit.lag)[:, 0], compare.held(motion.t_ns, motion.twist[:, 5], borders)[:, 0])
+    if found is None:
+        return
+    most, seconds, rate = found
+    imu.say(f"its gyro stays at its largest rate, {most:.4g} rad/s, for {seconds:.1f} s in which {words} is {rate:.4g} rad/s in the mean: it saturates (a range of "
+            "the gyro, or of the message's numbers, that is too small); left out there")
+    imu.leave_out(np.abs(imu.gyro[:, axis]) >= (1 - stuck.LIMIT_WITHIN) * most)
 
 
 def _without_bias(imu: Imu, motion: Motion) -> None:
@@ -331,13 +365,15 @@ def _by_gravity(imu: Imu, gravity: Array | None, motion: Motion | None) -> None:
 def _judge(imu: Imu, motion: Motion | None) -> None:
     """What gravity and the motion say of the IMU."""
     gravity = _gravity(imu)
+    words = "" if motion is None else f"the {'commands' if motion.is_command else 'turn rate'} of {motion.topic}"
     if motion is not None and not motion.is_command:
+        _without_repeats(imu, motion, words)
+        _without_limit(imu, motion, words)
         _without_bias(imu, motion)
     fit = "not observable" if motion is None else _fit(imu, motion)
     if motion is None or isinstance(fit, str):
         _by_gravity(imu, gravity, motion)
         return
-    words = f"the {'commands' if motion.is_command else 'turn rate'} of {motion.topic}"
     size = float(np.linalg.norm(fit.vector))
     if size < _SILENT and not (size * 180 / np.pi > _SILENT and fit.r > _FITS):
         imu.usable = False
