@@ -250,14 +250,23 @@ static const char *unit_of(double factor, int is_way) {
   return NULL;
 }
 
-static void factor_line(const scene *s, const channel *c, double measured, char *fix, size_t capacity) {
+// The difference of two wheels, whose turn is that over the track.
+static int is_of_track(const channel *c) { return c->kind == CHANNEL_TICKS_TURN || c->kind == CHANNEL_WHEELS_TURN; }
+
+static void factor_line(const scene *s, const channel *c, const channel *other, double measured, char *fix,
+                        size_t capacity) {
   const double factor = usual_factor(measured);
   const char *unit = unit_of(factor, channel_is_way(c->kind)), *source = source_of(c, s->assembly);
   const wm_wheels *w = s->all->wheels;
-  if (c->kind == CHANNEL_TICKS_TURN || c->kind == CHANNEL_WHEELS_TURN)
+  if (is_of_track(c))
     (void)snprintf(fix, capacity,
                    "measure the track again (`wheels: {track_m: %.3g}` would agree), or look at the gyro's unit",
                    w->track_m * factor);
+  else if (is_of_track(other) && c->kind == CHANNEL_YAW_RATE && !unit)
+    (void)snprintf(fix, capacity,
+                   "measure the track again (`wheels: {track_m: %.3g}` would agree), or look at the gyro's range and "
+                   "unit: %s times %.3g would agree, too",
+                   w->track_m / factor, word_of(c, s->assembly), 1 / factor);
   else if (c->kind == CHANNEL_TICKS_WAY)
     (void)snprintf(fix, capacity,
                    "one of them is wrong: the speed's unit, or the wheels' (`radius_m: %.4g` or `ticks_per_turn: %.6g` "
@@ -387,7 +396,7 @@ static void disagrees(const scene *s, const channel *c, const channel *other, co
     return;
   }
   const double lone = c->values > 0 ? (double)c->lone_zeros / (double)c->values : 0;
-  factor_line(s, c, factor, fix, sizeof fix);
+  factor_line(s, c, other, factor, fix, sizeof fix);
   if (lone > LONE_ZEROS_MIN)
     (void)snprintf(fix, sizeof fix, "%.0f of 100 of its values are 0 between others: leave those rows out of %s",
                    100 * lone, source_of(c, s->assembly));

@@ -90,6 +90,7 @@ class Search:
         self.facts: list[Change] = []
         self.cost = 0.0  # processor time of a second of the drive
         self.duration_s = 0.0
+        self.screen_most_s, self.screened_s, self.starts = SCREEN_MAX_S, 0.0, 0  # of the drive; its part that was screened last, and by how many trials
 
     def left_s(self) -> float:
         """Of the budget."""
@@ -104,6 +105,12 @@ class Search:
         affordable = share * self.left_s() / max(1e-9, drives * self.cost)
         part = min(most_s, max(SCREEN_MIN_S, affordable))
         return 0.0 if part >= self.duration_s else part
+
+    def _may_screen_more(self) -> bool:
+        """Whether time is left for a part that is twice as long: a robot that hardly moves at first shows little then."""
+        longer_s = self.part_s(self.starts, SCREEN_SHARE, math.inf) or self.duration_s
+        self.screen_most_s = math.inf if longer_s >= 2 * self.screened_s else SCREEN_MAX_S
+        return longer_s >= 2 * self.screened_s
 
     def run(self) -> Verdict:
         """Searches."""
@@ -122,6 +129,8 @@ class Search:
         while len(fixed) < CAUSES_MOST and not self._is_done(fixed, now):
             found = self._round(fixed, now)
             if fixed == self.facts:
+                if not any(self._is_right(c.drive) for c in found) and self._may_screen_more():
+                    found = self._round(fixed, now)
                 firsts = found[:FIRSTS]
             if not found or not self._helps(found[0], now):
                 break
@@ -178,13 +187,14 @@ class Search:
         rows = [row for row in self.rows if row.name not in used]
         starts = [(row, size) for row in rows for size in row.start if row.is_possible(size)]
         self.trials.settings = self._without_search()
-        part_s = self.part_s(len(starts), SCREEN_SHARE, SCREEN_MAX_S)
+        part_s = self.part_s(len(starts), SCREEN_SHARE, self.screen_most_s)
+        self.screened_s, self.starts = part_s or self.duration_s, len(starts)
         base = self._plain(fixed, part_s) or now
         kept = self._within_reach(self._best_sizes(self._tried(starts, fixed, part_s), part_s), base, part_s)[:ROWS_KEPT]
         near = self._fitted(kept[:ROWS_FITTED], fixed, part_s)  # a size that is far off loses the rest of the drive
         # Where a row explains the part, no table of identities is looked for.
         proposed = [] if any(self._is_right(c.drive) for c in kept) else self._proposals(fixed, now)
-        fit_s = self.part_s(ROWS_KEPT + len(proposed) + 9 * ROWS_FITTED, 0.5, FIT_MAX_S)
+        fit_s = self.part_s(ROWS_KEPT + len(proposed) + 9 * ROWS_FITTED, 0.5, max(FIT_MAX_S, self.screened_s))
         over_s = self._whole(fit_s) if proposed else fit_s
         base = self._plain(fixed, over_s) or now
         more = self._tried([*near, *((c.fault, c.size) for c in kept[ROWS_FITTED:]), *proposed], fixed, over_s)
