@@ -317,7 +317,7 @@ FAULTS = [
     ("gyro that saturates", weaving(imu_csv=lambda t: limited(t, 0.15)), ("bad", "motion-sensor", "imu"), "stays at its largest value, 0.15 rad/s, for 3", "larger range"),
     ("gyro that saturates, a zero that is off", weaving(0.02, imu_csv=lambda t: limited(t, 0.15)), ("bad", "motion-sensor", "imu"), "stays at its largest value, 0.15 rad/s, for", "larger range"),
     ("twist that saturates", weaving(motion_csv=lambda t: limited(t, 0.1, (2,))), ("bad", "motion-sensor", "motion"), "w_radps of motion stays at its largest value, 0.1 rad/s", "larger range"),
-    ("track of half the length", {"ticks.csv": ticks(track_m=1.0), "imu.csv": imu(), "calibration.yaml": WHEELS}, ("bad", DISAGREE, "*"), "times", ""),
+    ("track of half the length", {"ticks.csv": ticks(track_m=1.0), "imu.csv": imu(), "calibration.yaml": WHEELS}, ("bad", DISAGREE, "*"), "times", "track_m: 1"),
     ("counter that starts anew at 3000", {"ticks.csv": ticks(wraps_at=3000), "imu.csv": imu(), "calibration.yaml": WHEELS}, ("bad", "counter-restarts", "ticks"), "anew at about 30", "ticks.csv"),
     *[(f"counter of {bits} bits in a table", {"ticks.csv": ticks(wraps_at=2**bits, rate_hz=200, begin=50000), "imu.csv": imu(), "calibration.yaml": WHEELS}, ("bad", "counter-restarts", "ticks"), f"anew after {2**bits} counts", f"plus {2**bits} from") for bits in (8, 12, 16)],
     ("counter that restarts", {"ticks.csv": ticks(restart_s=10), "imu.csv": imu(), "calibration.yaml": WHEELS}, ("note", "counter-restarts", "ticks"), "right: the counter restarts at 0, 10.000 s after its first count", "goes on"),

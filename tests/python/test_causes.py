@@ -168,6 +168,18 @@ class Judgement(unittest.TestCase):
         self.search._drives = lambda jobs, *_, **__: driven([[job] for job in jobs])
         return ranges, driven
 
+    def test_a_longer_part_is_screened_where_time_is_left_for_one_that_is_twice_as_long(self):
+        for left_s, is_longer in ((28.0, True), (8.0, False)):  # of 100 trials at 1 ms a second of the drive: 84 s and 24 s of it
+            self.search.left_s = lambda left_s=left_s: left_s
+            self.search.cost, self.search.duration_s, self.search.starts, self.search.screened_s = 1e-3, 1000.0, 100, 20.0
+            self.assertEqual(self.search._may_screen_more(), is_longer)
+            self.assertAlmostEqual(self.search.part_s(100, search.SCREEN_SHARE, self.search.screen_most_s), 84.0 if is_longer else 20.0)
+
+    def test_states_of_a_drive_that_is_lost_tell_no_size(self):
+        clock = Fault("clock", ((0.0,),), lambda _: [], lambda _: "", step=(0.25,), smallest=(0.01,), settled=lambda size, states: (size[0] - states.get("offset", 0.0),))
+        told = [self.search._by_states([clock], dataclasses.replace(drive(1.0, unusual=9.0, lost=lost), states={"offset": 0.4})) for lost in (0.1, 0.95)]
+        self.assertEqual([[size for _, size in one] for one in told], [[(-0.4,)], []])
+
     def test_a_size_that_a_state_takes_up_is_near_the_state_s_start(self):
         ranges, driven = self.scaled_ranges()
         (_, (size,)), = self.search._fitted([search.Candidate(ranges, (0.001,), driven([[(ranges, (0.001,))]])[0])], [], 0.0)
