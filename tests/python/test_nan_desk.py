@@ -141,6 +141,7 @@ CASES = {
     "causes.changes.degrees": (changes.degrees, [1.0]),
     "causes.fault.Fault.by_states": (GIVEN.by_states, [{"speed_scale": 1.1}]),
     "causes.fault.Fault.moved": (lambda size, way: GIVEN.moved((size,), 0, way), [1.1, 0.1]),
+    "causes.fault.Fault.unit": (lambda size: GIVEN.unit((size,)) or np.nan, [1.1]),
     "causes.fault.Fault.neat": (lambda size: GIVEN.neat((size,)), [1.1]),
     "causes.fault.factor_words": (fault.factor_words, [1.1]),
     "mcapio.estimates.positions": (estimates.positions, [PLACES]),
@@ -201,10 +202,10 @@ CASES = {
 # Modules and functions whose numbers can't be NaN, or are absent as NaN by what they state; "*": all of a module.
 WITHOUT = {
     "waymark": {
-        "whole numbers or text": "bag.can.CanLog.finish bag.clocks.once bag.clocks.settle bag.clocks.Clock.mended bag.clocks.silences bag.clocks.excess bag.clocks.growth bag.clocks.onto bag.pictures.Depths.grey_byte bag.turns.settle bag.collection.Collection.on_clock "
+        "whole numbers or text": "bag.can.CanLog.finish bag.imu.Imu.leave_out bag.clocks.once bag.clocks.settle bag.clocks.Clock.mended bag.clocks.silences bag.clocks.excess bag.clocks.growth bag.clocks.onto bag.pictures.Depths.grey_byte bag.turns.settle bag.collection.Collection.on_clock "
                                  "bag.pictures.Depths.grey bag.tables.without_arrival bag.tags.corner_table causes.trial.Blocks.of causes.trial.Undo.original "
                                  "recording.jpeg_of recording.RecordingWriter.restamp",
-        "NaN is absent: windows, updates and samples without a number are left out": "bag.clocks.goes_on bag.compare.held bag.compare.Likeness.differs bag.compare.likeness "
+        "NaN is absent: windows, updates and samples without a number are left out": "bag.clocks.goes_on bag.stuck.repeats bag.stuck.limit bag.compare.held bag.compare.Likeness.differs bag.compare.likeness "
                                  "bag.compare.turns bag.compare.moves bag.collection.Collection.sample causes.trial.likelihoods causes.trial.judged causes.plan.judged mcapio.estimates.bounds "
                                  "mcapio.estimates.hypotheses mcapio.place.landmarks",
         "of calibrations and transforms, which are refused where one is NaN": "bag.frames.is_optical bag.tags.to_raw",
