@@ -154,6 +154,27 @@ void noise_adaption::update(const row &r) {
   if (r.kind < kFactors) learn(one);
 }
 
+void noise_adaption::turn(double sine, double cosine) {
+  if (!is_on()) return;
+  for (int k = 0; k < kFactors; k++) {
+    if (!is_used(k)) continue;
+    double(&d)[kBlock][kBlock] = variance_by_[k];
+    for (int x = 0; x < block_; x += kPose) {  // the pose's place; the time-correlated error
+      const int y = x + 1;
+      for (int j = 0; j < block_; j++) {
+        const double before = d[x][j];
+        d[x][j] = cosine * before - sine * d[y][j];
+        d[y][j] = sine * before + cosine * d[y][j];
+      }
+      for (int j = 0; j < block_; j++) {
+        const double before = d[j][x];
+        d[j][x] = cosine * before - sine * d[j][y];
+        d[j][y] = sine * before + cosine * d[j][y];
+      }
+    }
+  }
+}
+
 void noise_adaption::evidence::add(const evidence &one) {
   count += one.count;
   innovations += one.innovations;

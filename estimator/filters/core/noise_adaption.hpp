@@ -61,6 +61,8 @@ class noise_adaption {
   void fade_correlated(double left, double added_m2);
   // The factors learn from a row of a known kind; then the derivatives follow its update.
   void update(const row &r);
+  // The errors of places turned, by this sine and cosine, as the filter turns its covariance.
+  void turn(double sine, double cosine);
   // Time passes: sums are learned from, and factors forgotten.
   void pass(wm_time_ns t_ns);
   // With an alarm for a factor at its limit, which is forgotten by 1 % in 4 s.

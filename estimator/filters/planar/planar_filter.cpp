@@ -74,17 +74,26 @@ bool planar_filter::update(innovation &&i, const sparse_row *rows, const update_
   if (!state_.solve(&i, options.added_noise, moving)) return false;
   adapt(i, rows, options);
   keep_limits(i);
-  delayed delay = delay_of(i);
-  const double turn = options.turns_errors ? state_.step()[kHeading] : 0.0;
+  const delayed delay = delay_of(i);
+  const double *step = state_.step(), x_m = step[kX], y_m = step[kY];
+  const double turn = options.turns_errors ? step[kHeading] + delay.step * delay.by[2] : 0.0;
   add_step();
   state_.correct(std::move(i), moving);
   if (turn != 0.0) {
+    bend_step(turn, x_m, y_m);
     turn_errors(kX, turn);
     turn_errors(correlated_, turn);
-    delay.turn(turn);
+    const sin_cos h = sincos(turn);
+    noise_.turn(h.sin, h.cos);
   }
-  turn_delay(delay);
+  turn_delay(delay, turn);
   return true;
+}
+
+// A step of place and heading together is an arc's: by the exponential, to second order.
+void planar_filter::bend_step(double turn_rad, double x_m, double y_m) {
+  set_value(kX, value(kX) - 0.5 * turn_rad * y_m);
+  set_value(kY, value(kY) + 0.5 * turn_rad * x_m);
 }
 
 // A rotation as three shears, since each state is assigned from the others as they are.
@@ -104,63 +113,70 @@ void planar_filter::turn_errors(int first, double by_rad) {
   shear(first, first + 1, -along);
 }
 
-void planar_filter::delayed::turn(double by_rad) {
-  const sin_cos h = sincos(by_rad);
-  const double x = by[0], y = by[1];
-  by[0] = h.cos * x - h.sin * y;
-  by[1] = h.sin * x + h.cos * y;
-}
-
 // Where the velocity is a state, its random walk hides a delay: nothing turns.
 planar_filter::delayed planar_filter::delay_of(const innovation &of) {
-  delayed out{has_velocity() ? -1 : of.delay, {}, {}};
+  delayed out{};
+  out.state = has_velocity() ? -1 : of.delay;
   if (out.state < 0) return out;
   const double *step = state_.step(), heading = value(kHeading), turn = step[kHeading];
-  planar_twist after = twist_;
-  for (int k = 0; k < twist_.count; k++)
-    if (const int state = motion_state_[twist_.index[k]]; state >= 0) {
-      after.v += twist_.v_by[k] * step[state];
-      after.u += twist_.u_by[k] * step[state];
-      after.w += twist_.w_by[k] * step[state];
+  // Before the first step the robot moves as by the first datum.
+  const motion_twist now =
+      speed_of(twist_) == 0.0 && twist_.w == 0.0 ? front_.twist_at(now_ns(), calibration_) : twist_;
+  planar_twist after = now;
+  for (int k = 0; k < now.count; k++)
+    if (const int state = motion_state_[now.index[k]]; state >= 0) {
+      after.v += now.v_by[k] * step[state];
+      after.u += now.u_by[k] * step[state];
+      after.w += now.w_by[k] * step[state];
     }
-  const double moved_m2ps2 =
-      square(after.v - twist_.v) + square(after.u - twist_.u) + square(turn) * (square(twist_.v) + square(twist_.u));
+  const double speed2 = square(now.v) + square(now.u), turn2 = square(turn) * speed2;
+  const double moved_m2ps2 = square(after.v - now.v) + square(after.u - now.u) + turn2;
   const double place_m2 = variance(kX) < variance(kY) ? variance(kX) : variance(kY), own = variance(out.state);
-  if (own * moved_m2ps2 < kTurned * place_m2 && own * square(after.w - twist_.w) < kTurned * variance(kHeading))
-    return {-1, {}, {}};
-  put_age(twist_, sincos(heading), out.by);
-  put_age(after, sincos(heading + turn), out.after);
+  const double turned_m2 = square(step[out.state]) * speed2 * variance(kHeading);
+  if (own * moved_m2ps2 + turned_m2 < kTurned * place_m2 &&
+      own * square(after.w - now.w) < kTurned * variance(kHeading)) {
+    out.state = -1;
+    return out;
+  }
+  out.step = step[out.state];
+  put_age(now, sincos(heading), out.by);
+  put_age(after, sincos(heading + turn + out.step * out.by[2]), out.after);
   return out;
 }
 
-void planar_filter::turn_delay(const delayed &d) {
+void planar_filter::turn_delay(const delayed &d, double turn_rad) {
   if (d.state < 0) return;
-  turn_delay(d, kX, kPoseStates);
-  if (correlated_ >= 0) turn_delay(d, correlated_, 2);
+  turn_delay(d, turn_rad, kX, kPoseStates);
+  if (correlated_ >= 0) turn_delay(d, turn_rad, correlated_, 2);
 }
 
-// The states' regression on the delay, with the lag given, is a share of the derivatives `by`: other observations
-// determine the states, too. The share stays, and the derivatives become `after`. The regression on the lag is the
-// prediction's.
-void planar_filter::turn_delay(const delayed &d, int first, int count) {
+// The states' regression on the delay, with the lag given, is a share of the derivatives `by`, which have turned with
+// the errors: other observations determine the states, too. The share stays, and the derivatives become `after`; so
+// does it of the way since then, which the heading turns. The regression on the lag is the prediction's.
+void planar_filter::turn_delay(const delayed &d, double turn_rad, int first, int count) {
   const int lag = motion_state_[kLag];
   const double by_lag = lag >= 0 && variance(lag) > 0.0 ? covariance(lag, d.state) / variance(lag) : 0.0;
   const double own = variance(d.state) - (by_lag == 0.0 ? 0.0 : by_lag * covariance(lag, d.state));
+  const sin_cos h = sincos(turn_rad);
+  const double by[kPoseStates] = {h.cos * d.by[0] - h.sin * d.by[1], h.sin * d.by[0] + h.cos * d.by[1], d.by[2]};
   double common = 0.0, all = 0.0;
   for (int i = 0; i < count; i++) {
     const double with = covariance(first + i, d.state) - (by_lag == 0.0 ? 0.0 : by_lag * covariance(first + i, lag));
-    common -= with * d.by[i];
-    all += square(d.by[i]);
+    common -= with * by[i];
+    all += square(by[i]);
   }
   if (!(common > 0.0)) return;
   const double share = common < all * own ? common / (all * own) : 1.0;
+  const double across[kPoseStates] = {d.after[1], -d.after[0], 0.0};
+  const double bend[kPoseStates] = {-0.5 * turn_rad * d.by[1], 0.5 * turn_rad * d.by[0], d.after[2] - d.by[2]};
   planar_row rows[kPoseStates];
   double values[kPoseStates];
   for (int i = 0; i < count; i++) {
     rows[i].add(first + i, 1.0);
-    rows[i].add(d.state, share * (d.by[i] - d.after[i]));
-    rows[i].add(lag, -by_lag * share * (d.by[i] - d.after[i]));
-    values[i] = value(first + i);
+    rows[i].add(d.state, share * (by[i] - d.after[i]));
+    rows[i].add(kHeading, share * d.step * across[i]);
+    rows[i].add(lag, -by_lag * share * (by[i] - d.after[i]));
+    values[i] = value(first + i) + share * d.step * (d.by[i] - d.after[i] + bend[i]);
   }
   assign(first, count, rows, nullptr, 0, values);
 }

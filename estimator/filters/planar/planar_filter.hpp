@@ -74,19 +74,20 @@ class planar_filter : public planar_motion {
 
  private:
   void adapt(const innovation &i, const sparse_row *rows, const update_options &options);
+  // What positions observe is a pose before now. Its error on its own axes is what an update leaves as it is
+  // [Barrau2017]; the present pose, whose way from there has the twist and the delay in it, takes what these changed.
   // At a constant twist, a delay and a shift of the pose along the twist give the same observations: this direction of
-  // the state is not observable. A correction changes the twist (scale, bias, heading), and so the direction. So the
-  // correlation of the pose, and of the lasting error of positions, with the delay turns with each correction. Else
-  // noise adds information on the delay [Huang2010].
+  // the state is not observable. Were it left as it was, noise would add information on the delay [Huang2010].
   struct delayed {
     int state;                                   // of the delay; -1: none
+    double step;                                 // its change, s
     double by[kPoseStates], after[kPoseStates];  // derivatives of the pose by it before the update's step, and after
-    void turn(double by_rad);                    // the errors turned
   };
-  delayed delay_of(const innovation &of);      // between the update's solution and its step
+  delayed delay_of(const innovation &of);  // between the update's solution and its step
+  void bend_step(double turn_rad, double x_m, double y_m);
   void turn_errors(int first, double by_rad);  // of a vector on map's axes, two states from `first` on; not its value
-  void turn_delay(const delayed &d);
-  void turn_delay(const delayed &d, int first, int count);
+  void turn_delay(const delayed &d, double turn_rad);
+  void turn_delay(const delayed &d, double turn_rad, int first, int count);
 
   int correlated_, unused_;  // no padding; -1: none
   wheel_heading wheels_;
