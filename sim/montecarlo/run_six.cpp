@@ -308,8 +308,9 @@ double Statistics6::nees_mean() const {
 }
 
 double Statistics6::nees_inside(Band band) const {
-  return share_inside(steps, band,
-                      [&](const Step6 &s) { return s.runs < runs ? std::nan("") : s.nees / (6 * static_cast<double>(s.runs)); });
+  return share_inside(steps, band, [&](const Step6 &s) {
+    return s.runs < runs ? std::nan("") : s.nees / (6 * static_cast<double>(s.runs));
+  });
 }
 
 namespace {

@@ -89,14 +89,14 @@ TEST(test_a_lag_and_a_time_offset_are_observed_as_a_sum) {
     }
 }
 
-// Squared errors by their variances, which have the mean 1, over 12 drives of `seconds` with 100 observations a second:
-// of sightings, or of a receiver's positions.
+// Squared errors by their variances, which have the mean 1, over some drives of `seconds` with 100 observations a
+// second: of sightings, or of a receiver's positions.
 struct normalised {
   double heading, place, delay;
 };
 enum class source { sightings, positions };
 constexpr uint64_t kDrives = 24;
-normalised at_100_hz(source seen, double sigma_m, double sigma_rad, int seconds) {
+normalised at_100_hz(source seen, double sigma_m, double sigma_rad, int seconds, const char *name = "landmark_ekf") {
   wm_rig rig = {};
   rig.antenna_m[0] = 0.8, rig.antenna_m[1] = -0.5;
   setup.rig = &rig;
@@ -107,7 +107,7 @@ normalised at_100_hz(source seen, double sigma_m, double sigma_rad, int seconds)
     const auto off = [drive](uint64_t of, double sigma) { return sigma * wm_random_normal(drive, 3, of); };
     start_at({p.x_m + off(0, sigma_m), p.y_m + off(1, sigma_m), wm::wrap(p.heading_rad + off(2, sigma_rad))}, sigma_m,
              sigma_rad);  // NaN: not given
-    begin_with();
+    begin_with(name);
     for (uint64_t k = 0; k < 100 * static_cast<uint64_t>(seconds); k++) {
       const double t = 0.01 * static_cast<double>(k), v = base + 0.1 * std::sin(0.8 * t),
                    w = 0.5 * std::sin(0.4 * t + phase);
@@ -152,6 +152,16 @@ TEST(test_the_jitter_of_corrections_makes_no_delay_known) {
     const normalised out = at_100_hz(row.seen, row.sigma_m, row.sigma_rad, row.seconds);
     TEST_ASSERT_LESS_THAN_DOUBLE(1.5, out.heading);
     TEST_ASSERT_LESS_THAN_DOUBLE(row.most, out.delay);
+    TEST_ASSERT_LESS_THAN_DOUBLE(1.0, out.place);
+  }
+}
+
+// The places of new landmarks have the delay in common with the pose.
+TEST(test_the_jitter_of_corrections_makes_no_delay_known_while_mapping) {
+  for (const int seconds : {3, 10, 30}) {
+    const normalised out = at_100_hz(source::sightings, 0.001, 0.001, seconds, "slam");
+    TEST_ASSERT_LESS_THAN_DOUBLE(1.5, out.heading);
+    TEST_ASSERT_LESS_THAN_DOUBLE(1.5, out.delay);
     TEST_ASSERT_LESS_THAN_DOUBLE(1.0, out.place);
   }
 }
