@@ -9,9 +9,7 @@ namespace wm {
 namespace {
 
 constexpr double kUnproven_nis = 9.21;  // 99 % quantile of chi2, 2 degrees of freedom
-// Sigma of a heading up to which the noise's derivatives are linear in it, where a position corrects it.
-constexpr double kLinear_rad = 0.07;
-constexpr double kScaleSigmas = 1.5;  // of the pose while several observations misfit; not swept
+constexpr double kScaleSigmas = 1.5;    // of the pose while several observations misfit; not swept
 
 bool passes(const gate_result &g, int dof, const fuse_policy &policy) {
   return g.passed && (!policy.unproven || g.nis <= kUnproven_nis * gate_scale(dof));
@@ -33,15 +31,14 @@ wm_verdict update(planar_filter *filter, innovation &&prepared, const residual *
   const int count = prepared.rows;
   sparse_row rows[planar_filter::kRows];
   planar_filter::update_options options;
-  const bool is_vague = r->is_position && filter->variance(kHeading) > square(kLinear_rad);
-  if (is_vague) filter->noise().restart(false);
+  const bool waits = r->is_position && filter->noise().waits(filter->variance(kHeading), filter->now_ns());
   options.turns_errors = r->is_position;
   options.kept_from = kPoseStates;
   options.kept_to = policy.holds || (g.soft && policy.doubtful) ? policy.held_to : kPoseStates;
   for (int i = 0; i < count; i++) {
     rows[i] = r[i].row;
     options.added_noise[i] = r[i].noise * (g.noise_scale - 1.0);
-    if (policy.learns && !is_vague) options.source[i] = {r[i].source.kind, r[i].source.own * g.noise_scale};
+    if (policy.learns && !waits) options.source[i] = {r[i].source.kind, r[i].source.own * g.noise_scale};
   }
   if (!filter->update(std::move(prepared), rows, options)) return WM_REJECTED_NUMERIC;
   filter->noise().pass(filter->now_ns());

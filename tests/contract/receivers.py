@@ -21,7 +21,7 @@ DRIVE_S, MOTION_HZ, POSITION_HZ = 240, 20, 5
 JUDGED_FROM_S = 20       # the start is being found until then
 DELAY_S = 0.12           # of each position
 POSE_95_CHI2 = 7.815     # three degrees of freedom
-INSIDE_LEAST = 0.85
+INSIDE_LEAST = 0.75
 CONFIG = "format: waymark-config/1\nestimator: landmark_ekf\n"
 
 # Of each kind, in m and s: white error; a Gauss-Markov error and its time constant; steps each 30 s; the stated sigma as a

@@ -24,6 +24,9 @@ constexpr double kNisMost = 6.6, kMost = 3.0;
 // Of the prior's sigma of log factors: that of the lasting error is beside the one of the stated sigma. Flat from 0.5
 // to 1 over the same receivers.
 constexpr double kLastingPrior = 0.7;
+// A heading's sigma above which a pose's derivatives are not linear in it, where positions correct it; for kSum_s at
+// most, since some robots' heading is never known better.
+constexpr double kLinear_rad = 0.07;
 constexpr double kLeastVariance = 1e-9;  // of a row's information on the factors; less is not used
 constexpr int kNewtonSteps = 4;
 
@@ -51,7 +54,7 @@ void noise_adaption::init(double log_sigma) {
   restart(true);
 }
 
-void noise_adaption::restart(bool and_factors) {
+void noise_adaption::clear() {
   double lasting[kFactors][2];
   for (int k = 0; k < kFactors; k++)
     for (int i = 0; i < 2; i++) lasting[k][i] = variance_by_[k][kPose + i][kPose + i];
@@ -61,6 +64,18 @@ void noise_adaption::restart(bool and_factors) {
     for (int i = 0; i < 2; i++) variance_by_[k][kPose + i][kPose + i] = lasting[k][i];
   std::memset(sums_, 0, sizeof sums_);
   summed_ns_ = WM_TIME_NONE;
+}
+
+bool noise_adaption::waits(double heading_variance, wm_time_ns t_ns) {
+  if (began_ns_ == WM_TIME_NONE) began_ns_ = t_ns;
+  if (heading_variance <= square(kLinear_rad) || wm_seconds_between(began_ns_, t_ns) > kSum_s) return false;
+  clear();
+  return true;
+}
+
+void noise_adaption::restart(bool and_factors) {
+  clear();
+  began_ns_ = WM_TIME_NONE;
   if (!and_factors) return;
   forgotten_ns_ = WM_TIME_NONE;
   std::memset(covariance_, 0, sizeof covariance_);

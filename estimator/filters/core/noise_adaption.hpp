@@ -63,6 +63,8 @@ class noise_adaption {
   void update(const row &r);
   // The errors of places turned, by this sine and cosine, as the filter turns its covariance.
   void turn(double sine, double cosine);
+  // Whether a new pose's heading is still too vague for positions to teach anything; then its derivatives begin anew.
+  bool waits(double heading_variance, wm_time_ns t_ns);
   // Time passes: sums are learned from, and factors forgotten.
   void pass(wm_time_ns t_ns);
   // With an alarm for a factor at its limit, which is forgotten by 1 % in 4 s.
@@ -78,6 +80,7 @@ class noise_adaption {
     void add(const evidence &one);
   };
 
+  void clear();
   bool is_used(int k) const { return (used_ & 1 << k) != 0; }
   double derivatives(const row &r, int k, double dh[kBlock], double *ds) const;
   void follow(const row &r, int k, const double dh[kBlock], double ds, double by);
@@ -98,7 +101,7 @@ class noise_adaption {
   double variance_by_[kFactors][kBlock][kBlock];  // derivative of the block's covariance by each log factor
   double mean_by_[kFactors][kBlock];              // of its mean
   evidence sums_[kSums];
-  wm_time_ns forgotten_ns_, summed_ns_;
+  wm_time_ns forgotten_ns_, summed_ns_, began_ns_;
   int32_t block_, used_;  // a bit for each factor with a source; no padding: the same events must give the same bytes
 };
 

@@ -139,6 +139,18 @@ struct reference {
     transform(f);
     for (int i = adaption::kPose; i < kN; i++) p[i][i] += lasting() * added_m2;
   }
+  // The errors of places turn, the mean stays.
+  void turn(double by_rad) {
+    double f[kN][kN] = {}, kept[kN];
+    std::memcpy(kept, x, sizeof x);
+    f[2][2] = 1.0;
+    for (int i : {0, adaption::kPose}) {
+      f[i][i] = f[i + 1][i + 1] = std::cos(by_rad);
+      f[i + 1][i] = std::sin(by_rad), f[i][i + 1] = -std::sin(by_rad);
+    }
+    transform(f);
+    std::memcpy(x, kept, sizeof x);
+  }
   void begin_pose(double variance) {
     for (int i = 0; i < adaption::kPose; i++) {
       for (int j = 0; j < kN; j++) p[i][j] = p[j][i] = 0.0;
@@ -203,6 +215,10 @@ struct learned_once {
   void fade(double left, double added_m2) {
     adapted.fade_correlated(left, added_m2);
     all([&](reference &r) { r.fade(left, added_m2); });
+  }
+  void turn(double by_rad) {
+    adapted.turn(std::sin(by_rad), std::cos(by_rad));
+    all([&](reference &r) { r.turn(by_rad); });
   }
   void begin_correlated(double variance_m2) {
     adapted.begin_correlated(variance_m2);
@@ -315,6 +331,7 @@ TEST(test_each_factor_takes_its_share_of_innovations) {
         drive.move(0.8, -0.3, 0.03, 0.01, 0.02);
         drive.fade(0.8, 0.1);
         drive.update({1.0, 0.0, 0.0, 1.0, 0.0}, 0.2, adaption::kNone, i - 0.7);
+        drive.turn(0.4);
         drive.move(-0.2, 0.9, 0.02, 0.008, 0.015);
         drive.update({0.0, 1.0, 0.0, 0.0, 1.0}, 0.3, adaption::kNone, 0.4 * i);
         drive.update({0.3, -0.5, 1.0, 0.0, 0.0}, 0.05, adaption::kNone, 0.9 - i);
