@@ -48,8 +48,11 @@ class noise_adaption {
   // The variance's factor; 1 without adaption.
   double scale(int k) const { return scale_[k]; }
   // Of the time-correlated error: a sigma that is stated too small is so of both, one too large of a receiver that
-  // smooths is not.
-  double lasting_scale() const { return scale_[kLasting] * (understates() ? scale_[kPlace] : 1.0); }
+  // smooths is not. No more in all than one factor may be.
+  double lasting_scale() const {
+    const double both = scale_[kLasting] * (understates() ? scale_[kPlace] : 1.0);
+    return both < kMostFactor ? both : kMostFactor;
+  }
   // Of a measurement with this sigma.
   source source_of(int kind, double sigma) const { return {kind, square(sigma) * scale_[kind]}; }
 
