@@ -27,7 +27,7 @@ MISSED = {
     73: ("LCM seek_to_timestamp",),
     75: ("MuJoCo: bodies of a URDF",),
     78: ("pandas: to_datetime of 2026-01-01T00:00:00.500000001",),
-    83: ("first stamp of a .mkv",),
+    83: ("first stamp of a .mkv of H.264",),
     96: ("depthai: matrix of 640 x 480",),
     98: ("adafruit_gps: an RMC of NMEA 2.0",),
     110: ("dpkt: packets of one moment",),

@@ -35,9 +35,9 @@ POSE = ("geometry_msgs/Point position\ngeometry_msgs/Quaternion orientation\n" +
         + "=" * 80 + "\nMSG: geometry_msgs/Quaternion\nfloat64 x 0\nfloat64 y 0\nfloat64 z 0\nfloat64 w 1\n")
 
 
-def video(path, stamps_ms):
+def video(path, stamps_ms, codec="libx264"):
     with av.open(str(path), "w") as file:
-        stream = file.add_stream("libx264", rate=1000)
+        stream = file.add_stream(codec, rate=1000)
         stream.width, stream.height, stream.pix_fmt, stream.codec_context.time_base = 64, 48, "yuv420p", Fraction(1, 1000)
         for k, ms in enumerate(stamps_ms):
             frame = av.VideoFrame.from_ndarray(np.full((48, 64, 3), 20 + 30 * k, np.uint8), format="rgb24")
@@ -88,15 +88,15 @@ def of_times():
 def of_lcm():
     folder = Path(tempfile.mkdtemp())
     found = []
-    for size in (1, 8):
+    for count, size in ((10, 1), (10, 8), (20, 1), (20, 8)):
         log = lcm.EventLog(str(folder / "log"), "w", overwrite=True)
-        for k in range(10):
+        for k in range(count):
             log.write_event(1000000 * k, "A", b"x" * size)
         log.close()
         log = lcm.EventLog(str(folder / "log"), "r")
         log.seek_to_timestamp(4500000)
         found.append(log.read_next_event().timestamp // 1000000)
-    yield "LCM seek_to_timestamp(4.5 s) in a log of whole seconds: the next event", f"{found[0]} s with messages of 1 byte, {found[1]} s with those of 8", LCM, "reads its logs from the begin"
+    yield "LCM seek_to_timestamp(4.5 s) in a log of whole seconds: the next event", f"{found[0]} s with messages of 1 byte, {found[1]} s with those of 8; of 20 events {found[2]} s and {found[3]} s", LCM, "reads its logs from the begin"
     folder.joinpath("scan.lcm").write_text("package measured;\nstruct scan_t { int32_t count; float ranges[count]; }\n")
     subprocess.run([Path(sys.executable).parent / "lcm-gen", "-p", "--ppath", folder, folder / "scan.lcm"], check=True)
     sys.path.insert(0, str(folder))
@@ -122,12 +122,12 @@ def of_videos():
     yield "OpenCV: the picture at 1000 ms of 0, 100, 200, 1000, 1100, 1200 ms", f"that of {position(folder / 'even.mp4', 1000)} ms", CV, ours
     count = sum(1 for _ in imageio.v2.get_reader(str(folder / "even.mp4"), "ffmpeg"))
     yield "imageio: pictures of that video of six", f"{count}, at even times", "imageio 2.38.1, imageio-ffmpeg 0.8.1", ours
-    for ending in ("mp4", "mkv"):
-        video(folder / f"late.{ending}", (1400, 1500))
+    for ending, name, codec in (("mp4", "H.264", "libx264"), ("mkv", "H.264", "libx264"), ("mkv", "MPEG-4", "mpeg4")):
+        video(folder / f"late.{ending}", (1400, 1500), codec)
         with av.open(str(folder / f"late.{ending}")) as file:
             frame = next(file.decode(video=0))
             first = round(1000 * float(frame.pts * frame.time_base))
-        yield f"first stamp of a .{ending} whose first picture is of 1400 ms", f"OpenCV {position(folder / f'late.{ending}')} ms, PyAV {first} ms", f"{CV}, {AV}", "stamps count from the first picture"
+        yield f"first stamp of a .{ending} of {name} whose first picture is of 1400 ms", f"OpenCV {position(folder / f'late.{ending}')} ms, PyAV {first} ms", f"{CV}, {AV}", "stamps count from the first picture"
     yield from _of_pictures(folder)
 
 

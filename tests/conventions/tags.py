@@ -55,9 +55,9 @@ def rows():
     turn = np.degrees(np.arctan2(pose.pose_R[1, 0], pose.pose_R[0, 0]))
     yield "AprilTag: turn of OpenCV's upright print of a tag36h11", f"{abs(turn):.0f} degrees", april, "the four oldest families are read as OpenCV draws them ([families](detectors/markers.md))"
     yield "AprilTag: place of column 0", convention(plain.corners), april, ours
-    for name in ("SUBPIX", "APRILTAG"):
+    for name, do in (("SUBPIX", "the same origin: its corners are taken as they are"), ("APRILTAG", "corners need half a pixel subtracted: 0 is the pixel's side there")):
         x = offset(opencv(image, name))
-        yield f"OpenCV: mean of the corners with CORNER_REFINE_{name}", f"{x[0]:+.1f}, {x[1]:+.1f} px from where 0 is the left side of the first pixel", cv, "takes corners of others as they are stated: subtract half a pixel where theirs are of the pixel's side"
+        yield f"OpenCV: mean of the corners with CORNER_REFINE_{name}, of one print", f"{x[0]:+.1f}, {x[1]:+.1f} px from where 0 is the left side of the first pixel", cv, do
     square = np.full((480, 640), 255, np.uint8)
     square[120:280, 100:260] = cv2.aruco.generateImageMarker(FAMILY, 7, 160, borderBits=1)
     for name in ("NONE", "APRILTAG"):

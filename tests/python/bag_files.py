@@ -138,10 +138,10 @@ def image(t_ns, frame, picture, encoding, step=0, big=0, height=None, width=None
                   step=step or data.nbytes // rows, is_bigendian=big, data=data.view(np.uint8).ravel())
 
 
-def camera_info(t_ns, frame, size=(64, 48), k=(50, 51, 32, 24), d=(), model="plumb_bob", p=None, **more):
+def camera_info(t_ns, frame, size=(64, 48), k=(50, 51, 32, 24), d=(), model="plumb_bob", p=None, r=np.eye(3).ravel(), **more):
     """A sensor_msgs/CameraInfo; k and p as fx, fy, cx, cy."""
     fx, fy, cx, cy = k
     px = (0, 0, 0, 0) if p is None else p
     return M.make("CameraInfo", header=M.header(t_ns, frame), width=size[0], height=size[1], distortion_model=model, d=np.array(d, dtype=float),
-                  k=np.array([fx, 0, cx, 0, fy, cy, 0, 0, 1.0 if fx else 0.0]), r=np.eye(3).ravel(),
+                  k=np.array([fx, 0, cx, 0, fy, cy, 0, 0, 1.0 if fx else 0.0]), r=r,
                   p=np.array([px[0], 0, px[2], 0, 0, px[1], px[3], 0, 0, 0, 1.0, 0]), **more)

@@ -140,7 +140,7 @@ class Landmarks(Folder):
         table = {"id": np.array([1, 2]), "x_m": np.zeros(2), "y_m": np.ones(2)}
         waymark.write_landmarks(self.folder / "a.csv", table)
         self.assertEqual(waymark.read_landmarks(self.folder / "a.csv")["sigma_m"].tolist(), [0.05, 0.05])
-        for changed, text in (({"id": np.array([2, 2])}, "twice"), ({"x_m": np.array([0, np.nan])}, "not finite")):
+        for changed, text in (({"id": np.array([2, 2])}, "twice"), ({"id": np.array([1.5, 2])}, "whole"), ({"x_m": np.array([0, np.nan])}, "not finite")):
             with self.assertRaisesRegex(ValueError, text):
                 waymark.write_landmarks(self.folder / "b.csv", {**table, **changed})
         with self.assertRaisesRegex(ValueError, "y_m"):
@@ -148,6 +148,17 @@ class Landmarks(Folder):
 
 
 class Recordings(Folder):
+    def test_a_rate_that_no_header_holds_is_refused(self):
+        with waymark.RecordingWriter(self.folder / "rate") as writer:
+            for rate_hz in (np.inf, 1e-9, 1e30):
+                with self.subTest(rate_hz), self.assertRaisesRegex(ValueError, "rate"):
+                    writer.picture("front", 1, np.zeros((8, 8), dtype=np.uint8), rate_hz=rate_hz)
+
+    def test_a_table_of_ones_own_needs_no_stamps(self):
+        with waymark.RecordingWriter(self.folder / "own") as writer:
+            writer.table("mine.csv", {"arrival_ns": np.array([2, 1]), "x_m": np.array([1.0, 2.0])})
+        self.assertEqual(waymark.Recording(self.folder / "own").table("mine.csv")["x_m"].tolist(), [2.0, 1.0])
+
     def test_a_recording_written_from_arrays_is_localized_and_checked(self):
         """A robot that drives along a circle of 2 m past six landmarks, in 20 lines of numpy."""
         t = np.arange(0, 20, 0.02)

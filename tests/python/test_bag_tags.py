@@ -383,6 +383,13 @@ class Rectified(BagTest):
             _, found = self.corners(info, "--tags", "raw", out=f"{name}-raw")
             np.testing.assert_allclose(found, as_read, atol=1e-9)
 
+    def test_corners_are_refused_where_the_rectification_is_no_number(self):
+        lens = {"k": (150, 150, 160, 120), "d": (-0.3, 0.1, 0, 0, 0)}
+        for name, info in (("p", lens | {"p": (np.nan, 141, 155, 118)}), ("r", lens | {"p": (140, 141, 155, 118), "r": np.full(9, np.nan)})):
+            text, folder = self.take(april_events(self.POINTS, info=info).mcap(self.folder / "a.mcap"), out=name)
+            self.assertIn("P or R of its camera's camera_info is not a number", text)
+            self.assertEqual(list(folder.glob("marker-corners*.csv")), [])
+
     def test_where_both_pictures_are_the_same_nothing_is_done(self):
         as_read = (self.POINTS - 0.5)[[1, 0, 3, 2]]
         for i, info in enumerate(({"k": (150, 150, 160, 120)}, {"k": (150, 150, 160, 120), "p": (150, 150, 160, 120)},

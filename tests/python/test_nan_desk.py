@@ -26,18 +26,22 @@ from waymark_fleet import comparison, html, plan, statistics
 from waymark_hil import HilError, compare, fault_judge, lcm_log, page, poses, verdict
 
 from waymark import geometry, mavlink, ros
-from waymark.bag import clocks, frames, lens_fit, motion, tags
+from waymark.bag import clocks, frames, lens_fit, lenses, motion, motion_takers, tags
 from waymark.bag import samples as bag_samples
+from waymark.bag.cameras import Found
+from waymark.bag.decoding import BadMessage
 from waymark.causes import changes, fault
 from waymark.mcapio import estimates, place, streams
 from waymark.suggest import command as suggest_command
-from waymark.suggest import drive, parameters
+from waymark.suggest import drive, parameters, search
 
-nans.REFUSALS = (HilError, plan.PlanError)
+nans.REFUSALS = (HilError, plan.PlanError, BadMessage)
 MESSAGES = ros.Messages()
 T = np.array([10, 20], dtype=np.int64)
 ROTATION = geometry.from_rpy(0.1, 0.2, 0.3)
 POSE = geometry.pose([1.0, 2.0, 3.0], [0.0, 0.0, 0.6, 0.8])
+INTRINSICS = np.array([500.0, 0.0, 320.0, 0.0, 500.0, 240.0, 0.0, 0.0, 1.0])
+PROJECTION = np.array([450.0, 0.0, 320.0, 0.0, 0.0, 450.0, 240.0, 0.0, 0.0, 0.0, 1.0, 0.0])
 RAYS = np.array([[0.1, 0.2], [0.3, -0.1]])
 PLANE = {f"cov_{name}": np.array([1.0, 1.0]) for name in ("xx", "xy", "yy", "xt", "yt", "tt")} | {"cov_xy": np.zeros(2), "cov_xt": np.zeros(2), "cov_yt": np.zeros(2)}
 PLACES = {"t_ns": T, "x_m": np.array([1.0, 2.0]), "y_m": np.array([0.0, 1.0])}
@@ -66,6 +70,51 @@ def sampled(*values):
     out = bag_samples.Samples(3, "base", "base")
     out.add(1, 2, values)
     return out.values
+
+
+def odometry(twist, variances):
+    """What is read of a message's twist where the variance of its sideways speed says that it is not measured."""
+    linear, angular = (types.SimpleNamespace(**dict(zip("xyz", part))) for part in (twist[:3], twist[3:]))
+    where, turn = types.SimpleNamespace(x=0.0, y=0.0, z=0.0), types.SimpleNamespace(x=0.0, y=0.0, z=0.0, w=1.0)
+    header, covariance = types.SimpleNamespace(stamp=types.SimpleNamespace(sec=1, nanosec=0), frame_id="odom"), np.diag(variances).ravel()
+    message = types.SimpleNamespace(header=header, child_frame_id="base", pose=types.SimpleNamespace(pose=types.SimpleNamespace(position=where, orientation=turn)),
+                                    twist=types.SimpleNamespace(twist=types.SimpleNamespace(linear=linear, angular=angular), covariance=covariance))
+    rows = []
+    motion_takers.odometry(types.SimpleNamespace(sample=lambda *given: rows.append(given[-1])), "/odom", message, 1)
+    return rows[0][7:]
+
+
+def camera_info(k, p, r, d):
+    return types.SimpleNamespace(width=640, height=480, roi=types.SimpleNamespace(width=0, height=0, x_offset=0, y_offset=0), binning_x=0, binning_y=0,
+                                 distortion_model="plumb_bob", k=k, p=p, r=r, d=d)
+
+
+def lens(message, is_rectified):
+    found = lenses.of(message, is_rectified, (640, 480))
+    if found.entry is None:
+        raise ValueError(found.notes[-1])
+    return found
+
+
+def moved_corner(*given):
+    """A corner of a rectified picture in the raw one."""
+    message = camera_info(*given)
+    return tags.to_raw(Found("eye", lens(message, False), "eye", (), message), np.array([[100.0, 100.0]]))
+
+
+def written_motion(*twist):
+    """The rows of a drive of three messages, of which the second has this twist."""
+    written = []
+    into = types.SimpleNamespace(note=lambda *words: None, writer=types.SimpleNamespace(table=lambda name, table: written.append(table)))
+    times = np.array([10, 20, 30], dtype=np.int64)
+    motion.write(into, motion.Motion("/odom", times, times, np.array([[0.5, 0.2, 0.0, 0.0, 0.0, 0.1], twist, [0.5, 0.2, 0.0, 0.0, 0.0, 0.1]])), False)
+    if len(written[0]["t_ns"]) < len(times):
+        raise ValueError("the message is left out")
+    return written
+
+
+def scored(fit):
+    return drive.Score(np.ones((2, 30)), np.ones((2, 30)), fits={(split, 0, 1, "range"): tuple(fit) for split in range(3)}, caps={(0, 1, "range"): 1.0})
 
 
 def posed(x, y, qz, qw, xx, yy):
@@ -127,6 +176,12 @@ CASES = {
     "bag.clocks.seconds": (clocks.seconds, [2e9]),
     "bag.frames.mounting": (frames.mounting, [POSE[:3]]),
     "bag.frames.camera_pose": (lambda matrix: frames.camera_pose("eye", matrix), [POSE]),
+    "bag.lenses.of": (lambda k: lens(camera_info(k, np.zeros(12), np.zeros(9), np.zeros(5)), False).entry, [INTRINSICS]),
+    "bag.lenses.of: distortion": (lambda d: lens(camera_info(INTRINSICS, np.zeros(12), np.zeros(9), d), False).entry, [np.array([0.1, 0.01, 0.001, 0.002])]),
+    "bag.lenses.of: rectified": (lambda p: lens(camera_info(INTRINSICS, p, np.eye(3).ravel(), np.zeros(5)), True).entry, [PROJECTION]),
+    "bag.tags.to_raw": (moved_corner, [INTRINSICS, PROJECTION, geometry.from_rpy(0.02, 0.01, 0.03).ravel(), np.array([0.1, 0.01, 0.001, 0.002])]),
+    "bag.motion_takers.odometry": (lambda *twist: odometry(twist, np.full(6, 0.01)), [0.5, 0.1, 0.0, 0.0, 0.0, 0.1]),
+    "bag.motion.write": (written_motion, [0.5, 0.2, 0.0, 0.0, 0.0, 0.1]),
     "bag.lens_fit.rational": (lens_fit.rational, [np.array([0.1, 0.0, 0.01, 0.0]), RAYS]),
     "bag.lens_fit.radtan": (lens_fit.radtan, [[0.1, 0.0, 0.01, 0.0], RAYS]),
     "bag.lens_fit.equidistant": (lens_fit.equidistant, [[0.1, 0.0, 0.01, 0.0], RAYS]),
@@ -139,6 +194,9 @@ CASES = {
     "causes.changes.stretched": (lambda rate: changes.stretched("a.csv", "t_ns", rate, 5).apply(b"t_ns\n100\n"), [0.1]),
     "causes.changes.numbers": (changes.numbers, [[1.0, 2.0]]),
     "causes.changes.degrees": (changes.degrees, [1.0]),
+    "causes.fault.Clock.original": (lambda size: fault.Clock("eye", 0).original((size,)), [0.1]),
+    "causes.fault.Clock.original: rate": (lambda size: fault.Clock("eye", 0, True).original((size,)), [0.1]),
+    "causes.fault.Clock.later_s": (lambda size: fault.Clock("eye", 0).later_s((size,)), [0.1]),
     "causes.fault.Fault.by_states": (GIVEN.by_states, [{"speed_scale": 1.1}]),
     "causes.fault.Fault.moved": (lambda size, way: GIVEN.moved((size,), 0, way), [1.1, 0.1]),
     "causes.fault.Fault.unit": (lambda size: GIVEN.unit((size,)) or np.nan, [1.1]),
@@ -171,6 +229,9 @@ CASES = {
     "ros.Messages.cloud: is_dense": (lambda xyz: MESSAGES.cloud(5, "a", xyz).is_dense or np.nan, [np.ones((2, 3))]),
     "ros.Messages.colour": (MESSAGES.colour, [0.1, 0.2, 0.3, 0.4]),
     "suggest.drive.differences": (drive.differences, [{"observed": np.array([1.0]), "expected": np.array([0.5]), "residual": np.array(["range"])}]),
+    "suggest.search.residuals_of": (lambda fit: [(found.rms, found.refused, found.nis) for found in search.residuals_of(scored(fit), 0, search.ALL).values()],
+                                    [[10.0, 1.0, 2.0, 8.0]]),
+    "suggest.search.growth_of": (lambda squares, later: search.growth_of(scored([10.0, 1.0, squares, 8.0]), scored([10.0, 1.0, later, 8.0]), search.ALL), [2.0, 3.0]),
     "suggest.parameters.Parameter.trials": (NOISE.trials, [0.02, 2.0]),
     "suggest.parameters.Parameter.between": (NOISE.between, [0.04, 0.5]),
     # waymark_hil
@@ -208,7 +269,7 @@ WITHOUT = {
         "NaN is absent: windows, updates and samples without a number are left out": "bag.clocks.goes_on bag.stuck.repeats bag.stuck.limit bag.compare.held bag.compare.Likeness.differs bag.compare.likeness "
                                  "bag.compare.turns bag.compare.moves bag.collection.Collection.sample causes.trial.likelihoods causes.trial.judged causes.plan.judged mcapio.estimates.bounds "
                                  "mcapio.estimates.hypotheses mcapio.place.landmarks",
-        "of calibrations and transforms, which are refused where one is NaN": "bag.frames.is_optical bag.tags.to_raw",
+        "of calibrations and transforms, which are refused where one is NaN": "bag.frames.is_optical",
         "corners, whose reader refuses NaN": "bag.tags.of_another_picture",
         "poses, of which those of NaN are left out before": "bag.course.contradiction",
         "written by the table of mistakes": "causes.fault.discrete",
@@ -236,6 +297,10 @@ FOLDERS = {"waymark": "tools/python/src/waymark", "waymark_hil": "tools/hil/waym
 
 
 class Numbers(unittest.TestCase):
+    def test_a_variance_of_nan_hides_none_that_marks_a_speed_as_not_measured(self):
+        for marked in (-1.0, 1e9):
+            self.assertTrue(np.isnan(odometry([0.5, 0.1, 0.0, 0.0, 0.0, 0.1], [0.01, marked, np.nan, 0.01, 0.01, 0.01])[1]))
+
     def test_a_nan_comes_out_or_is_refused(self):
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Motion JPEG in AVI, the video of recordings: the JPEGs as they are."""
 
-import math
 import struct
 from collections.abc import Iterator
 from pathlib import Path
 
 _HEAD = struct.Struct("<4sI")
+_RATE_HZ = 0.001, 4e6  # of the header's numbers of 32 bits
 
 
 def read_jpegs(path: str | Path) -> Iterator[bytes]:
@@ -37,8 +37,8 @@ class AviWriter:
     _LIMIT = 2**32 - 2**20  # of RIFF's 32-bit lengths
 
     def __init__(self, path: str | Path, width: int, height: int, rate_hz: float):
-        if math.isnan(rate_hz):
-            raise ValueError(f"{path}: the rate of its pictures is no number")
+        if not (rate_hz <= 0 or _RATE_HZ[0] <= rate_hz <= _RATE_HZ[1]):
+            raise ValueError(f"{path}: the rate of its pictures is {rate_hz} Hz; {_RATE_HZ[0]} to {_RATE_HZ[1]:.0f} can be written")
         self._path = path
         self._file = Path(path).open("wb")
         self._count = 0

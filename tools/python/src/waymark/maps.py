@@ -16,7 +16,7 @@ import yaml
 from PIL import Image
 
 from .documents import read_yaml
-from .tables import Array, Table, read_table, write_table
+from .tables import Array, Table, as_column, read_table, write_table
 
 FREE, OCCUPIED, UNKNOWN = 0, 100, -1
 """Values of `FloorPlan.cells`, as nav_msgs/OccupancyGrid has them."""
@@ -196,9 +196,7 @@ def write_landmarks(path: str | Path, table: Table) -> None:
     if missing:
         raise ValueError(f"{path}: landmarks need the column {missing[0]}")
     count = len(table["id"])
-    if not np.isfinite(np.asarray(table["id"], dtype=np.float64)).all():
-        raise ValueError(f"{path}: an identity is not a number")
-    out: Table = {"id": np.asarray(table["id"], dtype=np.int64), "x_m": np.asarray(table["x_m"]), "y_m": np.asarray(table["y_m"]),
+    out: Table = {"id": as_column("id", table["id"], str(path)).astype(np.int64), "x_m": np.asarray(table["x_m"]), "y_m": np.asarray(table["y_m"]),
                   "z_m": np.asarray(table.get("z_m", np.zeros(count)))}
     if "sigma_m" in table:
         out["sigma_m"] = np.asarray(table["sigma_m"])

@@ -270,7 +270,7 @@ class RecordingWriter:
         path = self.path / name
         path.parent.mkdir(parents=True, exist_ok=True)
         write_table(path, table)
-        if key is not None and len(key):
+        if "t_ns" in table and len(table["t_ns"]):
             self._times += [int(table["t_ns"].min()), int(table["t_ns"].max())]
         self._streams.append(name)
 

@@ -89,6 +89,8 @@ def of(message: Any, is_rectified: bool, size: tuple[int, int] | None) -> Lens:
     if not is_rectified and not has_raw(message):
         return Lens(None, ["its camera_info has P, the lens of rectified pictures, alone, and its pictures are raw by their name: the lens is left out"])
     k, p, d = values(message, "k"), values(message, "p"), values(message, "d")
+    if is_rectified and not np.isfinite(p).all():
+        return Lens(None, ["P of its camera_info is not a number, and its pictures are rectified: the lens is left out"])
     raw = np.array([k[0], k[4], k[2], k[5]])
     has_p = has_rectified(message)
     matrix = np.array([p[0], p[5], p[2], p[6]]) if is_rectified and has_p else raw

@@ -379,12 +379,18 @@ def _increments(t: Array, arrival: Array, places: Array, heading: Array) -> Tabl
     return {"t_ns": t[1:], "from_ns": t[:-1], "dx_m": c * dx + s * dy, "dy_m": c * dy - s * dx, "dheading_rad": turn, "arrival_ns": arrival[1:]}
 
 
+def _is_whole(twist: Array) -> Array:
+    """Which rows have all their numbers; of a column without any but 0 and 5 the sensor has none."""
+    lacks = np.isnan(twist).all(axis=0) & ~np.isin(np.arange(6), (0, 5))
+    return np.asarray((np.isfinite(twist) | lacks).all(axis=1))
+
+
 def _twists(motion: Motion) -> tuple[str, Table]:
     """motion.csv, or motion6.csv where the robot moves sideways, vertically or leans."""
     twist = motion.twist.copy()
+    ok = _is_whole(twist)
     twist[:, np.nan_to_num(np.abs(twist)).max(axis=0) < _FLAT] = 0.0
-    ok = np.isfinite(twist[:, [0, 5]]).all(axis=1)
-    t, twist, arrival = motion.t_ns[ok], np.nan_to_num(twist[ok]), motion.arrival_ns[ok]
+    t, twist, arrival = motion.t_ns[ok], twist[ok], motion.arrival_ns[ok]
     if twist[:, 1:5].any():
         names = ("vx_mps", "vy_mps", "vz_mps", "wx_radps", "wy_radps", "wz_radps")
         return "motion6.csv", {"t_ns": t, **dict(zip(names, twist.T)), "arrival_ns": arrival}
@@ -396,7 +402,7 @@ def write(into: Collection, motion: Motion, has_gyro: bool) -> None:
     if not np.nan_to_num(motion.twist).any():
         into.refuse(motion.topic, "its twist is always 0" + (", and its poses stand still" if motion.poses is not None else ""))
         return
-    missing = int((~np.isfinite(motion.twist[:, [0, 5]]).all(axis=1)).sum())
+    missing = int((~_is_whole(motion.twist)).sum())
     if missing and not motion.by_poses:
         into.note(motion.topic, f"{missing} of its {len(motion.t_ns)} messages have no number as speed or turn rate: left out")
     usual = np.median(np.diff(motion.t_ns)) if len(motion.t_ns) > 1 else 0

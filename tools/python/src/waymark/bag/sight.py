@@ -166,12 +166,16 @@ def _write_tags(into: Collection, found: list[cameras.Found], rectified: bool | 
         columns = rows.columns()
         columns[0], columns[-1] = into.clocks[topic](columns[0], columns[-1])
         if rows.has_corners:
-            of_corners.add(name)
             pixels = np.stack(columns[2:10], axis=1).reshape(-1, 4, 2)
             if camera and camera.lens.entry and (said := tags.of_another_picture(camera.lens.entry, pixels)):
                 into.find(topic, f"{said} Write the lens of the pictures that the detector read into calibration.yaml")
             if camera and (tags.READERS[rows.kind].is_of_rectified if rectified is None else rectified):
-                columns = _in_raw(into, topic, camera, columns, is_said=rectified is not None)
+                try:
+                    columns = _in_raw(into, topic, camera, columns, is_said=rectified is not None)
+                except BadMessage as problem:
+                    into.refuse(topic, str(problem))
+                    continue
+            of_corners.add(name)
             if camera and camera.lens.entry:
                 written["marker-corners.csv"].append(tags.corner_table(columns, name))
             else:

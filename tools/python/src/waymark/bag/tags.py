@@ -242,15 +242,20 @@ def of_another_picture(entry: dict[str, Any], pixels: Array) -> str:
 
 
 def to_raw(camera: Found, pixels: Array) -> Array | None:
-    """Pixels (n, 2) of the rectified picture as those of the pictures that the recording's lens is of; None where nothing has to be done."""
+    """Pixels (n, 2) of the rectified picture as those of the pictures that the recording's lens is of; None where nothing has to be done.
+    BadMessage: P or R of the camera_info is not a number."""
     entry = camera.lens.entry
-    if entry is None or camera.info is None or camera.is_rectified or not lenses.has_rectified(camera.info):
+    if entry is None or camera.info is None or camera.is_rectified:
+        return None
+    turn = lenses.values(camera.info, "r")
+    if not np.isfinite([*turn, *lenses.values(camera.info, "p")]).all():
+        raise BadMessage("P or R of its camera's camera_info is not a number: nothing says where its corners are in the raw picture; `--tags raw` takes them as they are")
+    if not lenses.has_rectified(camera.info):
         return None
     straight = lenses.of(camera.info, True, (entry["size"][0], entry["size"][1])).entry
     if straight is None or (straight["intrinsics"] == entry["intrinsics"] and not any(entry["distortion"]) and entry["model"] == "pinhole-radtan"):
         return None
     fx, fy, cx, cy = straight["intrinsics"]
-    turn = lenses.values(camera.info, "r")
     rays = np.column_stack([(pixels[:, 0] - cx) / fx, (pixels[:, 1] - cy) / fy, np.ones(len(pixels))])
     if len(turn) == 9 and abs(np.linalg.det(turn.reshape(3, 3)) - 1) < 1e-3:
         rays = rays @ turn.reshape(3, 3)  # R turns rays of the raw camera into those of the rectified one

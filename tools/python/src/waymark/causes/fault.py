@@ -35,7 +35,7 @@ class Clock:
 
     def later_s(self, size: Size) -> float:
         """How much later a source's stamps become, s; 0: earlier."""
-        return 0.0 if self.is_rate else max(0.0, size[0])
+        return 0.0 if self.is_rate else max(size[0], 0.0)  # NaN stays
 
     def is_of(self, source: str) -> bool:
         """Whether it moves this source."""

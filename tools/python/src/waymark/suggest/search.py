@@ -90,7 +90,7 @@ def residuals_of(score: Score, channel: int, splits: list[bool]) -> dict[tuple[i
         sums = np.sum([score.fits[split, channel, source, name] for split in range(SPLITS) if splits[split]], 0)
         count, refused, squares, nis = (float(s) for s in sums)
         if count:
-            out[source, name] = Residual(source, name, count, math.sqrt(squares / count), refused / count, nis / max(1.0, count - refused))
+            out[source, name] = Residual(source, name, count, math.sqrt(squares / count), refused / count, nis / max(count - refused, 1.0))
     return out
 
 
@@ -99,9 +99,9 @@ def growth_of(before: Score, after: Score, splits: list[bool]) -> float:
     worst = 0.0
     for channel in (NEXT, AFTER_GAP):
         now, then = residuals_of(before, channel, splits), residuals_of(after, channel, splits)
-        pairs = [(now[k].count, math.log(then[k].rms / now[k].rms)) for k in now.keys() & then.keys() if now[k].rms > 0 and then[k].rms > 0]
+        pairs = [(now[k].count, math.log(then[k].rms / now[k].rms)) for k in now.keys() & then.keys() if not (now[k].rms <= 0 or then[k].rms <= 0)]
         if pairs:
-            worst = max(worst, math.exp(sum(n * log for n, log in pairs) / sum(n for n, _ in pairs)))
+            worst = float(np.maximum(worst, math.exp(sum(n * log for n, log in pairs) / sum(n for n, _ in pairs))))  # NaN stays
     return worst
 
 
