@@ -56,7 +56,7 @@ def main():
     assert hashlib.sha256(BAG.read_bytes()).hexdigest() == SHA256
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        assert import_main([str(BAG), "--out", str(folder / "rec"), "--truth", "/odom"]) == 0
+        assert import_main([str(BAG), "--out", str(folder / "rec"), "--motion", "/odom", "--truth", "/odom"]) == 0
         recording = waymark.Recording(folder / "rec")
         motion, truth = recording.table("motion.csv"), recording.table("truth.csv")
         assert len(motion["t_ns"]) == len(truth["t_ns"]) == 2639 and "arrival_ns" not in motion

@@ -338,7 +338,7 @@ def choose(into: Collection, given: argparse.Namespace, base: str) -> Motion | N
     poses = into.samples.get("poses", {})
     if given.motion in poses:
         found.append(_poses_alone(into, given.motion, poses[given.motion]))
-    found = [motion for motion in found if len(motion.t_ns) and motion.topic != given.truth]
+    found = [motion for motion in found if len(motion.t_ns) and (motion.topic != given.truth or motion.topic == given.motion)]
     if given.motion and given.motion not in {motion.topic for motion in found}:
         raise NoSuchTopic("--motion", given.motion, {motion.topic for motion in found} | set(poses))
     if not found:
