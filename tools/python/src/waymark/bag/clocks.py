@@ -329,11 +329,11 @@ def excess(t_ns: Array, end_ns: int) -> int:
     return int(t_ns[i] - t_ns[i - 1] - np.median(np.diff(t_ns))) if 0 < i < len(t_ns) else 0
 
 
-def goes_on(t_ns: Array, places: Array, end_ns: int) -> bool:
-    """Whether poses move on over a silence as over any other step."""
+def goes_on(t_ns: Array, places: Array, end_ns: int) -> bool | None:
+    """Whether poses move on over a silence as over any other step. None: they are too few, or stand."""
     i = int(np.searchsorted(t_ns, end_ns)) - 1
     if i < 3 or i + 4 > len(t_ns):
-        return False
+        return None
     steps = np.linalg.norm(np.diff(places[i - 3:i + 5], axis=0), axis=1)
     usual = float(np.median(np.delete(steps, 3)))
-    return 1e-4 < usual and float(steps[3]) <= 3 * usual
+    return float(steps[3]) <= 3 * usual if usual > 1e-4 else None

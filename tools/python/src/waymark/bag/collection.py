@@ -97,7 +97,8 @@ class Collection:
         text = f"no topic has a message for {seconds(end_ns - begin_ns)} from {(begin_ns - self._first_ns()) / 1e9:.2f} s on"
         if any((a.begin_ns or 0) < end_ns and (a.end_ns or end_ns) > begin_ns for a in self.absent):
             return None  # the bag's files are named with what they lack
-        moved = [by for t_ns, _, values in poses if goes_on(t_ns, values[:, :3], end_ns) and (by := excess(t_ns, end_ns)) > GAP_NS]
+        judged = [(by, goes_on(t_ns, values[:, :3], end_ns)) for t_ns, _, values in poses if (by := excess(t_ns, end_ns)) > GAP_NS]
+        moved = [by for by, on in judged if on and not any(other is False for _, other in judged)]
         if not moved and end_ns - begin_ns <= SET_NS:
             if end_ns - begin_ns > PAUSE_NS:
                 self.note("clock", f"{text}: a pause of the recorder, or a clock that was set; the times are kept")
