@@ -129,8 +129,8 @@ planar_filter::delayed planar_filter::delay_of(const innovation &of) {
       after.u += now.u_by[k] * step[state];
       after.w += now.w_by[k] * step[state];
     }
-  const double speed2 = square(now.v) + square(now.u), turn2 = square(turn) * speed2;
-  const double moved_m2ps2 = square(after.v - now.v) + square(after.u - now.u) + turn2;
+  const double speed2 = square(now.v) + square(now.u);
+  const double moved_m2ps2 = square(after.v - now.v) + square(after.u - now.u) + square(turn) * speed2;
   const double place_m2 = variance(kX) < variance(kY) ? variance(kX) : variance(kY), own = variance(out.state);
   const double turned_m2 = square(step[out.state]) * speed2 * variance(kHeading);
   if (own * moved_m2ps2 + turned_m2 < kTurned * place_m2 &&
@@ -151,8 +151,9 @@ void planar_filter::turn_delay(const delayed &d, double turn_rad) {
 }
 
 // The states' regression on the delay, with the lag given, is a share of the derivatives `by`, which have turned with
-// the errors: other observations determine the states, too. The share stays, and the derivatives become `after`; so
-// does it of the way since then, which the heading turns. The regression on the lag is the prediction's.
+// the errors: other observations determine the states, too. The share stays, and the derivatives become `after`. The
+// heading turns the way since then, which the delay's step made longer: that derivative changes by the same share. The
+// regression on the lag is the prediction's.
 void planar_filter::turn_delay(const delayed &d, double turn_rad, int first, int count) {
   const int lag = motion_state_[kLag];
   const double by_lag = lag >= 0 && variance(lag) > 0.0 ? covariance(lag, d.state) / variance(lag) : 0.0;

@@ -74,17 +74,18 @@ class planar_filter : public planar_motion {
 
  private:
   void adapt(const innovation &i, const sparse_row *rows, const update_options &options);
-  // What positions observe is a pose before now. Its error on its own axes is what an update leaves as it is
-  // [Barrau2017]; the present pose, whose way from there has the twist and the delay in it, takes what these changed.
-  // At a constant twist, a delay and a shift of the pose along the twist give the same observations: this direction of
-  // the state is not observable. Were it left as it was, noise would add information on the delay [Huang2010].
+  // A position shows where the antenna was a delay ago. An update keeps the error of that past pose, on the robot's
+  // axes [Barrau2017]. The error of the present pose follows from it by the way driven since then, which the update
+  // changes: its delay, its twist and its heading. At a constant twist, a delay and a shift of the pose along the twist
+  // give the same observations: this direction of the state is not observable. If it did not turn with the twist, noise
+  // would add information on the delay [Huang2010].
   struct delayed {
     int state;                                   // of the delay; -1: none
     double step;                                 // its change, s
     double by[kPoseStates], after[kPoseStates];  // derivatives of the pose by it before the update's step, and after
   };
-  delayed delay_of(const innovation &of);  // between the update's solution and its step
-  void bend_step(double turn_rad, double x_m, double y_m);
+  delayed delay_of(const innovation &of);                   // between the update's solution and its step
+  void bend_step(double turn_rad, double x_m, double y_m);  // the place's step (x_m, y_m), beside a turn, along an arc
   void turn_errors(int first, double by_rad);  // of a vector on map's axes, two states from `first` on; not its value
   void turn_delay(const delayed &d, double turn_rad);
   void turn_delay(const delayed &d, double turn_rad, int first, int count);

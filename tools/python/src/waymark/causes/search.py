@@ -30,7 +30,7 @@ GAIN_MIN = 0.1  # nats an update, over no mistake
 APART_MIN = 0.02  # nats an update, over another cause: below, the drive does not tell them apart
 # A drive is right with: 14 % of the updates refused, a mean square of 1.34, lost for 0.5 %: the most of 29 good drives.
 EXPLAINED_MIN, SQUARES_MOST, LOST_MOST, DEGRADED_MOST = 0.85, 1.7, 0.02, 0.2
-LOST_STATES = 0.8  # share of the time for which a drive's pose is lost, whose states tell nothing: they took nothing up
+LOST_STATES = 0.8  # share of a drive for which its pose is lost; beyond it, its calibration states were not estimated and propose no size
 STATES_APART = math.log(NAMED_FROM / (1 - NAMED_FROM))  # nats of calibration states
 # Gain, in nats, from which a mistake that few observations show is named. By chance a gain of g nats has odds of exp(-g). The number of
 # pairs that are tried, and errors that last, use up a part of it.
