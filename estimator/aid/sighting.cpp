@@ -244,17 +244,20 @@ expected_sighting sighting_aid::expect(const planar_filter &filter, const view &
                     setup_->landmarks[at.landmark].p_m, components);
 }
 
-sighting_aid::lent_slots sighting_aid::lend_states(int sensor, int landmark, planar_filter *filter) {
+sighting_aid::lent_slots sighting_aid::lend_states(const view &at, planar_filter *filter) {
   lent_slots out;
   const wm_time_ns t_ns = filter->now_ns();
-  const int64_t key = static_cast<int64_t>(landmark) * kMaxSensors + sensor;
-  const double tau_s = params().correlated_tau_s;
+  const int landmark = at.landmark;
+  const int64_t of_pair = static_cast<int64_t>(landmark) * kMaxSensors + at.s.sensor;
+  const bool alone = !at.reading.bearing && error_.bearing >= 0 && error_.range >= 0;
+  const double tau_s = params().correlated_tau_s, taus_s[] = {alone ? kOfAnchor_s : tau_s, tau_s};
   wm_time_ns &seen_ns = seen_ns_[static_cast<size_t>(landmark)];
   const double since_s = seen_ns == WM_TIME_NONE ? kVisit_s + tau_s : wm_seconds_between(seen_ns, t_ns);
   seen_ns = t_ns;
   out.repeated_error = repeated_variance(2.0 * tau_s, since_s);
   out.repeated_map = repeated_variance(kVisit_s, since_s);
-  out.error = errors_.lend(filter, key, error_.width, tau_s, kKept_s, t_ns);
+  out.error = errors_.lend(filter, 2 * of_pair + alone, error_.width, taus_s, kKept_s, t_ns);
+  out.of_anchor = alone && out.error >= 0 ? out.error + error_.bearing : -1;
   out.map = -1;
   const double sigma = map_sigma(landmark);
   if (!(sigma > 0.0)) return out;
@@ -293,8 +296,13 @@ void sighting_aid::add_errors(const view &at, const lent_slots &lent, const row_
     r->row.add(state, derivative);
     r->record.expected += derivative * filter.value(state);
   };
+  const auto add_error = [&](int state, double size) {
+    add_state(state, size);
+    r->source.own += square(size) * filter.variance(state);
+  };
+  if (lent.of_anchor >= 0) add_error(lent.of_anchor, of.error_size);
   if (lent.error >= 0 && of.error_offset >= 0)
-    add_state(lent.error + of.error_offset, of.error_size);
+    add_error(lent.error + of.error_offset, of.error_size);
   else
     r->noise += lent.repeated_error * square(of.error_size);
   if (lent.map >= 0) {
@@ -376,11 +384,13 @@ int sighting_aid::put_rows(const view &at, const expected_sighting &e, const wm_
                            planar_filter *filter, residual rows[3]) {
   const wm_sighting &s = at.s;
   const noise_adaption &noise = filter->noise();
-  const lent_slots lent = lend_states(s.sensor, at.landmark, filter);
+  const lent_slots lent = lend_states(at, filter);
   if (at.elevation) decay_tilt(filter);
   const double distance = larger(e.distance_m, kNear_m);
   const curvature second = curvature_of(e, filter->variance(kX), filter->covariance(kX, kY), filter->variance(kY));
   int count = 0;
+  // A sigma that is stated too small is so of the white and of the time-correlated error.
+  const auto factor_of = [&](int kind) { return std::sqrt(noise.scale(kind)); };
   const auto add = [&](noise_adaption::source source, double own, const row_of &of) {
     residual &r = rows[count++];
     r.source = source;
@@ -391,13 +401,13 @@ int sighting_aid::put_rows(const view &at, const expected_sighting &e, const wm_
     const auto source = noise.source_of(noise_adaption::kBearings, at.reading.bearing_sigma_rad);
     add(source, source.own + square(params().lateral_sigma_m / distance) + second.bearing_variance,
         {WM_RESIDUAL_BEARING, s.bearing_rad, e.bearing_rad + second.bearing_rad, e.bearing_by, error_.bearing,
-         correlated_bearing(params(), at.reading, distance)});
+         correlated_bearing(params(), at.reading, distance) * factor_of(noise_adaption::kBearings)});
   }
   if (at.reading.range) {
     const auto source = noise.source_of(noise_adaption::kRanges, at.reading.range_sigma_m);
     add(source, source.own + square(params().range_sigma_rel * e.range_m) + second.range_variance,
         {WM_RESIDUAL_RANGE, s.range_m, e.range_m + second.range_m, e.range_by, error_.range,
-         correlated_range(params(), at.reading, e.range_m)});
+         correlated_range(params(), at.reading, e.range_m) * factor_of(noise_adaption::kRanges)});
   }
   if (at.elevation)
     add({}, square(s.elevation_sigma_rad) + second.elevation_variance,

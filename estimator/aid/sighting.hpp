@@ -76,9 +76,9 @@ class sighting_aid {
 
  private:
   // The slots of the time-correlated error of this sensor on this landmark, and of the landmark's error on the map;
-  // -1: none.
+  // the state of an anchor's own error. -1: none.
   struct lent_slots {
-    int error, map;
+    int error, map, of_anchor;
     double repeated_error, repeated_map;  // variances of those without a slot, as noise, over their own
   };
   struct row_of {
@@ -105,7 +105,7 @@ class sighting_aid {
   void put_heading_row(const view &at, const lent_slots &lent, const wm_innovation &record, planar_filter *filter,
                        residual *r) const;
   int find_nearest(const planar_filter &filter, const view &at) const;
-  lent_slots lend_states(int sensor, int landmark, planar_filter *filter);
+  lent_slots lend_states(const view &at, planar_filter *filter);
   void decay_tilt(planar_filter *filter);
   void put_row(const view &at, const lent_slots &lent, const row_of &of, const wm_innovation &record,
                const planar_filter &filter, residual *r) const;

@@ -77,6 +77,10 @@ inline double correlated_range(const wm_sighting_params &p, const sighting_readi
   return std::sqrt(square(correlated_range(p, r.range_sigma_m)) + square(relative_m));
 }
 
+// Of ranges alone each anchor has an error for a whole drive, too, as large as the one that fades: of its delay, of the
+// walls beside it. It takes the state that a bearing's error has else. Time constant, s; flat from 60 on.
+inline constexpr double kOfAnchor_s = 300.0;
+
 // The states of a slot of time-correlated errors: `width` of them; the offsets of the bearing's and the range's error
 // in it, -1: not carried. An error of sigma 1 is scaled by the parameters.
 struct correlated_slot {

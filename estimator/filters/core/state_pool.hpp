@@ -66,19 +66,18 @@ class state_pool {
     return oldest;
   }
 
-  // Lends `width` states of unit variance to `key`: time-correlated errors (Gauss-Markov, time constant tau_s), carried
-  // on to t_ns. Returns the first state; -1 where there are none to lend.
+  // Lends `width` states of unit variance to `key`: time-correlated errors (Gauss-Markov, time constants tau_s[width]),
+  // carried on to t_ns. Returns the first state; -1 where there are none to lend.
   template <class Filter>
-  int lend(Filter *filter, int64_t key, int width, double tau_s, double kept_s, wm_time_ns t_ns) {
+  int lend(Filter *filter, int64_t key, int width, const double *tau_s, double kept_s, wm_time_ns t_ns) {
     bool fresh;
     slot *lent = take(key, t_ns, kept_s, &fresh);
     if (!lent) return -1;
-    const double left = fresh ? 0.0 : decay_over(lent->used_ns, t_ns, tau_s);
     for (int k = 0; k < width; k++) {
       if (fresh)
         filter->forget(lent->state + k, 0.0, 1.0);
       else
-        decay_state(filter, lent->state + k, left, 1.0);
+        decay_state(filter, lent->state + k, decay_over(lent->used_ns, t_ns, tau_s[k]), 1.0);
     }
     lent->used_ns = t_ns;
     return lent->state;

@@ -61,7 +61,8 @@ slam::relative_place slam::relative_place_of(const context &at, int landmark) co
 // The states of this sensor's time-correlated error on this landmark, decayed to now. -1: none is carried.
 int slam::lend(const context &at) {
   const int64_t key = static_cast<int64_t>(at.id) * kSlamSensors + at.sensor;
-  return errors_.lend(&joint_, key, error_.width, sightings().correlated_tau_s, 0.0, joint_.now_ns());
+  const double tau_s = sightings().correlated_tau_s, taus_s[] = {tau_s, tau_s};
+  return errors_.lend(&joint_, key, error_.width, taus_s, 0.0, joint_.now_ns());
 }
 
 // Completes the rows by the landmark's own derivatives; S and the NIS of all rows together.

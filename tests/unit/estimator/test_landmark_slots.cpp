@@ -74,6 +74,47 @@ TEST(test_an_anchors_own_error_does_not_grow_with_the_range) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.5, wm::correlated_range(p, r, 20.0));
 }
 
+// A minute in a small circle among eight landmarks, seen ten times a second: mean NEES of the last 40 s over the maps.
+// `factor`: of all sigmas over those that are stated; `tau_s`: of the time-correlated half of the errors.
+double nees_of_errors(double factor, double tau_s, bool with_bearings) {
+  constexpr int kCount = 8, kAll = 600, kJudged = 400;
+  double sum = 0;
+  all_by_default();
+  for (int map = 0; map < kMaps; map++) {
+    begin_among(kCount, 0.0);
+    truth = {};
+    now_s = 0.0;
+    double lasting[kCount][2];
+    const double left = std::exp(-0.1 / tau_s);
+    for (int i = 0; i < kAll; i++) {
+      feed(make::twist(now_s, 0.5, 0.25));
+      for (int k = 0; k < kCount; k++) {
+        const uint64_t of = static_cast<uint64_t>(20000 + 100 * map + 2 * k);
+        for (int c = 0; c < 2; c++) {
+          const double fresh = normal(of, 2 * i + c);
+          lasting[k][c] = i == 0 ? fresh : left * lasting[k][c] + std::sqrt(1 - left * left) * fresh;
+        }
+        const auto [bearing, range] = view_of(landmarks[k].p_m[0], landmarks[k].p_m[1]);
+        const double seen_rad = bearing + factor * 0.02 * (normal(of + 1, 2 * i) + lasting[k][0]);
+        const double seen_m = range + factor * 0.1 * (normal(of + 1, 2 * i + 1) + lasting[k][1]);
+        feed(make::sighting(now_s, k, with_bearings ? wm::wrap(seen_rad) : std::nan(""), seen_m));
+      }
+      if (i >= kAll - kJudged) sum += nees_from(truth) / 3.0 / (kMaps * kJudged);
+      go_on(0.5, 0.25, 0.1);
+    }
+  }
+  return sum;
+}
+
+// All sigmas are three times as large as stated: of anchors that are wrong for a whole drive, and of landmarks.
+TEST(test_time_correlated_errors_that_are_larger_than_stated_are_found) {
+  for (const bool landmarks_seen : {false, true}) {
+    const double nees = nees_of_errors(3.0, landmarks_seen ? 2.0 : 1000.0, landmarks_seen);
+    TEST_ASSERT_LESS_THAN_DOUBLE_MESSAGE(1.2, nees, landmarks_seen ? "landmarks" : "anchors");
+    TEST_ASSERT_GREATER_THAN_DOUBLE(0.2, nees);
+  }
+}
+
 // Wheels whose radii differ by 1 %: on a straight the counts turn, and the robot doesn't.
 TEST(test_a_straight_is_no_evidence_of_the_sign_of_a_turn) {
   all_by_default();
