@@ -91,7 +91,7 @@ static wm_status fail_empty(const wm_source_reader *readers, const wm_assembly *
 
 wm_status wm_source_readers_open(const wm_assembly *assembly, wm_source_reader *readers, wm_time_ns now_ns,
                                  wm_time_ns *first_ns, wm_error *err) {
-  int recorded = 0;
+  size_t recorded = 0;
   *first_ns = INT64_MAX;
   for (size_t i = 0; i < assembly->source_count; i++) {
     wm_source_reader *reader = &readers[i];
@@ -102,7 +102,7 @@ wm_status wm_source_readers_open(const wm_assembly *assembly, wm_source_reader *
     reader->source->from_ns = INT64_MIN;
     reader->source->until_ns = INT64_MAX;
     if (reader->source->is_live) continue;
-    recorded = 1;
+    recorded++;
     wm_status status = read_one(reader, err);
     if (status != WM_OK) return status;
     if (reader->has_next && reader->next.t_ns < *first_ns) *first_ns = reader->next.t_ns;
@@ -117,6 +117,10 @@ wm_status wm_source_readers_open(const wm_assembly *assembly, wm_source_reader *
     wm_status status = skip_outside(&readers[i], err);
     if (status != WM_OK) return status;
   }
+  if (recorded == assembly->source_count && !wm_source_readers_earliest(readers, assembly->source_count))
+    return wm_fail(err, WM_BAD_USAGE,
+                   "'%s' has no datum in the part from --from to --until (from_s, until_s), s since its first stamp",
+                   assembly->recording);
   return WM_OK;
 }
 

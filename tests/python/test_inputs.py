@@ -109,6 +109,13 @@ class Columns(Folder):
             self.assertNotIn("unknown column", done.stdout + done.stderr, name)
             self.assertNotRegex(done.stdout + done.stderr, "column '.*' is missing", name)
 
+    def test_spellings_of_numbers_that_only_python_knows_are_refused(self):
+        for field in ("1_0", "\u0661"):
+            for name in ("t_ns", "x_m"):
+                (self.folder / "a.csv").write_text(f"{name}\n1\n{field}\n", encoding="utf-8")
+                with self.subTest(field, name=name), self.assertRaisesRegex(ValueError, f"a.csv:3: '{field}' is not a number"):
+                    waymark.read_table(self.folder / "a.csv")
+
     def test_a_byte_order_mark_is_no_part_of_a_name(self):
         (self.folder / "a.csv").write_bytes(b"\xef\xbb\xbft_ns,x_m\r\n1,2\r\n")
         self.assertEqual(list(waymark.read_table(self.folder / "a.csv")), ["t_ns", "x_m"])

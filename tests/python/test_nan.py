@@ -136,6 +136,10 @@ class Library(unittest.TestCase):
                 with self.subTest(name, given=given), self.assertRaisesRegex(waymark.WaymarkError, name):
                     waymark.replay(given, self.drive.folder / "robot.yaml", **{name: float("nan")})
 
+    def test_a_part_behind_the_end_is_refused(self):
+        with self.assertRaisesRegex(waymark.WaymarkError, "no datum in the part"):
+            waymark.replay(self.drive.recording, self.drive.folder / "robot.yaml", from_s=1e6)
+
     def test_a_changed_value_of_nan_is_refused(self):
         for key in waymark.parameters(common.CONFIG):
             with self.subTest(key), self.assertRaisesRegex(waymark.WaymarkError, "finite"):

@@ -36,6 +36,9 @@ def is_text(column: str) -> bool:
 def _column(name: str, fields: list[str], path: Path) -> Array:
     if is_text(name):
         return np.array(fields, dtype=str)
+    for row, field in enumerate(fields):
+        if "_" in field or not field.isascii():  # Python's own spellings of numbers
+            raise ValueError(f"{path}:{row + 2}: '{field}' is not a number (column {name})")
     try:
         if is_integer(name):
             return np.array([int(field) if field else ABSENT for field in fields], dtype=np.int64)
