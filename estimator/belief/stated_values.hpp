@@ -27,10 +27,11 @@ class stated_values {
   void leave_untested(int state) { set_variance(state, 0.0); }
   // Looks for wrong ones, at most every kCheckEvery_s. True: the filter's mean and covariance changed.
   bool check(error_state *filter, wm_time_ns now_ns);
-  // Stated wrongly, and not known as well yet as it was stated.
+  // Stated wrongly, and not known as well yet as it was stated. What is not tested is stated by nothing.
   bool is_wrong(int state, double variance) const {
     for (int i = 0; i < count_; i++)
-      if (of_[i].state == state && of_[i].is_wrong) return is_vaguer(variance, of_[i].variance);
+      if (const value &s = of_[i]; s.state == state && s.is_wrong && s.variance > 0.0)
+        return is_vaguer(variance, s.variance);
     return false;
   }
 

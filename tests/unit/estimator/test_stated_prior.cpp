@@ -2,6 +2,7 @@
 // Priors that are stated wrongly: the closed forms against a filter that really begins with the wide prior.
 #include "belief/stated_prior.hpp"
 
+#include "belief/stated_values.hpp"
 #include "common/suite.h"
 #include "waymark/random.h"
 
@@ -133,6 +134,22 @@ TEST(test_the_most_probable_of_many_come_first) {
   }
   TEST_ASSERT_EQUAL(wm::blunder_search::kMost, search.take(&filter.x));
   for (int i = 0; i < wm::blunder_search::kMost; i++) TEST_ASSERT_EQUAL(19 - i, (search.key(i) * 7) % 20);
+}
+
+// As a speed's scale that the noise of a standing robot bent before its motion turned out to be commands.
+TEST(test_a_value_that_was_given_up_and_is_then_left_untested_is_not_wrong) {
+  const double root[3][3] = {{0.1, 0, 0}, {0, 0.1, 0}, {0, 0, 0.1}}, mean[3] = {0, 0, 0};
+  constants filter(root, 1.0, mean);
+  const double by[kStates] = {0, 1, 0, 0, 0, 0};
+  filter.observe(by, 3.0, 0.1);
+  wm::stated_values<1> stated;
+  stated.clear();
+  stated.add(1, 0.0, 0.01, 0.0);
+  TEST_ASSERT_TRUE(stated.check(&filter.x, 0));
+  TEST_ASSERT_TRUE(stated.is_wrong(1, filter.x.covariance(1, 1)));
+  TEST_ASSERT_FALSE(stated.is_wrong(1, 0.03));
+  stated.leave_untested(1);
+  TEST_ASSERT_FALSE(stated.is_wrong(1, 1e-4));
 }
 
 // Tested after each observation of 2000 drives, right priors are given up as rarely as stated.
