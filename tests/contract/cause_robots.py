@@ -75,6 +75,33 @@ def satellites_robot(folder, seed):
     _write(folder, "satellites", path, {"motion.csv": _twists(path, rng), "gnss.csv": gnss}, "gnss: {mounting: {xyz_m: [0.3, 0, 1]}}\n")
 
 
+WAITS_S = 25.0
+WIDE = """format: waymark-config/1
+estimator: landmark_ekf
+motion.states: {speed_scale_sigma: 0.05, yaw_rate_scale_sigma: 0.05}
+sightings.states: {sensor_yaw_sigma_rad: 0.2, sensor_time_offset_sigma_s: 0.1, range_bias_sigma_m: 0.05, range_scale_sigma: 0.03}
+"""
+
+
+def waiting_robot(folder, seed):
+    """Twists, and a sensor of bearings and ranges that sees from the first stamp on; it stands for WAITS_S before it drives."""
+    rng = random.Random(seed)
+    path = _path(60.0, lambda t: 0.0 if t < WAITS_S else 0.5 + 0.2 * math.sin(0.5 * t), lambda t: 0.0 if t < WAITS_S else 0.4 * math.sin(0.21 * t) + 0.2 * math.sin(0.8 * t))
+    sightings, landmarks = _posts(path, rng)
+    _write(folder, "waiting", path, {"motion.csv": _twists(path, rng), "sightings.csv": sightings, "landmarks.csv": landmarks},
+           "sensors: {front: {mounting: {xyz_m: [0, 0, 0.2], rpy_deg: [0, 0, 0]}, bearing_sigma_rad: 0.02, range_sigma_m: 0.03}}\n")
+
+
+def _posts(path, rng):
+    """Sightings of posts on a grid within 6 m in front, and the posts."""
+    posts = [(3.0 * i, 3.0 * j) for i in range(-8, 9) for j in range(-8, 9) if (i + 2 * j) % 3 == 0]
+    sightings = [{"t_ns": _stamp(t), "sensor": "front", "id": i + 1, "bearing_rad": bearing + rng.gauss(0, 0.01), "range_m": away + rng.gauss(0, 0.03)}
+                 for t, x, y, h, *_ in path[::5] for i, (px, py) in enumerate(posts)
+                 for away, bearing in [(math.hypot(px - x, py - y), math.remainder(math.atan2(py - y, px - x) - h, 2 * math.pi))]
+                 if 0.5 < away < 6 and abs(bearing) < 1.2]
+    return sightings, [{"id": i + 1, "x_m": x, "y_m": y, "z_m": 0.0, "sigma_m": 0.01} for i, (x, y) in enumerate(posts)]
+
+
 def fork_robot(folder, seed):
     """A forklift that is steered: speed and the angle of the steering wheel on CAN (ratio 12), a sensor of bearings and ranges."""
     rng, wheelbase, ratio = random.Random(seed), 1.4, 12.0
@@ -84,12 +111,7 @@ def fork_robot(folder, seed):
         wheel = ratio * math.atan2(wheelbase * w, v)
         data = round(v / 0.001).to_bytes(2, "little", signed=True) + round(wheel / 0.001).to_bytes(2, "little", signed=True)
         frames.append(f"({_stamp(t) / 1e9:.6f}) can0 200#{data.hex().upper()}")
-    posts = [(3.0 * i, 3.0 * j) for i in range(-8, 9) for j in range(-8, 9) if (i + 2 * j) % 3 == 0]
-    sightings = [{"t_ns": _stamp(t), "sensor": "front", "id": i + 1, "bearing_rad": bearing + rng.gauss(0, 0.01), "range_m": away + rng.gauss(0, 0.03)}
-                 for t, x, y, h, *_ in path[::5] for i, (px, py) in enumerate(posts)
-                 for away, bearing in [(math.hypot(px - x, py - y), math.remainder(math.atan2(py - y, px - x) - h, 2 * math.pi))]
-                 if 0.5 < away < 6 and abs(bearing) < 1.2]
-    landmarks = [{"id": i + 1, "x_m": x, "y_m": y, "z_m": 0.0, "sigma_m": 0.01} for i, (x, y) in enumerate(posts)]
+    sightings, landmarks = _posts(path, rng)
     dbc = ('VERSION ""\n\nNS_ :\n\nBS_:\n\nBU_: TRUCK WAYMARK\n\nBO_ 512 DRIVE: 4 TRUCK\n SG_ SPEED : 0|16@1- (0.001,0) [-30|30] "m/s" WAYMARK\n'
            ' SG_ WHEEL : 16|16@1- (0.001,0) [-30|30] "rad" WAYMARK\n')
     signals = "- {quantity: vehicle_speed, message: DRIVE, signal: SPEED}\n- {quantity: steering_wheel, message: DRIVE, signal: WHEEL}\n"

@@ -22,7 +22,7 @@ import mistakes
 import plan_robots
 import replays
 import small_robot
-from cause_robots import fork_robot, landmarks_robot, satellites_robot, tables_robot, tags_robot
+from cause_robots import WIDE, fork_robot, landmarks_robot, satellites_robot, tables_robot, tags_robot, waiting_robot
 
 SIZE_WITHIN = 0.25  # of the planted size: a filter's own states take a part of it
 RIGHT_LEAST, WRONG_MOST = 0.85, 0.02  # shares of the drives
@@ -210,6 +210,24 @@ def setting(rng):
     return {"config": lambda w: w.replace("sightings:\n", f"sightings:\n  noise: {{range_factor: {f}}}\n")}, "setting sightings.noise.range_factor", [1.0]
 
 
+def wide(mistake):
+    """The same with a configuration whose states have wide priors, which take mistakes up."""
+    def change(rng):
+        changes, name, size = mistake(rng)
+        return changes | {"config": lambda _: WIDE}, name, size
+    change.__name__ = f"wide_{mistake.__name__}"
+    return change
+
+
+def quarter(rng):
+    a = rng.choice((90, -90, 180))
+    return {"calibration.yaml": value(r"rpy_deg: \[0, 0, 0\]", f"rpy_deg: [0, 0, {a}]")}, "yaw of sightings:front", [math.radians(-a)]
+
+
+def kmh(rng):
+    return {"motion.csv": each(v_mps=lambda v: 3.6 * v)}, "scale of the speed", [1 / 3.6]
+
+
 # ── a floor plan ─────────────────────────────────────────────────────────────────────────────────────────────────────
 
 def numbers(text):
@@ -299,6 +317,7 @@ PLANTED += [(satellites_robot, m) for m in (none, antenna, small_antenna, receiv
 PLANTED += [(landmarks_robot, m) for m in (wheels_swapped, byte_order, setting, bus_counter)]
 PLANTED += [(tags_robot, m) for m in (none, tag_size, tilt, tag_yaw, tags_exchanged, tags_scaled, camera_late)]
 PLANTED += [(fork_robot, m) for m in (none, steering_ratio)]
+PLANTED += [(waiting_robot, wide(m)) for m in (none, quarter, kmh, bearings)]
 PLANS = [(plan_robots.corridor, m) for m in (none, plan_scale, plan_turned, camera_tilt, camera_height, camera_yaw, camera_place)]
 PLANS += [(plan_robots.flat, m) for m in (none, plan_scale, plan_turned, camera_tilt, camera_height, plan_radius, plan_track)]
 

@@ -27,7 +27,7 @@ if not LIBRARY.exists():
 os.environ["WAYMARK_LIBRARY"] = str(LIBRARY)
 
 import plan_robots  # noqa: E402
-from waymark.causes import changes, plan, search  # noqa: E402
+from waymark.causes import changes, plan, search, trial  # noqa: E402
 from waymark.causes.faults import all_faults  # noqa: E402
 from waymark.causes.features import with_points  # noqa: E402
 from waymark.causes.fault import Clock, Fault, discrete, factor_words  # noqa: E402
@@ -111,6 +111,11 @@ class Rows(unittest.TestCase):
         self.assertFalse([name for name in alone if name.startswith(("clock of", "drift of"))])
         self.assertTrue({"drift of imu", "clock of imu", "drift of ticks", "clock of ticks"} <= set(both))
 
+    def test_a_speed_s_unit_is_what_the_filter_s_own_scale_took(self):
+        speed = self.rows_of(motion=["t_ns,v_mps,w_radps", "1000000000,0.5,0.1"])["scale of the speed"]
+        self.assertEqual(speed.unit(speed.by_states({"motion.speed_scale": 0.3})), (1 / 3.6,))
+        self.assertIn("km/h", speed.say((1 / 3.6,)))
+
     def test_rows_in_disorder_are_a_fact_and_a_late_one_is_none(self):
         def stamped(order):
             turns = ["t_ns,wx_radps,wy_radps,wz_radps", *(f"{10**9 + k * 10**8},0,0,0.1" for k in order)]
@@ -171,9 +176,36 @@ class Judgement(unittest.TestCase):
     def test_a_longer_part_is_screened_where_time_is_left_for_one_that_is_twice_as_long(self):
         for left_s, is_longer in ((28.0, True), (8.0, False)):  # of 100 trials at 1 ms a second of the drive: 84 s and 24 s of it
             self.search.left_s = lambda left_s=left_s: left_s
-            self.search.cost, self.search.duration_s, self.search.starts, self.search.screened_s = 1e-3, 1000.0, 100, 20.0
+            self.search.trial_cost, self.search.duration_s, self.search.starts, self.search.screened_s = 1e-3, 1000.0, 100, 20.0
+            self.search.moved_at_s = self.search.moved_s = np.arange(1000.0)
             self.assertEqual(self.search._may_screen_more(), is_longer)
             self.assertAlmostEqual(self.search.part_s(100, search.SCREEN_SHARE, self.search.screen_most_s), 84.0 if is_longer else 20.0)
+
+    def test_a_part_has_movement_where_the_robot_stands_at_first(self):
+        t_s = np.arange(0, 200, 0.1)
+        published = {"t_ns": (1e9 * t_s).astype(np.int64), "odom_x_m": 0.02 * t_s + 0.5 * np.maximum(0, t_s - 50), "odom_y_m": 0 * t_s, "odom_heading_rad": 0 * t_s}
+        self.search.trial_cost, self.search.duration_s, self.search.left_s = 1e-3, 200.0, lambda: 5.0
+        self.search.moved_at_s, self.search.moved_s = search._moving(published)
+        self.assertAlmostEqual(self.search.part_s(100, search.SCREEN_SHARE, 20.0), 60.0, delta=1.0)
+        self.search.moved_at_s, self.search.moved_s = search._moving(published | {"odom_x_m": 0.02 * t_s})  # no witness of what stands
+        self.assertAlmostEqual(self.search.part_s(100, search.SCREEN_SHARE, 20.0), 15.0, delta=1.0)
+
+    def test_a_drive_whose_states_are_far_from_their_priors_is_no_right_one(self):
+        self.assertEqual([self.search._is_right(drive(2.0, unusual=nats)) for nats in (1.0, 12.5)], [True, False])
+
+    def test_what_is_found_is_judged_though_the_budget_is_spent(self):
+        self.search.left_s, self.search.trials = (lambda: -1.0), SimpleNamespace(run=lambda jobs, *_, **__: [drive(2.0)] * len(jobs))
+        self.assertEqual([one is None for last in (False, True) for one in self.search._drives([(row("row"), (1.0,))], [], 0.0, is_last=last)], [True, False])
+
+    def test_the_prior_of_a_state_is_that_before_any_observation(self):
+        folder = Path(tempfile.mkdtemp())
+        self.addCleanup(shutil.rmtree, folder)
+        (folder / "made").mkdir()
+        (folder / "made/motion.csv").write_text("t_ns,v_mps\n0,1\n")
+        (folder / "made/sightings.csv").write_text("t_ns,id\n0,1\n1000000000,2\n1500000000,3\n")
+        trial._blinded(folder / "made", folder / "blind")
+        self.assertEqual((folder / "blind/sightings.csv").read_text(), "t_ns,id\n1500000000,3\n")
+        self.assertEqual((folder / "blind/motion.csv").read_text(), "t_ns,v_mps\n0,1\n")
 
     def test_states_of_a_drive_that_is_lost_tell_no_size(self):
         clock = Fault("clock", ((0.0,),), lambda _: [], lambda _: "", step=(0.25,), smallest=(0.01,), settled=lambda size, states: (size[0] - states.get("offset", 0.0),))

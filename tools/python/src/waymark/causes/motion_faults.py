@@ -2,7 +2,7 @@
 """Rows of motion: wheels, twists, gyros, the CAN bus."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -133,6 +133,13 @@ def _rate_words(name: str, factor: float, is_angle: bool) -> str:
     return f"{name} is {factor_words(factor)}"
 
 
+def _speed(said: str, edits: Callable[[Size], Sequence[Edit]], more: Sequence[float]) -> Fault:
+    """The scale or unit of a speed: a filter's own scale takes a part of it, or all."""
+    return Fault(f"scale of {said}", tuple((f,) for f in (*SPEEDS[1:4], *more)), edits, lambda s: _rate_words(said, s[0], False), step=(0.04,), smallest=(0.004,),
+                 is_log=True, named=(*SPEEDS[1:], 0.001, 0.01), is_possible=lambda s: 5e-4 <= s[0] <= 2000 and abs(math.log(s[0])) > 0.02,
+                 settled=lambda s, states: (s[0] * states.get("motion.speed_scale", 1.0),))
+
+
 def _can(robot: Robot, bound: dict[str, int]) -> Iterator[Fault]:
     quantities: list[tuple[tuple[str, ...], tuple[float, ...], bool]] = [(("yaw_rate",), TURNS, True), (("vehicle_speed",), SPEEDS, False), (("steering_wheel",), (-1.0, DEG, 1 / DEG), True),
                   (("road_wheel",), (-1.0, DEG, 1 / DEG), True)]
@@ -142,7 +149,9 @@ def _can(robot: Robot, bound: dict[str, int]) -> Iterator[Fault]:
         if len(items) < len(names):
             continue
         said = names[0] + (" with the other side's" if len(names) > 1 else "")
-        for f in sizes:
+        if not is_angle:
+            yield _speed(said, lambda s, i=tuple(items): [_scaled(robot, item, s[0]) for item in i], NEAR)
+        for f in sizes if is_angle else sizes[:1]:
             yield discrete(f"{names[0]} times {f:.4g}", lambda _, i=tuple(items), f=f: [_scaled(robot, item, f) for item in i],
                            lambda _, n=said, f=f, a=is_angle: _rate_words(n, f, a), group=f"scale of {names[0]}")
     signals: dict[str, list[str]] = {}
@@ -172,9 +181,8 @@ def _twists(robot: Robot) -> Iterator[Fault]:
         for f in TURNS[:4]:
             yield discrete(f"turn rate times {f:.4g}", lambda _, f=f, file=file, names=turns: [column(file, n, f) for n in (names[:1] if f < 0 else names)],
                            lambda _, f=f: _rate_words("the turn rate", f, True))
-        for f in (*SPEEDS[:4], 0.001, 0.01, *NEAR):
-            yield discrete(f"speed times {f:.4g}", lambda _, f=f, file=file, names=speeds: [column(file, n, f) for n in (names[:1] if f < 0 else names)],
-                           lambda _, f=f: _rate_words("the speed", f, False), group="scale of the speed")
+        yield discrete("speed times -1", lambda _, file=file, name=speeds[0]: [column(file, name, -1)], lambda _: _rate_words("the speed", -1, False))
+        yield _speed("the speed", lambda s, file=file, names=speeds: [column(file, n, s[0]) for n in names], (0.001, 0.01, *NEAR))
         if file == "motion.csv":
             yield discrete("columns of motion.csv", lambda _: [swapped("motion.csv", "v_mps", "w_radps")], lambda _: "speed and turn rate of motion are swapped")
         else:

@@ -9,15 +9,17 @@ from statistics import NormalDist
 
 import numpy as np
 
-from ..tables import Array
+from ..tables import Array, Table
 from .changes import column
 from .fault import Fault, Size, discrete
 from .faults import all_faults, exchanged
 from .robot import Robot, Source
-from .trial import Blocks, Change, Drive, Trials, outliers
+from .trial import UNUSUAL_MOST, Blocks, Change, Drive, Trials, outliers
 
 BUDGET_S, PLAN_BUDGET_S = 14.0, 45.0  # of processor time a processor; after it no further round is begun. With a floor plan, whose start alone is 0.2 s
 SCREEN_SHARE, SCREEN_MIN_S, SCREEN_MAX_S = 0.3, 10.0, 20.0
+MOVES_STEP_S, MOVES_MPS, MOVES_RADPS = 0.5, 0.05, 0.05  # of a robot that moves, as the monitor has it
+STANDS_SHARE = 2.0  # of the budget, so that a part has movement; what a standing robot takes of it is given back
 FIT_MAX_S = 40.0  # of the drive, for sizes
 ROWS_KEPT, ROWS_FITTED, ROWS_JUDGED = 10, 4, 6
 FIT_ROUNDS, SETTLED_MOST = 4, 3
@@ -90,21 +92,32 @@ class Search:
         self.facts: list[Change] = []
         self.cost = 0.0  # processor time of a second of the drive
         self.duration_s = 0.0
+        self.trial_cost, self.stood_s = 0.0, 0.0  # the same of trials that do not search for their pose; what was spent on a standing robot
+        self.moved_at_s, self.moved_s = np.zeros(0), np.zeros(0)  # times from the start, and for how long the robot has moved until then
         self.screen_most_s, self.screened_s, self.starts = SCREEN_MAX_S, 0.0, 0  # of the drive; its part that was screened last, and by how many trials
 
     def left_s(self) -> float:
         """Of the budget."""
-        return self.budget_s() - self.trials.spent_s
+        return self.budget_s() + self.stood_s - self.trials.spent_s
 
     def budget_s(self) -> float:
         """Processor time of all processors."""
         return (PLAN_BUDGET_S if self.robot.floor_camera else BUDGET_S) * self.trials.pool.at_once
 
     def part_s(self, drives: int, share: float, most_s: float) -> float:
-        """How much of the drive so many trials may take; 0: all of it."""
-        affordable = share * self.left_s() / max(1e-9, drives * self.cost)
-        part = min(most_s, max(SCREEN_MIN_S, affordable))
+        """Until when so many trials may drive: for at most `most_s` of movement, and at least for SCREEN_MIN_S of it; 0: all of the drive."""
+        each = self.left_s() / max(1e-9, drives * self.trial_cost)
+        least = max(SCREEN_MIN_S, min(self._moved_until(SCREEN_MIN_S), STANDS_SHARE * each))
+        part = max(least, min(self._moved_until(most_s), share * each))
         return 0.0 if part >= self.duration_s else part
+
+    def _moved_until(self, moved_s: float) -> float:
+        """When the robot has moved for so long: what stands shows neither ways nor turns."""
+        at = int(np.searchsorted(self.moved_s, moved_s))
+        return float(self.moved_at_s[at]) if at < len(self.moved_s) else self.duration_s
+
+    def _moved_by(self, until_s: float) -> float:
+        return float(self.moved_s[self.moved_at_s <= until_s].max(initial=0.0))
 
     def _may_screen_more(self) -> bool:
         """Whether time is left for a part that is twice as long: a robot that hardly moves at first shows little then."""
@@ -173,10 +186,15 @@ class Search:
         self.duration_s = float(stamps[-1] - stamps[0]) * 1e-9
         length = min(BLOCK_S, self.duration_s / BLOCKS_MIN)
         self.trials.blocks = Blocks(int(stamps[0]), length, max(2, math.ceil(self.duration_s / length)), outliers(self.robot))
-        self.cost = cpu_s / self.duration_s
+        self.cost = self.trial_cost = cpu_s / self.duration_s
         self.trials.spent_s += cpu_s
         before = self.trials.run([[]], keeps=True, has_states=True)[0]
         self.trials.sources = before.sources if before else ()
+        self.trial_cost, self.stood_s = 0.0, 0.0  # the same of trials that do not search for their pose; what was spent on a standing robot
+        self.moved_at_s, self.moved_s = _moving(estimate.published)
+        self.trials.settings = self._without_search()
+        short = self._plain([], FIT_MAX_S) if FIT_MAX_S < self.duration_s else None
+        self.trial_cost, self.trials.settings = min(self.cost, short.cpu_s / FIT_MAX_S) if short else self.cost, {}
         return before
 
     # ── a round ──────────────────────────────────────────────────────────────────────────────────────────────────────
@@ -190,26 +208,32 @@ class Search:
         part_s = self.part_s(len(starts), SCREEN_SHARE, self.screen_most_s)
         self.screened_s, self.starts = part_s or self.duration_s, len(starts)
         base = self._plain(fixed, part_s) or now
-        kept = self._within_reach(self._best_sizes(self._tried(starts, fixed, part_s), part_s), base, part_s)[:ROWS_KEPT]
+        spent_s = self.trials.spent_s
+        tried = self._tried(starts, fixed, part_s)
+        self.stood_s += (self.trials.spent_s - spent_s) * max(0.0, 1 - (self._moved_by(self.screened_s) + SCREEN_MIN_S) / self.screened_s)
+        kept = self._within_reach(self._best_sizes(tried, part_s), base, part_s)[:ROWS_KEPT]
         near = self._fitted(kept[:ROWS_FITTED], fixed, part_s)  # a size that is far off loses the rest of the drive
         # Where a row explains the part, no table of identities is looked for.
         proposed = [] if any(self._is_right(c.drive) for c in kept) else self._proposals(fixed, now)
         fit_s = self.part_s(ROWS_KEPT + len(proposed) + 9 * ROWS_FITTED, 0.5, max(FIT_MAX_S, self.screened_s))
         over_s = self._whole(fit_s) if proposed else fit_s
-        base = self._plain(fixed, over_s) or now
+        base = self._plain(fixed, over_s, has_states=True) or now
         more = self._tried([*near, *((c.fault, c.size) for c in kept[ROWS_FITTED:]), *proposed], fixed, over_s)
         ordered = self._within_reach(self._best_sizes(more, over_s), base, over_s)
         fitted = self._fitted(ordered[:ROWS_FITTED], fixed, fit_s, 1 / 3)
         others = [(c.fault, c.size) for c in ordered[ROWS_FITTED:ROWS_JUDGED]]
         self.trials.settings = {}
-        told = self._by_states(rows, now)
+        judged = self._tried([*fitted, *others], fixed, 0.0, has_states=True, is_last=True)  # first: what follows may take all that is left
+        # A filter that does not search, or that another change helped, may have taken the mistake up.
+        best = [c.drive for c in self._ordered(judged)[:1]]
+        told = list({row.name: (row, size) for drive in (now, *best, base) for row, size in self._by_states(rows, drive)}.values())
         growing = [Candidate(*change, now) for change in told if change[0].clock and change[0].clock.is_rate]  # which the whole drive shows
         late = [(row, size) for row in rows if row.clock and row.clock.is_rate and row.clock.is_motion for size in row.start]  # of motion, no state tells
         late_best = self._best_sizes(self._tried(late, fixed, 0.0), 0.0)
         growing += [c for c in late_best if c.fault.is_shown] or self._within_reach(late_best, now, 0.0)
         told = [c for c in told if c[0] not in [g.fault for g in growing]] + self._fitted(growing, fixed, 0.0)
         by_states = [self._settled(c, fixed) for c in self._tried(told, fixed, 0.0, has_states=True)]
-        return self._ordered([*self._tried([*fitted, *others], fixed, 0.0, has_states=True), *by_states])
+        return self._ordered([*judged, *by_states])
 
     def _by_states(self, rows: list[Fault], now: Drive) -> list[Change]:
         """Rows that a calibration state took up: their sizes are what the state says."""
@@ -233,8 +257,8 @@ class Search:
     def _whole(self, fit_s: float) -> float:
         return 0.0 if self.cost * self.duration_s * 30 < self.left_s() else fit_s
 
-    def _tried(self, changes: Sequence[Change], fixed: list[Change], until_s: float, has_states: bool = False) -> list[Candidate]:
-        drives = self._drives(changes, fixed, until_s, has_states=has_states)
+    def _tried(self, changes: Sequence[Change], fixed: list[Change], until_s: float, has_states: bool = False, is_last: bool = False) -> list[Candidate]:
+        drives = self._drives(changes, fixed, until_s, has_states=has_states, is_last=is_last)
         self.progress(min(0.99, self.trials.spent_s / self.budget_s()))
         return [Candidate(fault, size, drive) for (fault, size), drive in zip(changes, drives) if drive is not None]
 
@@ -270,16 +294,17 @@ class Search:
         return [(f.fault, f.fault.neat(f.size) if f.steps else f.size) for f in state]
 
     def _drives(self, jobs: Sequence[Change], fixed: list[Change], until_s: float, plain: bool = False,
-                has_states: bool = False) -> list[Drive | None]:
-        """With each of the jobs beside what is fixed; `plain`: with nothing beside it."""
+                has_states: bool = False, is_last: bool = False) -> list[Drive | None]:
+        """With each of the jobs beside what is fixed; `plain`: with nothing beside it; `is_last`: though the budget is spent, for what was
+        found is judged."""
         changes: list[list[Change]] = [[*fixed]] if plain else [[*fixed, job] for job in jobs]
-        if self.left_s() <= 0:
+        if self.left_s() <= 0 and not is_last:
             return [None] * len(changes)
         return self.trials.run(changes, until_s, most_s=2 + LONGEST * self.cost * (until_s or self.duration_s), has_states=has_states)
 
-    def _plain(self, fixed: list[Change], until_s: float) -> Drive | None:
+    def _plain(self, fixed: list[Change], until_s: float, has_states: bool = False) -> Drive | None:
         """The drive with what is fixed alone."""
-        return self._drives([], fixed, until_s, plain=True)[0]
+        return self._drives([], fixed, until_s, plain=True, has_states=has_states)[0]
 
     def _without_search(self) -> dict[str, str]:
         """Settings with which a filter that starts at a known pose does not look for it elsewhere: a copy that is wrong need not be
@@ -418,7 +443,7 @@ class Search:
     @staticmethod
     def _is_right(drive: Drive) -> bool:
         return (drive.explained >= EXPLAINED_MIN and drive.squares <= SQUARES_MOST and drive.lost <= LOST_MOST
-                and drive.degraded <= DEGRADED_MOST)
+                and drive.degraded <= DEGRADED_MOST and drive.unusual < UNUSUAL_MOST)
 
     def _pairs(self, firsts: list[Candidate], before: Drive, verdict: Verdict) -> tuple[list[Change], Drive] | None:
         """Two mistakes of which neither explains the drive alone."""
@@ -435,6 +460,19 @@ class Search:
             verdict.probability = probability
             return [*fixed, (best.fault, best.size)], best.drive
         return None
+
+
+def _moving(published: Table) -> tuple[Array, Array]:
+    """Times from the start, s, and for how long the odometry has moved until then, in steps of MOVES_STEP_S. Where it hardly moves at all it is
+    no witness, and all times count."""
+    t_s = (published["t_ns"] - published["t_ns"][:1]) * 1e-9
+    step = np.unique(np.searchsorted(t_s, np.arange(0.0, t_s[-1] + MOVES_STEP_S, MOVES_STEP_S)).clip(0, len(t_s) - 1)) if len(t_s) else np.zeros(0, np.int64)
+    at_s, x, y, turn = t_s[step], *(published[f"odom_{name}"][step] for name in ("x_m", "y_m", "heading_rad"))
+    taken = np.diff(at_s)
+    away_m, turned = np.hypot(np.diff(x), np.diff(y)), np.abs(np.remainder(np.diff(turn) + math.pi, 2 * math.pi) - math.pi)
+    moves = (away_m > MOVES_MPS * taken) | (turned > MOVES_RADPS * taken)
+    moved_s = np.cumsum(np.where(moves, taken, 0.0))
+    return at_s[1:], moved_s if moved_s.max(initial=0.0) >= SCREEN_MIN_S else at_s[1:]
 
 
 def _worth(drive: Drive) -> float:

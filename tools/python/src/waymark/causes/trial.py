@@ -19,10 +19,10 @@ from ..pool import Pool
 from ..replaying import Estimate, replay
 from ..tables import Array
 from . import plan
-from .changes import CONFIG, NAMED, Edit, Impossible, Value
+from .changes import CONFIG, NAMED, Edit, Impossible, Value, link
 from .fault import Fault, Size
 from .plan import Scans
-from .robot import Place, Robot
+from .robot import OBSERVED, Place, Robot
 
 # Log density of an outlier, which has any value: over a turn, over 50 m, over a picture of 1000 px, over half a turn. That of ranges and
 # bearings is over the values that the recording has, where they are further: of ranges in mm.
@@ -34,7 +34,8 @@ DOUBT = {"lost": 0.3, "degraded": 0.1}
 OUTLIERS = 0.05  # share of outliers that is expected whatever the filter did: refusing more is not rewarded
 FAR_OUTLIERS = 1e-6  # where sizes are fitted: an update of any size still tells which is nearer
 
-BEGIN_S = 0.02  # of a drive that states where the calibration begins: before its first observations are fused
+BEGIN_S = 0.02  # of a drive that states where the calibration begins, without the observations of its first UNSEEN_NS
+UNSEEN_NS = 1_000_000_000
 UNUSUAL_MOST = 12.0  # nats of one state: of 5 sigma and more
 # What wheels and ranges are off by where nothing is wrong: a filter's start sigma is wider, so that it finds more.
 PLAUSIBLE = {"range_scale": 0.02, "speed_scale": 0.015}
@@ -190,8 +191,9 @@ def _driven(job: Job) -> Drive | None:
     if not arguments.get("out"):
         return drive
     ended, sources = ended_states(arguments["out"])
-    began = arguments["out"].with_name(arguments["out"].name + "-begin")
-    replay(**arguments | {"until_s": BEGIN_S, "out": began})
+    began, blind = (arguments["out"].with_name(f"{arguments['out'].name}-{what}") for what in ("begin", "blind"))
+    _blinded(arguments["input"], blind)
+    replay(**arguments | {"input": blind, "until_s": BEGIN_S, "out": began})
     stated, _ = ended_states(began)
     sigmas = {}
     for name, (value, _) in ended.items():
@@ -200,9 +202,21 @@ def _driven(job: Job) -> Drive | None:
         if sigma > 0 and not name.startswith("noise."):
             sigmas[name] = (value - 1) / usual if usual else (value - at) / sigma
     remove(began)
+    remove(blind)
     nats = [0.5 * sigma**2 for sigma in sigmas.values()]
     return dataclasses.replace(drive, sources=sources, states={name: value for name, (value, _) in ended.items()},
                                unusual=sum(min(UNUSUAL_MOST, value) for value in nats), far_states=sum(nats))
+
+
+def _blinded(recording: Path, out: Path) -> None:
+    """Makes the folder `out`: the recording whose observations begin UNSEEN_NS later. What contradicts a prior at once is else counted as stated."""
+    seen = {file for file in OBSERVED if (recording / file).is_file()}
+    link(recording.resolve(), out, seen)
+    for file in seen:
+        head, *lines = (recording / file).read_text(encoding="utf-8-sig").splitlines()
+        at = head.split(",").index("t_ns")
+        stamps = [int(line.split(",")[at]) for line in lines]
+        (out / file).write_text("\n".join([head, *(line for line, t_ns in zip(lines, stamps) if t_ns > min(stamps) + UNSEEN_NS)]) + "\n")
 
 
 def ended_states(run: Path) -> tuple[dict[str, tuple[float, float]], tuple[str, ...]]:
