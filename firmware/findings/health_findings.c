@@ -120,7 +120,7 @@ wm_severity wm_refused_severity(uint64_t refused, uint64_t updates) {
 }
 
 static void about_refused(const wm_source_health *s, wm_findings *out) {
-  const uint64_t refused = s->rejected[WM_REJECTED_GATE] + s->rejected[WM_REJECTED_SEARCHING], all = refused + s->fused;
+  const uint64_t refused = s->rejected[WM_REJECTED_GATE], all = refused + s->fused;
   const uint64_t unknown = s->rejected[WM_REJECTED_UNKNOWN_ID];
   const double share = all > 0 ? (double)refused / (double)all : 0;
   const wm_severity severity = wm_refused_severity(refused, all);

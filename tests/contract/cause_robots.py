@@ -78,8 +78,9 @@ def satellites_robot(folder, seed):
 WAITS_S = 25.0
 WIDE = """format: waymark-config/1
 estimator: landmark_ekf
-motion.states: {speed_scale_sigma: 0.05, yaw_rate_scale_sigma: 0.05}
-sightings.states: {sensor_yaw_sigma_rad: 0.2, sensor_time_offset_sigma_s: 0.1, range_bias_sigma_m: 0.05, range_scale_sigma: 0.03}
+motion: {states: {speed_scale_sigma: 0.05, yaw_rate_scale_sigma: 0.05}}
+sightings:
+  states: {sensor_yaw_sigma_rad: 0.2, sensor_time_offset_sigma_s: 0.1, range_bias_sigma_m: 0.05, range_scale_sigma: 0.03}
 """
 
 

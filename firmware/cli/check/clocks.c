@@ -92,11 +92,24 @@ static void take_part(clock_facts *f, wm_time_ns t_ns) {
   if (t_ns > f->part[f->parts - 1].newest_ns) f->part[f->parts - 1].newest_ns = t_ns;
 }
 
+// Rows that a program wrote one landmark after the other have a step back between two.
+static void take_identity(clock_facts *f, const wm_event *event) {
+  const int is_known = event->kind == WM_EVENT_SIGHTING && event->as.sighting.landmark_id >= 0;
+  const uint64_t id = is_known ? UINT64_C(1) << (event->as.sighting.landmark_id % 64) : 0;
+  if (f->events > 0 && event->t_ns - f->before_ns < -JUMP_MIN_NS) {
+    f->ids_before |= f->ids;
+    f->ids = 0;
+  }
+  f->ids |= id;
+  f->is_mixed |= id == 0 || (f->ids_before & id) != 0;
+}
+
 void clock_data_take(clock_data *self, const wm_event *event) {
   clock_facts *f = &self->at[event->source];
   if (event->source >= WM_SOURCES_MAX || llabs(event->t_ns) > STAMP_MAX_NS || llabs(event->arrival_ns) > STAMP_MAX_NS)
     return;
   take_part(f, event->t_ns);
+  take_identity(f, event);
   if (f->events == 0)
     f->first_ns = f->newest_ns = event->t_ns;
   else
@@ -137,7 +150,7 @@ static int parts_follow(const clock_facts *f) {
 // no small ones that go back together.
 static int is_disordered(const clock_facts *f, uint64_t out_of_order) {
   if (f->events < EVENTS_MIN || out_of_order == 0 || f->behind_ns <= JUMP_MIN_NS) return 0;
-  return f->backs == 0 || f->backs > CLOCK_BACKS_MAX || parts_follow(f);
+  return f->backs == 0 || f->backs > CLOCK_BACKS_MAX || !f->is_mixed || parts_follow(f);
 }
 
 static int jumps_back(const clock_facts *f) {

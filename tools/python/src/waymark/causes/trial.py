@@ -216,7 +216,8 @@ def _blinded(recording: Path, out: Path) -> None:
         head, *lines = (recording / file).read_text(encoding="utf-8-sig").splitlines()
         at = head.split(",").index("t_ns")
         stamps = [int(line.split(",")[at]) for line in lines]
-        (out / file).write_text("\n".join([head, *(line for line, t_ns in zip(lines, stamps) if t_ns > min(stamps) + UNSEEN_NS)]) + "\n")
+        begin = min(stamps, default=0) + UNSEEN_NS
+        (out / file).write_text("\n".join([head, *(line for line, t_ns in zip(lines, stamps) if t_ns > begin)]) + "\n")
 
 
 def ended_states(run: Path) -> tuple[dict[str, tuple[float, float]], tuple[str, ...]]:
