@@ -272,6 +272,13 @@ def weaving(bias=0.0, **changes):
 DISAGREE, STAMPS = "sensors-disagree", "clock-jumped"
 BROKEN = ("counter-restarts", "rows-disordered", "motion-sensor", "clock-drifts", "clock-coarse", STAMPS)
 # name, files, finding (severity, identifier, about), words of its text, words of its fix
+def by_post(sightings, most):
+    """The rows of the first posts, one post after the other."""
+    head, *rows = sightings.splitlines()
+    ids = {int(row.split(",")[2]) for row in rows}
+    return "\n".join([head, *(row for i in sorted(ids)[:most] for row in rows if row.split(",")[2] == str(i))]) + "\n"
+
+
 FAULTS = [
     ("gyro of the other sign", both(imu_csv=imu(factor=-1)), ("bad", DISAGREE, "imu"), "-1.00 times", "wz_radps times -1"),
     ("gyro that hangs upside down", both(imu_csv=imu(factor=-1, up=(0, 0, -1))), ("bad", DISAGREE, "imu"), "-1.00 times", "rpy_deg: [180, 0, 0]"),
@@ -346,6 +353,7 @@ FAULTS = [
     ("stamps of whole seconds", both(motion_csv=motion(stamp=grid(1.0))), ("bad", "clock-coarse", "motion"), "have the stamp of the one before", "grid of about 1 s"),
     ("stamps of 16 ms at 200 Hz", both(imu_csv=imu(200, stamp=grid(0.016))), ("bad", "clock-coarse", "imu"), "have the stamp", "0.016 s"),
     ("stamps of 10 ms at 200 Hz", both(imu_csv=imu(200, stamp=grid(0.01))), ("note", "clock-coarse", "imu"), "have the stamp", "0.01 s"),
+    ("rows of one post after the other", sighted() | {"sightings.csv": by_post(sighted()["sightings.csv"], 4)}, ("bad", "rows-disordered", "sightings:eye"), "are older", "sort the rows by t_ns"),
     ("rows that come twice", both(motion_csv="\n".join(line for row in motion().splitlines() for line in ([row, row] if row[0] == "1" else [row])) + "\n"), ("bad", "rows-disordered", "motion"), "come twice", "two programs"),
     *spoilt_rows(),
     ("error frames among the others", {**can(), "can.log": "".join(line + (f"{line.split(' ')[0]} can0 20000004#0001000000000000\n" if k % 30 == 17 else "") for k, line in enumerate(can()["can.log"].splitlines(keepends=True)))}, ("note", "device-trouble", "can"), "error frames", "termination"),

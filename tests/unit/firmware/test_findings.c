@@ -106,6 +106,14 @@ TEST(a_health_in_order_makes_no_finding) {
   TEST_ASSERT_EQUAL_MESSAGE(0, found.count, found.at[0].text);
 }
 
+// Kept for a search: there is no pose to contradict.
+TEST(observations_that_wait_for_a_pose_do_not_contradict_one) {
+  EYE->fused = 0;
+  EYE->rejected[WM_REJECTED_SEARCHING] = 1000;
+  wm_health_findings(&health, &found);
+  TEST_ASSERT_FALSE(wm_findings_has(&found, WM_FOUND_OBSERVATIONS_REFUSED, "eye"));
+}
+
 TEST(each_broken_health_makes_its_finding_alone) {
   for (size_t i = 0; i < sizeof kBroken / sizeof kBroken[0]; i++) {
     setUp();
