@@ -28,7 +28,8 @@ typedef struct clock_facts {
     wm_time_ns oldest_ns, newest_ns;
   } part[2 * CLOCK_BACKS_MAX + 1];
   size_t parts;
-  // Identities of the rows since the last step back, and of those before it, by their number of 64; whether one comes in both.
+  // Identities of the rows since the last step back, and of those before it, by their number of 64; whether one comes
+  // in both.
   uint64_t ids, ids_before;
   int is_mixed;
   // Rows of the same quantity at the stamp of the one before: of a source that measures once a stamp.

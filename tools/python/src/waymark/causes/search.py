@@ -228,11 +228,12 @@ class Search:
         best = [c.drive for c in self._ordered(judged)[:1]]
         told = list({row.name: (row, size) for drive in (now, *best, base) for row, size in self._by_states(rows, drive)}.values())
         growing = [Candidate(*change, now) for change in told if change[0].clock and change[0].clock.is_rate]  # which the whole drive shows
+        by_states = self._tried([c for c in told if c[0] not in [g.fault for g in growing]], fixed, 0.0, has_states=True, is_last=True)
         late = [(row, size) for row in rows if row.clock and row.clock.is_rate and row.clock.is_motion for size in row.start]  # of motion, no state tells
         late_best = self._best_sizes(self._tried(late, fixed, 0.0), 0.0)
         growing += [c for c in late_best if c.fault.is_shown] or self._within_reach(late_best, now, 0.0)
-        told = [c for c in told if c[0] not in [g.fault for g in growing]] + self._fitted(growing, fixed, 0.0)
-        by_states = [self._settled(c, fixed) for c in self._tried(told, fixed, 0.0, has_states=True)]
+        by_states += self._tried(self._fitted(growing, fixed, 0.0), fixed, 0.0, has_states=True)
+        by_states = [self._settled(c, fixed) for c in by_states]
         return self._ordered([*judged, *by_states])
 
     def _by_states(self, rows: list[Fault], now: Drive) -> list[Change]:
