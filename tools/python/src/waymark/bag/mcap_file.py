@@ -13,7 +13,7 @@ import zstandard
 
 from . import decoding
 from .decoding import Topic
-from .order import Batch, Seams, in_order
+from .order import BagFile, Batch
 
 MAGIC = b"\x89MCAP0\r\n"
 _HEADER, _FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _CHUNK_INDEX, _ATTACHMENT, _STATISTICS, _DATA_END = 1, 2, 3, 4, 5, 6, 8, 9, 11, 15
@@ -30,26 +30,17 @@ def _text(data: Any, at: int) -> tuple[str, int]:
     return bytes(data[at + 4 : at + 4 + length]).decode("utf-8", "replace"), at + 4 + length
 
 
-class McapFile:
-    """An MCAP file: its topics, its messages in the order of the log, its attachments."""
+class McapFile(BagFile):
+    """An MCAP file; its channels are the topics."""
 
     def __init__(self, path: Path):
-        self.path = path
-        self.notes: list[str] = []
-        self.done = 0.0
-        self._size = path.stat().st_size
+        super().__init__(path)
         self._schemas: dict[int, tuple[str, str, bytes]] = {}
-        self._channels: dict[int, Topic] = {}
         self._counts: dict[int, int] = {}
         self._chunks: list[int] = []  # offsets by the summary, where there is one
         self._wrong_sums = 0
         if not self._summary():
             self._scan()
-
-    @property
-    def topics(self) -> list[Topic]:
-        """All channels; a topic may have several."""
-        return list(self._channels.values())
 
     # ── what is in it ──
 
@@ -85,20 +76,12 @@ class McapFile:
                     self._learn(code, body)
         except (struct.error, ValueError):
             return False
-        for key, topic in self._channels.items():
+        for key, topic in self._topics.items():
             topic.count = self._counts.get(key, 0) if statistics else None
-        return statistics and set(self._counts) <= set(self._channels)
+        return statistics and set(self._counts) <= set(self._topics)
 
     def _scan(self) -> None:
-        """Channels and counts by the whole file."""
-        self._channels.clear()
-        counts: dict[Topic, int] = {}
-        for batch in self._batches(lambda topic: True):
-            for _, topic, _ in batch.messages:
-                counts[topic] = counts.get(topic, 0) + 1
-        for topic in self._channels.values():
-            topic.count = counts.get(topic, 0)
-        self.notes.clear()  # reading says the same again
+        super()._scan()
         self._wrong_sums = 0
 
     def _learn(self, code: int, body: Any) -> None:
@@ -110,21 +93,18 @@ class McapFile:
             self._schemas.setdefault(key, (name, encoding, bytes(body[at + 4 :])))
         elif code == _CHANNEL:
             key, schema = struct.unpack_from("<HH", body)
-            if key in self._channels:
+            if key in self._topics:
                 return
             name, at = _text(body, 4)
             wire, _ = _text(body, at)
             kind, encoding, definition = self._schemas.get(schema, ("unknown", "", b""))
-            self._channels[key] = decoding.topic(name, kind, definition.decode("utf-8", "replace"), _STYLES.get(encoding, ""), wire)
+            self._topics[key] = decoding.topic(name, kind, definition.decode("utf-8", "replace"), _STYLES.get(encoding, ""), wire)
 
     # ── messages ──
 
     def messages(self, wanted: Callable[[Topic], bool]) -> Iterator[tuple[Topic, int, Any]]:
-        """Messages of the wanted topics in the order of their log: topic, log time in ns, bytes."""
-        seams = Seams()
-        yield from in_order(self._batches(wanted), seams)
-        self.done = 1.0
-        self.notes += seams.notes()
+        """As of each bag; says which checksums were wrong."""
+        yield from super().messages(wanted)
         if self._wrong_sums:
             self.notes.append(f"{self._wrong_sums} of its chunks differ from their checksums: bytes were damaged, and values may be wrong")
 
@@ -132,8 +112,8 @@ class McapFile:
         choice: dict[int, Topic | None] = {}
 
         def chosen(key: int) -> Topic | None:
-            if key not in choice and key in self._channels:
-                topic = self._channels[key]
+            if key not in choice and key in self._topics:
+                topic = self._topics[key]
                 choice[key] = topic if wanted(topic) else None
             return choice.get(key)
 
@@ -248,9 +228,6 @@ class McapFile:
                 if wanted(name):
                     found[name] = body[at + 8 : at + 8 + size]
         return found
-
-    def close(self) -> None:
-        """Nothing is open between calls."""
 
 
 def _decompressed(data: memoryview, how: str, size: int) -> bytes | memoryview | None:

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Messages of chunks that overlap in time, in the order of the log."""
+"""Messages of a bag in the order of its log, also of chunks that overlap in time."""
 
 import heapq
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from operator import itemgetter
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from .decoding import Topic
@@ -78,3 +79,48 @@ def in_order(batches: Iterable[Batch], seams: Seams | None = None) -> Iterator[t
         held = sum(len(data) for _, _, data in pending)
     for log_ns, topic, data in pending:
         yield topic, log_ns, data
+
+
+class BagFile:
+    """What each kind of bag is: its topics (one name may have several), its messages in the order of the log, its attachments."""
+
+    def __init__(self, path: Path):
+        self.path = path
+        self.notes: list[str] = []
+        self.done = 0.0
+        self._size = path.stat().st_size
+        self._topics: dict[int, Topic] = {}
+
+    @property
+    def topics(self) -> list[Topic]:
+        """All topics."""
+        return list(self._topics.values())
+
+    def messages(self, wanted: Callable[[Topic], bool]) -> Iterator[tuple[Topic, int, Any]]:
+        """Messages of the wanted topics in the order of their log: topic, log time in ns, bytes."""
+        seams = Seams()
+        yield from in_order(self._batches(wanted), seams)
+        self.done = 1.0
+        self.notes += seams.notes()
+
+    def _batches(self, wanted: Callable[[Topic], bool]) -> Iterator[Batch]:
+        """In the order in which they were written."""
+        raise NotImplementedError
+
+    def _scan(self) -> None:
+        """Topics and counts by the whole file."""
+        self._topics.clear()
+        counts: dict[Topic, int] = {}
+        for batch in self._batches(lambda topic: True):
+            for _, topic, _ in batch.messages:
+                counts[topic] = counts.get(topic, 0) + 1
+        for topic in self._topics.values():
+            topic.count = counts.get(topic, 0)
+        self.notes.clear()  # reading says the same again
+
+    def attachments(self, _wanted: Callable[[str], bool]) -> dict[str, bytes]:
+        """Attached files by name: MCAP alone has them."""
+        return {}
+
+    def close(self) -> None:
+        """Nothing is open between calls."""

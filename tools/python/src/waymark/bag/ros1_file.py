@@ -12,7 +12,7 @@ import lz4.frame  # type: ignore[import-untyped]
 
 from . import decoding
 from .decoding import Topic
-from .order import Batch, Seams, in_order
+from .order import BagFile, Batch
 
 MAGIC = b"#ROSBAG V2.0\n"
 _MESSAGE, _CHUNK, _CONNECTION, _CHUNK_INFO = 2, 5, 7, 6
@@ -34,22 +34,13 @@ def _number(fields: dict[bytes, bytes], name: bytes) -> int:
     return int.from_bytes(fields.get(name, b"\0"), "little")
 
 
-class Ros1File:
-    """A ROS 1 bag: its topics and its messages in the order of the log."""
+class Ros1File(BagFile):
+    """A ROS 1 bag; its connections are the topics."""
 
     def __init__(self, path: Path):
-        self.path = path
-        self.notes: list[str] = []
-        self.done = 0.0
-        self._size = path.stat().st_size
-        self._connections: dict[int, Topic] = {}
+        super().__init__(path)
         if not self._index():
             self._scan()
-
-    @property
-    def topics(self) -> list[Topic]:
-        """All connections; a topic may have several."""
-        return list(self._connections.values())
 
     def _index(self) -> bool:
         """Connections and counts by the end of the file; False where the bag has no index."""
@@ -71,25 +62,14 @@ class Ros1File:
                     for key, count in struct.iter_unpack("<II", data[: len(data) // 8 * 8]):
                         counts[key] = counts.get(key, 0) + count
             is_whole = file.tell() == self._size
-        for key, topic in self._connections.items():
+        for key, topic in self._topics.items():
             topic.count = counts.get(key, 0)
-        return is_whole and bool(self._connections)
-
-    def _scan(self) -> None:
-        """Connections and counts by the whole file."""
-        self._connections.clear()
-        counts: dict[Topic, int] = {}
-        for batch in self._batches(lambda topic: True):
-            for _, topic, _ in batch.messages:
-                counts[topic] = counts.get(topic, 0) + 1
-        for topic in self._connections.values():
-            topic.count = counts.get(topic, 0)
-        self.notes.clear()  # reading says the same again
+        return is_whole and bool(self._topics)
 
     def _connect(self, fields: dict[bytes, bytes], data: Any) -> None:
         key, about = _number(fields, b"conn"), _fields(data)
-        if key not in self._connections:
-            self._connections[key] = decoding.topic(fields.get(b"topic", b"").decode("utf-8", "replace"), about.get(b"type", b"?").decode("utf-8", "replace"),
+        if key not in self._topics:
+            self._topics[key] = decoding.topic(fields.get(b"topic", b"").decode("utf-8", "replace"), about.get(b"type", b"?").decode("utf-8", "replace"),
                                                     about.get(b"message_definition", b"").decode("utf-8", "replace"), "msg", "ros1")
 
     def _record(self, file: Any) -> tuple[dict[bytes, bytes], bytes] | None:
@@ -112,13 +92,6 @@ class Ros1File:
             return None
         # A chunk that is cut is read as far as it goes.
         return (fields, data) if len(data) == size or _number(fields, b"op") == _CHUNK else None
-
-    def messages(self, wanted: Callable[[Topic], bool]) -> Iterator[tuple[Topic, int, Any]]:
-        """Messages of the wanted topics in the order of their log: topic, log time in ns, bytes."""
-        seams = Seams()
-        yield from in_order(self._batches(wanted), seams)
-        self.done = 1.0
-        self.notes += seams.notes()
 
     def _batches(self, wanted: Callable[[Topic], bool]) -> Iterator[Batch]:
         choice: dict[int, Topic | None] = {}
@@ -151,8 +124,8 @@ class Ros1File:
             self._connect(fields, data)
         elif code == _MESSAGE:
             key = _number(fields, b"conn")
-            if key not in choice and key in self._connections:
-                choice[key] = self._connections[key] if wanted(self._connections[key]) else None
+            if key not in choice and key in self._topics:
+                choice[key] = self._topics[key] if wanted(self._topics[key]) else None
             if topic := choice.get(key):
                 seconds, nanos = struct.unpack("<II", fields.get(b"time", b"")[:8].ljust(8, b"\0"))
                 yield seconds * 10**9 + nanos, topic, data
@@ -193,10 +166,3 @@ class Ros1File:
         except (OSError, RuntimeError, ValueError, EOFError):
             self.notes.append(f"a chunk is damaged: {len(out)} of its {_number(fields, b'size')} bytes are read")
         return memoryview(bytes(out))
-
-    def attachments(self, _wanted: Callable[[str], bool]) -> dict[str, bytes]:
-        """A ROS 1 bag has none."""
-        return {}
-
-    def close(self) -> None:
-        """Nothing is open between calls."""

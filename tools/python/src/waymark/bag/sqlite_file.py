@@ -11,22 +11,19 @@ from typing import Any
 
 from . import decoding
 from .decoding import Topic
-from .order import Batch, Seams, in_order
+from .order import BagFile, Batch
 
 MAGIC = b"SQLite format 3\0"
 _STYLES = {"ros2msg": "msg", "ros2idl": "idl"}
 
 
-class SqliteFile:
-    """A database of rosbag2: its topics and its messages in the order of the log."""
+class SqliteFile(BagFile):
+    """A database of rosbag2."""
 
     def __init__(self, path: Path):
-        self.path = path
-        self.notes: list[str] = []
-        self.done = 0.0
+        super().__init__(path)
         self._folder: tempfile.TemporaryDirectory[str] | None = None
         self._database = sqlite3.connect(self._address(), uri=True)
-        self._topics: dict[int, Topic] = {}
         try:
             self._read_topics()
         except sqlite3.Error:
@@ -72,20 +69,8 @@ class SqliteFile:
         for key, topic in self._topics.items():
             topic.count = counts.get(key, 0)
 
-    @property
-    def topics(self) -> list[Topic]:
-        """All topics."""
-        return list(self._topics.values())
-
-    def messages(self, wanted: Callable[[Topic], bool]) -> Iterator[tuple[Topic, int, Any]]:
-        """Messages of the wanted topics in the order of their log: topic, log time in ns, bytes."""
-        seams = Seams()
-        yield from in_order(self._batches({key: topic for key, topic in self._topics.items() if wanted(topic)}), seams)
-        self.notes += seams.notes()
-        self.done = 1.0
-
-    def _batches(self, chosen: dict[int, Topic]) -> Iterator[Batch]:
-        """In the order in which they were written."""
+    def _batches(self, wanted: Callable[[Topic], bool]) -> Iterator[Batch]:
+        chosen = {key: topic for key, topic in self._topics.items() if wanted(topic)}
         total = sum(topic.count or 0 for topic in chosen.values())
         query = f"SELECT topic_id, timestamp, data FROM messages WHERE topic_id IN ({','.join('?' * len(chosen))}) ORDER BY id"
         count = 0
@@ -97,10 +82,6 @@ class SqliteFile:
                     yield Batch(log_ns, [(log_ns, chosen[key], data)])
         except sqlite3.Error:
             self.notes.append(f"its database is damaged or cut: {count} of its messages are read; `sqlite3 {self.path.name} .recover` may give more")
-
-    def attachments(self, _wanted: Callable[[str], bool]) -> dict[str, bytes]:
-        """A database has none."""
-        return {}
 
     def close(self) -> None:
         """Closes the database."""
