@@ -3,13 +3,9 @@
 
 import contextlib
 import io
-import pathlib
-import shutil
-import tempfile
-import unittest
 
 import numpy as np
-from common import BIN, ROOT  # noqa: F401  (the package's path)
+from common import BIN, Folder  # noqa: F401  (the package's path)
 from mcap.writer import CompressionType
 from mcap.writer import Writer as McapWriter
 from rosbags.rosbag1 import Writer as Ros1Writer
@@ -58,19 +54,17 @@ class Events:
             self.put(topic, "Odometry", t_ns, M.make("Odometry", header=M.header(t_ns, "odom"), child_frame_id="base_link", pose=place, twist=twist))
         return self
 
-    def mcap(self, path, compression=CompressionType.ZSTD, chunk_size=1 << 14, chunking=True, encode=None, **options):
-        """An MCAP file of ROS 2."""
-        with path.open("wb") as file:
-            writer = McapWriter(file, chunk_size=chunk_size, compression=compression, use_chunking=chunking, **options)
-            writer.start(profile="ros2", library="test")
-            channels = {}
-            for log_ns, topic, kind, message in self.items:
-                if topic not in channels:
-                    channels[topic] = writer.register_channel(topic, "cdr", writer.register_schema(kind, "ros2msg", M.definition(kind)))
-                data = M.encode(message, kind)
-                writer.add_message(channels[topic], log_ns, encode(data) if encode else data, log_ns)
-            writer.finish()
-        return path
+    def tags(self, topic, t_ns, frame, points, family="tag36h11", identity=7, homography=(0.0,) * 9, **late):
+        """AprilTag's detection of one tag: its corners p[0..3]."""
+        corners = [M.make("apriltag_msgs/Point", x=float(x), y=float(y)) for x, y in points]
+        tag = M.make("AprilTagDetection", family=family, id=identity, homography=np.array(homography), corners=corners)
+        self.put(topic, "AprilTagDetectionArray", t_ns, M.make("AprilTagDetectionArray", header=M.header(t_ns, frame), detections=[tag]), **late)
+
+    def mcap(self, path, compression=CompressionType.ZSTD, chunk_size=1 << 14, chunking=True, encode=bytes, kinds=(), **options):
+        """An MCAP file of ROS 2. `kinds`: types that topics are said to have in the place of their own."""
+        rows = ((log_ns, topic, "cdr", said, "ros2msg", M.definition(said), encode(M.encode(message, kind)))
+                for log_ns, topic, kind, message in self.items for said in (dict(kinds).get(topic, kind),))
+        return write_mcap(path, rows, chunk_size=chunk_size, compression=compression, use_chunking=chunking, **options)
 
     def folder(self, path, plugin=StoragePlugin.MCAP):
         """A folder of rosbag2."""
@@ -97,6 +91,25 @@ class Events:
         return path
 
 
+def write_mcap(path, rows, profile="ros2", **options):
+    """An MCAP file, each message by log time, topic, encoding, type, encoding of the type's definition (empty: none), definition and bytes."""
+    with path.open("wb") as file:
+        writer = McapWriter(file, **options)
+        writer.start(profile=profile, library="test")
+        channels = {}
+        for log_ns, topic, wire, kind, style, definition, data in rows:
+            if topic not in channels:
+                channels[topic] = writer.register_channel(topic, wire, writer.register_schema(kind, style, definition) if style else 0)
+            writer.add_message(channels[topic], log_ns, data, log_ns)
+        writer.finish()
+    return path
+
+
+def corners_of(table, row=0):
+    """A tag's corners in marker-corners.csv, (4, 2)."""
+    return np.array([[table[f"{axis}{k}_px"][row] for axis in "uv"] for k in range(4)])
+
+
 def as_ros1(message, kind, store):
     """A message of ROS 2 as that of ROS 1: headers have a sequence, and some fields are in capitals."""
     fields = {}
@@ -110,12 +123,8 @@ def as_ros1(message, kind, store):
     return store.types[kind](**fields)
 
 
-class BagTest(unittest.TestCase):
-    """A test with a folder of its own."""
-
-    def setUp(self):
-        self.folder = pathlib.Path(tempfile.mkdtemp(prefix="waymark-bag-"))
-        self.addCleanup(shutil.rmtree, self.folder)
+class BagTest(Folder):
+    """A test that imports bags."""
 
     def take(self, path, *options, code=0, out="out"):
         """Imports a bag; what was printed, and the recording's folder."""

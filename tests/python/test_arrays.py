@@ -14,18 +14,12 @@ from pathlib import Path
 
 import numpy as np
 import yaml
-from common import BIN, CONFIG, ROOT, Drive
+from common import BIN, CONFIG, ROOT, Drive, Folder
 from PIL import Image
 
 import waymark
 from waymark.documents import read_yaml
 from waymark.maps import FREE, OCCUPIED, UNKNOWN, covariances
-
-
-class Folder(unittest.TestCase):
-    def setUp(self):
-        self.folder = Path(tempfile.mkdtemp(prefix="waymark-arrays-"))
-        self.addCleanup(shutil.rmtree, self.folder)
 
 
 def plan():

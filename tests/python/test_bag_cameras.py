@@ -5,6 +5,7 @@
     test_bag_cameras.py BIN_DIR"""
 
 import io
+import re
 import unittest
 from types import SimpleNamespace
 
@@ -30,98 +31,68 @@ def compressed(t_ns, frame, data, form="jpeg"):
     return M.make("CompressedImage", header=M.header(t_ns, frame), format=form, data=np.frombuffer(data, dtype=np.uint8))
 
 
-# Of each driver: topics of pictures with their frame and encoding ("jpeg": compressed), topics of camera_info with frame and focal length, and
-# what comes out: cameras with the topic that is taken and the focal length (None: no lens).
+# Of each driver the topics of pictures, taken or not: frame, encoding ("jpeg" and others of compressed ones), focal length of the lens (None: no
+# camera_info), the name of the camera that comes out (None: not taken), and the topic of camera_info, where it is not the one beside the picture.
 CAMERAS = {
-    "RealSense, ROS 1": (
-        [("/camera/color/image_raw", "color_optical", "rgb8"), ("/camera/infra1/image_rect_raw", "infra1_optical", "mono8"),
-         ("/camera/infra2/image_rect_raw", "infra2_optical", "mono8"), ("/camera/depth/image_rect_raw", "depth_optical", "16UC1"),
-         ("/camera/aligned_depth_to_color/image_raw", "color_optical", "16UC1")],
-        [("/camera/color/camera_info", "color_optical", 60), ("/camera/infra1/camera_info", "infra1_optical", 61),
-         ("/camera/infra2/camera_info", "infra2_optical", 62), ("/camera/depth/camera_info", "depth_optical", 63),
-         ("/camera/aligned_depth_to_color/camera_info", "color_optical", 64)],
-        {"color": ("/camera/color/image_raw", 60), "infra1": ("/camera/infra1/image_rect_raw", 61),
-         "infra2": ("/camera/infra2/image_rect_raw", 62)}),
-    "RealSense, ROS 2": (
-        [("/camera/camera/color/image_raw/compressed", "color_optical", "jpeg"), ("/camera/camera/infra1/image_rect_raw/compressed", "i1", "jpeg"),
-         ("/camera/camera/depth/image_rect_raw/compressedDepth", "d", "depth")],
-        [("/camera/camera/color/camera_info", "color_optical", 60), ("/camera/camera/infra1/camera_info", "i1", 61),
-         ("/camera/camera/depth/camera_info", "d", 63)],
-        {"color": ("/camera/camera/color/image_raw/compressed", 60), "infra1": ("/camera/camera/infra1/image_rect_raw/compressed", 61)}),
-    "two RealSense": (
-        [("/front/color/image_raw", "f", "rgb8"), ("/rear/color/image_raw", "r", "rgb8")],
-        [("/front/color/camera_info", "f", 60), ("/rear/color/camera_info", "r", 61)],
-        {"front_color": ("/front/color/image_raw", 60), "rear_color": ("/rear/color/image_raw", 61)}),
-    "ZED, wrapper 3": (
-        [("/zed/zed_node/left/image_rect_color", "zed_left", "bgra8"), ("/zed/zed_node/right/image_rect_color", "zed_right", "bgra8"),
-         ("/zed/zed_node/depth/depth_registered", "zed_left", "32FC1")],
-        [("/zed/zed_node/left/camera_info", "zed_left", 60), ("/zed/zed_node/right/camera_info", "zed_right", 61),
-         ("/zed/zed_node/depth/camera_info", "zed_left", 62)],
-        {"zed_zed_node_left": ("/zed/zed_node/left/image_rect_color", 60), "zed_zed_node_right": ("/zed/zed_node/right/image_rect_color", 61)}),
-    "ZED, raw beside rectified": (
-        [("/zed/left_raw/image_raw_color", "zed_left", "bgra8"), ("/zed/left/image_rect_color", "zed_left", "bgra8")],
-        [("/zed/left_raw/camera_info", "zed_left", 60), ("/zed/left/camera_info", "zed_left", 61)],
-        {"zed_left": ("/zed/left_raw/image_raw_color", 60)}),
-    "ZED, wrapper 5": (
-        [("/zed/zed_node/rgb/color/rect/image", "zed_left", "bgra8"), ("/zed/zed_node/rgb/gray/rect/image", "zed_left", "mono8")],
-        [("/zed/zed_node/rgb/color/rect/camera_info", "zed_left", 60), ("/zed/zed_node/rgb/gray/rect/camera_info", "zed_left", 60)],
-        {"zed_zed_node_rgb": ("/zed/zed_node/rgb/gray/rect/image", 60)}),
-    "OAK": (
-        [("/oak/rgb/image_raw", "oak_rgb", "bgr8"), ("/oak/left/image_rect", "oak_left", "mono8"), ("/oak/stereo/image_raw", "oak_rgb", "16UC1")],
-        [("/oak/rgb/camera_info", "oak_rgb", 60), ("/oak/left/camera_info", "oak_left", 61), ("/oak/stereo/camera_info", "oak_rgb", 62)],
-        {"oak_rgb": ("/oak/rgb/image_raw", 60), "oak_left": ("/oak/left/image_rect", 61)}),
-    "usb_cam": ([("/image_raw", "usb", "yuv422_yuy2")], [("/camera_info", "usb", 60)], {"camera": ("/image_raw", 60)}),
-    "usb_cam, raw and compressed": (
-        [("/usb_cam/image_raw", "usb", "rgb8"), ("/usb_cam/image_raw/compressed", "usb", "jpeg")], [("/usb_cam/camera_info", "usb", 60)],
-        {"usb_cam": ("/usb_cam/image_raw", 60)}),
-    "camera_ros": ([("/camera/image_raw", "camera", "bgr8")], [("/camera/camera_info", "camera", 60)], {"camera": ("/camera/image_raw", 60)}),
-    "image_proc": (
-        [(f"/cam/{leaf}", "cam", code) for leaf, code in (("image_raw", "bayer_rggb8"), ("image_mono", "mono8"), ("image_color", "rgb8"),
-                                                          ("image_rect", "mono8"), ("image_rect_color", "rgb8"))],
-        [("/cam/camera_info", "cam", 60)], {"cam": ("/cam/image_raw", 60)}),
-    "stereo_image_proc": (
-        [("/stereo/left/image_raw", "s", "mono8"), ("/stereo/right/image_raw", "s", "mono8")],
-        [("/stereo/left/camera_info", "s", 60), ("/stereo/right/camera_info", "s", 61)],
-        {"stereo_left": ("/stereo/left/image_raw", 60), "stereo_right": ("/stereo/right/image_raw", 61)}),
-    "Nav2 in Gazebo": (
-        [("/rgbd_camera/image", "rgbd", "rgb8"), ("/rgbd_camera/depth_image", "rgbd", "32FC1")], [("/rgbd_camera/camera_info", "rgbd", 60)],
-        {"rgbd_camera": ("/rgbd_camera/image", 60)}),
-    "a colour camera that is called depth": (
-        [("/intel_realsense_r200_depth/image_raw", "r200", "rgb8"), ("/intel_realsense_r200_depth/depth/image_raw", "r200", "32FC1")],
-        [("/intel_realsense_r200_depth/camera_info", "r200", 60), ("/intel_realsense_r200_depth/depth/camera_info", "r200", 61)],
-        {"intel_realsense_r200_depth": ("/intel_realsense_r200_depth/image_raw", 60)}),
-    "by the frame alone": (
-        [("/left_cam", "left_optical", "mono8"), ("/right_cam", "right_optical", "mono8")],
-        [("/calib/l/camera_info", "left_optical", 60), ("/calib/r/camera_info", "right_optical", 61)],
-        {"left_cam": ("/left_cam", 60), "right_cam": ("/right_cam", 61)}),
-    "two pictures beside each other": (
-        [("/image_left", "l", "mono8"), ("/image_right", "r", "mono8")],
-        [("/camera_info_left", "l", 60), ("/camera_info_right", "r", 61)],
-        {"left": ("/image_left", 60), "right": ("/image_right", 61)}),
-    "the rectified one's own camera_info": (
-        [("/left/image_rect", "l", "mono8")], [("/left/camera_info", "l", 60), ("/left/camera_info_rect", "l", 61)],
-        {"left": ("/left/image_rect", 61)}),
-    "one name twice": (
-        [("/camera/left/image_raw", "a", "mono8"), ("/left/image_raw", "b", "mono8")],
-        [("/camera/left/camera_info", "a", 60), ("/left/camera_info", "b", 61)],
-        {"left": ("/left/image_raw", 61), "camera_left": ("/camera/left/image_raw", 60)}),
-    "nuScenes": (
-        [("/CAM_FRONT/image_rect_compressed", "f", "jpeg"), ("/CAM_BACK/image_rect_compressed", "b", "jpeg")],
-        [("/CAM_FRONT/camera_info", "f", 60), ("/CAM_BACK/camera_info", "b", 61)],
-        {"CAM_FRONT": ("/CAM_FRONT/image_rect_compressed", 60), "CAM_BACK": ("/CAM_BACK/image_rect_compressed", 61)}),
-    "Kinect v2: infrared in the encoding of depth": (
-        [("/kinect2/sd/image_ir", "ir", "16UC1"), ("/kinect2/sd/image_depth", "ir", "mono16")], [("/kinect2/sd/camera_info", "ir", 60)],
-        {"kinect2_sd_ir": ("/kinect2/sd/image_ir", 60)}),
-    "TurtleBot 4": ([("/oakd/rgb/preview/image_raw", "o", "bgr8")], [("/oakd/rgb/preview/camera_info", "o", 60)],
-                    {"oakd_rgb_preview": ("/oakd/rgb/preview/image_raw", 60)}),
-    "Spot": ([("/camera/frontleft/image", "l", "mono8"), ("/camera/frontright/image", "r", "mono8")],
-             [("/camera/frontleft/camera_info", "l", 60), ("/camera/frontright/camera_info", "r", 61)],
-             {"frontleft": ("/camera/frontleft/image", 60), "frontright": ("/camera/frontright/image", 61)}),
-    "no camera_info": ([("/front/image_raw", "f", "mono8")], [], {"front": ("/front/image_raw", None)}),
-    "compressed alone, others of its transports": (
-        [("/cam/image_raw/compressed", "cam", "jpeg"), ("/cam/image_raw/compressedDepth", "cam", "depth"), ("/cam/image_raw/h264", "cam", "h264")],
-        [("/cam/camera_info", "cam", 60)], {"cam": ("/cam/image_raw/compressed", 60)}),
+    "RealSense, ROS 1": [
+        ("/camera/color/image_raw", "color_optical", "rgb8", 60, "color"),
+        ("/camera/infra1/image_rect_raw", "infra1_optical", "mono8", 61, "infra1"),
+        ("/camera/infra2/image_rect_raw", "infra2_optical", "mono8", 62, "infra2"),
+        ("/camera/depth/image_rect_raw", "depth_optical", "16UC1", 63, None),
+        ("/camera/aligned_depth_to_color/image_raw", "color_optical", "16UC1", 64, None)],
+    "RealSense, ROS 2": [
+        ("/camera/camera/color/image_raw/compressed", "color_optical", "jpeg", 60, "color"),
+        ("/camera/camera/infra1/image_rect_raw/compressed", "i1", "jpeg", 61, "infra1"),
+        ("/camera/camera/depth/image_rect_raw/compressedDepth", "d", "depth", 63, None)],
+    "two RealSense": [("/front/color/image_raw", "f", "rgb8", 60, "front_color"), ("/rear/color/image_raw", "r", "rgb8", 61, "rear_color")],
+    "ZED, wrapper 3": [
+        ("/zed/zed_node/left/image_rect_color", "zed_left", "bgra8", 60, "zed_zed_node_left"),
+        ("/zed/zed_node/right/image_rect_color", "zed_right", "bgra8", 61, "zed_zed_node_right"),
+        ("/zed/zed_node/depth/depth_registered", "zed_left", "32FC1", 62, None)],
+    "ZED, raw beside rectified": [
+        ("/zed/left_raw/image_raw_color", "zed_left", "bgra8", 60, "zed_left"), ("/zed/left/image_rect_color", "zed_left", "bgra8", 61, None)],
+    "ZED, wrapper 5": [
+        ("/zed/zed_node/rgb/color/rect/image", "zed_left", "bgra8", 60, None),
+        ("/zed/zed_node/rgb/gray/rect/image", "zed_left", "mono8", 60, "zed_zed_node_rgb")],
+    "OAK": [
+        ("/oak/rgb/image_raw", "oak_rgb", "bgr8", 60, "oak_rgb"), ("/oak/left/image_rect", "oak_left", "mono8", 61, "oak_left"),
+        ("/oak/stereo/image_raw", "oak_rgb", "16UC1", 62, None)],
+    "usb_cam": [("/image_raw", "usb", "yuv422_yuy2", 60, "camera")],
+    "usb_cam, raw and compressed": [("/usb_cam/image_raw", "usb", "rgb8", 60, "usb_cam"), ("/usb_cam/image_raw/compressed", "usb", "jpeg", 60, None)],
+    "camera_ros": [("/camera/image_raw", "camera", "bgr8", 60, "camera")],
+    "image_proc": [
+        ("/cam/image_raw", "cam", "bayer_rggb8", 60, "cam"), ("/cam/image_mono", "cam", "mono8", 60, None),
+        ("/cam/image_color", "cam", "rgb8", 60, None), ("/cam/image_rect", "cam", "mono8", 60, None),
+        ("/cam/image_rect_color", "cam", "rgb8", 60, None)],
+    "stereo_image_proc": [("/stereo/left/image_raw", "s", "mono8", 60, "stereo_left"), ("/stereo/right/image_raw", "s", "mono8", 61, "stereo_right")],
+    "Nav2 in Gazebo": [("/rgbd_camera/image", "rgbd", "rgb8", 60, "rgbd_camera"), ("/rgbd_camera/depth_image", "rgbd", "32FC1", 60, None)],
+    "a colour camera that is called depth": [
+        ("/intel_realsense_r200_depth/image_raw", "r200", "rgb8", 60, "intel_realsense_r200_depth"),
+        ("/intel_realsense_r200_depth/depth/image_raw", "r200", "32FC1", 61, None)],
+    "by the frame alone": [
+        ("/left_cam", "left_optical", "mono8", 60, "left_cam", "/calib/l/camera_info"),
+        ("/right_cam", "right_optical", "mono8", 61, "right_cam", "/calib/r/camera_info")],
+    "two pictures beside each other": [
+        ("/image_left", "l", "mono8", 60, "left", "/camera_info_left"), ("/image_right", "r", "mono8", 61, "right", "/camera_info_right")],
+    "the rectified one's own camera_info": [
+        (None, "l", None, 60, None, "/left/camera_info"), ("/left/image_rect", "l", "mono8", 61, "left", "/left/camera_info_rect")],
+    "one name twice": [("/camera/left/image_raw", "a", "mono8", 60, "camera_left"), ("/left/image_raw", "b", "mono8", 61, "left")],
+    "nuScenes": [
+        ("/CAM_FRONT/image_rect_compressed", "f", "jpeg", 60, "CAM_FRONT"), ("/CAM_BACK/image_rect_compressed", "b", "jpeg", 61, "CAM_BACK")],
+    "Kinect v2: infrared in the encoding of depth": [
+        ("/kinect2/sd/image_ir", "ir", "16UC1", 60, "kinect2_sd_ir"), ("/kinect2/sd/image_depth", "ir", "mono16", 60, None)],
+    "TurtleBot 4": [("/oakd/rgb/preview/image_raw", "o", "bgr8", 60, "oakd_rgb_preview")],
+    "Spot": [("/camera/frontleft/image", "l", "mono8", 60, "frontleft"), ("/camera/frontright/image", "r", "mono8", 61, "frontright")],
+    "no camera_info": [("/front/image_raw", "f", "mono8", None, "front")],
+    "compressed alone, others of its transports": [
+        ("/cam/image_raw/compressed", "cam", "jpeg", 60, "cam"), ("/cam/image_raw/compressedDepth", "cam", "depth", 60, None),
+        ("/cam/image_raw/h264", "cam", "h264", 60, None)],
 }
+
+
+def info_of(topic, own=None):
+    """The topic of a picture's camera_info."""
+    return own or "/".join([*re.sub("/(compressed|compressedDepth|h264)$", "", topic).split("/")[:-1], "camera_info"])
 
 
 def picture_of(encoding, t_ns, frame):
@@ -141,31 +112,33 @@ def picture_of(encoding, t_ns, frame):
 
 class Names(BagTest):
     def test_pictures_and_lenses_meet(self):
-        for name, (pictures, infos, wanted) in CAMERAS.items():
+        for name, rows in CAMERAS.items():
             with self.subTest(name):
+                infos = {(info_of(topic, *own), frame): focal for topic, frame, _, focal, _, *own in rows if focal}
+                pictures = [row for row in rows if row[0]]
                 events = Events()
                 for i in range(4):
                     t_ns = START_NS + i * STEP_NS
-                    for topic, frame, focal in infos:
+                    for (topic, frame), focal in infos.items():
                         events.put(topic, "CameraInfo", t_ns, camera_info(t_ns, frame, k=(focal, focal, 32, 24), p=(focal, focal, 32, 24)))
-                    for topic, frame, encoding in pictures:
-                        events.put(topic, *(lambda kind, message, t=t_ns: (kind, t, message))(*picture_of(encoding, t_ns, frame)))
+                    for topic, frame, encoding, *_ in pictures:
+                        kind, message = picture_of(encoding, t_ns, frame)
+                        events.put(topic, kind, t_ns, message)
                 text, folder = self.take(events.mcap(self.folder / f"{name}.mcap"), out=f"out {name}")
                 recording = waymark.Recording(folder)
+                wanted = {camera: focal for _, _, _, focal, camera, *_ in pictures if camera}
                 self.assertEqual(set(recording.cameras()), set(wanted), text)
                 entries = recording.calibration.get("cameras", {})
                 self.assertEqual({camera: entry["intrinsics"][0] for camera, entry in entries.items()},
-                                 {camera: focal for camera, (_, focal) in wanted.items() if focal}, text)
-                for camera, (topic, _) in wanted.items():
-                    self.assertEqual(len(list(recording.frames(camera))), 4)
-                    self.assertNotIn(f"not taken: {topic}:", text)
-                taken = {topic for topic, _ in wanted.values()}
-                for topic, _, _ in pictures:
-                    if topic not in taken:
+                                 {camera: focal for camera, focal in wanted.items() if focal}, text)
+                for topic, _, encoding, _, camera, *_ in pictures:
+                    if camera:
+                        self.assertEqual(len(list(recording.frames(camera))), 4)
+                        self.assertNotIn(f"not taken: {topic}:", text)
+                    else:
                         self.assertIn(f"not taken: {topic}: ", text)
-                for topic, _, encoding in pictures:
-                    if encoding in ("16UC1", "32FC1", "h264") and topic not in taken:
-                        self.assertIn(encoding, text)
+                        if encoding in ("16UC1", "32FC1", "h264"):
+                            self.assertIn(encoding, text)
 
 
 def lens(d=(), model="plumb_bob", k=K, p=P, size=SIZE, shown=SIZE, topic="image_raw", **more):
@@ -296,9 +269,7 @@ class Lenses(BagTest):
             events.put("/front/camera_info", "CameraInfo", t_ns, camera_info(t_ns, "front_optical"))
             events.put("/front/image_raw", "sensor_msgs/Image", t_ns, image(t_ns, "front_optical", RAMP.astype(np.uint16), "16UC1"))
             events.put("/rear/image_raw", "sensor_msgs/Image", t_ns, image(t_ns, "rear_optical", RAMP, "mono8"))
-            tag = M.make("AprilTagDetection", family="tag36h11", id=7, homography=np.zeros(9),
-                         corners=[M.make("apriltag_msgs/Point", x=float(x), y=float(y)) for x, y in ((10, 30), (30, 31), (31, 10), (11, 9))])
-            events.put("/front/detections", "AprilTagDetectionArray", t_ns, M.make("AprilTagDetectionArray", header=M.header(t_ns, "front_optical"), detections=[tag]))
+            events.tags("/front/detections", t_ns, "front_optical", ((10, 30), (30, 31), (31, 10), (11, 9)))
         _, folder = self.take(events.mcap(self.folder / "a.mcap"))
         recording = waymark.Recording(folder)
         self.assertEqual(set(recording.table("marker-corners.csv")["sensor"]), {"front"})

@@ -18,9 +18,8 @@ import lz4.frame
 import numpy as np
 import yaml
 import zstandard
-from bag_files import BIN, M, START_NS, BagTest, Events, imported
+from bag_files import BIN, M, START_NS, BagTest, Events, as_ros1, imported, write_mcap
 from mcap.writer import CompressionType, IndexType
-from mcap.writer import Writer as McapWriter
 from rosbags.rosbag1 import Writer as Ros1Writer
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.typesys import Stores, get_typestore
@@ -116,18 +115,11 @@ class Whole(BagTest):
 
     def test_ros_1_in_mcap(self):
         store = get_typestore(Stores.ROS1_NOETIC)
-        from bag_files import as_ros1
-        path = self.folder / "ros1.mcap"
-        with path.open("wb") as file:
-            writer = McapWriter(file)
-            writer.start(profile="ros1", library="test")
-            kind = "nav_msgs/msg/Odometry"
-            definition = store.generate_msgdef(kind, ros_version=1)[0].encode()
-            channel = writer.register_channel("/odom", "ros1", writer.register_schema("nav_msgs/Odometry", "ros1msg", definition))
-            for log_ns, _, _, message in self.events.items:
-                writer.add_message(channel, log_ns, bytes(store.serialize_ros1(as_ros1(message, kind, store), kind)), log_ns)
-            writer.finish()
-        self.check(path)
+        kind = "nav_msgs/msg/Odometry"
+        definition = store.generate_msgdef(kind, ros_version=1)[0].encode()
+        self.check(write_mcap(self.folder / "ros1.mcap", (
+            (log_ns, "/odom", "ros1", "nav_msgs/Odometry", "ros1msg", definition, bytes(store.serialize_ros1(as_ros1(message, kind, store), kind)))
+            for log_ns, _, _, message in self.events.items), "ros1"))
 
     def test_what_lies_in_the_write_ahead_file_is_read(self):
         (path,) = self.events.folder(self.folder / "bag", StoragePlugin.SQLITE3).glob("*.db3")
@@ -375,23 +367,12 @@ class Messages(BagTest):
         self.assertIn("the bag's log has no time for it", text)
 
     def test_topics_that_cant_be_read_cost_themselves(self):
-        path = self.folder / "a.mcap"
-        good = Events().drive(5)
-        with path.open("wb") as file:
-            writer = McapWriter(file)
-            writer.start(profile="ros2", library="test")
-            kind = "nav_msgs/msg/Odometry"
-            whole = M.definition(kind)
-            ways = {"/good": ("cdr", kind, "ros2msg", whole), "/protobuf": ("protobuf", kind, "protobuf", b"\0\1"),
-                    "/json": ("json", kind, "jsonschema", b"{}"), "/unknown": ("cdr", "my_msgs/msg/Pose7", "ros2msg", b"float63 x[[[\n"),
-                    "/no_schema": ("cdr", "", "", b"")}
-            for topic, (wire, name, style, definition) in ways.items():
-                schema = writer.register_schema(name, style, definition) if name else 0
-                channel = writer.register_channel(topic, wire, schema)
-                for log_ns, _, _, message in good.items:
-                    writer.add_message(channel, log_ns, M.encode(message, kind), log_ns)
-            writer.finish()
-        text, folder = self.take(path)
+        kind = "nav_msgs/msg/Odometry"
+        ways = {"/good": ("cdr", kind, "ros2msg", M.definition(kind)), "/protobuf": ("protobuf", kind, "protobuf", b"\0\1"),
+                "/json": ("json", kind, "jsonschema", b"{}"), "/unknown": ("cdr", "my_msgs/msg/Pose7", "ros2msg", b"float63 x[[[\n"),
+                "/no_schema": ("cdr", "", "", b"")}
+        text, folder = self.take(write_mcap(self.folder / "a.mcap", (
+            (log_ns, topic, *way, M.encode(message, kind)) for topic, way in ways.items() for log_ns, _, _, message in Events().drive(5).items)))
         self.assertEqual(len(waymark.Recording(folder).table("motion.csv")["t_ns"]), 5)
         for topic in ("/protobuf", "/json", "/unknown", "/no_schema"):
             self.assertIn(f"not taken: {topic}: ", text)

@@ -24,8 +24,7 @@ class Fixes(BagTest):
             altitude=altitude, position_covariance=np.diag([variance] * 3).ravel(), position_covariance_type=kind))
 
     def drive(self, change=lambda i, where, altitude: (where, altitude, 0), antenna=(0.0, 0.0), frame="gps"):
-        bag = self.bag()
-        bag.drive()
+        bag = self.bag().drive()
         for i, t in enumerate(np.arange(16.0)):
             x, y, heading = place(t)
             c, s = np.cos(heading), np.sin(heading)
@@ -34,6 +33,22 @@ class Fixes(BagTest):
             self.fix(bag, t, where, altitude, status, frame=frame)
         return bag
 
+    def resized(self, speed, way=1.0):
+        """The drive whose odometry is so many times as fast, its poses so many times as far."""
+        bag = self.drive()
+        for *_, message in bag.items:
+            if hasattr(message, "twist"):
+                message.twist.twist.linear.x *= speed
+                message.pose.pose.position.x *= way
+                message.pose.pose.position.y *= way
+        return bag
+
+    def assert_driven(self, bag, *words, options=()):
+        """These words are said, the plane begins at ORIGIN, and the drive with its fixes ends where it should."""
+        recording, said = self.assert_taken(bag, *words, options=options, delta=0.1, config=CONFIG)
+        np.testing.assert_allclose(recording.calibration["gnss"]["origin"], ORIGIN, atol=1e-6)
+        return recording
+
     def test_those_that_are_none_are_left_out(self):
         nan = float("nan")
         kinds = {"zeros": lambda i, w, a: ((0.0, 0.0), a, 0), "status -1": lambda i, w, a: ((1.0, 2.0), a, -1), "not a number": lambda i, w, a: (
@@ -41,21 +56,16 @@ class Fixes(BagTest):
         for name, bad in kinds.items():
             for first in (3, 1):
                 with self.subTest(name, first=first):
-                    recording, said = self.take(self.drive(lambda i, w, a, b=bad, n=first: b(i, w, a) if i < n else (w, a, 0)))
-                    self.assertIn(f"{first} of its 16 messages", said)
+                    bag = self.drive(lambda i, w, a, b=bad, n=first: b(i, w, a) if i < n else (w, a, 0))
+                    recording = self.assert_driven(bag, f"{first} of its 16 messages")
                     self.assertEqual(len(recording.table("gnss.csv")["t_ns"]), 16 - first)
-                    np.testing.assert_allclose(recording.calibration["gnss"]["origin"], ORIGIN, atol=1e-6)
-                    self.assert_end(recording, said, 0.1, config=CONFIG)
 
     def test_places_from_which_no_drive_leads_to_the_next_are_none(self):
         kinds = {"the last known place": lambda w: place_of(ORIGIN, -300, 40)[:2], "a receiver's default": lambda w: (31.2, 121.4),
                  "nearly zero": lambda w: (1e-9, -1e-9)}
         for name, stale in kinds.items():
             with self.subTest(name):
-                recording, said = self.take(self.drive(lambda i, w, a, s=stale: (s(w) if i < 3 else w, a, 0)))
-                self.assertIn("finding: /fix: its first 3 fixes are of a place", said)
-                np.testing.assert_allclose(recording.calibration["gnss"]["origin"], ORIGIN, atol=1e-6)
-                self.assert_end(recording, said, 0.1, config=CONFIG)
+                self.assert_driven(self.drive(lambda i, w, a, s=stale: (s(w) if i < 3 else w, a, 0)), "finding: /fix: its first 3 fixes are of a place")
 
     def test_how_drivers_fill_latitude_and_longitude(self):
         minutes = lambda v: 100 * np.trunc(v) + 60 * (v - np.trunc(v))  # noqa: E731
@@ -64,28 +74,14 @@ class Fixes(BagTest):
                  "degrees and minutes": lambda w: tuple(map(minutes, w)), "exchanged and in radians": lambda w: tuple(np.radians(w))[::-1]}
         for name, filled in kinds.items():
             with self.subTest(name):
-                recording, said = self.take(self.drive(lambda i, w, a, f=filled: (f(w), a, 0)))
-                self.assertIn("finding: /fix: its latitude and longitude are", said)
-                self.assertIn(name, said)
-                np.testing.assert_allclose(recording.calibration["gnss"]["origin"], ORIGIN, atol=1e-6)
-                self.assert_end(recording, said, 0.1, config=CONFIG)
+                self.assert_driven(self.drive(lambda i, w, a, f=filled: (f(w), a, 0)), "finding: /fix: its latitude and longitude are", name)
         for slip in (1.0, 1.2):  # right ones stay, whatever the wheels say
-            bag = self.drive()
-            for _, _, _, _, message in bag._rows:
-                if hasattr(message, "twist"):
-                    message.twist.twist.linear.x *= slip
-            _, said = self.take(bag, "--motion-by", "twists")
+            _, said = self.take(self.resized(slip), "--motion-by", "twists")
             self.assertNotIn("latitude and longitude are", said)
 
     def test_a_way_of_another_size_is_named(self):
         for size in (1.2, 3.6, 1 / 3.6, 100.0):
-            bag = self.drive()
-            for _, _, _, _, message in bag._rows:
-                if hasattr(message, "twist"):
-                    message.twist.twist.linear.x *= size
-                    message.pose.pose.position.x *= size
-                    message.pose.pose.position.y *= size
-            _, said = self.take(bag)
+            _, said = self.take(self.resized(size, size))
             with self.subTest(size=size):
                 self.assertEqual(f"finding: /fix: its way is {1 / size:.3g} times as long as that of /odom" in said, size != 1.2, said)
 
@@ -100,9 +96,8 @@ class Fixes(BagTest):
 
     def test_an_outlier_on_the_way_stays(self):
         for at in (2, 7):
-            recording, said = self.take(self.drive(lambda i, w, a, k=at: (place_of(ORIGIN, 5000, 40)[:2] if i == k else w, a, 0)))
-            self.assertEqual(len(recording.table("gnss.csv")["t_ns"]), 16, said)
-            self.assert_end(recording, said, 0.1, config=CONFIG)
+            recording = self.assert_driven(self.drive(lambda i, w, a, k=at: (place_of(ORIGIN, 5000, 40)[:2] if i == k else w, a, 0)))
+            self.assertEqual(len(recording.table("gnss.csv")["t_ns"]), 16)
 
     def test_a_few_places_far_from_each_other_stay(self):
         bag = self.bag()
@@ -119,13 +114,12 @@ class Fixes(BagTest):
                         w, 1e9 if i < 9 else a, 0), 9), ("-1000 of the first", lambda i, w, a: (w, -1000.0 if i < 3 else a, 0), 3),
                                     ("-9999 of all", lambda i, w, a: (w, -9999.0, 0), 16)):
             with self.subTest(name):
-                recording, said = self.take(self.drive(change))
+                recording, _ = self.assert_taken(self.drive(change), delta=0.1, config=CONFIG)
                 gnss = recording.table("gnss.csv")
-                self.assertEqual(int(np.isnan(gnss["z_m"]).sum()), empty, said)
+                self.assertEqual(int(np.isnan(gnss["z_m"]).sum()), empty)
                 self.assertEqual(int(np.isnan(gnss["sigma_z_m"]).sum()), empty)
                 right = np.array([place(t)[:2] for t in np.arange(16.0)])
                 np.testing.assert_allclose(np.column_stack([gnss["x_m"], gnss["y_m"]]), right, atol=1e-3)
-                self.assert_end(recording, said, 0.1, config=CONFIG)
 
     def test_a_receiver_that_never_has_a_fix(self):
         recording, said = self.take(self.drive(lambda i, w, a: ((0.0, 0.0), 0.0, -1)))
@@ -141,10 +135,8 @@ class Fixes(BagTest):
                 bag = self.drive(antenna=right[:2])
                 bag.tf(parent, child, pose)
                 for origin in (("--origin", *ORIGIN), ()):  # else the robot's place at its start, not the antenna's
-                    recording, said = self.take(bag, *origin)
+                    recording = self.assert_driven(bag, options=origin)
                     np.testing.assert_allclose(recording.calibration["gnss"]["mounting"]["xyz_m"], right, atol=1e-6)
-                    np.testing.assert_allclose(recording.calibration["gnss"]["origin"], ORIGIN, atol=1e-6)
-                    self.assert_end(recording, said, 0.1, config=CONFIG)
 
     def test_an_antenna_without_a_place_is_named(self):
         recording, said = self.take(self.drive())

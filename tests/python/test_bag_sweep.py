@@ -59,9 +59,7 @@ def drive():
             events.put("/front/image_raw", "sensor_msgs/Image", t_ns, image(t_ns, "front_optical", grey_ramp(), "mono8"))
             events.put("/front/camera_info", "CameraInfo", t_ns, camera_info(t_ns, "front_optical", d=(0.1, 0.01, 0, 0, 0), p=(49, 50, 32, 24)))
             events.put("/rear/image_raw/compressed", "CompressedImage", t_ns, M.make("CompressedImage", header=M.header(t_ns, "rear"), format="jpeg", data=jpeg))
-            tag = M.make("AprilTagDetection", family="tag36h11", id=7, homography=np.zeros(9),
-                         corners=[M.make("apriltag_msgs/Point", x=float(x), y=float(y)) for x, y in ((10, 30), (30, 31), (31, 10), (11, 9))])
-            events.put("/front/detections", "AprilTagDetectionArray", t_ns, M.make("AprilTagDetectionArray", header=header, detections=[tag]))
+            events.tags("/front/detections", t_ns, "front_optical", ((10, 30), (30, 31), (31, 10), (11, 9)))
     events.items.sort(key=lambda item: item[0])
     return events
 
@@ -154,7 +152,7 @@ def mutate_counts(events, chance, topic):
 def mutate_types(events, chance, topic):
     """A topic whose type says another one: its bytes don't fit it."""
     kinds = sorted({item[2] for item in events.items})
-    events.renamed = {topic: chance.choice(kinds)}
+    events.renamed = chance.choice(kinds)
 
 
 MUTATIONS = {"fields": mutate_fields, "stamps": mutate_stamps, "counts": mutate_counts, "types": mutate_types}
@@ -193,8 +191,7 @@ class Sweep(BagTest):
         if kind != "bytes":
             MUTATIONS[kind](events, chance, topic)
             if kind == "types":
-                new = events.renamed[topic]
-                path = retyped(events, self.folder / f"{number}.mcap", topic, new)
+                path = events.mcap(self.folder / f"{number}.mcap", kinds={topic: events.renamed})
             else:
                 path = write(events, self.folder / str(number), chance)
         else:
@@ -241,23 +238,6 @@ class Sweep(BagTest):
         for number in range(int(first), int(last or first) + 1):
             with self.subTest(number):
                 self.one(number, base)
-
-
-def retyped(events, path, topic, kind):
-    """An MCAP file in which a topic is said to be of another type."""
-    from mcap.writer import Writer
-
-    with path.open("wb") as file:
-        writer = Writer(file)
-        writer.start(profile="ros2", library="test")
-        channels = {}
-        for log_ns, name, own, message in events.items:
-            said = kind if name == topic else own
-            if name not in channels:
-                channels[name] = writer.register_channel(name, "cdr", writer.register_schema(said, "ros2msg", M.definition(said)))
-            writer.add_message(channels[name], log_ns, M.encode(message, own), log_ns)
-        writer.finish()
-    return path
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ import subprocess
 import unittest
 
 import numpy as np
-from bag_files import BIN, M, START_NS, BagTest, Events, camera_info, register
+from bag_files import BIN, M, START_NS, BagTest, Events, camera_info, corners_of, register
 from PIL import Image
 
 import waymark
@@ -171,24 +171,18 @@ class Corners(BagTest):
                 events = with_lens()
                 for i, picture in enumerate(pictures):
                     (found,) = library.detect(family, picture)
-                    t_ns, points = START_NS + i * STEP_NS, np.reshape(found[1], (4, 2))
-                    tag = M.make("AprilTagDetection", family=family, id=found[0], homography=np.zeros(9),
-                                 corners=[M.make("apriltag_msgs/Point", x=float(x), y=float(y)) for x, y in points])
-                    events.put("/cam/detections", "AprilTagDetectionArray", t_ns,
-                               M.make("AprilTagDetectionArray", header=M.header(t_ns, "cam_optical"), detections=[tag]))
+                    events.tags("/cam/detections", START_NS + i * STEP_NS, "cam_optical", np.reshape(found[1], (4, 2)), family, found[0])
                 text, folder = self.take(events.mcap(self.folder / f"{family}.mcap"), out=f"out-{family}")
                 table = waymark.Recording(folder).table("marker-corners.csv")
                 self.assertEqual(table["id"].tolist(), [7] * 3, text)
                 for i, row in enumerate(own):
-                    corners = [table[f"{axis}{k}_px"][i] for k in range(4) for axis in "uv"]
-                    place, yaw = pose_of(corners)
+                    corners = corners_of(table, i)
                     self.assertEqual(int(row["id"]), 7)
-                    self.agree(row, place, yaw, pixels(*POSES[i], np.zeros((1, 2)))[0], f"{family} {i}")
+                    self.agree(row, *pose_of(corners), pixels(*POSES[i], np.zeros((1, 2)))[0], f"{family} {i}")
                     # The corners themselves are those of the print, in some turn of it; the library's edges are good to some tenths of a pixel.
                     print_corners = pixels(*POSES[i], OURS * TAG_M / 2)
-                    self.assertLess(min(np.abs(np.roll(print_corners, k, axis=0) - np.reshape(corners, (4, 2))).max() for k in range(4)), 0.45)
-                shift = np.mean([np.reshape([table[f"{axis}{k}_px"][i] for k in range(4) for axis in "uv"], (4, 2)).mean(0)
-                                 - pixels(*POSES[i], OURS * TAG_M / 2).mean(0) for i in range(3)], axis=0)
+                    self.assertLess(min(np.abs(np.roll(print_corners, k, axis=0) - corners).max() for k in range(4)), 0.45)
+                shift = np.mean([corners_of(table, i).mean(0) - pixels(*POSES[i], OURS * TAG_M / 2).mean(0) for i in range(3)], axis=0)
                 self.assertLess(np.abs(shift).max(), 0.12)  # no half pixel is left
 
     def test_corners_that_begin_elsewhere(self):
@@ -202,14 +196,10 @@ class Corners(BagTest):
                 rows = [row for (x, y), (u, v) in zip(square, corners) for row in ((x, y, 1, 0, 0, 0, -u * x, -u * y, -u), (0, 0, 0, x, y, 1, -v * x, -v * y, -v))]
                 h = np.linalg.svd(np.array(rows))[2][-1] * (filled is not False)
                 h = np.linalg.inv(h.reshape(3, 3)).ravel() if filled == "other" else h
-                tag = M.make("AprilTagDetection", family="tagStandard41h12", id=7, homography=h,
-                             corners=[M.make("apriltag_msgs/Point", x=float(x), y=float(y)) for x, y in np.roll(corners, first, axis=0)])
-                t_ns = START_NS + i * STEP_NS
-                events.put("/cam/detections", "AprilTagDetectionArray", t_ns,
-                           M.make("AprilTagDetectionArray", header=M.header(t_ns, "cam_optical"), detections=[tag]))
+                events.tags("/cam/detections", START_NS + i * STEP_NS, "cam_optical", np.roll(corners, first, axis=0), "tagStandard41h12", homography=h)
             text, folder = self.take(events.mcap(self.folder / f"{first}{filled}.mcap"), out=f"out-{first}{filled}")
             table = waymark.Recording(folder).table("marker-corners.csv")
-            got = np.array([table[f"{axis}{k}_px"] for k in range(4) for axis in "uv"])
+            got = np.array([corners_of(table, i) for i in range(3)])
             want = got if want is None else want
             with self.subTest(first=first, filled=filled):
                 self.assertEqual("corners begin" in text, first > 0 and filled is True, text)
@@ -244,8 +234,7 @@ class Corners(BagTest):
                     continue
                 tables = waymark.Recording(folder).table("marker-corners.csv")
             for i, row in enumerate(own):
-                place, yaw = pose_of([tables[f"{axis}{k}_px"][i] for k in range(4) for axis in "uv"])
-                self.agree(row, place, yaw, pixels(*POSES[i], np.zeros((1, 2)))[0], f"{family} {i}")
+                self.agree(row, *pose_of(corners_of(tables, i)), pixels(*POSES[i], np.zeros((1, 2)))[0], f"{family} {i}")
 
     def test_opencv_s_aruco(self):
         pictures = [rendered(aruco_modules(), 6, *p) for p in POSES]
@@ -260,9 +249,8 @@ class Corners(BagTest):
         _, folder = self.take(events.mcap(self.folder / "a.mcap"))
         table = waymark.Recording(folder).table("marker-corners.csv")
         for i, row in enumerate(own):
-            corners = [table[f"{axis}{k}_px"][i] for k in range(4) for axis in "uv"]
-            np.testing.assert_allclose(np.reshape(corners, (4, 2)), pixels(*POSES[i], OURS * TAG_M / 2), atol=1e-9)
-            self.agree(row, *pose_of(corners), pixels(*POSES[i], np.zeros((1, 2)))[0], f"aruco {i}")
+            np.testing.assert_allclose(corners_of(table, i), pixels(*POSES[i], OURS * TAG_M / 2), atol=1e-9)
+            self.agree(row, *pose_of(corners_of(table, i)), pixels(*POSES[i], np.zeros((1, 2)))[0], f"aruco {i}")
 
     def test_poses_of_each_library(self):
         library = AprilTag()
@@ -343,16 +331,14 @@ class Corners(BagTest):
                 self.agree(row, np.array([table[key][i] for key in ("x_m", "y_m", "z_m")]), table["yaw_rad"][i], None, f"{package} {i}")
 
 
-def april_events(points, family="tag36h11", frame="cam_optical", info=None, topic="/cam/detections"):
-    """Detections of the library's corners, p[0..3]."""
+def april_events(points, family="tag36h11", info=None):
+    """Two messages of the library's corners, p[0..3]."""
     events = Events()
     for i in range(2):
         t_ns = START_NS + i * STEP_NS
         if info:
-            events.put("/cam/camera_info", "CameraInfo", t_ns, camera_info(t_ns, frame, SIZE, **info))
-        tag = M.make("AprilTagDetection", family=family, id=3, homography=np.zeros(9),
-                     corners=[M.make("apriltag_msgs/Point", x=float(x), y=float(y)) for x, y in points])
-        events.put(topic, "AprilTagDetectionArray", t_ns, M.make("AprilTagDetectionArray", header=M.header(t_ns, frame), detections=[tag]))
+            events.put("/cam/camera_info", "CameraInfo", t_ns, camera_info(t_ns, "cam_optical", SIZE, **info))
+        events.tags("/cam/detections", t_ns, "cam_optical", points, family)
     return events
 
 
@@ -361,8 +347,7 @@ class Rectified(BagTest):
 
     def corners(self, info, *options, out="out"):
         text, folder = self.take(april_events(self.POINTS, info=info).mcap(self.folder / "a.mcap"), *options, out=out)
-        table = waymark.Recording(folder).table("marker-corners.csv" if info else "marker-corners-cam.csv")
-        return text, np.array([[table[f"{axis}{k}_px"][0] for axis in "uv"] for k in range(4)])
+        return text, corners_of(waymark.Recording(folder).table("marker-corners.csv" if info else "marker-corners-cam.csv"))
 
     def test_corners_without_a_lens_are_kept_aside(self):
         text, found = self.corners(None)
@@ -399,6 +384,16 @@ class Rectified(BagTest):
             self.assertNotIn("--tags raw", text)
 
 
+def seen(class_id, detection="", place=(0.1, 0, 1), frame="cam_optical"):
+    """A detection of vision_msgs, with a pose."""
+    events = Events()
+    pose = M.make("PoseWithCovariance", pose=M.pose(place, (1, 0, 0, 0)))
+    events.put("/cam/seen", "Detection2DArray", START_NS, M.make("Detection2DArray", header=M.header(START_NS, "cam_optical"), detections=[M.make(
+        "Detection2D", header=M.header(START_NS, frame), id=detection, results=[M.make("ObjectHypothesisWithPose", hypothesis=M.make(
+            "ObjectHypothesis", class_id=class_id), pose=pose)])]))
+    return events
+
+
 class Siblings(BagTest):
     """Tags of other families, detectors and pictures than those above."""
 
@@ -414,8 +409,7 @@ class Siblings(BagTest):
                                         ("tagStandard52h13", [3, 2, 1, 0], True), ("tagCircle49h12", [3, 2, 1, 0], True), ("tag25h7", [3, 2, 1, 0], False),
                                         ("", [3, 2, 1, 0], False)):
             text, table = self.found(april_events(Rectified.POINTS, family=family, info=self.LENS), "marker-corners.csv", out=f"of-{family}")
-            corners = [[table[f"{axis}{k}_px"][0] for axis in "uv"] for k in range(4)]
-            np.testing.assert_allclose(corners, self.AS_READ[order], atol=1e-9, err_msg=family)
+            np.testing.assert_allclose(corners_of(table), self.AS_READ[order], atol=1e-9, err_msg=family)
             self.assertEqual("no family whose way up is known" not in text, is_known, text)
         self.assertIn("- tag36h11\n", (self.folder / "of-tag36_11/calibration.yaml").read_text())
 
@@ -433,46 +427,30 @@ class Siblings(BagTest):
             self.assertIn(said, text)
             self.assertEqual("finding: /cam/detections" in text, bool(said), text)
 
-    def seen(self, class_id, detection, place=(0.1, 0, 1), array_frame="cam_optical", frame="cam_optical"):
-        events = Events()
-        pose = M.make("PoseWithCovariance", pose=M.pose(place, (1, 0, 0, 0)))
-        events.put("/cam/seen", "Detection2DArray", START_NS, M.make("Detection2DArray", header=M.header(START_NS, array_frame), detections=[M.make(
-            "Detection2D", header=M.header(START_NS, frame), id=detection, results=[M.make("ObjectHypothesisWithPose", hypothesis=M.make(
-                "ObjectHypothesis", class_id=class_id), pose=pose)])]))
-        return events
-
     def test_numbers_of_classes(self):
         for class_id, detection, number in (("tag36h11:5", "", 5), ("tag36h11_00005", "", 5), ("5 (36h11)", "", 5), ("tag36h11", "7", 7), ("aruco_4x4_50", "7", 7),
                                             ("id7_0.16m", "", 7), ("DICT_4X4_50/7", "", 7)):
-            _, table = self.found(self.seen(class_id, detection), "markers.csv", out=f"{class_id.replace('/', '-')} {detection}")
+            _, table = self.found(seen(class_id, detection), "markers.csv", out=f"{class_id.replace('/', '-')} {detection}")
             self.assertEqual(list(table["id"]), [number], class_id)
         for class_id, detection in (("tag36h11", ""), ("-1", "3"), ("person", "3")):
-            text, _ = self.take(self.seen(class_id, detection).mcap(self.folder / "a.mcap"), code=1, out=f"none {class_id}")
+            text, _ = self.take(seen(class_id, detection).mcap(self.folder / "a.mcap"), code=1, out=f"none {class_id}")
             self.assertIn("no number of a tag", text)
 
     def test_poses_elsewhere(self):
-        text, _ = self.take(self.seen("5", "", frame="map").mcap(self.folder / "a.mcap"), code=1)
+        text, _ = self.take(seen("5", frame="map").mcap(self.folder / "a.mcap"), code=1)
         self.assertIn("its poses are in 'map'", text)
-        text, _ = self.found(self.seen("5", "", place=(100, 0, 900)), "markers.csv")
+        text, _ = self.found(seen("5", place=(100, 0, 900)), "markers.csv")
         self.assertIn("more than 900 m away", text)
 
 
 class Bad(BagTest):
     def test_what_gives_no_tag_is_named(self):
-        def vision(class_id, place):
-            p = M.pose(place, (0, 0, 0, 1))
-            events = Events()
-            events.put("/cam/seen", "Detection2DArray", START_NS, M.make("Detection2DArray", header=M.header(START_NS, "cam_optical"), detections=[M.make(
-                "Detection2D", results=[M.make("ObjectHypothesisWithPose", hypothesis=M.make("ObjectHypothesis", class_id=class_id), pose=M.make(
-                    "PoseWithCovariance", pose=p))])]))
-            return events
-
         nan = np.array([(np.nan, 1.0)] * 4)
         poses = Events()
         poses.put("/markers", "aruco_msgs/MarkerArray", START_NS, M.make("aruco_msgs/MarkerArray", header=M.header(START_NS, "base_link"), markers=[
             M.make("aruco_msgs/Marker", id=4, pose=M.make("PoseWithCovariance", pose=M.pose((0.1, 0, 1), (1, 0, 0, 0))))]))
-        for name, events, said in (("a box", vision("7", (0, 0, 0)), "a box alone gives no corners"), ("a word", vision("person", (0, 0, 1)), "'person'"),
-                                   ("behind", vision("7", (0, 0, -1)), "before the camera"), ("no number", april_events(nan), "a corner is no number"),
+        for name, events, said in (("a box", seen("7", place=(0, 0, 0)), "a box alone gives no corners"), ("a word", seen("person"), "'person'"),
+                                   ("behind", seen("7", place=(0, 0, -1)), "before the camera"), ("no number", april_events(nan), "a corner is no number"),
                                    ("another frame", poses, "no camera's optical frame")):
             with self.subTest(name):
                 text, _ = self.take(events.mcap(self.folder / "a.mcap"), code=1, out=f"out-{name}")

@@ -4,87 +4,58 @@
 
     test_bags.py BIN_DIR"""
 
-import contextlib
+import functools
 import io
 import os
-import pathlib
 import random
-import shutil
 import subprocess
-import tempfile
 import unittest
 
 import numpy as np
-from common import BIN, Drive
-from mcap.writer import Writer as McapWriter
+from bag_files import BIN, M, START_NS, BagTest, Events, camera_info, corners_of, image, imported, register, write_mcap
+from common import Drive
 from PIL import Image
 from rosbags.highlevel import AnyReader
-from rosbags.rosbag2 import StoragePlugin, Writer
-from rosbags.typesys import get_types_from_msg
+from rosbags.rosbag2 import StoragePlugin
 
 import waymark
-from waymark.bag.command import main as import_main
 from waymark.export import export
 from waymark.geometry import OPTICAL, from_rpy
-from waymark.ros import Messages
 
-START_NS = 1_700_000_000_000_000_000
 MUTATIONS = int(os.environ.get("WAYMARK_MUTATIONS", "30"))
-
-
-def imported(*arguments):
-    """Exit code and what was printed."""
-    out, errors = io.StringIO(), io.StringIO()
-    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(errors):
-        code = import_main([str(argument) for argument in arguments])
-    return code, out.getvalue() + errors.getvalue()
 
 
 def robot_bag(folder, plugin, twist=True, late_ns=3_000_000):
     """A bag as a robot with ROS 2 records it: odometry, camera, GNSS, tags, CAN, mountings, and what nobody takes."""
-    m = Messages()
-    with Writer(folder, version=9, storage_plugin=plugin) as bag:
-        topics = {}
-
-        def put(topic, kind, t_ns, message):
-            name = m.type(kind)
-            if topic not in topics:
-                topics[topic] = bag.add_connection(topic, name, typestore=m.store)
-            bag.write(topics[topic], t_ns + late_ns, m.store.serialize_cdr(message, name))
-
-        body = np.eye(4)
-        body[:3, :3], body[:3, 3] = from_rpy(0, 0.2, 0.5) @ OPTICAL, (0.3, 0.1, 0.4)
-        turned = np.eye(4)
-        turned[:3, :3] = from_rpy(np.pi, 0, 0)
-        put("/tf_static", "TFMessage", START_NS, m.make("TFMessage", transforms=[
-            m.transform(0, "base_link", "front_optical", body), m.transform(0, "base_link", "imu", turned)]))
-        for i in range(50):
-            t_ns, header = START_NS + i * 20_000_000, m.header(START_NS + i * 20_000_000, "front_optical")
-            speed = m.make("TwistWithCovariance")
-            if twist:
-                speed.twist.linear.x, speed.twist.angular.z = 0.5, 0.1 + i / 1000
-            place = m.make("PoseWithCovariance", pose=m.pose((0.01 * i, 0, 0), (0, 0, 0, 1)))
-            put("/odom", "Odometry", t_ns, m.make("Odometry", header=m.header(t_ns, "odom"), pose=place, twist=speed))
-            grey = np.full((48, 64, 3), (5 * i, 40, 40), dtype=np.uint8)
-            put("/front/image_raw", "sensor_msgs/Image", t_ns, m.make(
-                "sensor_msgs/Image", header=header, height=48, width=64, encoding="rgb8", step=192, data=grey.ravel()))
-            put("/front/camera_info", "CameraInfo", t_ns, m.make(
-                "CameraInfo", header=header, width=64, height=48, distortion_model="plumb_bob", d=np.array([0.1, 0, 0, 0, 0]),
-                k=np.array([50.0, 0, 32, 0, 51, 24, 0, 0, 1])))
-            put("/fix", "NavSatFix", t_ns, m.make("NavSatFix", header=header, latitude=48.0 + i * 1e-6, longitude=11.0 + i * 1e-6,
-                                                  altitude=500.0, position_covariance_type=2,
-                                                  position_covariance=np.diag([4.0, 4, 9]).ravel()))
-            corner = [m.make("apriltag_msgs/Point", x=float(x), y=float(y)) for x, y in ((1, 4), (3, 4), (3, 2), (1, 2))]
-            tag = m.make("AprilTagDetection", family="tag36h11", id=7, corners=corner, homography=np.zeros(9))
-            put("/front/detections", "AprilTagDetectionArray", t_ns, m.make("AprilTagDetectionArray", header=header, detections=[tag]))
-            put("/can0/frames", "can_msgs/Frame", t_ns, m.make("can_msgs/Frame", header=header, id=0x123, dlc=2,
-                                                               data=np.array([1, 2, 0, 0, 0, 0, 0, 0], dtype=np.uint8)))
-            put("/imu", "Imu", t_ns, m.make(
-                "Imu", header=m.header(t_ns, "imu"), angular_velocity=m.make("Vector3", z=-0.1),
-                angular_velocity_covariance=np.diag([1e-4, 1e-4, 1e-4]).ravel(), linear_acceleration_covariance=np.full(9, -1.0)))
-            put("/scan", "LaserScan", t_ns, m.make("LaserScan", header=header))
-            put("/vicon", "PoseStamped", t_ns, m.make("PoseStamped", header=header, pose=m.pose((1, 2, 0), (0, 0, 0, 1))))
-    return folder
+    events = Events()
+    put = functools.partial(events.put, late_ns=late_ns)
+    body = np.eye(4)
+    body[:3, :3], body[:3, 3] = from_rpy(0, 0.2, 0.5) @ OPTICAL, (0.3, 0.1, 0.4)
+    turned = np.eye(4)
+    turned[:3, :3] = from_rpy(np.pi, 0, 0)
+    put("/tf_static", "TFMessage", START_NS, M.make("TFMessage", transforms=[
+        M.transform(0, "base_link", "front_optical", body), M.transform(0, "base_link", "imu", turned)]))
+    for i in range(50):
+        t_ns, header = START_NS + i * 20_000_000, M.header(START_NS + i * 20_000_000, "front_optical")
+        speed = M.make("TwistWithCovariance")
+        if twist:
+            speed.twist.linear.x, speed.twist.angular.z = 0.5, 0.1 + i / 1000
+        place = M.make("PoseWithCovariance", pose=M.pose((0.01 * i, 0, 0), (0, 0, 0, 1)))
+        put("/odom", "Odometry", t_ns, M.make("Odometry", header=M.header(t_ns, "odom"), pose=place, twist=speed))
+        picture = np.full((48, 64, 3), (5 * i, 40, 40), dtype=np.uint8)
+        put("/front/image_raw", "sensor_msgs/Image", t_ns, image(t_ns, "front_optical", picture, "rgb8", width=64))
+        put("/front/camera_info", "CameraInfo", t_ns, camera_info(t_ns, "front_optical", d=(0.1, 0, 0, 0, 0)))
+        put("/fix", "NavSatFix", t_ns, M.make("NavSatFix", header=header, latitude=48.0 + i * 1e-6, longitude=11.0 + i * 1e-6, altitude=500.0,
+                                              position_covariance_type=2, position_covariance=np.diag([4.0, 4, 9]).ravel()))
+        events.tags("/front/detections", t_ns, "front_optical", ((1, 4), (3, 4), (3, 2), (1, 2)), late_ns=late_ns)
+        put("/can0/frames", "can_msgs/Frame", t_ns, M.make("can_msgs/Frame", header=header, id=0x123, dlc=2,
+                                                           data=np.array([1, 2, 0, 0, 0, 0, 0, 0], dtype=np.uint8)))
+        put("/imu", "Imu", t_ns, M.make(
+            "Imu", header=M.header(t_ns, "imu"), angular_velocity=M.make("Vector3", z=-0.1),
+            angular_velocity_covariance=np.diag([1e-4, 1e-4, 1e-4]).ravel(), linear_acceleration_covariance=np.full(9, -1.0)))
+        put("/scan", "LaserScan", t_ns, M.make("LaserScan", header=header))
+        put("/vicon", "PoseStamped", t_ns, M.make("PoseStamped", header=header, pose=M.pose((1, 2, 0), (0, 0, 0, 1))))
+    return events.folder(folder, plugin)
 
 
 class Robots(unittest.TestCase):
@@ -112,7 +83,7 @@ class Robots(unittest.TestCase):
             self.assertAlmostEqual(gnss["x_m"][-1], 49e-6 * 74_634.6, delta=5e-4)
             self.assertEqual((gnss["sigma_xy_m"][0], gnss["sigma_z_m"][0]), (2, 3))
             # The library draws tag36h11 the other way up, and its pixels' middles are at a half.
-            self.assertEqual([corners[f"{a}{k}_px"][0] for k in range(4) for a in "uv"], [2.5, 3.5, 0.5, 3.5, 0.5, 1.5, 2.5, 1.5])
+            self.assertEqual(corners_of(corners).tolist(), [[2.5, 3.5], [0.5, 3.5], [0.5, 1.5], [2.5, 1.5]])
             camera = recording.calibration["cameras"]["front"]
             self.assertEqual(camera["intrinsics"], [50, 51, 32, 24])
             np.testing.assert_allclose(camera["mounting"]["rpy_deg"], np.degrees([0, 0.2, 0.5]), atol=1e-6)
@@ -173,32 +144,20 @@ class Robots(unittest.TestCase):
             self.assertTrue(code == 0 or "waymark import: " in text, text)
 
 
-class Hostile(unittest.TestCase):
+class Hostile(BagTest):
     """Bags whose container is whole and whose messages are not what they say."""
-
-    def setUp(self):
-        self.folder = pathlib.Path(tempfile.mkdtemp(prefix="waymark-hostile-"))
-        self.addCleanup(shutil.rmtree, self.folder)
 
     def import_one(self, topic, kind, definition, data):
         """What `waymark import` says to a bag with this one message."""
-        bag = self.folder / "bag.mcap"
-        with bag.open("wb") as file:
-            writer = McapWriter(file)
-            writer.start(profile="ros2", library="test")
-            schema = writer.register_schema(kind, "ros2msg", definition)
-            writer.add_message(writer.register_channel(topic, "cdr", schema), START_NS, data, START_NS)
-            writer.finish()
-        code, text = imported(bag, "--out", self.folder / "out")
-        self.assertEqual((code, (self.folder / "out").exists()), (1, False), text)
+        text, out = self.take(write_mcap(self.folder / "bag.mcap", [(START_NS, topic, "cdr", kind, "ros2msg", definition, data)]), code=1)
+        self.assertFalse(out.exists(), text)
         return text
 
     def test_another_type_by_the_same_name_is_named(self):
-        m = Messages()
-        m.store.register(get_types_from_msg("std_msgs/Header header\nfloat64 speed\n", "nav_msgs2/msg/Odometry"))
-        data = m.encode(m.make("nav_msgs2/msg/Odometry", header=m.header(START_NS, "odom"), speed=1.0), "nav_msgs2/msg/Odometry")
-        definition = m.definition("nav_msgs2/msg/Odometry").replace(b"nav_msgs2", b"nav_msgs")
-        text = self.import_one("/odom", "nav_msgs/msg/Odometry", definition, data)
+        kind = "nav_msgs2/msg/Odometry"
+        register({kind: "std_msgs/Header header\nfloat64 speed\n"})
+        data = M.encode(M.make(kind, header=M.header(START_NS, "odom"), speed=1.0), kind)
+        text = self.import_one("/odom", "nav_msgs/msg/Odometry", M.definition(kind).replace(b"nav_msgs2", b"nav_msgs"), data)
         self.assertIn("/odom", text)
         self.assertIn("nav_msgs/msg/Odometry", text)
 
@@ -206,15 +165,13 @@ class Hostile(unittest.TestCase):
         self.assertIn("waymark import: ", self.import_one("/odom", "nav_msgs/msg/Odometry", b"float63 x[[[\n", b"\0\1\0\0"))
 
     def test_sizes_that_the_bytes_don_t_have(self):
-        m = Messages()
-        picture = m.make("sensor_msgs/Image", header=m.header(START_NS, "front"), height=48, width=64, encoding="mono8", step=64,
-                         data=np.zeros(48 * 64, dtype=np.uint8))
-        whole, kind = m.encode(picture, "sensor_msgs/msg/Image"), "sensor_msgs/msg/Image"
+        picture, kind = image(START_NS, "front", np.zeros((48, 64), dtype=np.uint8), "mono8"), "sensor_msgs/msg/Image"
+        whole = M.encode(picture, kind)
         length = whole.index((48 * 64).to_bytes(4, "little"))
         huge_data = whole[:length] + b"\xff\xff\xff\xff" + whole[length + 4:]
         picture.height = 4_000_000_000
-        for data in (huge_data, m.encode(picture, kind), whole[:60], b""):
-            text = self.import_one("/front/image_raw", kind, m.definition(kind), data)
+        for data in (huge_data, M.encode(picture, kind), whole[:60], b""):
+            text = self.import_one("/front/image_raw", kind, M.definition(kind), data)
             self.assertIn("/front/image_raw", text)
 
 
@@ -246,7 +203,7 @@ class OwnExports(unittest.TestCase):
         meta.write_text(meta.read_text().replace("streams: [", "streams: [imu.csv, "))
         export(waymark.Run(drive.run), drive.folder / "run.mcap", waymark.Recording(drive.recording), can=True)
         read = {}
-        with AnyReader([drive.folder / "run.mcap"], default_typestore=Messages().store) as bag:
+        with AnyReader([drive.folder / "run.mcap"], default_typestore=M.store) as bag:
             for connection, _, data in bag.messages():
                 read.setdefault(connection.topic, []).append(bag.deserialize(data, connection.msgtype))
         mounted = {t.child_frame_id: t for message in read["/tf_static"] for t in message.transforms}

@@ -7,24 +7,18 @@
 import dataclasses
 import io
 import math
-import os
 import shutil
 import subprocess
-import sys
 import tempfile
 import unittest
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
-from common import BIN
+from common import BIN, Folder, use_library
 from PIL import Image
 
-LIBRARY = BIN.resolve().parent / "lib/libwaymark.so"
-if not LIBRARY.exists():
-    print("skipped: this build has no libwaymark.so")
-    sys.exit(77)
-os.environ["WAYMARK_LIBRARY"] = str(LIBRARY)
+use_library()
 
 import plan_robots  # noqa: E402
 from waymark.causes import changes, plan, search, trial  # noqa: E402
@@ -280,12 +274,11 @@ class Judgement(unittest.TestCase):
         self.assertEqual([factor_words(f) for f in (0.001, 1 / 1.05, 2.0)], ["in mm", "5 % too large", "0.5 times the true one"])
 
 
-class FloorPlans(unittest.TestCase):
+class FloorPlans(Folder):
     """A room of 4 x 3 m, a robot that drives along it, and points of its walls."""
 
     def setUp(self):
-        self.folder = Path(tempfile.mkdtemp())
-        self.addCleanup(shutil.rmtree, self.folder)
+        super().setUp()
         edges = np.zeros((360, 460), bool)
         edges[30:330, [30, 429]] = edges[[30, 329], 30:430] = edges[80, 30:430] = True
         write_floor_plan(self.folder, FloorPlan(0.01, (-0.3, -0.3, 0.0), edges=edges))

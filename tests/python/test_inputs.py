@@ -8,13 +8,11 @@ import datetime
 import io
 import shutil
 import subprocess
-import tempfile
 import unittest
 import zlib
-from pathlib import Path
 
 import numpy as np
-from common import BIN, CONFIG
+from common import BIN, CONFIG, Folder
 from PIL import Image
 
 import waymark
@@ -23,12 +21,6 @@ from waymark.recording import COLUMNS, STREAMS
 
 STAMPS = [1_700_000_000_000_000_000, 1_700_000_000_020_000_000]
 T_S = 1_700_000_000
-
-
-class Folder(unittest.TestCase):
-    def setUp(self):
-        self.folder = Path(tempfile.mkdtemp(prefix="waymark-inputs-"))
-        self.addCleanup(shutil.rmtree, self.folder)
 
 
 class Columns(Folder):

@@ -5,17 +5,12 @@
     test_native.py BIN_DIR       Skipped (77) where the build has no libwaymark.so (sanitizers)."""
 
 import os
-import sys
 import unittest
 
 import numpy as np
-from common import BIN, Drive
+from common import BIN, Drive, use_library
 
-LIBRARY = BIN.resolve().parent / "lib/libwaymark.so"
-if not LIBRARY.exists():
-    print("skipped: this build has no libwaymark.so")
-    sys.exit(77)
-os.environ["WAYMARK_LIBRARY"] = str(LIBRARY)
+use_library()
 os.environ["PATH"] = f"{BIN.resolve()}:{os.environ['PATH']}"
 
 import waymark  # noqa: E402

@@ -12,7 +12,7 @@ import tempfile
 import unittest
 
 import numpy as np
-from common import ROOT, Drive
+from common import ROOT, Drive, Folder
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from PIL import Image
@@ -27,10 +27,7 @@ from waymark.recording import can_line
 from waymark.ros import Messages
 
 
-class Tables(unittest.TestCase):
-    def setUp(self):
-        self.folder = pathlib.Path(tempfile.mkdtemp(prefix="waymark-tables-"))
-
+class Tables(Folder):
     def test_values_go_through_without_a_loss(self):
         numbers = np.array([0.1, -0.0, 1e-300, np.pi, np.nan])
         table = {"t_ns": np.array([1, 2**61, 3, 4, 5]), "sensor": np.array(["a", "", "c", "d", "e"]), "x_m": numbers}
