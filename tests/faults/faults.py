@@ -4,7 +4,6 @@
 drivers (played_world.h), heard by LCM's own logger. Each drive has a network of its own; they drive side by side.
 
     faults.py BUILD [DRIVE ...]          needs the right to network and mount namespaces, and liblcm-bin; skipped (77) without"""
-import csv
 import fcntl
 import json
 import math
@@ -398,8 +397,7 @@ def box(work):
             video = drive.folder / f"box/{what}-front-{part}.avi"
             if not video.exists():
                 continue
-            with open(video.with_suffix(".csv"), newline="") as f:
-                stamps += [(int(row["t_ns"]) - drive.begin_ns) * 1e-9 for row in csv.DictReader(f)]
+            stamps += [(int(row["t_ns"]) - drive.begin_ns) * 1e-9 for row in drives.rows(video.with_suffix(".csv"))]
             whole += sum(p[:2] == b"\xff\xd8" and p[-2:] == b"\xff\xd9" for p in edges.pictures(video))
         heard.check(whole == len(stamps) > 0.8 * pictures_hz * keep_s and until_s - 1.5 < max(stamps) < until_s + 1,
                     f"{what}: {whole} whole pictures, {len(stamps)} stamps, to {until_s - max(stamps, default=math.nan):.1f} s before it")

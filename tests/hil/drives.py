@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A recording through the guest's drivers into `waymark run`: its timeline for guest/play, and the judgement of what the run
 said over LCM, against a replay of the recording with the data that the guest saw, and against the truth."""
+import csv
 import pathlib
 import re
 import shutil
@@ -14,6 +15,12 @@ from waymark_hil.poses import BEGIN_NS, HEADING_DEG, POSITION_M, apart_of, at, d
 TRUTH_RATIO = 1.5
 COMPILER = "cc"  # of what runs in the guest
 URL = "udpm://239.255.76.67:7667?ttl=0"
+
+
+def rows(path):
+    """A table's rows, texts by column."""
+    with open(path, newline="") as file:
+        return list(csv.DictReader(file))
 
 
 def can_items(recording):

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
 """A rendered corridor through the guest's CAN controller and V4L2 device into edge_mcl."""
-import csv
 import shutil
 import struct
 
@@ -22,6 +21,15 @@ def pictures(avi):
         at += 8 + length + (length & 1)
 
 
+def played(recording):
+    """The player's lines of the pictures, (t_ns, line), and the pictures' bytes one behind the other."""
+    items, blob = [], bytearray()
+    for row, picture in zip(drives.rows(recording / "video/front.csv"), pictures(recording / "video/front.avi")):
+        items.append((int(row["t_ns"]), f"p {len(blob)} {len(picture)}"))
+        blob += picture
+    return items, blob
+
+
 def prepare(work, root, here, simulate):
     """The drive, its timeline for the player, and the robot's configuration."""
     world = (root / "config/worlds/corridor-easy.yaml").read_text()
@@ -29,12 +37,8 @@ def prepare(work, root, here, simulate):
     (work / "world.yaml").write_text(world)
     recording, scenario = drives.make(work, "edges", simulate, work / "world.yaml", "--duration", str(SECONDS))
 
-    items, blob = list(drives.can_items(recording)), bytearray()
-    with open(recording / "video/front.csv", newline="") as f:
-        for row, picture in zip(csv.DictReader(f), pictures(recording / "video/front.avi")):
-            items.append((int(row["t_ns"]), f"p {len(blob)} {len(picture)}"))
-            blob += picture
-    drives.write(scenario, here, items, blob, SECONDS)
+    items, blob = played(recording)
+    drives.write(scenario, here, [*drives.can_items(recording), *items], blob, SECONDS)
     for name in ("vehicle.dbc", "can-signals.yaml", "calibration.yaml"):
         shutil.copy(recording / name, scenario)
     shutil.copytree(recording / "map", scenario / "map")

@@ -2,7 +2,6 @@
 """A robot with two driven wheels and an RTK receiver, without CAN: its twist comes over LCM, NMEA sentences come on a serial line that gpsd
 reads, each block when it arrived in the recording; landmark_ekf. gpsd's first report of a fix has no standard deviations, as the recording has,
 so that poses are compared with the replay of what the guest recorded."""
-import csv
 import datetime
 import functools
 import math
@@ -83,10 +82,8 @@ def block(t_ns, x_m, y_m, z_m, sigma_m, sigma_up_m):
 
 def fixes(recording):
     """(arrival_ns, t_ns, numbers) of gnss.csv."""
-    with open(recording / "gnss.csv", newline="") as f:
-        for row in csv.DictReader(f):
-            numbers = [float(row[name]) for name in ("x_m", "y_m", "z_m", "sigma_xy_m", "sigma_z_m")]
-            yield int(row["arrival_ns"]), int(row["t_ns"]), numbers
+    for row in drives.rows(recording / "gnss.csv"):
+        yield int(row["arrival_ns"]), int(row["t_ns"]), [float(row[name]) for name in ("x_m", "y_m", "z_m", "sigma_xy_m", "sigma_z_m")]
 
 
 def before(rows):

@@ -13,7 +13,6 @@ The service and power parts run the package under systemd; without one they are 
 Judged on the host: the guest's own checks; the log of its run gives its poses bit by bit; its poses are those of a replay
 of the same frames."""
 import argparse
-import csv
 import math
 import pathlib
 import shutil
@@ -50,12 +49,6 @@ def boot(work, machine, script, *devices, clock=SLOW, init="", watch=None):
     is_good = guest.boot(guest.command_of(work / "image", machine, work / "share", script, devices, clock, init), log, watch=watch)
     print(log.read_text(errors="replace"))
     return is_good
-
-
-def poses(path):
-    with open(path, newline="") as f:
-        return [(int(r["t_ns"]), float(r["x_m"]), float(r["y_m"]), 2 * math.atan2(float(r["qz"]), float(r["qw"])))
-                for r in csv.DictReader(f)]
 
 
 def worst_difference(a, b):
@@ -158,8 +151,7 @@ def judge_power(work, waymark):
     if replay.returncode:
         return [f"power cut: the recording doesn't replay: {replay.stderr[-300:]}"]
     cut_s = marks(work / "share/out/camera-marks")["power"]
-    with open(folder / "rec/video/front.csv", newline="") as f:
-        pictures_s = [int(row["t_ns"]) * 1e-9 for row in csv.DictReader(f)]
+    pictures_s = [int(row["t_ns"]) * 1e-9 for row in drives.rows(folder / "rec/video/front.csv")]
     whole = sum(len(p) == 320 * 180 for p in edges.pictures(folder / "rec/video/front.avi"))
     frames_s = [float(line[1:].split(")")[0]) for line in (folder / "rec/can.log").read_text().splitlines() if line.endswith(tuple("0123456789ABCDEF"))]
     if not pictures_s or not frames_s:
@@ -175,8 +167,7 @@ def judge_camera(work, waymark):
     left of a recording when the disk was full is read."""
     whole = sum(len(p) == 320 * 180 for p in edges.pictures(work / "share/out/camera-full/video/front.avi"))
     print(f"camera: {whole} whole pictures in the recording that filled the disk")
-    with open(work / "share/out/camera-faults/video/front.csv", newline="") as f:
-        rows = [(int(r["t_ns"]), int(r["arrival_ns"])) for r in csv.DictReader(f)]
+    rows = [(int(r["t_ns"]), int(r["arrival_ns"])) for r in drives.rows(work / "share/out/camera-faults/video/front.csv")]
     failures = [] if whole >= 5 else ["a recording that filled the disk has lost its pictures"]
     if any(b[0] <= a[0] for a, b in zip(rows, rows[1:])):
         failures.append("stamps of pictures go back")
@@ -201,11 +192,11 @@ def judge_can(work, waymark):
     shutil.copy(out / "heard.log", heard / "can.log")
     subprocess.run([waymark, "replay", heard, "--config", work / "can.yaml", "--out", work / "witness"],
                    check=True, stdout=subprocess.DEVNULL)
-    guest = poses(out / "drive/trajectory.csv")
+    guest = drives.table(out / "drive/trajectory.csv")
     for name, limit_m, limit_deg, what in (
             ("witness", POSITION_M, HEADING_DEG, "what candump heard beside it"),
             ("desk", PLAYER_M, PLAYER_DEG, "the recording itself, whose times the player can't keep")):
-        other = poses(work / name / "trajectory.csv")
+        other = drives.table(work / name / "trajectory.csv")
         worst_m, worst_deg, worst_ms = worst_difference(guest, other)
         print(f"can: {len(guest)} poses in the guest, {len(other)} by {what}: at most {worst_m:.5f} m and "
               f"{worst_deg:.5f} degrees apart, stamps {worst_ms:.3f} ms")

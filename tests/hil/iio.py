@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A robot with two driven wheels and an IMU: its measured twist and the bearings of landmarks come over LCM, its turn rate from the IIO
 buffer of the kernel's driver for HID gyroscopes, each at its own time; landmark_ekf."""
-import csv
-
 import drives
 import messages
 import motion
@@ -14,9 +12,8 @@ RECEIVED_LEAST = 0.98  # of the samples; the buffer is opened after the first
 
 def rates(recording):
     """(t_ns, line for the player) of imu.csv."""
-    with open(recording / "imu.csv", newline="") as f:
-        for row in csv.DictReader(f):
-            yield int(row["t_ns"]), "g " + " ".join(str(round(1e6 * float(row[name]))) for name in ("wx_radps", "wy_radps", "wz_radps"))
+    for row in drives.rows(recording / "imu.csv"):
+        yield int(row["t_ns"]), "g " + " ".join(str(round(1e6 * float(row[name]))) for name in ("wx_radps", "wy_radps", "wz_radps"))
 
 
 def prepare(work, root, here, simulate):

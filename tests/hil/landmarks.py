@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A simulated crossing through the guest's CAN controller into landmark_ekf; its sightings come from another program, over LCM,
 each when it arrived in the recording."""
-import csv
 import math
 import shutil
 
@@ -13,9 +12,8 @@ def sightings(work, recording):
     """(arrival_ns, t_ns, message) of each sensor's picture."""
     waymark = messages.types(work)
     together = {}
-    with open(recording / "sightings.csv", newline="") as f:
-        for row in csv.DictReader(f):
-            together.setdefault((int(row["t_ns"]), row["sensor"]), []).append(row)
+    for row in drives.rows(recording / "sightings.csv"):
+        together.setdefault((int(row["t_ns"]), row["sensor"]), []).append(row)
     number = lambda text: float(text) if text else math.nan
     for (t_ns, sensor), rows in together.items():
         said = waymark.observations_t()

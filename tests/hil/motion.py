@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A holonomic robot without CAN: its twist comes at 50 Hz over LCM from another program, as do the bearings of landmarks, each when it
 arrived in the recording; landmark_ekf."""
-import csv
 import shutil
 
 import drives
@@ -14,12 +13,11 @@ WORLD = "yard-holonomic"
 def twists(work, recording):
     """(t_ns, message) of motion.csv."""
     waymark = messages.types(work)
-    with open(recording / "motion.csv", newline="") as f:
-        for row in csv.DictReader(f):
-            said = waymark.motion_t()
-            said.t_ns = int(row["t_ns"])
-            said.v_mps, said.vy_mps, said.w_radps = (float(row.get(name) or "nan") for name in ("v_mps", "vy_mps", "w_radps"))
-            yield said.t_ns, said.encode()
+    for row in drives.rows(recording / "motion.csv"):
+        said = waymark.motion_t()
+        said.t_ns = int(row["t_ns"])
+        said.v_mps, said.vy_mps, said.w_radps = (float(row.get(name) or "nan") for name in ("v_mps", "vy_mps", "w_radps"))
+        yield said.t_ns, said.encode()
 
 
 def over_lcm(work, recording):

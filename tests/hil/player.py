@@ -2,12 +2,13 @@
 """`waymark play` into the guest's virtual CAN and V4L2 devices: two buses, together 2000 frames a second, and two cameras at 30 Hz, recorded
 there by `waymark record` and v4l2-ctl, and compared with what was played: nothing is lost or changed, and stamps of CAN and pictures
 agree. Then with faults that real interfaces have."""
-import csv
 import json
 import re
 import shutil
 import struct
 import subprocess
+
+import drives
 
 SECONDS, RATE_HZ, PICTURES_HZ, WIDTH, HEIGHT = 8, 1900, 30, 320, 200
 FIRST_NS = 40 * 10**9
@@ -96,8 +97,7 @@ def taken(path):
 
 
 def read_stamps(path):
-    with open(path, newline="") as f:
-        return [int(row["t_ns"]) for row in csv.DictReader(f)]
+    return [int(row["t_ns"]) for row in drives.rows(path)]
 
 
 def percentile(values, share):

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The parts of hil.py in which the package runs as a service under systemd, as it is shipped: silent for minutes, killed, and cut
 off from power. A robot drives past markers on walls (an office, `slam`), played through a CAN controller and a V4L2 device."""
-import csv
 import math
 import pathlib
 import random
@@ -53,11 +52,7 @@ def scenario_of(name, work, root, here, simulate):
     """The folder for the guest with the robot's files, pictures and player; and the timeline's items."""
     recording, folder = drive(work, root, simulate), work / f"share/{name}"
     folder.mkdir(parents=True)
-    can, pictures, blob = list(drives.can_items(recording)), [], bytearray()
-    with open(recording / "video/front.csv", newline="") as f:
-        for row, picture in zip(csv.DictReader(f), edges.pictures(recording / "video/front.avi")):
-            pictures.append((int(row["t_ns"]), f"p {len(blob)} {len(picture)}"))
-            blob += picture
+    can, (pictures, blob) = list(drives.can_items(recording)), edges.played(recording)
     (folder / "pictures").write_bytes(blob)
     drives.compile_player(here, folder)
     for file in ("vehicle.dbc", "can-signals.yaml", "calibration.yaml"):
@@ -112,10 +107,8 @@ def prepare_service(work, root, here, simulate):
 
 def in_view(recording, from_s, until_s):
     """Markers that are in a picture of that time."""
-    with open(recording / "video/front.csv", newline="") as f:
-        times_s = [(int(row["t_ns"]) - first_ns(recording)) * 1e-9 for row in csv.DictReader(f)]
-    with open(recording / "labels/markers.csv", newline="") as f:
-        return {row["id"] for row in csv.DictReader(f) if from_s <= times_s[int(row["frame"])] < until_s}
+    times_s = [(int(row["t_ns"]) - first_ns(recording)) * 1e-9 for row in drives.rows(recording / "video/front.csv")]
+    return {row["id"] for row in drives.rows(recording / "labels/markers.csv") if from_s <= times_s[int(row["frame"])] < until_s}
 
 
 class Judge:

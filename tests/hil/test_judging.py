@@ -69,6 +69,21 @@ class Drive:
         return next(check.status for check in self.checks if check.name == name)
 
 
+class InFolder(unittest.TestCase):
+    """With a folder of its own."""
+
+    def setUp(self):
+        self.temporary = tempfile.TemporaryDirectory()
+        self.folder = pathlib.Path(self.temporary.name)
+        self.addCleanup(self.temporary.cleanup)
+
+    def write(self, name, text):
+        path = self.folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+        return path
+
+
 class Faults(unittest.TestCase):
     def setUp(self):
         self.drive = Drive()
@@ -82,24 +97,19 @@ class Faults(unittest.TestCase):
             self.drive.fault["pose"] = {name: value}
             self.assertEqual(self.drive.failures(), [f"pose {name}"], name)
 
-    def test_wrong_health(self):
-        for i in (12, 13):
-            self.drive.healths[i] = (i + 0.4, health(i + 0.4, FROZEN))
-        self.assertEqual(self.drive.failures(), ["health 1: edges:front absent, as long as it lasts"])
-
-    def test_health_that_is_never_stated(self):
-        self.drive.healths = [(t, health(t, WORKS)) for t, _ in self.drive.healths]
-        self.assertIn("health 1: edges:front absent, in time", self.drive.failures())
-
-    def test_health_that_is_too_late(self):
-        for i in (10, 11, 12):
-            self.drive.healths[i] = (i + 0.4, health(i + 0.4, WORKS))
-        self.assertIn("health 1: edges:front absent, in time", self.drive.failures())
-
-    def test_health_that_is_not_taken_back(self):
-        for i in range(15, 29):
-            self.drive.healths[i] = (i + 0.4, health(i + 0.4, ABSENT))
-        self.assertEqual(self.drive.failures(), ["health 1: edges:front absent, taken back"])
+    def test_health_that_is_wrong(self):
+        """In some seconds of the drive another state of the device."""
+        for name, seconds, state, failed, is_all in (("another", (12, 13), FROZEN, "as long as it lasts", True),
+                                                     ("never stated", range(30), WORKS, "in time", False),
+                                                     ("too late", (10, 11, 12), WORKS, "in time", False),
+                                                     ("not taken back", range(15, 29), ABSENT, "taken back", True)):
+            with self.subTest(name):
+                self.drive = Drive()
+                for i in seconds:
+                    self.drive.healths[i] = (i + 0.4, health(i + 0.4, state))
+                failures = self.drive.failures()
+                self.assertIn(f"health 1: edges:front absent, {failed}", failures)
+                self.assertTrue(not is_all or len(failures) == 1, failures)
 
     def test_a_pose_that_does_not_recover(self):
         self.drive.fault["pose"] = {"within_s": 2.0}
@@ -203,7 +213,7 @@ class Faults(unittest.TestCase):
         self.assertEqual(self.drive.failures(), ["it happened"])
 
 
-class Written(unittest.TestCase):
+class Written(InFolder):
     def checks(self):
         out = verdict.Checks()
         out.add("log", "bits", True, "the same")
@@ -214,10 +224,8 @@ class Written(unittest.TestCase):
     def test_junit_is_read_by_a_parser(self):
         import junitparser
         text = verdict.junit(self.checks(), "waymark hil drive", 12.5, "said\x01")
-        with tempfile.TemporaryDirectory() as folder:
-            path = pathlib.Path(folder) / "junit.xml"
-            path.write_bytes(text)
-            read = junitparser.JUnitXml.fromfile(str(path))
+        (self.folder / "junit.xml").write_bytes(text)
+        read = junitparser.JUnitXml.fromfile(str(self.folder / "junit.xml"))
         cases = [case for suite in read for case in suite]
         self.assertEqual((read.tests, read.failures, [suite.name for suite in read]), (3, 1, ["log", "poses", "computer"]))
         self.assertEqual([type(case.result[0]).__name__ if case.result else "passed" for case in cases], ["passed", "Failure", "Skipped"])
@@ -227,25 +235,9 @@ class Written(unittest.TestCase):
     def test_json_has_no_nan(self):
         checks = verdict.Checks()
         checks.at_most("poses", "never", math.inf, 1.0, "never")
-        with tempfile.TemporaryDirectory() as folder:
-            result = verdict.write(pathlib.Path(folder), {"name": "x"}, checks)
-            self.assertEqual(json.loads((pathlib.Path(folder) / "result.json").read_text())["verdict"], "failed")
+        result = verdict.write(self.folder, {"name": "x"}, checks)
+        self.assertEqual(json.loads((self.folder / "result.json").read_text())["verdict"], "failed")
         self.assertEqual(result["checks"][0]["value"], None)
-
-
-class InFolder(unittest.TestCase):
-    """With a folder of its own."""
-
-    def setUp(self):
-        self.temporary = tempfile.TemporaryDirectory()
-        self.folder = pathlib.Path(self.temporary.name)
-        self.addCleanup(self.temporary.cleanup)
-
-    def write(self, name, text):
-        path = self.folder / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text)
-        return path
 
 
 class Files(InFolder):
@@ -417,7 +409,7 @@ class Players(InFolder):
             self.assertEqual(self.judged(60, [{**fault, **other}]), ["failed", "failed"])
 
 
-class Guests(unittest.TestCase):
+class Guests(InFolder):
     def test_rate_of_instructions(self):
         machine, words = guest.at_rate("amd64", 2000)
         self.assertEqual((machine, words), (guest.MACHINES["amd64"], "tsc_early_khz=2000000 tsc=reliable"))
@@ -428,41 +420,38 @@ class Guests(unittest.TestCase):
 
     def test_an_unpacked_kernel(self):
         """Of x86-64, once for each kernel; another architecture's is booted as it is."""
-        with tempfile.TemporaryDirectory() as folder:
-            image = pathlib.Path(folder)
-            for number, content in enumerate((b"\x7fELF kernel", b"\x7fELF of an update")):
-                payload = lzma.compress(content)
-                packed = bytearray(1024 + 0x300 + len(payload))
-                packed[0x1F1], packed[0x202:0x206] = 1, b"HdrS"
-                packed[0x248:0x250] = (0x300).to_bytes(4, "little") + len(payload).to_bytes(4, "little")
-                packed[1024 + 0x300:] = payload
-                (image / "vmlinuz").write_bytes(packed)
-                os.utime(image / "vmlinuz", ns=((2 + number) * 10**18,) * 2)
-                self.assertEqual(guest.kernel_of(image).read_bytes(), content)
-                os.utime(image / "vmlinux", ns=((2 + number) * 10**18,) * 2)
-            self.assertEqual(guest.kernel_of(image), image / "vmlinux")
-            (image / "vmlinuz").write_bytes(b"MZ" + bytes(0x300))
-            os.utime(image / "vmlinuz", ns=(4 * 10**18,) * 2)
-            self.assertEqual(guest.kernel_of(image), image / "vmlinuz")
+        image = self.folder
+        for number, content in enumerate((b"\x7fELF kernel", b"\x7fELF of an update")):
+            payload = lzma.compress(content)
+            packed = bytearray(1024 + 0x300 + len(payload))
+            packed[0x1F1], packed[0x202:0x206] = 1, b"HdrS"
+            packed[0x248:0x250] = (0x300).to_bytes(4, "little") + len(payload).to_bytes(4, "little")
+            packed[1024 + 0x300:] = payload
+            (image / "vmlinuz").write_bytes(packed)
+            os.utime(image / "vmlinuz", ns=((2 + number) * 10**18,) * 2)
+            self.assertEqual(guest.kernel_of(image).read_bytes(), content)
+            os.utime(image / "vmlinux", ns=((2 + number) * 10**18,) * 2)
+        self.assertEqual(guest.kernel_of(image), image / "vmlinux")
+        (image / "vmlinuz").write_bytes(b"MZ" + bytes(0x300))
+        os.utime(image / "vmlinuz", ns=(4 * 10**18,) * 2)
+        self.assertEqual(guest.kernel_of(image), image / "vmlinuz")
 
     def test_an_end(self):
         """A guest that is done, one that works without an end, one that waits on a busy desk."""
-        with tempfile.TemporaryDirectory() as folder:
-            log = pathlib.Path(folder) / "log"
-            self.assertTrue(guest.boot(["sh", "-c", "echo GUEST-RC 0"], log))
-            self.assertFalse(guest.boot(["sh", "-c", "while :; do :; done"], log, 0.3))
-            self.assertIn("was ended by the desk", log.read_text())
-            self.assertTrue(guest.boot(["sh", "-c", "sleep 1.5; echo GUEST-RC 0"], log, 1))
-            self.assertNotIn("was ended", log.read_text())
+        log = self.folder / "log"
+        self.assertTrue(guest.boot(["sh", "-c", "echo GUEST-RC 0"], log))
+        self.assertFalse(guest.boot(["sh", "-c", "while :; do :; done"], log, 0.3))
+        self.assertIn("was ended by the desk", log.read_text())
+        self.assertTrue(guest.boot(["sh", "-c", "sleep 1.5; echo GUEST-RC 0"], log, 1))
+        self.assertNotIn("was ended", log.read_text())
 
     def test_what_is_missing(self):
         """An image of an older kernel is there, and a newer one cannot be made."""
-        with tempfile.TemporaryDirectory() as folder, mock.patch.object(guest, "missing", lambda arch, has_image=False: [] if has_image else ["mmdebstrap"]), \
-                mock.patch.object(guest.subprocess, "run", lambda *_, **__: types.SimpleNamespace(returncode=1)):
-            (pathlib.Path(folder) / "image").mkdir()
-            (pathlib.Path(folder) / "image/made_of").write_text("6.1.0-1 0")
-            with self.assertRaisesRegex(HilError, "apt-get install mmdebstrap"):
-                guest.prepare("amd64", pathlib.Path(folder))
+        self.write("image/made_of", "6.1.0-1 0")
+        with mock.patch.object(guest, "missing", lambda arch, has_image=False: [] if has_image else ["mmdebstrap"]), \
+                mock.patch.object(guest.subprocess, "run", lambda *_, **__: types.SimpleNamespace(returncode=1)), \
+                self.assertRaisesRegex(HilError, "apt-get install mmdebstrap"):
+            guest.prepare("amd64", self.folder)
 
     def test_programs_that_are_missing(self):
         with mock.patch.object(targets.shutil, "which", lambda *_, **__: None), self.assertRaisesRegex(HilError, "openssh-client"):
@@ -474,7 +463,7 @@ class Guests(unittest.TestCase):
         self.assertEqual((other.name, other.computer), ("guest amd64, 3000 MIPS", ["one processor that does 3000 million instructions a second"]))
 
 
-class Boards(unittest.TestCase):
+class Boards(InFolder):
     """Who may do what root does."""
 
     def prepared(self, *lines):
@@ -491,10 +480,8 @@ class Boards(unittest.TestCase):
 
     def test_no_connection(self):
         """ssh's own failure is stated without the command that was to run there."""
-        with tempfile.TemporaryDirectory() as folder, mock.patch.dict(os.environ, {"PATH": f"{folder}:{os.environ['PATH']}"}):
-            ssh = pathlib.Path(folder) / "ssh"
-            ssh.write_text("#!/bin/sh\necho 'ssh: Could not resolve hostname robot' >&2\nexit 255\n")
-            ssh.chmod(0o755)
+        self.write("ssh", "#!/bin/sh\necho 'ssh: Could not resolve hostname robot' >&2\nexit 255\n").chmod(0o755)
+        with mock.patch.dict(os.environ, {"PATH": f"{self.folder}:{os.environ['PATH']}"}):
             with self.assertRaisesRegex(HilError, "^pi@robot: no connection: ssh: Could not resolve hostname robot; try `ssh pi@robot true`$"):
                 targets.Host("pi@robot", [], {}).prepare(None)
 
@@ -530,16 +517,15 @@ class Compared(unittest.TestCase):
             compare.compare(self.side(memory_mb=1.0), self.side(memory_mb=1.0) | {"target": "other"}, limits.COMPARE)
 
 
-class Poses(unittest.TestCase):
+class Poses(InFolder):
     def test_a_run_in_the_plane_has_no_height(self):
         """A road that climbs is no error of a planar estimator; in space the height counts."""
-        with tempfile.TemporaryDirectory() as folder:
-            for name, columns in (("plane", "cov_xx,cov_xy,cov_yy"), ("space", "cov_xx,cov_zz")):
-                run, truth = pathlib.Path(folder) / f"{name}.csv", pathlib.Path(folder) / "truth.csv"
-                run.write_text(f"t_ns,x_m,y_m,z_m,qx,qy,qz,qw,{columns}\n" + "".join(f"{t},0,0,0,0,0,0,1{',1' * columns.count('cov')}\n" for t in (0, 10)))
-                truth.write_text("t_ns,x_m,y_m,z_m\n0,3,0,4\n20,3,0,4\n")
-                rows = poses.table(truth, not poses.is_planar(run))
-                self.assertEqual(poses.rms(m for _, m, _ in poses.differences(poses.table(run), rows, 0)), 3.0 if name == "plane" else 5.0)
+        truth = self.write("truth.csv", "t_ns,x_m,y_m,z_m\n0,3,0,4\n20,3,0,4\n")
+        for name, columns in (("plane", "cov_xx,cov_xy,cov_yy"), ("space", "cov_xx,cov_zz")):
+            run = self.write(f"{name}.csv", f"t_ns,x_m,y_m,z_m,qx,qy,qz,qw,{columns}\n" + "".join(
+                f"{t},0,0,0,0,0,0,1{',1' * columns.count('cov')}\n" for t in (0, 10)))
+            rows = poses.table(truth, not poses.is_planar(run))
+            self.assertEqual(poses.rms(m for _, m, _ in poses.differences(poses.table(run), rows, 0)), 3.0 if name == "plane" else 5.0)
 
     def test_between_and_around(self):
         rows = [(k * 10**9, float(k), 0.0, 3.1 if k % 2 else -3.1, 0.0) for k in range(8)]

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The part of hil.py that captures by libcamera: the robot's files, and what is to be said of the guest's recordings."""
-import csv
 import statistics
 
+import drives
 import edges
 
 # libcamera's driver of vimc gives multiples of six alone, three times the sensor's: smaller ones have no room for the running
@@ -32,8 +32,7 @@ def judge(work):
     for name in ("plain", "bright"):
         folder = work / f"share/out/libcamera-{name}/video"
         whole = [p for p in edges.pictures(folder / "front.avi") if len(p) == WIDTH * HEIGHT]
-        with open(folder / "front.csv", newline="") as f:
-            rows = [(int(r["t_ns"]), int(r["arrival_ns"])) for r in csv.DictReader(f)]
+        rows = [(int(r["t_ns"]), int(r["arrival_ns"])) for r in drives.rows(folder / "front.csv")]
         late_ms = [(a - t) / 1e6 for t, a in rows]
         period_ms = statistics.median((b[0] - a[0]) / 1e6 for a, b in zip(rows, rows[1:]))
         mean[name] = statistics.fmean(whole[-1])

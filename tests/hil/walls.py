@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """config/datasets/office-walls.yaml on a device: two detectors, the black box and a recording read one camera. The run's poses are those of
 the replay of that recording; the processor's time is compared with that of each detector's run alone."""
-import csv
 import subprocess
 
 import drives
@@ -41,8 +40,7 @@ def judge(work, waymark, root):
     poses = [p for p in poses if p[0] > rows[0][0] + BEGIN_S * 10**9]
     apart = list(drives.apart_of(poses, rows, 0))
     worst_m, worst_deg = max(m for _, m, _ in apart), max(d for *_, d in apart)
-    with open(out / "rec/video/front.csv", newline="") as f:
-        recorded = sum(1 for _ in csv.DictReader(f))
+    recorded = len(drives.rows(out / "rec/video/front.csv"))
     boxed = sum(len(path.read_text().splitlines()) - 1 for path in (out / "keep/box").glob("pictures-front-*.csv"))
     print(f"walls: {len(apart)} poses over LCM at most {worst_m:.4f} m and {worst_deg:.3f} degrees from the replay of the recording; "
           f"{recorded} pictures recorded, {boxed} in the black box")
