@@ -170,29 +170,23 @@ def late(r, w, d):
 def silent(r, w, d):
     begin, length = r.uniform(5, 20), log_uniform(r, 3, 60)
 
-    def whole(text):
-        head, *lines = text.splitlines()
+    def kept(lines):
         first = int(lines[0].split(",")[0])
-        kept = [line for line in lines if not begin <= (int(line.split(",")[0]) - first) * 1e-9 < begin + length]
-        return "\n".join([head, *kept]) + "\n"
-    d.change(w.seen, whole, f"{w.seen} silent from {begin:.1f} s for {length:.1f} s")
+        return [line for line in lines if not begin <= (int(line.split(",")[0]) - first) * 1e-9 < begin + length]
+    d.change(w.seen, replays.of_lines(kept), f"{w.seen} silent from {begin:.1f} s for {length:.1f} s")
 
 
 def frozen(r, w, d):
     """Values of the last observation before it again and again, with stamps that go on."""
     begin, length = r.uniform(5, 20), log_uniform(r, 2, 30)
+    first, kept = [], {}
 
-    def whole(text):
-        head, *lines = text.splitlines()
-        names, first, kept, out = head.split(","), int(lines[0].split(",")[0]), None, []
-        for line in lines:
-            fields = dict(zip(names, line.split(",")))
-            if begin <= (int(fields["t_ns"]) - first) * 1e-9 < begin + length:
-                kept = kept or fields
-                fields = {**kept, **{n: fields[n] for n in ("t_ns", "arrival_ns") if n in fields}}
-            out.append(",".join(fields[n] for n in names))
-        return "\n".join([head, *out]) + "\n"
-    d.change(w.seen, whole, f"{w.seen} frozen from {begin:.1f} s for {length:.1f} s")
+    def change(f):
+        first.append(int(f["t_ns"]))
+        if begin <= (int(f["t_ns"]) - first[0]) * 1e-9 < begin + length:
+            kept.update({} if kept else f)
+            f.update((name, value) for name, value in kept.items() if name not in ("t_ns", "arrival_ns"))
+    d.change(w.seen, replays.each_row(change), f"{w.seen} frozen from {begin:.1f} s for {length:.1f} s")
 
 
 def motion_file(w):

@@ -36,15 +36,10 @@ def moved(by_us):
     def change(text):
         if text.startswith("("):
             return re.sub(r"^\((\d+)\.(\d{6})\)", lambda m: "(%d.%06d)" % divmod(int(m[1]) * 10**6 + int(m[2]) + by_us, 10**6), text, flags=re.M)
-        head, *lines = text.splitlines()
-        at = [i for i, name in enumerate(head.split(",")) if name in ("t_ns", "arrival_ns")]
-        out = []
-        for line in lines:
-            fields = line.split(",")
-            for i in at:
-                fields[i] = str(int(fields[i]) + 1000 * by_us) if fields[i] else ""
-            out.append(",".join(fields))
-        return "\n".join([head, *out]) + "\n"
+        return replays.each_row(row)(text)
+
+    def row(f):
+        f.update((name, str(int(f[name]) + 1000 * by_us)) for name in ("t_ns", "arrival_ns") if f.get(name))
     return change
 
 
@@ -98,17 +93,11 @@ def tracks(options, world, config, seconds):
         given = [int(row["id"]) for row in replays.rows(recording / "stereo.csv")]
         middle = (min(given) + max(given)) // 2
 
-        def renumbered(text):
-            head, *lines = text.splitlines()
-            at, out = head.split(",").index("id"), [head]
-            for line in lines:
-                fields = line.split(",")
-                number = LAST_TRACK - middle + int(fields[at])
-                fields[at] = str(number if number <= LAST_TRACK else number - LAST_TRACK - 1 + FIRST_TRACK)
-                out.append(",".join(fields))
-            return "\n".join(out) + "\n"
+        def renumbered(f):
+            number = LAST_TRACK - middle + int(f["id"])
+            f["id"] = str(number if number <= LAST_TRACK else number - LAST_TRACK - 1 + FIRST_TRACK)
 
-        replays.copy_changed(recording, pathlib.Path(folder) / "renumbered", {"stereo.csv": renumbered})
+        replays.copy_changed(recording, pathlib.Path(folder) / "renumbered", {"stereo.csv": replays.each_row(renumbered)})
         both = []
         for one in (recording, pathlib.Path(folder) / "renumbered"):
             scratch = pathlib.Path(folder) / f"run-{one.name}"

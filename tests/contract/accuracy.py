@@ -14,29 +14,18 @@ import tempfile
 import bench
 import covariances
 import replays
-from replays import each_row, rows, scaled, shifted, turned
+from replays import each_row, of_lines, rows, scaled, shifted, turned
 
 failures = []
 
 
-def longest_beyond(trajectory, truth, sigmas):
-    """Longest time in s that the position's error stays beyond so many sigma of its 2 x 2 covariance (Mahalanobis)."""
-    poses = [[float(r[k]) for k in ("t_ns", "x_m", "y_m", "cov_xx", "cov_xy", "cov_yy")] for r in trajectory]
-    longest = since = at = 0
+def longest_beyond(run, recording, sigmas):
+    """Longest time in s that the position's error stays beyond so many sigma of its covariance (Mahalanobis)."""
+    longest = since = 0
     last = None
-    for row in truth:
-        t = float(row["t_ns"])
-        while at + 1 < len(poses) and poses[at + 1][0] <= t:
-            at += 1
-        if at + 1 >= len(poses) or poses[at][0] > t:
-            continue
-        a, b = poses[at], poses[at + 1]
-        share = (t - a[0]) / (b[0] - a[0])
-        x, y, xx, xy, yy = (p + share * (q - p) for p, q in zip(a[1:], b[1:]))
-        dx, dy = float(row["x_m"]) - x, float(row["y_m"]) - y
-        beyond = (dx * dx * yy - 2 * dx * dy * xy + dy * dy * xx) / (xx * yy - xy * xy) > sigmas ** 2
-        since = since + (t - last) * 1e-9 if beyond and last is not None else 0
-        longest, last = max(longest, since), t
+    for t_s, _, _, off in replays.errors(run, recording):
+        since = since + t_s - last if off > sigmas and last is not None else 0
+        longest, last = max(longest, since), t_s
     return longest
 
 
@@ -55,7 +44,6 @@ def run(recording, config, *eval_options, seed=1, replay=(), what=""):
         title = ", ".join(filter(None, [recording.name, what, " ".join(eval_options)]))
         figures, folder = BENCH.judge(title, recording, config_path(config, scratch), eval_options, replay, seed)
     figures["run"] = folder
-    figures["longest_beyond_s"] = None if "gnss" in eval_options else longest_beyond(rows(folder / "trajectory.csv"), rows(recording / "truth.csv"), 3.5)
     return figures
 
 
@@ -65,6 +53,24 @@ def bar(what, value, most=None, least=None):
           + (f" (at least {least:.4f})" if least is not None else ""), flush=True)
     if not good:
         failures.append(what)
+
+
+NAMES = {"position_rmse_m": "position RMSE", "position_mean_m": "mean position error", "position_max_m": "largest error",
+         "heading_rmse_deg": "heading RMSE", "heading_mean_abs_deg": "mean heading error, degrees", "rotation_rmse_deg": "rotation RMSE",
+         "nees_inside_95": "NEES inside 95 %", "lost_count": "lost", "landmarks_found": "landmarks found", "landmark_rmse_m": "landmark RMSE",
+         "landmark_max_m": "worst landmark", "landmark_rmse_own_fit_m": "landmark RMSE, own fit", "recall": "share of lines found",
+         "false_per_right": "false lines for each true one", "azimuth_rms_deg": "azimuth error, degrees RMS"}
+SHARES = ("nees_inside_95", "landmarks_found", "recall")  # the larger the better
+
+
+def bars(where, figures, **limits):
+    """A bar of each of these figures of one replay."""
+    for name, limit in limits.items():
+        bar(f"{where}: {NAMES[name]}", figures[name], **{"least" if name in SHARES else "most": limit})
+
+
+def bar_of_mean(where, results, name, most):
+    bar(f"{where}: mean {NAMES[name]}", sum(r[name] for r in results) / len(results), most=most)
 
 
 class disturbed:
@@ -94,9 +100,7 @@ def starry():
     recording = DATA / "starry-night-plan-a"
     for config, most in (("starry-night-plan", 0.0165), ("starry-night-plan-bearings", 0.024)):
         plain = run(recording, config)
-        bar(f"{config}: position RMSE", plain["position_rmse_m"], most=most)
-        bar(f"{config}: heading RMSE", plain["heading_rmse_deg"], most=0.6)
-        bar(f"{config}: NEES inside 95 %", plain["nees_inside_95"], least=0.85)
+        bars(config, plain, position_rmse_m=most, heading_rmse_deg=0.6, nees_inside_95=0.85)
         settled = run(recording, config, "--from", "60")["position_rmse_m"]
         changes = {"laser turned by +10 deg": {"calibration.yaml": turned(10)},
                    "laser turned by -10 deg": {"calibration.yaml": turned(-10)},
@@ -116,11 +120,10 @@ def mrclam():
     seen = []
     for config, most in (("mrclam", 0.11), ("mrclam-bearings", 0.155)):
         results = [run(DATA / f"mrclam-d6-r{i}", config) for i in range(1, 6)]
-        bar(f"{config}: mean position RMSE", sum(r["position_rmse_m"] for r in results) / 5, most=most)
+        bar_of_mean(config, results, "position_rmse_m", most)
         for i, r in enumerate(results, 1):
-            bar(f"{config}, robot {i}: largest error", r["position_max_m"], most=1.1)
-            bar(f"{config}, robot {i}: longest time beyond 3.5 sigma, s", r["longest_beyond_s"], most=2.0)
-            bar(f"{config}, robot {i}: NEES inside 95 %", r["nees_inside_95"], least=0.80)
+            bars(f"{config}, robot {i}", r, position_max_m=1.1, nees_inside_95=0.80)
+            bar(f"{config}, robot {i}: longest time beyond 3.5 sigma, s", longest_beyond(r["run"], DATA / f"mrclam-d6-r{i}", 3.5), most=2.0)
         if config == "mrclam":
             seen = [r["position_rmse_landmark_seen_m"] for r in results]
     bar("mrclam: mean RMSE where a landmark was seen within 2 s", sum(seen) / 5, most=0.08)
@@ -129,34 +132,31 @@ def mrclam():
 def slam():
     """Tubes at unknown places: aligned (se2), because where the map lies nothing tells."""
     results = [run(DATA / f"mrclam-d6-r{i}", "mrclam-slam", "--align", "se2") for i in range(1, 6)]
-    bar("mrclam-slam: mean position RMSE, aligned", sum(r["position_rmse_m"] for r in results) / 5, most=0.17)
-    bar("mrclam-slam: mean landmark RMSE, aligned with the poses", sum(r["landmark_rmse_m"] for r in results) / 5, most=0.14)
-    bar("mrclam-slam: mean landmark RMSE, map aligned to the true one", sum(r["landmark_rmse_own_fit_m"] for r in results) / 5, most=0.05)
+    for name, most in (("position_rmse_m", 0.17), ("landmark_rmse_m", 0.14), ("landmark_rmse_own_fit_m", 0.05)):
+        bar_of_mean("mrclam-slam, aligned", results, name, most)
     for i, r in enumerate(results, 1):
-        bar(f"mrclam-slam, robot {i}: NEES inside 95 %", r["nees_inside_95"], least=0.90)
-        bar(f"mrclam-slam, robot {i}: landmarks found", r["landmarks_found"], least=14)
+        bars(f"mrclam-slam, aligned, robot {i}", r, nees_inside_95=0.90, landmarks_found=14)
     plain = [run(DATA / f"mrclam-d6-r{i}", "mrclam-slam") for i in range(1, 6)]
-    bar("mrclam-slam: mean position RMSE, not aligned", sum(r["position_rmse_m"] for r in plain) / 5, most=0.33)
+    bar_of_mean("mrclam-slam, not aligned", plain, "position_rmse_m", 0.33)
     for i, r in enumerate(plain, 1):
-        bar(f"mrclam-slam, robot {i}: NEES inside 95 %, not aligned", r["nees_inside_95"], least=0.90)
-    def misread(text):
+        bars(f"mrclam-slam, not aligned, robot {i}", r, nees_inside_95=0.90)
+
+    def misread(lines):
         """Every fiftieth code is read as another."""
-        head, *lines = text.splitlines()
         for k in range(7, len(lines), 50):
             t, sensor, _, bearing, distance = lines[k].split(",")
             lines[k] = f"{t},{sensor},{6 + k * 7 % 15},{bearing},{distance}"
-        return "\n".join([head, *lines]) + "\n"
-    errors = []
+        return lines
+
+    results = []
     for i in range(1, 6):
-        with disturbed(DATA / f"mrclam-d6-r{i}", {"sightings.csv": misread}) as folder:
-            r = run(folder, "mrclam-slam", "--align", "se2", what="one code in fifty misread")
-            errors.append(r["position_rmse_m"])
-            bar(f"mrclam-slam, one code in fifty misread, robot {i}: NEES inside 95 %", r["nees_inside_95"], least=0.90)
-    bar("mrclam-slam, one code in fifty misread: mean position RMSE, aligned", sum(errors) / 5, most=0.17)
+        with disturbed(DATA / f"mrclam-d6-r{i}", {"sightings.csv": of_lines(misread)}) as folder:
+            results.append(run(folder, "mrclam-slam", "--align", "se2", what="one code in fifty misread"))
+            bars(f"mrclam-slam, one code in fifty misread, robot {i}", results[-1], nees_inside_95=0.90)
+    bar_of_mean("mrclam-slam, one code in fifty misread, aligned", results, "position_rmse_m", 0.17)
     for i in range(1, 6):
-        r = run(DATA / f"mrclam-d6-r{i}", "mrclam-slam-bearings", "--align", "se2")
-        bar(f"mrclam-slam-bearings, robot {i}: position RMSE, aligned", r["position_rmse_m"], most=1.2)
-        bar(f"mrclam-slam-bearings, robot {i}: NEES inside 95 %", r["nees_inside_95"], least=0.75)
+        bars(f"mrclam-slam-bearings, aligned, robot {i}", run(DATA / f"mrclam-d6-r{i}", "mrclam-slam-bearings", "--align", "se2"),
+             position_rmse_m=1.2, nees_inside_95=0.75)
 
 
 def park():
@@ -164,32 +164,28 @@ def park():
     recording = DATA / "victoria-park-a"
     against = ["--against", "gnss", "--align", "se2"]
     for part, options in (("", []), (", first half", ["--to", "320"]), (", second half", ["--from", "320"])):
-        bar(f"victoria-park{part}: position RMSE against GNSS, aligned",
-            run(recording, "victoria-park", *against, *options)["position_rmse_m"], most=4.2)
+        bars(f"victoria-park against GNSS, aligned{part}", run(recording, "victoria-park", *against, *options), position_rmse_m=4.2)
 
     def from_s(seconds):
-        def change(text):
-            head, *lines = text.splitlines()
-            return "\n".join([head, *(line for line in lines if int(line.split(",")[0]) >= seconds * 1e9)]) + "\n"
+        change = of_lines(lambda lines: [line for line in lines if int(line.split(",")[0]) >= seconds * 1e9])
         return {name: change for name in ("motion.csv", "sightings.csv", "gnss.csv")}
 
-    def thinned(text):
-        head, *lines = text.splitlines()
-        return "\n".join([head, *(line for i, line in enumerate(lines) if i * 7 % 10 < 6)]) + "\n"
+    def thinned(lines):
+        return [line for i, line in enumerate(lines) if i * 7 % 10 < 6]
 
-    def cluttered(text):
+    def cluttered(lines):
         """Every eighth detection is somewhere else."""
-        head, *lines = text.splitlines()
         for i in range(0, len(lines), 8):
             t, sensor, identity, _, _ = lines[i].split(",")
             lines[i] = f"{t},{sensor},{identity},{(i * 0.618) % 3 - 1.5:.4f},{2 + (i * 0.414) % 28:.3f}"
-        return "\n".join([head, *lines]) + "\n"
+        return lines
 
     for what, changes in (("speed + 3 %", {"motion.csv": scaled("v_mps", 1.03)}), ("turns - 5 %", {"motion.csv": scaled("w_radps", 0.95)}),
-                          ("40 % of the detections lost", {"sightings.csv": thinned}), ("12 % of them false", {"sightings.csv": cluttered}),
+                          ("40 % of the detections lost", {"sightings.csv": of_lines(thinned)}),
+                          ("12 % of them false", {"sightings.csv": of_lines(cluttered)}),
                           ("begun at 90 s", from_s(90)), ("begun at 220 s", from_s(220))):
         with disturbed(recording, changes) as folder:
-            bar(f"victoria-park, {what}: position RMSE", run(folder, "victoria-park", *against, what=what)["position_rmse_m"], most=4.2)
+            bars(f"victoria-park, {what}", run(folder, "victoria-park", *against, what=what), position_rmse_m=4.2)
 
 
 def lost_on_a_map():
@@ -201,10 +197,8 @@ def lost_on_a_map():
     tracked = [r for r in rows(whole["run"] / "trajectory.csv") if r["state"] == "tracking"]
     seen = rows(whole["run"] / "innovations.csv")
     bar("office-frozen: time until it knows where it is, s", (int(tracked[0]["t_ns"]) - int(seen[0]["t_ns"])) * 1e-9, most=3.0)
-    bar("office-frozen: largest error of a pose given out", whole["position_max_m"], most=0.1)
-    bar("office-frozen: largest error after 3 s", settled["position_max_m"], most=0.03)
-    bar("office-frozen: position RMSE after 3 s", settled["position_rmse_m"], most=0.02)
-    bar("office-frozen: heading RMSE after 3 s", settled["heading_rmse_deg"], most=0.4)
+    bars("office-frozen, all that is given out", whole, position_max_m=0.1)
+    bars("office-frozen, after 3 s", settled, position_max_m=0.03, position_rmse_m=0.02, heading_rmse_deg=0.4)
     surveyed = subprocess.run([str(BIN / "waymark-map"), "survey", str(lap)], capture_output=True, text=True)
     bar("office: findings of the survey of lap one (0: none)", surveyed.returncode, most=0)
 
@@ -213,39 +207,33 @@ def office():
     """Markers on a ceiling, from pixels and CAN; nothing of the map is given."""
     recording = DATA / "office-a"
     plain = run(recording, "office")
-    bar("office: position RMSE", plain["position_rmse_m"], most=0.02)
-    bar("office: heading RMSE", plain["heading_rmse_deg"], most=0.4)
-    bar("office: NEES inside 95 %", plain["nees_inside_95"], least=0.85)
-    bar("office: markers found", plain["landmarks_found"], least=plain["landmarks_total"])
-    bar("office: marker RMSE", plain["landmark_rmse_m"], most=0.015)
-    scaled_ = run(recording, "office", "--align", "sim2")
-    bar("office: position RMSE, aligned with scale", scaled_["position_rmse_m"], most=0.01)
-    # 0.0047 m where the scale of the map wanders with the rounds.
-    bar("office: worst marker, aligned with scale", scaled_["landmark_max_m"], most=0.004)
+    bars("office", plain, position_rmse_m=0.02, heading_rmse_deg=0.4, nees_inside_95=0.85, landmarks_found=plain["landmarks_total"], landmark_rmse_m=0.015)
+    # A landmark is 0.0047 m off where the scale of the map wanders with the rounds.
+    bars("office, aligned with scale", run(recording, "office", "--align", "sim2"), position_rmse_m=0.01, landmark_max_m=0.004)
+
+
+def stamps_off(seconds):
+    """A camera's stamps so much later; what arrives does so after its stamp."""
+    def change(f):
+        f["t_ns"] = str(int(f["t_ns"]) + round(seconds * 1e9))
+        f["arrival_ns"] = str(max(int(f["arrival_ns"]), int(f["t_ns"]) + 1_000_000))
+    return each_row(change)
 
 
 def hall():
     """Upright lines from pixels, and CAN; azimuths don't see scale. Then with the camera's stamps falsified."""
     recording = DATA / "hall-a"
     plain = run(recording, "hall")
-    bar("hall: position RMSE", plain["position_rmse_m"], most=0.085)
-    bar("hall: heading RMSE", plain["heading_rmse_deg"], most=0.25)
-    bar("hall: NEES inside 95 %", plain["nees_inside_95"], least=0.85)
+    bars("hall", plain, position_rmse_m=0.085, heading_rmse_deg=0.25, nees_inside_95=0.85)
     bar("hall: lines of the map for each one labelled: lost ones are joined", plain["landmarks_estimated"] / plain["landmarks_total"], most=1.3)
-    scaled_ = run(recording, "hall", "--align", "sim2")
-    bar("hall: position RMSE, aligned with scale", scaled_["position_rmse_m"], most=0.007)
-    bar("hall: heading RMSE, aligned with scale", scaled_["heading_rmse_deg"], most=0.25)
+    bars("hall, aligned with scale", run(recording, "hall", "--align", "sim2"), position_rmse_m=0.007, heading_rmse_deg=0.25)
     lines = run(recording, "hall", "--detector", "lines")
-    bar(f"hall: share found of {lines['with_contrast']} lines with contrast (of {lines['labelled']} labelled)", lines["recall"], least=0.80)
-    bar("hall: false lines for each true one", lines["false_per_right"], most=0.2)
-    bar("hall: azimuth error, degrees RMS", lines["azimuth_rms_deg"], most=0.15)
+    bars(f"hall, {lines['with_contrast']} lines with contrast (of {lines['labelled']} labelled)", lines, recall=0.80, false_per_right=0.2,
+         azimuth_rms_deg=0.15)
     for seconds in (0.03, -0.03):
-        def later(f, by=round(seconds * 1e9)):
-            f["t_ns"] = str(int(f["t_ns"]) + by)
-            f["arrival_ns"] = str(max(int(f["arrival_ns"]), int(f["t_ns"]) + 1_000_000))
-        with disturbed(recording, {"video/omni.csv": each_row(later)}) as folder:
-            bar(f"hall, camera's stamps {seconds} s off: position RMSE, aligned with scale, after 20 s",
-                run(folder, "hall", "--align", "sim2", "--from", "20", what=f"stamps {seconds} s off")["position_rmse_m"], most=0.02)
+        with disturbed(recording, {"video/omni.csv": stamps_off(seconds)}) as folder:
+            bars(f"hall, camera's stamps {seconds} s off, aligned with scale, after 20 s",
+                 run(folder, "hall", "--align", "sim2", "--from", "20", what=f"stamps {seconds} s off"), position_rmse_m=0.02)
 
 
 def mounted(pitch_deg, height_m):
@@ -275,19 +263,11 @@ def corridor():
     """From raw pixels and CAN; with pitch, height and stamps of the camera falsified; with a second of wrong speeds."""
     recording = DATA / "corridor-a"
     for seed in (1, 2, 3):
-        r = run(recording, "corridor", seed=seed)
-        bar(f"corridor, seed {seed}: mean position error", r["position_mean_m"], most=0.010)
-        bar(f"corridor, seed {seed}: largest position error", r["position_max_m"], most=0.05)
-        bar(f"corridor, seed {seed}: mean heading error, degrees", r["heading_mean_abs_deg"], most=0.08)
-        bar(f"corridor, seed {seed}: NEES inside 95 %", r["nees_inside_95"], least=0.90)
-        bar(f"corridor, seed {seed}: lost", r["lost_count"], most=0)
+        bars(f"corridor, seed {seed}", run(recording, "corridor", seed=seed), position_mean_m=0.010, position_max_m=0.05, heading_mean_abs_deg=0.08,
+             nees_inside_95=0.90, lost_count=0)
     settled = run(recording, "corridor", "--from", "30")["position_mean_m"]
     for sign in (1, -1):
-        def later(f, by=sign * 30_000_000):
-            f["t_ns"] = str(int(f["t_ns"]) + by)
-            f["arrival_ns"] = str(max(int(f["arrival_ns"]), int(f["t_ns"]) + 1_000_000))
-        with disturbed(recording, {"calibration.yaml": mounted(0.5 * sign, 0.01 * sign),
-                                   "video/front.csv": each_row(later)}) as folder:
+        with disturbed(recording, {"calibration.yaml": mounted(0.5 * sign, 0.01 * sign), "video/front.csv": stamps_off(0.03 * sign)}) as folder:
             bar(f"corridor, {0.5 * sign} deg, {sign} cm, {30 * sign} ms: mean error over the undisturbed one's, after 30 s",
                 run(folder, "corridor", "--from", "30", what=f"{0.5 * sign} deg, {sign} cm, {30 * sign} ms")["position_mean_m"] / settled, most=1.25)
     for begin_s in (87.5, 88.0):  # a look-alike of the place is 36 m away
@@ -295,14 +275,12 @@ def corridor():
         with disturbed(recording, {"can.log": bytes_swapped(begin_s)}) as folder:
             r = run(folder, "corridor", what=what)
         bar(f"corridor, {what}: share of the time confidently wrong", replays.confidently_wrong(r["run"], recording), most=0.02)
-        bar(f"corridor, {what}: largest position error", r["position_max_m"], most=5.0)
+        bars(f"corridor, {what}", r, position_max_m=5.0)
 
 
 def comma():
     recording = DATA / "comma2k19-a"
-    plain = run(recording, "comma2k19")
-    bar("comma2k19: position RMSE", plain["position_rmse_m"], most=0.75)
-    bar("comma2k19: largest error", plain["position_max_m"], most=2.5)
+    bars("comma2k19", run(recording, "comma2k19"), position_rmse_m=0.75, position_max_m=2.5)
     bar("comma2k19-tunnel: end error in % of the way without GNSS",
         run(recording, "comma2k19-tunnel", "--from", "25")["position_end_percent"], most=1.5)
     settled = run(recording, "comma2k19", "--from", "20")["position_rmse_m"]
@@ -316,18 +294,12 @@ def comma():
 
 
 def stereo():
-    recording = DATA / "starry-night-stereo-a"
-    plain = run(recording, "starry-night-stereo")
-    bar("starry-night-stereo: position RMSE", plain["position_rmse_m"], most=0.031)
-    bar("starry-night-stereo: rotation RMSE", plain["rotation_rmse_deg"], most=3.8)
-    bar("starry-night-stereo: NEES inside 95 %", plain["nees_inside_95"], least=0.85)
+    bars("starry-night-stereo", run(DATA / "starry-night-stereo-a", "starry-night-stereo"), position_rmse_m=0.031, rotation_rmse_deg=3.8,
+         nees_inside_95=0.85)
 
 
 def without_frames(*frames):
-    def change(text):
-        head, *lines = text.splitlines()
-        return "\n".join([head, *(line for line in lines if int(line.split(",")[0]) not in frames)]) + "\n"
-    return change
+    return of_lines(lambda lines: [line for line in lines if int(line.split(",")[0]) not in frames])
 
 
 def failing_pictures(stuck, damaged):
@@ -353,10 +325,7 @@ def failing_pictures(stuck, damaged):
 def seabed():
     """Points found in a stereo pair's pictures, and a noisy twist; nothing of the map is given."""
     recording = DATA / "seabed-a"
-    plain = run(recording, "seabed")
-    bar("seabed: position RMSE", plain["position_rmse_m"], most=0.04)
-    bar("seabed: rotation RMSE", plain["rotation_rmse_deg"], most=0.5)
-    bar("seabed: NEES inside 95 %", plain["nees_inside_95"], least=0.85)
+    bars("seabed", run(recording, "seabed"), position_rmse_m=0.04, rotation_rmse_deg=0.5, nees_inside_95=0.85)
     for what, changes in (
             ("mounting 0.4 degrees and 1 cm off", {"calibration.yaml": mounted(0.4, 0.01)}),
             ("stamps 15 ms late", {f"video/{side}.csv": shifted(0.015) for side in ("left", "right")}),
@@ -367,38 +336,29 @@ def seabed():
             ("turn rates 0.3 degrees/s off", {"motion6.csv": each_row(
                 lambda f: f.update(wz_radps=repr(float(f["wz_radps"]) + 0.005)))})):
         with disturbed(recording, changes) as folder:
-            off = run(folder, "seabed", what=what)
-            bar(f"seabed, {what}: position RMSE", off["position_rmse_m"], most=0.06)
-            bar(f"seabed, {what}: rotation RMSE", off["rotation_rmse_deg"], most=0.75)
-            bar(f"seabed, {what}: NEES inside 95 %", off["nees_inside_95"], least=0.85)
+            bars(f"seabed, {what}", run(folder, "seabed", what=what), position_rmse_m=0.06, rotation_rmse_deg=0.75, nees_inside_95=0.85)
 
 
 def ranges_and_fixes():
-    uwb = run(DATA / "labyrinth-uwb", "labyrinth-uwb")
-    bar("labyrinth-uwb, ranges only, heading unknown: position RMSE", uwb["position_rmse_m"], most=0.15)
-    bar("labyrinth-uwb: NEES inside 95 %", uwb["nees_inside_95"], least=0.80)
+    bars("labyrinth-uwb, ranges only, heading unknown", run(DATA / "labyrinth-uwb", "labyrinth-uwb"), position_rmse_m=0.15, nees_inside_95=0.80)
     recording = DATA / "smartloc-potsdamer-a"
-    plain = run(recording, "smartloc")
-    bar("smartloc: position RMSE", plain["position_rmse_m"], most=11.5)
-    bar("smartloc: NEES inside 95 %", plain["nees_inside_95"], least=0.85)
+    bars("smartloc", run(recording, "smartloc"), position_rmse_m=11.5, nees_inside_95=0.85)
     for begin, east, north in ((60, 20, 0), (60, -20, 0), (100, 0, 20), (30, 20, 20)):
         def pulled(f, begin=begin, east=east, north=north):
             if begin <= int(f["t_ns"]) * 1e-9 <= begin + 7:
                 f["x_m"], f["y_m"] = repr(float(f["x_m"]) + east), repr(float(f["y_m"]) + north)
         with disturbed(recording, {"gnss.csv": each_row(pulled)}) as folder:
-            bar(f"smartloc, positions {east} m east and {north} m north off for 7 s from {begin} s on: RMSE",
-                run(folder, "smartloc", what=f"{east} m east, {north} m north from {begin} s on")["position_rmse_m"], most=11.5)
+            bars(f"smartloc, positions {east} m east and {north} m north off for 7 s from {begin} s on",
+                 run(folder, "smartloc", what=f"{east} m east, {north} m north from {begin} s on"), position_rmse_m=11.5)
 
 
 def plane():
-    bar("mecanum-1, odometry by its defaults: position RMSE", run(DATA / "mecanum-1", "odometry:")["position_rmse_m"], most=0.23)
+    bars("mecanum-1, odometry by its defaults", run(DATA / "mecanum-1", "odometry:"), position_rmse_m=0.23)
     with tempfile.TemporaryDirectory() as folder:
         copy = pathlib.Path(folder) / "dlr-a"
         covariances.copy(DATA / "dlr-a", copy)
-        r = run(copy, "slam:", what="with covariances")
-        bar("dlr-a with its source's covariances, slam by its defaults: position RMSE", r["position_rmse_m"], most=0.75)
-        bar("dlr-a with its source's covariances: landmarks, own fit", r["landmark_rmse_own_fit_m"], most=0.30)
-        bar("dlr-a with its source's covariances: NEES inside 95 %", r["nees_inside_95"], least=0.90)
+        bars("dlr-a with its source's covariances, slam by its defaults", run(copy, "slam:", what="with covariances"), position_rmse_m=0.75,
+             landmark_rmse_own_fit_m=0.30, nees_inside_95=0.90)
 
 
 PARTS = (starry, mrclam, slam, park, office, lost_on_a_map, hall, corridor, comma, stereo, seabed, ranges_and_fixes, plane)

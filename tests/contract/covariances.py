@@ -4,18 +4,14 @@
 in place of motion6.csv, sightings-covariance.csv the covariance columns of sightings.csv.
 
     covariances.py RECORDING COPY"""
-import csv
 import math
 import pathlib
 import sys
 
+from replays import rows
+
 STEP = ("dx_m", "dy_m", "dheading_rad", "cov_xx", "cov_xy", "cov_yy", "cov_xt", "cov_yt", "cov_tt")
 PLACE = ("cov_xx_m2", "cov_xy_m2", "cov_yy_m2")
-
-
-def rows(path):
-    with open(path, newline="") as file:
-        return list(csv.DictReader(file))
 
 
 def write(path, heads, lines):

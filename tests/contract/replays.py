@@ -152,6 +152,14 @@ def copy_changed(recording, out, changes):
             (out / file.name).write_text(after)
 
 
+def of_lines(change):
+    """Change of a table by a function of its lines, without the head, to others."""
+    def whole(text):
+        head, *lines = text.splitlines()
+        return "\n".join([head, *change(lines)]) + "\n"
+    return whole
+
+
 def each_row(change):
     """Change of a table by a function that alters a row's fields in place."""
     def whole(text):
