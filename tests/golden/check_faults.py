@@ -2,19 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """`waymark check` finds what is planted: a small robot without a fault, and a table of faults, one at a time, each with
 the words of its finding. Nothing is found in the robot itself, nor in the shipped configurations."""
-import json
 import math
-import os
 import pathlib
 import random
 import shutil
 import struct
-import subprocess
 import sys
 import tempfile
 
-ROOT = pathlib.Path(os.environ.get("WM_SOURCE_DIR", ".")).resolve()
-BIN = pathlib.Path(os.environ.get("WM_BIN_DIR", ROOT / "build/bin"))
+from judged import ROOT, checked
 
 CONFIG = """format: waymark-config/1
 estimator: landmark_ekf
@@ -218,12 +214,7 @@ def lay_out(folder, files):
 
 
 def check(*words):
-    done = subprocess.run([BIN / "waymark", "check", *map(str, words), "--json", "--quick"], capture_output=True, text=True)
-    if done.returncode not in (0, 2):
-        sys.exit(f"check {words}: exit code {done.returncode}\n{done.stdout}{done.stderr}")
-    said = json.loads(done.stdout)
-    assert said["good"] == (done.returncode == 0), said
-    return said["findings"]
+    return checked(*words)["findings"]
 
 
 def main():

@@ -3,18 +3,15 @@
 """`waymark check` compares the sources of a recording with each other and looks at the clock of each: a drive whose way
 is known, written with one fault at a time, and the finding that has to name it, with its size and the line to write.
 Right drives, of other rates and noises, make no finding, but for what they don't show."""
-import json
 import math
-import os
 import pathlib
 import random
 import struct
-import subprocess
 import sys
 import tempfile
 
-ROOT = pathlib.Path(os.environ.get("WM_SOURCE_DIR", ".")).resolve()
-BIN = pathlib.Path(os.environ.get("WM_BIN_DIR", ROOT / "build/bin"))
+from judged import checked
+
 START_NS = 1_700_000_000 * 10**9
 SECONDS = 20.0
 CONFIG = "format: waymark-config/1\nestimator: odometry\n"
@@ -404,20 +401,13 @@ RIGHT = [
 ]
 
 
-def check(folder):
-    done = subprocess.run([BIN / "waymark", "check", folder / "config.yaml", folder, "--json", "--quick"], capture_output=True, text=True)
-    if done.returncode not in (0, 2):
-        sys.exit(f"exit code {done.returncode}\n{done.stdout}{done.stderr}")
-    return json.loads(done.stdout)
-
-
 def drive(folder, files):
     for old in folder.iterdir():
         old.unlink()
     streams = [f for f in files if f.endswith((".csv", ".log"))]
     for name, content in {"config.yaml": CONFIG, "recording.yaml": RECORDING.format(", ".join(streams)), **files}.items():
         (folder / name).write_text(content)
-    return check(folder)
+    return checked(folder / "config.yaml", folder)
 
 
 def main():

@@ -3,9 +3,7 @@
 """Localization by edges end to end when things go wrong: a camera that is covered for three seconds, a map whose origin
 is turned, a start outside of the map, maps that are none, a log and another map. What must come of it: the right poses, a
 clear refusal, or a state that says so; never a number that isn't one."""
-import csv
 import math
-import os
 import pathlib
 import re
 import shutil
@@ -13,11 +11,11 @@ import subprocess
 import sys
 import tempfile
 
-BIN = pathlib.Path(os.environ["WM_BIN_DIR"])
-SOURCE = pathlib.Path(os.environ["WM_SOURCE_DIR"])
+from judged import BIN, ROOT, failures, rows
+
+CONFIG = ROOT / "config/datasets/corridor.yaml"
 COVERED_S = (8, 11)
 TURN_RAD = 0.6
-failures = []
 
 
 def expect(good, what):
@@ -32,7 +30,7 @@ def run(*command):
 
 
 def replay(recording, out, *more):
-    return run(BIN / "waymark", "replay", recording, "--config", SOURCE / "config/datasets/corridor.yaml", "--out", out, *more)
+    return run(BIN / "waymark", "replay", recording, "--config", CONFIG, "--out", out, *more)
 
 
 def refused(what, texts, *command):
@@ -42,15 +40,13 @@ def refused(what, texts, *command):
 
 
 def poses(file):
-    with open(file, encoding="utf8") as f:
-        rows = [{k: v if k == "state" else float(v) for k, v in row.items() if k not in ("made_ns", "fused_until_ns", "cause")}
-                for row in csv.DictReader(f)]
-    for row in rows:
+    found = [{k: v if k == "state" else float(v) for k, v in row.items() if k not in ("made_ns", "fused_until_ns", "cause")} for row in rows(file)]
+    for row in found:
         numbers = (v for k, v in row.items() if k != "state" and not (k.startswith("bound_") and v == math.inf))  # inf: no bound
         expect(all(map(math.isfinite, numbers)), f"{file}: not a number: {row}")
         expect(row["cov_xx"] > 0 and row["cov_yy"] > 0 and row["cov_tt"] > 0, f"{file}: covariance: {row}")
-    expect(len(rows) > 10, f"{file} is short")
-    return rows
+    expect(len(found) > 10, f"{file} is short")
+    return found
 
 
 def heading(row):
@@ -61,8 +57,8 @@ def off(a, b):
     return math.hypot(a["x_m"] - b["x_m"], a["y_m"] - b["y_m"])
 
 
-def nearest(rows, t_ns):
-    return min(rows, key=lambda r: abs(r["t_ns"] - t_ns))
+def nearest(truth, t_ns):
+    return min(truth, key=lambda r: abs(r["t_ns"] - t_ns))
 
 
 def copy_of(recording, to, map_too=True):
@@ -90,23 +86,18 @@ def covered_camera(recording, out):
     """Dead reckoning while it is dark, with a covariance that grows; right again after it."""
     code, text = replay(recording, out)
     expect(code == 0, text)
-    truth = poses_of_truth(recording / "truth.csv")
+    truth = [{k: float(v) for k, v in row.items()} for row in rows(recording / "truth.csv")]
     for name in ("trajectory", "published"):
-        rows = poses(out / f"{name}.csv")
+        found = poses(out / f"{name}.csv")
         since = lambda r: (r["t_ns"] - truth[0]["t_ns"]) * 1e-9
-        dark = [r for r in rows if COVERED_S[0] + 1.3 < since(r) < COVERED_S[1]]
+        dark = [r for r in found if COVERED_S[0] + 1.3 < since(r) < COVERED_S[1]]
         expect(dark and all(r["state"] in ("dead_reckoning", "lost") for r in dark), f"{name}: a covered camera isn't told")
         expect(dark[-1]["cov_yy"] > 1.3 * dark[0]["cov_yy"] and dark[-1]["cov_tt"] > 1.3 * dark[0]["cov_tt"],
                f"{name}: the covariance doesn't grow in the dark")
-        light = [r for r in rows if since(r) > COVERED_S[1] + 1.5]
+        light = [r for r in found if since(r) > COVERED_S[1] + 1.5]
         expect(light and all(r["state"] == "tracking" for r in light), f"{name}: no tracking after the cover is gone")
-        worst = max(off(r, nearest(truth, r["t_ns"])) for r in rows[5::25])
+        worst = max(off(r, nearest(truth, r["t_ns"])) for r in found[5::25])
         expect(worst < 0.3, f"{name}: off by {worst:.2f} m")
-
-
-def poses_of_truth(file):
-    with open(file, encoding="utf8") as f:
-        return [{k: float(v) for k, v in row.items()} for row in csv.DictReader(f)]
 
 
 def turned_map(recording, plain_out, folder):
@@ -123,10 +114,10 @@ def turned_map(recording, plain_out, folder):
            f"x_m: {c * x - s * y:.9f}, y_m: {s * x + c * y:.9f}, heading_rad: {h + TURN_RAD:.9f}")
     code, text = replay(turned, folder / "turned-out")
     expect(code == 0, text)
-    plain, rows = poses(plain_out / "trajectory.csv"), poses(folder / "turned-out/trajectory.csv")
-    expect(len(plain) == len(rows), "a turned map changes how many poses there are")
+    plain, found = poses(plain_out / "trajectory.csv"), poses(folder / "turned-out/trajectory.csv")
+    expect(len(plain) == len(found), "a turned map changes how many poses there are")
     worst = worst_rad = 0
-    for a, b in list(zip(plain, rows))[::20]:
+    for a, b in list(zip(plain, found))[::20]:
         worst = max(worst, math.hypot(c * a["x_m"] - s * a["y_m"] - b["x_m"], s * a["x_m"] + c * a["y_m"] - b["y_m"]))
         d = heading(b) - heading(a) - TURN_RAD
         worst_rad = max(worst_rad, abs(math.atan2(math.sin(d), math.cos(d))))
@@ -151,8 +142,7 @@ def start_outside(recording, folder):
 
 
 def bad_maps(recording, folder):
-    check = lambda rec: (BIN / "waymark", "replay", rec, "--config", SOURCE / "config/datasets/corridor.yaml", "--out",
-                         folder / "none")
+    command = lambda rec: (BIN / "waymark", "replay", rec, "--config", CONFIG, "--out", folder / "none")
     bad = copy_of(recording, folder / "bad")
     yaml = bad / "map/map.yaml"
     good = yaml.read_text(encoding="utf8")
@@ -166,15 +156,15 @@ def bad_maps(recording, folder):
                                 (r"origin: .*", "origin: [0, .nan, 0]", ["map.yaml:3", "origin"])):
         yaml.write_text(good, encoding="utf8")
         change(yaml, pattern, new)
-        refused(new or pattern, texts, *check(bad))
+        refused(new or pattern, texts, *command(bad))
     shutil.rmtree(bad / "map")
-    refused("no map", ["map"], *check(bad))
+    refused("no map", ["map"], *command(bad))
 
 
 def main():
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
-        world = (SOURCE / "config/worlds/corridor-easy.yaml").read_text(encoding="utf8")
+        world = (ROOT / "config/worlds/corridor-easy.yaml").read_text(encoding="utf8")
         world = world.replace("samples: 2", "samples: 1").replace(
             "faults:\n", f"faults:\n  lights_off: {{from_s: {COVERED_S[0]}, to_s: {COVERED_S[1]}, left_percent: 0}}\n")
         (folder / "world.yaml").write_text(world + "\ncameras:\n  - {name: front, size: [640, 360]}\n", encoding="utf8")

@@ -3,7 +3,6 @@
 """`waymark replay --frames-of`: the log of a drive whose pictures came only in part, on another clock; the replay of the whole
 drive by this log looks at the same pictures and gives the same poses. A log of another drive is refused. `--timing-of`: detectors
 take the time that they took in a run."""
-import csv
 import json
 import math
 import pathlib
@@ -12,7 +11,7 @@ import shutil
 import sys
 import tempfile
 
-from judged import ROOT, check, failures, run
+from judged import ROOT, check, failures, rows, run
 
 CONFIG = ROOT / "config/datasets/corridor.yaml"
 
@@ -25,12 +24,8 @@ def simulate(folder, seed, seconds):
     return folder / f"drive-{seed}"
 
 
-def fused(folder):
-    return json.loads((folder / "health.json").read_text())["sources"]["edges:front"]["fused"]
-
-
-def lateness_ms(folder):
-    return json.loads((folder / "health.json").read_text())["sources"]["edges:front"]["lateness_worst_ms"]
+def health(folder, figure="fused"):
+    return json.loads((folder / "health.json").read_text())["sources"]["edges:front"][figure]
 
 
 def check_timing_of(drive, work):
@@ -42,8 +37,8 @@ def check_timing_of(drive, work):
     timing["look edges:front"]["p50_us"] = 60000.0
     (slow / "timing.json").write_text(json.dumps(timing))
     run("waymark", "replay", drive, "--config", CONFIG, "--timing-of", slow, "--out", work / "late")
-    check(abs(lateness_ms(work / "late") - lateness_ms(work / "all") - 60) < 1e-3,
-          f"pictures are {lateness_ms(work / 'late'):.3f} ms late at worst, without the run's time {lateness_ms(work / 'all'):.3f}")
+    late_ms, usual_ms = (health(work / name, "lateness_worst_ms") for name in ("late", "all"))
+    check(abs(late_ms - usual_ms - 60) < 1e-3, f"pictures are {late_ms:.3f} ms late at worst, without the run's time {usual_ms:.3f}")
     del timing["look edges:front"]
     (slow / "timing.json").write_text(json.dumps(timing))
     said = run("waymark", "replay", drive, "--config", CONFIG, "--timing-of", slow, "--out", work / "x", expect=(2,))
@@ -71,8 +66,7 @@ def lose_pictures(drive, out, ahead_s):
 
 
 def poses(folder, ahead_s=0):
-    with open(folder / "trajectory.csv", newline="") as f:
-        return {int(r["t_ns"]) - ahead_s * 10**9: (float(r["x_m"]), float(r["y_m"])) for r in csv.DictReader(f)}
+    return {int(r["t_ns"]) - ahead_s * 10**9: (float(r["x_m"]), float(r["y_m"])) for r in rows(folder / "trajectory.csv")}
 
 
 with tempfile.TemporaryDirectory() as temporary:
@@ -83,8 +77,9 @@ with tempfile.TemporaryDirectory() as temporary:
     run("waymark", "replay", drive, "--config", CONFIG, "--out", work / "all")
     said = run("waymark", "replay", drive, "--config", CONFIG, "--frames-of", work / "lossy/events.wmlog", "--out", work / "same")
     check("its clock is 7000000000 ns ahead" in said, "the run's clock is found")
-    check(0 < fused(work / "lossy") < fused(work / "all"), f"{fused(work / 'lossy')} of {fused(work / 'all')} pictures in the run")
-    check(fused(work / "same") == fused(work / "lossy"), f"{fused(work / 'same')} of them in the replay")
+    lossy, same, whole = (health(work / name) for name in ("lossy", "same", "all"))
+    check(0 < lossy < whole, f"{lossy} of {whole} pictures in the run")
+    check(same == lossy, f"{same} of them in the replay")
     a, b, all_of_them = poses(work / "lossy", 7), poses(work / "same"), poses(work / "all")
     check(len(a) > 300 and set(a) == set(b), f"{len(a)} poses in the run, {len(b)} in the replay")
     worst = max(math.dist(p, b.get(t, (1e9, 1e9))) for t, p in a.items())

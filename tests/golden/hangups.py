@@ -11,8 +11,8 @@ import sys
 import tempfile
 import time
 
-ROOT = pathlib.Path(os.environ.get("WM_SOURCE_DIR", ".")).resolve()
-WAYMARK = pathlib.Path(os.environ.get("WM_BIN_DIR", ROOT / "build/bin")) / "waymark"
+from judged import BIN
+
 HANGUPS, WARM, PATIENCE_S = 100, 20, 20
 # A run's memory comes and goes as a whole; what the allocator keeps of it moves by less than a run's share of pictures.
 GROWTH_KB = 3000
@@ -44,7 +44,7 @@ def main():
         work = pathlib.Path(folder)
         write_robot(work)
         said = open(work / "said.txt", "w+")
-        run = subprocess.Popen([WAYMARK, "run", "--config", work / "robot.yaml"], stdout=subprocess.DEVNULL, stderr=said)
+        run = subprocess.Popen([BIN / "waymark", "run", "--config", work / "robot.yaml"], stdout=subprocess.DEVNULL, stderr=said)
 
         def heard(what, times):
             until = time.monotonic() + PATIENCE_S

@@ -3,7 +3,6 @@
 """Signs from pixels to a pose: a rendered crossing replayed twice and from its event log gives the same bytes, the pose is near the
 truth, the judge finds few false ones; a landmark taught from one picture (`map add-landmark`) is found in another (`map look`). The
 drive cut and put together elsewhere (sim/montecarlo/carried_off.py) has counters without a gap, and wheels that didn't turn meanwhile."""
-import csv
 import json
 import math
 import pathlib
@@ -13,7 +12,7 @@ import subprocess
 import sys
 import tempfile
 
-from judged import BIN, ROOT, check, failures, run
+from judged import BIN, ROOT, check, failures, rows, run
 
 sys.path.insert(0, str(ROOT / "sim/montecarlo"))
 import carried_off
@@ -28,10 +27,9 @@ def trajectory(folder):
 
 def pose_at(rec, t_s):
     """Truth's x, y and heading in degrees, t_s after the start."""
-    with open(rec / "truth.csv") as file:
-        rows = list(csv.DictReader(file))
-    start = int(rows[0]["t_ns"])
-    row = min(rows, key=lambda r: abs(int(r["t_ns"]) - start - t_s * 1e9))
+    truth = rows(rec / "truth.csv")
+    start = int(truth[0]["t_ns"])
+    row = min(truth, key=lambda r: abs(int(r["t_ns"]) - start - t_s * 1e9))
     q = {k: float(row[k]) for k in ("qx", "qy", "qz", "qw")}
     heading = math.atan2(2 * (q["qw"] * q["qz"] + q["qx"] * q["qy"]), 1 - 2 * (q["qy"] ** 2 + q["qz"] ** 2))
     return float(row["x_m"]), float(row["y_m"]), math.degrees(heading)
@@ -40,10 +38,9 @@ def pose_at(rec, t_s):
 def reasons(out, landmarks):
     """looked-for.csv: each landmark once a picture; health.json has the sums, `found` are the sightings."""
     sources = json.loads((out / "health.json").read_text())["sources"]
-    with open(out / "looked-for.csv") as file:
-        rows = list(csv.DictReader(file))
+    looked = rows(out / "looked-for.csv")
     for name in ("landmarks:left", "landmarks:right"):
-        mine = [{k: int(v) for k, v in r.items() if k not in ("source", "landmark")} for r in rows if r["source"] == name]
+        mine = [{k: int(v) for k, v in r.items() if k not in ("source", "landmark")} for r in looked if r["source"] == name]
         pictures = {sum(r.values()) for r in mine}
         sums = {k: sum(r[k] for r in mine) for k in mine[0]}
         check(len(mine) == landmarks and len(pictures) == 1, f"{name}: each of {len(mine)} landmarks has a fate in {pictures} pictures")
@@ -74,7 +71,7 @@ def drives(folder, world):
     check(trajectory(folder / "a") == trajectory(folder / "b"), "two replays give the same bytes")
     check(trajectory(folder / "a") == trajectory(folder / "c"), "and so does the event log")
     decoder(folder)
-    reasons(folder / "a", len(list(csv.DictReader(open(rec / "landmarks/appearance.csv")))))
+    reasons(folder / "a", len(rows(rec / "landmarks/appearance.csv")))
     judged = json.loads(run("waymark-eval", folder / "a", rec, "--json"))
     check(judged["position_rmse_m"] < 0.1, f"position {judged['position_rmse_m']:.4f} m RMS")
     seen = json.loads(run("waymark-eval", folder / "a", rec, "--detector", "landmarks", "--json"))
@@ -92,9 +89,8 @@ def carried(folder):
     run("waymark", "replay", cut, "--config", CONFIG, "--out", out)
     bus = json.loads((out / "health.json").read_text())["sources"]["can"]
     check(bus["lost"] == 0 and bus["malformed"] == 0, "no counter on the bus shows the seam")
-    with open(out / "trajectory.csv") as file:
-        rows = [r for r in csv.DictReader(file) if int(r["t_ns"]) > at_ns - int(2e8)]
-    steps = [math.dist((float(a["x_m"]), float(a["y_m"])), (float(b["x_m"]), float(b["y_m"]))) for a, b in zip(rows, rows[1:])
+    near = [r for r in rows(out / "trajectory.csv") if int(r["t_ns"]) > at_ns - int(2e8)]
+    steps = [math.dist((float(a["x_m"]), float(a["y_m"])), (float(b["x_m"]), float(b["y_m"]))) for a, b in zip(near, near[1:])
              if int(b["t_ns"]) < at_ns + int(2e8)]
     check(max(steps) < 0.5 < jump, f"no wheel turned while it was carried {jump:.1f} m: {max(steps):.2f} m between two poses at most")
 
@@ -102,10 +98,9 @@ def carried(folder):
 def labelled(rec, camera):
     """{frame: {id: (u, v)}} of what is in sight of a camera."""
     frames = {}
-    with open(rec / "labels/landmarks.csv") as file:
-        for row in csv.DictReader(file):
-            if int(row["camera"]) == camera:
-                frames.setdefault(int(row["frame"]), {})[int(row["id"])] = (float(row["u_px"]), float(row["v_px"]))
+    for row in rows(rec / "labels/landmarks.csv"):
+        if int(row["camera"]) == camera:
+            frames.setdefault(int(row["frame"]), {})[int(row["id"])] = (float(row["u_px"]), float(row["v_px"]))
     return frames
 
 
@@ -116,16 +111,14 @@ def teach(folder, world):
     frames = labelled(rec, camera=0)
     moments = (min(frames), max(frames))
     both = set(frames[moments[0]]) & set(frames[moments[1]])
-    with open(rec / "landmarks.csv") as file:
-        places = {int(r["id"]): r for r in csv.DictReader(file)}
+    places = {int(r["id"]): r for r in rows(rec / "landmarks.csv")}
     taught = folder / "taught"
-    with open(rec / "landmarks/appearance.csv") as file:
-        for look in csv.DictReader(file):
-            if int(look["id"]) in both:
-                at = places[int(look["id"])]
-                run("waymark-map", "add-landmark", taught, "--id", look["id"], "--picture", rec / "landmarks" / look["picture"],
-                    "--at", f"{at['x_m']},{at['y_m']},{at['z_m']}", "--size", f"{look['width_m']},{look['height_m']}",
-                    "--yaw", math.degrees(float(look["yaw_rad"])))
+    for look in rows(rec / "landmarks/appearance.csv"):
+        if int(look["id"]) in both:
+            at = places[int(look["id"])]
+            run("waymark-map", "add-landmark", taught, "--id", look["id"], "--picture", rec / "landmarks" / look["picture"],
+                "--at", f"{at['x_m']},{at['y_m']},{at['z_m']}", "--size", f"{look['width_m']},{look['height_m']}",
+                "--yaw", math.degrees(float(look["yaw_rad"])))
     for frame in moments:
         t_s = frame / RATE_HZ
         view = folder / f"{frame}.png"

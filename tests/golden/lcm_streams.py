@@ -7,7 +7,6 @@ The robot drives sideways on a circle. Its wheels' turn rate is wrong by a fifth
 clock of its own. Checked: the pose, health, the log's replay with the same bits, the recording's replay, and its live play.
 Then another one with counts of its wheels, a compass and positions, for landmark_ekf; and a vehicle in space with an IMU.
 """
-import csv
 import json
 import math
 import re
@@ -17,6 +16,7 @@ import sys
 import time
 
 import lcm_tools
+from judged import rows, run as program
 from lcm_tools import in_a_network
 
 V, VY, W = 0.4, 0.2, 0.3
@@ -173,14 +173,9 @@ def stop(run, after_s):
 
 def replay_both(work, name):
     """The log gives the same bits; and the recording is replayed."""
-    waymark("replay", work / name / "events.wmlog", "--out", work / f"{name}-again")
+    program("waymark", "replay", work / name / "events.wmlog", "--out", work / f"{name}-again")
     assert (work / f"{name}-again/trajectory.csv").read_bytes() == (work / name / "trajectory.csv").read_bytes()
-    waymark("replay", work / f"{name}-rec", "--config", work / f"{name}-rec/config.yaml", "--out", work / f"{name}-replayed")
-
-
-def rows(path):
-    with open(path, newline="") as f:
-        return list(csv.DictReader(f))
+    program("waymark", "replay", work / f"{name}-rec", "--config", work / f"{name}-rec/config.yaml", "--out", work / f"{name}-replayed")
 
 
 def heading_of(row):
@@ -201,12 +196,6 @@ def check_pose(trajectory, what):
     assert turned > 0.5 * W * SECONDS and off < 0.02 and off_deg < 0.2
 
 
-def waymark(*words):
-    done = subprocess.run([lcm_tools.WAYMARK, *map(str, words)], capture_output=True, text=True)
-    assert done.returncode == 0, f"{words}: exit code {done.returncode}\n{done.stdout}{done.stderr}"
-    return done.stdout + done.stderr
-
-
 def check_twist(work):
     lcm_tools.config(work / "twist.yaml", "odometry", TWIST)
     (work / "calibration.yaml").write_text("imu: {mounting: {rpy_deg: [180, 0, 30]}}\n")
@@ -222,9 +211,9 @@ def check_twist(work):
     replay_both(work, "twist")
     check_pose(rows(work / "twist-replayed/trajectory.csv"), "recording")
     recording = work / "twist-rec"
-    waymark("run", "--recording", recording, "--config", recording / "config.yaml", "--out", work / "played", "--speed", "4")
+    program("waymark", "run", "--recording", recording, "--config", recording / "config.yaml", "--out", work / "played", "--speed", "4")
     check_pose(rows(work / "played/trajectory.csv"), "played")
-    assert "\ngood" in waymark("check", recording / "config.yaml", recording, "--quick")
+    assert "\ngood" in program("waymark", "check", recording / "config.yaml", recording, "--quick")
 
 
 def main():

@@ -11,7 +11,6 @@ In a network of its own with nothing but a loopback:
      appears later is found.
 """
 import contextlib
-import csv
 import functools
 import json
 import math
@@ -24,12 +23,12 @@ import time
 import urllib.error
 import urllib.request
 
-ROOT = pathlib.Path(os.environ.get("WM_SOURCE_DIR", ".")).resolve()
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "common"))
 import in_a_network  # noqa: E402
 from in_a_network import ROUTE  # noqa: E402
+from judged import BIN, ROOT, rows  # noqa: E402
 
-WAYMARK = pathlib.Path(os.environ.get("WM_BIN_DIR", ROOT / "build/bin")) / "waymark"
+WAYMARK = BIN / "waymark"
 URL = "udpm://239.255.76.67:7667?ttl=0"
 
 
@@ -68,14 +67,14 @@ def write_recording(folder, seconds):
     v, w = 0.5, 0.25
     (folder / "motion.csv").write_text(
         "t_ns,v_mps,w_radps\n" + "".join(f"{i * 20_000_000},{v},{w}\n" for i in range(seconds * 50)))
-    rows = ["t_ns,sensor,id,bearing_rad,range_m\n"]
+    sightings = ["t_ns,sensor,id,bearing_rad,range_m\n"]
     for i in range(seconds * 10):
         t = i / 10
         heading, x, y = w * t, v / w * math.sin(w * t), v / w * (1 - math.cos(w * t))
         for number, (lx, ly) in enumerate(landmarks):
             bearing = math.remainder(math.atan2(ly - y, lx - x) - heading, 2 * math.pi)
-            rows.append(f"{i * 100_000_000},eye,{number},{bearing:.6f},{math.hypot(lx - x, ly - y):.6f}\n")
-    (folder / "sightings.csv").write_text("".join(rows))
+            sightings.append(f"{i * 100_000_000},eye,{number},{bearing:.6f},{math.hypot(lx - x, ly - y):.6f}\n")
+    (folder / "sightings.csv").write_text("".join(sightings))
 
 
 def run(recording, config, out):
@@ -90,8 +89,7 @@ def finish(process, timeout_s=60):
 
 
 def published(out):
-    with open(out / "published.csv", newline="") as f:
-        return {int(row["t_ns"]): row for row in csv.DictReader(f)}
+    return {int(row["t_ns"]): row for row in rows(out / "published.csv")}
 
 
 def python_types(work):
@@ -137,20 +135,20 @@ def check_logger(work):
     counts = {channel: len(messages) for channel, messages in heard.items()}
     print("lcm-logger recorded, and LCM's Python binding decoded:", counts)
 
-    rows = published(work / "heard")
+    written = published(work / "heard")
     poses = heard["WAYMARK_POSE"]
     least = 20 if "WM_FEWER" in os.environ else 100  # an emulator is slow
-    assert len(poses) == len(rows) and len(rows) > least, f"{len(poses)} poses heard, {len(rows)} written"
+    assert len(poses) == len(written) > least, f"{len(poses)} poses heard, {len(written)} written"
     assert all(a.t_ns < b.t_ns for a, b in zip(poses, poses[1:])), "stamps don't rise"
     for pose in poses:
-        row = rows[pose.t_ns]
+        row = written[pose.t_ns]
         assert pose.position_m[0] == float(row["x_m"]) and pose.position_m[1] == float(row["y_m"])
         assert pose.covariance[0][0] == float(row["cov_xx"]) and pose.covariance[5][5] == float(row["cov_tt"])
         assert pose.made_ns == int(row["made_ns"]) <= pose.sent_ns and pose.jumps == int(row["resets"])
     bounds = heard["WAYMARK_POSE_BOUND"]
     assert [bound.t_ns for bound in bounds] == [pose.t_ns for pose in poses], "a bound for each pose"
     for bound in bounds:
-        row = rows[bound.t_ns]
+        row = written[bound.t_ns]
         assert bound.usable == int(row["usable"]) and bound.unusable == int(row["unusable"])
         assert math.isclose(bound.horizontal_m, float(row["bound_m"]), rel_tol=1e-8), row["bound_m"]
     utc_ns = poses[-1].t_ns + poses[-1].utc_offset_ns
@@ -160,8 +158,7 @@ def check_logger(work):
     names = [bytes(s.name).rstrip(b"\0").decode() for s in health.sources[:health.source_count]]
     assert names == ["motion", "sightings:eye", "commands"], names
     assert [tuple(p) for p in heard["WAYMARK_LANDMARKS"][0].position_m[:2]] == [(5, 0, 0), (0, 5, 0)]
-    with open(work / "heard/innovations.csv", newline="") as f:
-        assert counts["WAYMARK_INNOVATION"] == sum(1 for _ in csv.DictReader(f))
+    assert counts["WAYMARK_INNOVATION"] == len(rows(work / "heard/innovations.csv"))
     seen = heard["WAYMARK_OBSERVATIONS"]
     assert all(bytes(o.sensor).rstrip(b"\0") == b"eye" and o.count == 4 for o in seen) and len(seen) > 20
 
@@ -182,9 +179,9 @@ def check_commands(work):
     node.publish("WAYMARK_SET_POSE", told.encode())
     node.publish("WAYMARK_SET_POSE", b"rubbish")
     finish(process)
-    rows = list(published(work / "told").values())
-    assert abs(float(rows[0]["x_m"])) < 1 and abs(float(rows[-1]["x_m"]) - 100) < 5, rows[-1]
-    print("told to stand at 100, -50: ends at", rows[-1]["x_m"], rows[-1]["y_m"])
+    first, *_, last = published(work / "told").values()
+    assert abs(float(first["x_m"])) < 1 and abs(float(last["x_m"]) - 100) < 5, last
+    print("told to stand at 100, -50: ends at", last["x_m"], last["y_m"])
 
 
 def check_web(work):

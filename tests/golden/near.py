@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Are two outputs of a replay the same but for rounding? For a change of arithmetic that keeps every decision: another order of
 sums, another form of a derivative. What was decided (verdicts, states, counts, stamps) has to be equal, numbers within LIMITS."""
-import csv
 import json
 import math
+
+import judged
 
 # Some 1e6 times the rounding of a double at 1 m and 1 rad, and a millionth of a sigma of 1 mm.
 LIMITS = {"m": 1e-9, "rad": 1e-9, "sigma": 1e-9, "lost": 1e-6, "calibration": 1e-8}
@@ -34,10 +35,7 @@ class comparison:
 
 
 def rows(folder, name):
-    if not (folder / name).exists():
-        return None
-    with open(folder / name, newline="", encoding="utf-8") as text:
-        return list(csv.DictReader(text))
+    return judged.rows(folder / name) if (folder / name).exists() else None
 
 
 def value(text):

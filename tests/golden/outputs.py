@@ -10,7 +10,6 @@ A change of any bit of a trajectory, an innovation or a detection is a change of
                                       poses within 1e-9 m and rad, sigmas within 1e-9 of themselves (tests/golden/near.py)
 
 The simulator makes the same bytes from a scenario and its seed on every machine; nothing else is read."""
-import csv
 import difflib
 import hashlib
 import json
@@ -21,6 +20,7 @@ import sys
 import tempfile
 
 import near
+from judged import rows
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 OUTPUTS = ROOT / "tests/golden/outputs"
@@ -51,11 +51,6 @@ def run(*command):
 
 def digest(data):
     return hashlib.sha256(data).hexdigest()[:16]
-
-
-def rows(file):
-    with open(file, newline="", encoding="utf-8") as text:
-        return list(csv.DictReader(text))
 
 
 def trajectory_text(file):

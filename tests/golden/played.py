@@ -11,7 +11,6 @@ equal stamps. Without the recordings the test is skipped (exit code 77).
 """
 import argparse
 import bisect
-import csv
 import json
 import math
 import os
@@ -21,17 +20,14 @@ import sys
 import tempfile
 import time
 
+from judged import rows
+
 SKIPPED = 77
 # recording, estimator by its defaults, times real speed
 CASES = [("mecanum-1", "odometry", 1), ("kitti-0926-0001", "stereo_ekf", 1)]
 MORE = [("dlr-a", "slam", 2), ("kitti-0926-0095", "stereo_ekf", 1), ("kitti-0930-0020", "stereo_ekf", 1), ("canedge-1", "landmark_ekf", 2)]
 # The largest distance from the replay, m: stamps are of another clock
 OVER_LCM = [("mecanum-1", "odometry", 0.02), ("dlr-a", "slam", 0.02)]
-
-
-def rows(path):
-    with open(path, newline="") as f:
-        return list(csv.DictReader(f))
 
 
 def places(path):

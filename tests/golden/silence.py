@@ -4,14 +4,13 @@ and after it is back the pose is no further from the truth than its sigma says, 
 in a hundred is false: where the pose is vague, one of them may fit. The same for a minute without bus and camera, in
 which a wheel's counter of 16 bits may have wrapped: how far the robot drove is then unknown, and `slam` finds it in its map."""
 import bisect
-import csv
 import math
 import pathlib
 import shutil
 import sys
 import tempfile
 
-from judged import ROOT, check, failures, run
+from judged import ROOT, check, failures, rows, run
 
 CONFIG = ROOT / "config/datasets/crossing-points.yaml"
 WORLD = ROOT / "config/worlds/crossing-laps.yaml"
@@ -35,8 +34,7 @@ def yaw(row):
 
 class Truth:
     def __init__(self, folder):
-        with open(folder / "truth.csv") as file:
-            self.rows = list(csv.DictReader(file))
+        self.rows = rows(folder / "truth.csv")
         self.t_ns = [int(row["t_ns"]) for row in self.rows]
 
     def at(self, t_ns):
@@ -64,19 +62,18 @@ def silence(recording, to, begin_ns, end_ns, blind):
 def judge(trajectory, truth, begin_ns, end_ns):
     """(errors in sigmas from the silence on, s after its end when the pose was last not right)"""
     sigmas, late_s = [], 0.0
-    with open(trajectory) as file:
-        for row in csv.DictReader(file):
-            t_ns = int(row["t_ns"])
-            if not begin_ns <= t_ns <= end_ns + 30_000_000_000:
-                continue
-            x, y, heading = truth.at(t_ns)
-            dx, dy = float(row["x_m"]) - x, float(row["y_m"]) - y
-            turned = abs(math.remainder(yaw(row) - heading, math.tau))
-            xx, xy, yy = (float(row[k]) for k in ("cov_xx", "cov_xy", "cov_yy"))
-            place = math.sqrt((yy * dx * dx - 2 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy))
-            sigmas.append(max(place, turned / math.sqrt(float(row["cov_tt"]))))
-            if t_ns >= end_ns and (math.hypot(dx, dy) > RIGHT_M or turned > RIGHT_RAD):
-                late_s = (t_ns - end_ns) * 1e-9
+    for row in rows(trajectory):
+        t_ns = int(row["t_ns"])
+        if not begin_ns <= t_ns <= end_ns + 30_000_000_000:
+            continue
+        x, y, heading = truth.at(t_ns)
+        dx, dy = float(row["x_m"]) - x, float(row["y_m"]) - y
+        turned = abs(math.remainder(yaw(row) - heading, math.tau))
+        xx, xy, yy = (float(row[k]) for k in ("cov_xx", "cov_xy", "cov_yy"))
+        place = math.sqrt((yy * dx * dx - 2 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy))
+        sigmas.append(max(place, turned / math.sqrt(float(row["cov_tt"]))))
+        if t_ns >= end_ns and (math.hypot(dx, dy) > RIGHT_M or turned > RIGHT_RAD):
+            late_s = (t_ns - end_ns) * 1e-9
     return sigmas, late_s
 
 
@@ -124,7 +121,6 @@ with tempfile.TemporaryDirectory() as temporary:
     silence(recording, work / "silent", begin_ns, back_ns, True)
     silence(work / "silent", work / "dead", begin_ns, 1 << 62, False)
     run("waymark", "replay", work / "dead", "--config", CONFIG, "--out", work / "run", "--until", 75)
-    with open(work / "run/innovations.csv") as file:
-        verdicts = [row["verdict"] for row in csv.DictReader(file) if int(row["t_ns"]) >= back_ns]
+    verdicts = [row["verdict"] for row in rows(work / "run/innovations.csv") if int(row["t_ns"]) >= back_ns]
     check(verdicts.count("fused") > 0.8 * len(verdicts), f"no bus any more: {verdicts.count('fused')} of {len(verdicts)} sightings are fused")
 sys.exit(bool(failures))

@@ -12,6 +12,7 @@ import threading
 import time
 
 import lcm_tools
+import restarts
 from lcm_tools import in_a_network
 
 BLOCK_S, DRIVE_S, SILENT_S, WATCHDOG_S = 3, 6, 5, 1
@@ -32,20 +33,6 @@ class Manager(threading.Thread):
             self.heard.append((time.monotonic(), text))
 
 
-class Subscriber(threading.Thread):
-    def __init__(self, pose_t):
-        super().__init__(daemon=True)
-        import lcm
-        self.node = lcm.LCM(lcm_tools.URL)
-        self.arrivals = []
-        self.node.subscribe("WAYMARK_POSE",
-                            lambda _, data: self.arrivals.append((time.monotonic(), pose_t.decode(data).t_ns)))
-
-    def run(self):
-        while True:
-            self.node.handle_timeout(100)
-
-
 def largest_gap(times):
     return max(b - a for a, b in zip(times, times[1:]))
 
@@ -61,7 +48,7 @@ def main():
             for i in range(DRIVE_S * 10, (DRIVE_S + SILENT_S) * 10):
                 f.write(f"{i * 100_000_000},eye,0,0,5\n")
         lcm_tools.config(work / "config.yaml", "landmark_ekf")
-        manager, subscriber = Manager(work / "notify"), Subscriber(waymark.pose_t)
+        manager, subscriber = Manager(work / "notify"), restarts.Subscriber(waymark)
         manager.start()
         subscriber.start()
         environment = dict(os.environ, LD_PRELOAD=library, WM_BLOCK_FOLDER=str(work / "out"), WM_BLOCK_AFTER_S="2",
@@ -74,8 +61,8 @@ def main():
         assert "slow disk: blocked" in done.stderr, done.stderr
         time.sleep(0.3)
         rows = lcm_tools.published(work / "out")
-        heard = [t_ns for _, t_ns in subscriber.arrivals]
-        gap = largest_gap([at for at, _ in subscriber.arrivals])
+        heard = [pose.t_ns for _, pose in subscriber.poses]
+        gap = largest_gap([at for at, _ in subscriber.poses])
         fed = [at for at, text in manager.heard if "WATCHDOG=1" in text]
         print(f"{len(heard)} poses heard, {len(rows)} written, largest gap {gap:.3f} s; watchdog fed {len(fed)} times, "
               f"largest gap {largest_gap(fed):.2f} s")

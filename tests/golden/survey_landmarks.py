@@ -3,22 +3,23 @@
 """A map of landmarks by driving: `map survey RUN --poses RECORDING` of simulated drives puts landmarks where they stand, within
 its covariances; the filter is as good with that map as with the measured one; who moved, stands twice or is not where the map
 says is named."""
-import csv
 import json
 import pathlib
 import shutil
 import sys
 import tempfile
 
-from judged import ROOT, check, failures, run
+from judged import ROOT, check, failures, rows, run
+
+sys.path.insert(0, str(ROOT / "sim/montecarlo"))
+import carried_off
 
 CONFIG = ROOT / "config/datasets/crossing-cameras.yaml"
 WORLD = ROOT / "config/worlds/crossing-drawn.yaml"
 
 
 def places(file):
-    with open(file, newline="") as rows:
-        return {row["id"]: {k: float(v) for k, v in row.items() if k != "id" and v} for row in csv.DictReader(rows)}
+    return {row["id"]: {k: float(v) for k, v in row.items() if k != "id" and v} for row in rows(file)}
 
 
 def normalised(surveyed, truth):
@@ -35,17 +36,11 @@ def findings(table):
     return [line for line in table.splitlines() if line.startswith("landmark ")]
 
 
-def rewrite_sightings(drive, change):
-    file = drive / "sightings.csv"
-    with open(file, newline="") as rows:
-        reader = csv.DictReader(rows)
-        columns, kept = reader.fieldnames, list(reader)
+def rewrite(file, change):
+    kept = rows(file)
     for row in kept:
         change(row)
-    with open(file, "w", newline="") as rows:
-        writer = csv.DictWriter(rows, columns, lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(kept)
+    carried_off.save(file, kept, list(kept[0]))
 
 
 def surveyed(folder, drive, name):
@@ -81,24 +76,17 @@ def good_drives(folder):
 def odd_ones(folder):
     """Who is seen most: turned into two, or moved half-way, in what the recording says was seen."""
     drive = folder / "drive1"
-    with open(drive / "sightings.csv", newline="") as rows:
-        seen = [row["id"] for row in csv.DictReader(rows)]
+    seen = [row["id"] for row in rows(drive / "sightings.csv")]
     ids = sorted(set(seen), key=seen.count, reverse=True)
     doubled = folder / "doubled"
     shutil.copytree(drive, doubled)
-    rewrite_sightings(doubled, lambda row: row.update(id=ids[0]) if row["id"] == ids[1] else None)
+    rewrite(doubled / "sightings.csv", lambda row: row.update(id=ids[0]) if row["id"] == ids[1] else None)
     table = surveyed(folder, doubled, "doubled-run")
     words = [line for line in findings(table) if line.startswith(f"landmark {ids[0]} ")]
     check(any("duplicate" in line or "moved" in line for line in words), f"two of one identity: {words}")
     wrong = folder / "wrong-map"
     shutil.copytree(drive, wrong)
-    rows = (wrong / "landmarks.csv").read_text().splitlines()
-    for i, row in enumerate(rows):
-        if row.split(",")[0] == ids[0]:
-            cells = row.split(",")
-            cells[1] = f"{float(cells[1]) + 1.5:.4f}"
-            rows[i] = ",".join(cells)
-    (wrong / "landmarks.csv").write_text("\n".join(rows) + "\n")
+    rewrite(wrong / "landmarks.csv", lambda row: row.update(x_m=f"{float(row['x_m']) + 1.5:.4f}") if row["id"] == ids[0] else None)
     table = surveyed(folder, wrong, "wrong-run")
     words = findings(table)
     check(len(words) == 1 and f"landmark {ids[0]} is 1." in words[0], f"off where the map has it: {words}")

@@ -11,8 +11,7 @@ import subprocess
 import sys
 import tempfile
 
-ROOT = pathlib.Path(os.environ.get("WM_SOURCE_DIR", ".")).resolve()
-WAYMARK = pathlib.Path(os.environ.get("WM_BIN_DIR", ROOT / "build/bin")) / "waymark"
+from judged import BIN, drive_straight
 
 
 def main():
@@ -24,17 +23,11 @@ def main():
         return 77
     work = pathlib.Path(tempfile.mkdtemp(prefix="waymark-strace-"))
     try:
-        recording = work / "rec"
-        recording.mkdir()
-        (recording / "recording.yaml").write_text(
-            "format: waymark-recording/1\nname: straight\nduration_s: 2\nstreams: [motion.csv]\n"
-            "vehicle: {initial_pose: {t_ns: 0, x_m: 0, y_m: 0, heading_rad: 0}}\n")
-        (recording / "motion.csv").write_text(
-            "t_ns,v_mps,w_radps\n" + "".join(f"{i * 20_000_000},0.5,0.1\n" for i in range(100)))
+        recording = drive_straight(work / "rec", 2, 50)
         (work / "config.yaml").write_text(
             "format: waymark-config/1\nestimator: odometry\npublish: {lcm: false}\nrealtime: {lock_memory: false}\n")
         trace = work / "trace"
-        done = subprocess.run(["strace", "-f", "-o", trace, WAYMARK, "run", "--config", work / "config.yaml",
+        done = subprocess.run(["strace", "-f", "-o", trace, BIN / "waymark", "run", "--config", work / "config.yaml",
                                "--recording", recording, "--out", work / "out"], capture_output=True, text=True)
         if not trace.exists() or "getrusage" not in trace.read_text():
             print(f"skipped: strace may not watch here\n{done.stderr}")

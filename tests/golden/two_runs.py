@@ -9,7 +9,6 @@
   3. `commands: {lcm: true}` after the default route moved to another network's interface: a command is heard.
 
 Needs lcm-gen, and the right to a network namespace (else 77)."""
-import csv
 import json
 import signal
 import socket
@@ -19,6 +18,7 @@ import sys
 import time
 
 import lcm_tools
+from judged import rows
 from lcm_tools import WAYMARK, config, in_a_network, write_recording
 
 
@@ -61,8 +61,7 @@ def check_other_runs(work):
 
 
 def last_x_m(work, name):
-    with open(work / f"out-{name}/published.csv", newline="") as f:
-        return float(list(csv.DictReader(f))[-1]["x_m"])
+    return float(rows(work / f"out-{name}/published.csv")[-1]["x_m"])
 
 
 def set_pose(work, x_m):
