@@ -82,14 +82,15 @@ static void about_losses(const wm_source_health *s, const char *reason, wm_findi
   for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++) {
     if (kinds[i].count == 0) continue;
     const int is_refused = kinds[i].id == WM_FOUND_ROWS_SKIPPED;
+    const int has_reason = is_refused || kinds[i].id == WM_FOUND_CLOCKS_APART;
     const int is_apart = kinds[i].id == WM_FOUND_DATA_MISSING || kinds[i].id == WM_FOUND_VALUES_FROZEN;
     // What was refused, is missing or repeats the one before is not among those received.
     const uint64_t all = s->received + (is_refused ? s->malformed + s->not_finite : is_apart ? kinds[i].count : 0);
     wm_find(out, kinds[i].id, WM_SEVERITY_NOTE, s->name, kinds[i].fix, "%" PRIu64 " of %" PRIu64 " %s%s%s",
-            kinds[i].count, all, kinds[i].what, is_refused && reason[0] ? "; the first: " : "",
-            is_refused ? reason : "")
+            kinds[i].count, all, kinds[i].what, has_reason && reason[0] ? "; the first: " : "",
+            has_reason ? reason : "")
         ->size = all > 0 ? (double)kinds[i].count / (double)all : 0;
-    if (is_refused) reason = "";  // it is of one of them
+    if (has_reason) reason = "";  // it is of one of them
   }
 }
 

@@ -188,31 +188,33 @@ static void learn_lateness(source_state *s, wm_time_ns lateness_ns) {
   s->late_in_a_row = 0;
 }
 
+static wm_merge_verdict refuse(wm_merge_counts *counts, wm_merge_verdict why) {
+  uint64_t *const of[] = {[WM_MERGE_LATE] = &counts->late,
+                          [WM_MERGE_DROPPED] = &counts->dropped,
+                          [WM_MERGE_DUPLICATE] = &counts->duplicates,
+                          [WM_MERGE_FUTURE] = &counts->future};
+  *of[why] += 1;
+  return why;
+}
+
+void wm_merge_refuse(wm_merge *self, size_t source, wm_merge_verdict why) {
+  self->sources[source].counts.received++;
+  (void)refuse(&self->sources[source].counts, why);
+}
+
 wm_merge_verdict wm_merge_push(wm_merge *self, const wm_event *event) {
   source_state *s = &self->sources[event->source];
   wm_merge_counts *counts = &s->counts;
   counts->received++;
   wm_time_ns lateness_ns = minus(event->arrival_ns, event->t_ns);
-  if (lateness_ns < -self->horizon_ns) {
-    counts->future++;
-    return WM_MERGE_FUTURE;
-  }
+  if (lateness_ns < -self->horizon_ns) return refuse(counts, WM_MERGE_FUTURE);
   if (counts->last_arrival_ns == WM_TIME_NONE || event->arrival_ns > counts->last_arrival_ns)
     counts->last_arrival_ns = event->arrival_ns;
   measure_lateness(counts, lateness_ns);
   learn_lateness(s, lateness_ns);
-  if (event->t_ns < self->watermark_ns) {
-    counts->late++;
-    return WM_MERGE_LATE;
-  }
-  if (seen_before(s, event)) {
-    counts->duplicates++;
-    return WM_MERGE_DUPLICATE;
-  }
-  if (self->waiting == self->capacity) {
-    counts->dropped++;
-    return WM_MERGE_DROPPED;
-  }
+  if (event->t_ns < self->watermark_ns) return refuse(counts, WM_MERGE_LATE);
+  if (seen_before(s, event)) return refuse(counts, WM_MERGE_DUPLICATE);
+  if (self->waiting == self->capacity) return refuse(counts, WM_MERGE_DROPPED);
   if (counts->newest_ns == WM_TIME_NONE || event->t_ns > counts->newest_ns) {
     if (counts->newest_ns == WM_TIME_NONE) counts->first_ns = event->t_ns;
     counts->newest_ns = event->t_ns;

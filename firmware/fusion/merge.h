@@ -66,6 +66,8 @@ wm_merge *wm_merge_init(void *memory, const wm_merge_source *sources, size_t sou
 
 // An event that arrived (event->source is an index into the sources given at init; arrival_ns is set).
 WM_REALTIME wm_merge_verdict wm_merge_push(wm_merge *self, const wm_event *event);
+// Counts one that its receiver refused for its stamp: WM_MERGE_LATE, WM_MERGE_FUTURE.
+void wm_merge_refuse(wm_merge *self, size_t source, wm_merge_verdict why);
 // The arrival clock is at `now_ns`; never goes back.
 WM_REALTIME void wm_merge_advance(wm_merge *self, wm_time_ns now_ns);
 // No event will follow: all that wait are final.

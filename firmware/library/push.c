@@ -142,6 +142,14 @@ static void count_refused(pushed_source *source, wm_status status, const wm_erro
   *(status == WM_NOT_FINITE || status == WM_OUT_OF_RANGE ? &counts->not_finite : &counts->malformed) += 1;
 }
 
+// Of a time that check_clock refused.
+static void count_time(session *self, pushed_source *source, wm_status status, const wm_error *err) {
+  keep_reason(source, err);
+  for (size_t i = 0; i < self->assembly.source_count; i++)
+    if (self->readers[i].source == &source->base)
+      wm_merge_refuse(self->pipeline.merge, i, status == WM_TIME_RAN_BACK ? WM_MERGE_LATE : WM_MERGE_FUTURE);
+}
+
 // source->event is filled but for its arrival.
 static wm_status deliver(session *self, pushed_source *source, wm_time_ns arrival_ns, wm_error *err) {
   const wm_time_ns t_ns = source->event.t_ns;
@@ -149,7 +157,7 @@ static wm_status deliver(session *self, pushed_source *source, wm_time_ns arriva
   wm_status status =
       check_clock(self, arrival_ns == WM_TIME_NONE ? "t_ns" : "arrival_ns", source->event.arrival_ns, err);
   if (status != WM_OK) {
-    count_refused(source, WM_BAD_DATA, err);
+    count_time(self, source, status, err);
     return wm_fail_in(err, "%s", source->base.name);
   }
   status = open_readers(self, t_ns, err);

@@ -78,8 +78,16 @@ TEST(test_one_stamp_far_ahead_makes_nothing_late) {
   }
   ok(waymark_health(started, &health, sizeof health, &err));
   TEST_ASSERT_EQUAL_UINT64(0, health.sources[0].late);
-  TEST_ASSERT_EQUAL_UINT64(19, health.sources[0].malformed);  // none is left out without a count
+  TEST_ASSERT_EQUAL_UINT64(19, health.sources[0].future);  // none is left out without a count
+  TEST_ASSERT_EQUAL_UINT64(0, health.sources[0].malformed + health.sources[0].not_finite);
+  TEST_ASSERT_EQUAL_UINT64(51 + 199 + 19, health.sources[0].received);
   TEST_ASSERT_NOT_NULL_MESSAGE(strstr(health.refused_because[0], "60.0"), health.refused_because[0]);
+  TEST_ASSERT_EQUAL(WM_TIME_RAN_BACK, row(started, motion, -3600, 0.5, NANV, 0));
+  TEST_ASSERT_EQUAL(WM_TIME_RAN_BACK,
+                    waymark_push_row(started, motion, NS(5), NS(-3600), (double[3]){0.5, NANV, 0}, 3, &err));
+  ok(waymark_health(started, &health, sizeof health, &err));
+  TEST_ASSERT_EQUAL_UINT64(2, health.sources[0].late);
+  TEST_ASSERT_EQUAL_UINT64(19, health.sources[0].future);
 }
 
 // Before the first datum the session has no clock.
