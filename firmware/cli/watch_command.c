@@ -27,6 +27,9 @@ static const char kHelp[] =
     "  --url URL      LCM's (default: LCM_DEFAULT_URL, else this computer's)\n"
     "  --prefix TEXT  of the channels (default WAYMARK_)\n"
     "  --duration S   seconds, then stop\n"
+    "  --once         stop with the first message of a run's health; exit code 1 where none comes within 5 s or "
+    "--duration:\n"
+    "                 a container's health check\n"
     "  --metrics FILE instead of the view, metrics in Prometheus' text format, written anew each 5 s: for "
     "node_exporter's\n"
     "                 collector of text files; `waymark web` has the same as /metrics\n"
@@ -41,6 +44,7 @@ static const char kHelp[] =
     "For a browser, with the map and live pictures: `waymark web CONFIG`.\n";
 
 #define SHOW_EVERY_NS (500 * WM_NS_PER_MS)   // refresh of the terminal
+#define ONCE_S 5.0                           // health comes each second
 #define METRICS_EVERY_NS (5 * WM_NS_PER_S)   // Prometheus asks each 15 s or less often
 #define METRICS_MAX_BYTES ((size_t)1 << 18)  // of 32 sources 100 kB
 #define LOG_QUEUE 1000                       // messages that wait for a disk: 15 s of poses and health
@@ -90,18 +94,20 @@ static void on_any(const lcm_recv_buf_t *message, const char *channel, void *con
 
 static watch seen;
 
-static void show(lcm_t *lcm, double duration_s) {
+// Until the end of `duration_s` (0: none), a signal, or with `is_once` the first health. 0: no run was heard.
+static int show(lcm_t *lcm, double duration_s, int is_once) {
   int is_terminal = isatty(STDOUT_FILENO);
   wm_time_ns begin_ns = wm_monotonic_ns(), next_ns = begin_ns;
   wm_time_ns end_ns = duration_s > 0 ? begin_ns + wm_ns_from_seconds(duration_s) : INT64_MAX;
-  while (!atomic_load(&stop) && wm_monotonic_ns() < end_ns) {
+  while (!atomic_load(&stop) && wm_monotonic_ns() < end_ns && !(is_once && seen.has_health)) {
     if (lcm_handle_timeout(lcm, 100) < 0) break;
-    if (wm_monotonic_ns() < next_ns) continue;
+    if (is_once ? !seen.has_health : wm_monotonic_ns() < next_ns) continue;
     next_ns = wm_monotonic_ns() + (is_terminal ? SHOW_EVERY_NS : WM_NS_PER_S);
-    if (is_terminal) (void)fputs("\033[H\033[J", stdout);
+    if (is_terminal && !is_once) (void)fputs("\033[H\033[J", stdout);
     watch_print(&seen, wm_monotonic_ns(), stdout);
     (void)fflush(stdout);
   }
+  return seen.has_health;
 }
 
 static wm_status put_metrics(const char *path, char *text, wm_error *err) {
@@ -172,13 +178,14 @@ static int write_log(lcm_t *lcm, const char *prefix, const char *path, double du
 int command_watch(int argc, char *const *argv) {
   const char *url = "", *prefix = "WAYMARK_", *log_path = NULL, *metrics_path = NULL, *why;
   double duration_s = 0;
-  int help = 0;
+  int help = 0, is_once = 0;
   const char *web = NULL;
   const option options[] = {{"--url", OPTION_TEXT, &url},
                             {"--prefix", OPTION_TEXT, &prefix},
                             {"--duration", OPTION_F64, &duration_s},
                             {"--metrics", OPTION_TEXT, &metrics_path},
                             {"--log", OPTION_TEXT, &log_path},
+                            {"--once", OPTION_FLAG, &is_once},
                             {"--web", OPTION_TEXT, &web},
                             {"--help", OPTION_FLAG, &help},
                             {"-h", OPTION_FLAG, &help}};
@@ -217,17 +224,19 @@ int command_watch(int argc, char *const *argv) {
   (void)lcm_subscribe(lcm, channel, on_pose, &seen);
   (void)snprintf(channel, sizeof channel, "%.80sPOSE_BOUND", prefix);
   (void)lcm_subscribe(lcm, channel, on_bound, &seen);
-  (void)snprintf(channel, sizeof channel, "%.80sHEALTH", prefix);
-  (void)lcm_subscribe(lcm, channel, on_health, &seen);
   (void)snprintf(channel, sizeof channel, "%.80sREFUSED", prefix);
   (void)lcm_subscribe(lcm, channel, on_refused, &seen);
   (void)snprintf(channel, sizeof channel, "%.80sINNOVATION", prefix);
   (void)lcm_subscribe(lcm, channel, on_innovation, &seen);
+  (void)snprintf(channel, sizeof channel, "%.80sHEALTH", prefix);
+  (void)lcm_subscribe(lcm, channel, on_health, &seen);
   int code = EXIT_DONE;
   if (metrics_path)
     code = write_metrics(lcm, metrics_path, duration_s);
-  else
-    show(lcm, duration_s);
+  else if (!show(lcm, is_once && !(duration_s > 0) ? ONCE_S : duration_s, is_once) && is_once) {
+    (void)fprintf(stderr, "waymark watch: no run sends its health on %s, channel %s\n", lcm_connect_url(url), channel);
+    code = EXIT_WORK_FAILED;
+  }
   lcm_destroy(lcm);
   return code;
 }

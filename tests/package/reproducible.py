@@ -1,10 +1,13 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Packages are the same bytes wherever, whenever and by whomever they are made: reproducible.py BUILD.
+"""Packages are the same bytes wherever, whenever and by whomever they are made: reproducible.py BUILD | --whole FOLDER.
 
 The installed part of a build is packed twice, from copies in two folders: the second one deeper, with other times of all files, written
 in another order, in another time zone, by a user whose umask is 077. Then sources are compiled in both by the commands of the build with
-WM_REPRODUCIBLE: the objects, which have the names of their sources in them, are the same. Skipped (77) without cpack or dpkg-deb."""
+WM_REPRODUCIBLE: the objects, which have the names of their sources in them, are the same. Skipped (77) without cpack or dpkg-deb.
+
+--whole: everything is built in both (below FOLDER, which stays), one after the other without a compiler's cache, the second with another
+number of compilers at once; all packages are compared, and what differs is named by package and file. What is there is built on."""
 import hashlib
 import json
 import os
@@ -17,7 +20,7 @@ import sys
 import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-BUILD = pathlib.Path(sys.argv[1]).resolve()
+BUILD = pathlib.Path(sys.argv[1]).resolve()  # no folder with --whole
 # Packages of programs, of a library, of headers and of scripts. The others are made by the same rules.
 COMPONENTS = ("runtime", "library", "dev", "fleet")
 COMPILED = ("msgs/src/status.c", "firmware/library/entry.c", "estimator/filters/registry.c")
@@ -38,11 +41,17 @@ def moved(text, place):
     return text.replace(str(BUILD), str(place / "built")).replace(str(ROOT), str(place / "sources"))
 
 
-def copy(place, backwards):
-    """Sources and build below `place`, with its paths in what CMake wrote."""
-    pairs = [(path, place / "sources" / path.relative_to(ROOT)) for path in sources()]
-    pairs += [(path, place / "built" / path.relative_to(BUILD)) for path in files_of(BUILD)
-              if not NOT_INSTALLED.search("/" + str(path.relative_to(BUILD))) and (path.suffix not in (".json", ".xml") or path.stat().st_size < 1e6)]
+def of_sources(place):
+    return [(path, place / "sources" / path.relative_to(ROOT)) for path in sources()]
+
+
+def of_build(place):
+    return [(path, place / "built" / path.relative_to(BUILD)) for path in files_of(BUILD)
+            if not NOT_INSTALLED.search("/" + str(path.relative_to(BUILD))) and (path.suffix not in (".json", ".xml") or path.stat().st_size < 1e6)]
+
+
+def copy(pairs, place, backwards):
+    """Files (from, to) below `place`, with its paths in what CMake wrote."""
     for path, to in sorted(pairs, reverse=backwards):
         to.parent.mkdir(parents=True, exist_ok=True)
         if path.suffix in (".cmake", ".pc"):
@@ -54,12 +63,16 @@ def copy(place, backwards):
             os.utime(to, (1000000000, 1000000000))
 
 
-def pack(place, umask, zone):
-    """{name: sum} of the packages."""
-    env = {**os.environ, "TZ": zone, "SOURCE_DATE_EPOCH": "1700000000"}
-    done = subprocess.run(["cpack", "-G", "DEB", "-B", str(place / "out"), "-D", f"CPACK_COMPONENTS_ALL={';'.join(COMPONENTS)}"],
-                          cwd=place / "built", env=env, umask=umask, capture_output=True, text=True, check=False)
+def run(words, place, umask, zone):
+    env = {**os.environ, "TZ": zone, "SOURCE_DATE_EPOCH": "1700000000", "CCACHE_DISABLE": "1"}
+    done = subprocess.run(words, cwd=place, env=env, umask=umask, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+def pack(place, umask, zone, components=COMPONENTS):
+    """{name: sum} of the packages; without components all that there are."""
+    chosen = ["-D", f"CPACK_COMPONENTS_ALL={';'.join(components)}"] if components else []
+    run(["cpack", "-G", "DEB", "-B", str(place / "out"), *chosen], place / "built", umask, zone)
     return {deb.name: hashlib.sha256(deb.read_bytes()).hexdigest() for deb in (place / "out").glob("*.deb")}
 
 
@@ -73,6 +86,25 @@ def check_package(deb):
         assert owner == "root/root" and (day, time) == ("2023-11-14", "22:13"), (deb.name, owner, day, time, name)
         assert not mode.startswith("d") or mode == "drwxr-xr-x", (deb.name, mode, name)
         assert mode.startswith("l") or mode[7] == "r", (deb.name, mode, name)  # everybody reads
+
+
+def compare(first, second, a, b):
+    """Names what differs in packages {name: sum} of two places; how many do."""
+    assert a and a.keys() == b.keys(), (a, b)
+    for deb in sorted(a):
+        check_package(first / "out" / deb)
+        print(f"{a[deb]}  {deb}" if a[deb] == b[deb] else f"{deb}: two packages of the same sources differ: {a[deb]} and {b[deb]}")
+        if a[deb] != b[deb]:
+            for x, y in zip(modes(first / "out" / deb), modes(second / "out" / deb)):
+                if x != y:
+                    print("  differs:", *x, "|", *y)
+            for place in (first, second):
+                run(["dpkg-deb", "-R", place / "out" / deb, place / "unpacked" / deb], place, 0o022, "UTC")
+            for path in files_of(first / "unpacked" / deb):
+                other = second / "unpacked" / deb / path.relative_to(first / "unpacked" / deb)
+                if not path.is_symlink() and not (other.is_file() and path.read_bytes() == other.read_bytes()):
+                    print("  other content:", path, other)
+    return sum(a[deb] != b[deb] for deb in a)
 
 
 def compiled(place, source):
@@ -89,7 +121,26 @@ def compiled(place, source):
     return data
 
 
+def whole(folder):
+    """All of it, built twice; no file of one is of use to the other."""
+    first, second = folder / "a", folder / "another/and/deeper"
+    sums = []
+    for place in (first, second):
+        if not (place / "sources").exists():
+            copy(of_sources(place), place, place == second)
+    for place, umask, zone, jobs in ((first, 0o022, "UTC", 2), (second, 0o077, "Pacific/Auckland", 3)):
+        run(["cmake", "--preset", "release", "-B", place / "built", "-DWM_TESTS=OFF", "-DWM_REPRODUCIBLE=ON"], place / "sources", umask, zone)
+        run(["cmake", "--build", place / "built", "-j", str(jobs)], place / "sources", umask, zone)
+        sums.append(pack(place, umask, zone, components=()))
+        print(f"{place}: {len(sums[-1])} packages", flush=True)
+    differing = compare(first, second, *sums)
+    print(f"{len(sums[0]) - differing} of {len(sums[0])} packages of two whole builds: the same bytes")
+    return int(differing > 0)
+
+
 def main():
+    if sys.argv[1] == "--whole":
+        return whole(pathlib.Path(sys.argv[2]).resolve())
     if not (shutil.which("cpack") and shutil.which("dpkg-deb")) or not (BUILD / "lib/libwaymark.so").exists():
         print("skipped: no cpack or dpkg-deb here, or no libwaymark.so in this build")
         return 77
@@ -97,17 +148,10 @@ def main():
     assert "-ffile-prefix-map=${CMAKE_SOURCE_DIR}=. -ffile-prefix-map=${CMAKE_BINARY_DIR}=./build" in options
     with tempfile.TemporaryDirectory(prefix="waymark-reproducible-") as name:
         first, second = pathlib.Path(name) / "a", pathlib.Path(name) / "another/and/deeper"
-        copy(first, False), copy(second, True)
+        for place in (first, second):
+            copy(of_sources(place) + of_build(place), place, place == second)
         a, b = pack(first, 0o022, "UTC"), pack(second, 0o077, "Pacific/Auckland")
-        assert len(a) == len(COMPONENTS) and a.keys() == b.keys(), (a, b)
-        for deb in sorted(a):
-            check_package(first / "out" / deb)
-            if a[deb] != b[deb]:
-                for x, y in zip(modes(first / "out" / deb), modes(second / "out" / deb)):
-                    if x != y:
-                        print("differs:", *x, "|", *y)
-            assert a[deb] == b[deb], f"{deb}: two packages of the same build differ: {a[deb]} and {b[deb]}"
-            print(f"{a[deb]}  {deb}")
+        assert len(a) == len(COMPONENTS) and not compare(first, second, a, b)
         for source in COMPILED:
             assert compiled(first, source) == compiled(second, source), f"{source}: its object is another in another folder"
     print(f"{len(a)} packages and {len(COMPILED)} objects: the same bytes in two folders, at two times, by two users")

@@ -128,8 +128,8 @@ void doctor_limits(wm_findings *out) {
     wm_find(out, WM_FOUND_COMPUTER_REALTIME, WM_SEVERITY_GOOD, "priority", "", "real-time priority 80 is allowed");
   else
     wm_find(out, WM_FOUND_COMPUTER_REALTIME, WM_SEVERITY_BAD, "priority",
-            "LimitRTPRIO=90 in the systemd unit (config/waymark.service has it), or `* - rtprio 90` in "
-            "/etc/security/limits.conf",
+            "LimitRTPRIO=90 in the systemd unit (config/waymark.service has it), `* - rtprio 90` in "
+            "/etc/security/limits.conf, or of a container `--ulimit rtprio=90`",
             "this user may not have real-time priority 80");
   struct rlimit memory = {0};
   (void)getrlimit(RLIMIT_MEMLOCK, &memory);
@@ -137,7 +137,8 @@ void doctor_limits(wm_findings *out) {
     wm_find(out, WM_FOUND_COMPUTER_MEMORY, WM_SEVERITY_GOOD, "memory lock", "", "memory may be locked");
   else
     wm_find(out, WM_FOUND_COMPUTER_MEMORY, WM_SEVERITY_BAD, "memory lock",
-            "LimitMEMLOCK=infinity in the systemd unit (config/waymark.service has it)",
+            "LimitMEMLOCK=infinity in the systemd unit (config/waymark.service has it), of a container `--ulimit "
+            "memlock=-1`",
             "only %llu kB may be locked: page faults may stop the estimator",
             (unsigned long long)(memory.rlim_cur >> 10));
 }

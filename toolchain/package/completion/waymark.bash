@@ -29,7 +29,7 @@ _waymark() {
     "run") words='--config --recording --out --record --force --out-max-mb --duration --speed --seed --resume --landmarks --map --calibration' ;;
     "replay") words='--config --out --seed --landmarks --calibration --map --frames-of --timing-of --from --until --lost --force --reference' ;;
     "record") words='--config --out --duration --max-mb --free-mb' ;;
-    "watch") words='--url --prefix --duration --metrics --log --foxglove' ;;
+    "watch") words='--url --prefix --duration --once --metrics --log --foxglove' ;;
     "check") words='--landmarks --calibration --map --json --quick --apply' ;;
     "doctor") words='--json --seconds' ;;
     "stamps") words='' ;;
