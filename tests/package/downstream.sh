@@ -20,9 +20,11 @@ done
 usr=$dir/root/usr
 
 echo "by find_package"
-cmake -G Ninja -S "$here/downstream" -B "$dir/cmake" -DCMAKE_PREFIX_PATH="$usr" -DCMAKE_BUILD_TYPE=Release >"$dir/cmake.log" 2>&1 ||
-  { cat "$dir/cmake.log"; exit 1; }
-cmake --build "$dir/cmake" >"$dir/cmake.log" 2>&1 || { cat "$dir/cmake.log"; exit 1; }
+for standards in "11 20" "23 23"; do
+  cmake -G Ninja -S "$here/downstream" -B "$dir/cmake" -DCMAKE_PREFIX_PATH="$usr" -DCMAKE_BUILD_TYPE=Release -DCMAKE_C_STANDARD="${standards% *}" \
+    -DCMAKE_CXX_STANDARD="${standards#* }" >"$dir/cmake.log" 2>&1 || { cat "$dir/cmake.log"; exit 1; }
+  cmake --build "$dir/cmake" >"$dir/cmake.log" 2>&1 || { cat "$dir/cmake.log"; exit 1; }
+done
 "$dir/cmake/filters" | grep -q '^landmark_ekf: '
 
 echo "by pkg-config"
@@ -33,11 +35,19 @@ cc -Wall -Wextra -Werror -o "$dir/hear" "$here/downstream/hear.c" $(pkg-config -
 # shellcheck disable=SC2046
 c++ -Wall -Wextra -Werror -o "$dir/filters" "$here/downstream/filters.cpp" $(pkg-config --cflags --libs --static waymark-estimator)
 "$dir/filters" | grep -q '^slam: '
-# shellcheck disable=SC2046
-cc -Wall -Wextra -Werror -o "$dir/robot" "$here/downstream/robot.c" $(pkg-config --cflags --libs waymark-session)
-# shellcheck disable=SC2046
-c++ -std=c++17 -Wall -Wextra -Werror -o "$dir/robot_cpp" "$here/downstream/robot.cpp" $(pkg-config --cflags --libs waymark-session)
-for robot in "$dir"/robot "$dir"/cmake/robot "$dir"/robot_cpp "$dir"/cmake/robot_cpp; do
+in_standard() { # STANDARD SOURCE MODULE... : an example, with the compiler's warnings as errors
+  local compiler=c++
+  [[ $1 != c++* ]] && compiler=cc
+  # shellcheck disable=SC2046
+  $compiler "-std=$1" -Wall -Wextra -Wpedantic -Werror -o "$dir/$(basename "${2%.*}")-$1" "$here/downstream/$2" $(pkg-config --cflags --libs "${@:3}")
+}
+for standard in c11 c17 c2x; do
+  in_standard $standard robot.c waymark-session
+  in_standard $standard hear.c waymark
+done
+for standard in c++17 c++20 c++23; do in_standard $standard robot.cpp waymark-session; done
+for standard in c++20 c++23; do in_standard $standard filters.cpp --static waymark-estimator; done
+for robot in "$dir"/robot-c* "$dir"/cmake/robot "$dir"/cmake/robot_cpp; do
   { LD_LIBRARY_PATH=$PKG_CONFIG_PATH/.. "$robot" 2>&1 || true; } | grep -q '^usage: robot'
 done
 

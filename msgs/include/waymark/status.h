@@ -16,6 +16,14 @@ extern "C" {
 #define WM_NODISCARD
 #endif
 
+// C before C23 and C++ before C++17 know it as an extension: no warning of -Wpedantic.
+#if defined(__clang__)
+#pragma clang diagnostic push
+#pragma clang diagnostic ignored "-Wc++17-extensions"
+#elif defined(__GNUC__)
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wpedantic"
+#endif
 typedef enum WM_NODISCARD wm_status {
   WM_OK = 0,
   WM_END,            // the end of a source's data; not an error
@@ -32,6 +40,11 @@ typedef enum WM_NODISCARD wm_status {
   WM_IO,             // an operating system call failed; the error text has the reason
   WM_INTERNAL        // a fault of this program
 } wm_status;
+#if defined(__clang__)
+#pragma clang diagnostic pop
+#elif defined(__GNUC__)
+#pragma GCC diagnostic pop
+#endif
 
 #define WM_ERROR_TEXT_MAX 768
 

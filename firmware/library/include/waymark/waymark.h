@@ -26,14 +26,6 @@
 #include <stddef.h>
 #include <stdint.h>
 
-// wm_status has an attribute that C before C23 and C++ before C++17 know as an extension: no warning of -Wpedantic.
-#if defined(__clang__)
-#pragma clang diagnostic push
-#pragma clang diagnostic ignored "-Wc++17-extensions"
-#elif defined(__GNUC__)
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wpedantic"
-#endif
 #include <waymark/bound.h>
 #include <waymark/event.h>
 #include <waymark/frame.h>
@@ -41,11 +33,6 @@
 #include <waymark/pose.h>
 #include <waymark/status.h>
 #include <waymark/time.h>
-#if defined(__clang__)
-#pragma clang diagnostic pop
-#elif defined(__GNUC__)
-#pragma GCC diagnostic pop
-#endif
 
 #ifdef __cplusplus
 extern "C" {
