@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# What `cmake --install` puts where, in the components that become packages: runtime, tools, calibrate, fleet, dev, ros2.
+# What `cmake --install` puts where, in the components that become packages: runtime, gst, tools, calibrate, fleet, dev, ros2.
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 # Libraries of several architectures side by side, also under /usr/local.
@@ -37,6 +37,10 @@ wm_install_compressed(${WM_PACKAGE_DIR}/man/waymark-play.1 waymark-play.1 man/ma
 if(TARGET waymark-camera)
   install(TARGETS waymark-camera DESTINATION lib/waymark COMPONENT runtime)
 endif()
+# A package of its own: GStreamer brings many libraries.
+if(TARGET waymark-gst)
+  install(TARGETS waymark-gst DESTINATION lib/waymark COMPONENT gst)
+endif()
 if(TARGET waymark-web) # a robot's page comes from the robot
   install(TARGETS waymark-web DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT runtime)
   install(FILES config/waymark-web.service DESTINATION lib/systemd/system COMPONENT runtime)
@@ -60,7 +64,7 @@ if(TARGET waymark-simulate)
   install(DIRECTORY config/worlds DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/waymark-sim/examples COMPONENT sim)
 endif()
 # Scripts: what they need is Python and the programs above.
-foreach(command batch compare mine)
+foreach(command batch bench compare mine)
   install(PROGRAMS ${CMAKE_BINARY_DIR}/fleet/waymark-${command} DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT fleet)
   wm_install_compressed(${WM_PACKAGE_DIR}/man/waymark-${command}.1 waymark-${command}.1 man/man1 fleet)
 endforeach()
@@ -115,6 +119,9 @@ if(TARGET waymark-simulate)
 endif()
 if(TARGET wm_shared)
   list(APPEND packages library:libwaymark0)
+endif()
+if(TARGET waymark-gst)
+  list(APPEND packages gst:waymark-gst)
 endif()
 if(TARGET waymark-ros2)
   list(APPEND packages ros2:waymark-ros2)

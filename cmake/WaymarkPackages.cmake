@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# Debian packages by CPack: waymark (the robot's), waymark-tools (the desk's), waymark-calibrate, waymark-sim, waymark-fleet, libwaymark0, libwaymark-dev, waymark-ros2. docs/boards.md.
+# Debian packages by CPack: waymark (the robot's), waymark-gst, waymark-tools (the desk's), waymark-calibrate, waymark-sim, waymark-fleet, libwaymark0, libwaymark-dev, waymark-ros2. docs/boards.md.
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME waymark)
 set(CPACK_PACKAGE_VENDOR Waymark)
@@ -68,6 +68,17 @@ file(WRITE ${CMAKE_BINARY_DIR}/debian/conffiles "${conffiles}")
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_CONTROL_EXTRA ${CMAKE_BINARY_DIR}/debian/conffiles ${WM_PACKAGE_DIR}/postinst
   ${WM_PACKAGE_DIR}/prerm ${WM_PACKAGE_DIR}/postrm)
 
+if(TARGET waymark-gst)
+  list(APPEND CPACK_COMPONENTS_ALL gst)
+  set(CPACK_DEBIAN_GST_PACKAGE_NAME waymark-gst)
+  set(CPACK_DEBIAN_GST_PACKAGE_SECTION misc)
+  set(CPACK_DEBIAN_GST_PACKAGE_DEPENDS "waymark (= ${PROJECT_VERSION}-1), libc6 (>= 2.36), libglib2.0-0 (>= 2.12.0), libgstreamer1.0-0 (>= 1.18.0), libgstreamer-plugins-base1.0-0 (>= 1.18.0)")
+  set(CPACK_DEBIAN_GST_PACKAGE_RECOMMENDS "gstreamer1.0-plugins-base, gstreamer1.0-plugins-good")
+  set(CPACK_DEBIAN_GST_DESCRIPTION "cameras of a robot by GStreamer
+Gives waymark the pictures of any GStreamer pipeline, as those of NVIDIA's
+Argus on Jetsons: devices.cameras with the key gst.")
+endif()
+
 set(CPACK_DEBIAN_TOOLS_PACKAGE_NAME waymark-tools)
 set(CPACK_DEBIAN_TOOLS_PACKAGE_SECTION misc)
 set(CPACK_DEBIAN_TOOLS_PACKAGE_DEPENDS "waymark (= ${PROJECT_VERSION}-1), ${base}, ${pictures}, ${packed}${videos}${urdf}${pages}")
@@ -107,8 +118,9 @@ set(CPACK_DEBIAN_FLEET_PACKAGE_DEPENDS "waymark-tools (= ${PROJECT_VERSION}-1), 
 set(CPACK_DEBIAN_FLEET_PACKAGE_SUGGESTS "snakemake, qemu-system-x86, qemu-system-arm, mmdebstrap, cpio, e2fsprogs, gcc-12, make, openssh-client")
 set(CPACK_DEBIAN_FLEET_DESCRIPTION "many drives of robots at once
 Replays and judges all recordings of a fleet on every core or on a cluster,
-compares what a change did to them, lists what black boxes hold, and plays
-recordings into boards and guests: waymark batch, compare, mine, hil.")
+compares what a change did to them, lists what black boxes hold, measures
+boards, and plays recordings into boards and guests: waymark batch, bench,
+compare, mine, hil.")
 
 set(CPACK_DEBIAN_DEV_PACKAGE_NAME libwaymark-dev)
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)

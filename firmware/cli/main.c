@@ -38,6 +38,7 @@ static const struct {
   const char *name, *about, *package;
 } kDesk[] = {
     {"batch", "replay and judge many recordings on all cores", "waymark-fleet"},
+    {"bench", "measure a board: detectors, filters, wake-ups, temperature", "waymark-fleet"},
     {"calibrate", "find a camera's lens and mounting; read calibrations of other programs", "waymark-calibrate"},
     {"causes", "find the mistake in the files that explains a drive", "waymark, of Python (pip)"},
     {"compare", "what a change did to all drives of a batch", "waymark-fleet"},

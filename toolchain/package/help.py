@@ -10,7 +10,7 @@ import subprocess
 import sys
 
 HERE = pathlib.Path(__file__).resolve().parent
-TOOLS = ["batch", "calibrate", "compare", "detect", "diff", "eval", "hil", "import", "init", "map", "mine", "play", "reference", "report", "simulate", "web"]
+TOOLS = ["batch", "bench", "calibrate", "compare", "detect", "diff", "eval", "hil", "import", "init", "map", "mine", "play", "reference", "report", "simulate", "web"]
 OPTIONAL = ["ros2"]  # not built everywhere: a manual page, no completion of its options
 PATHS = {"BOX", "PLAN", "BEFORE", "AFTER", "FILE", "FOLDER", "CONFIG", "RECORDING", "RUN", "REC", "OTHER", "LOG", "SCENARIO"}
 

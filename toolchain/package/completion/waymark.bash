@@ -4,7 +4,7 @@ _waymark() {
   local word=${COMP_WORDS[COMP_CWORD]} command=${COMP_WORDS[1]:-} words= more=
   COMPREPLY=()
   if [ "$COMP_CWORD" -eq 1 ]; then
-    mapfile -t COMPREPLY < <(compgen -W 'run replay record watch check doctor stamps config causes mavlink suggest batch calibrate compare detect diff eval hil import init map mine play reference report simulate web --help --version' -- "$word")
+    mapfile -t COMPREPLY < <(compgen -W 'run replay record watch check doctor stamps config causes mavlink suggest batch bench calibrate compare detect diff eval hil import init map mine play reference report simulate web --help --version' -- "$word")
     return
   fi
   case $command in
@@ -38,6 +38,7 @@ _waymark() {
     "mavlink") words='--help --link --as --frame --north --zero --origin --rate --take --system --component --url --prefix --duration' ;;
     "suggest") words='--help --out --against --only --from --to --minutes --json' ;;
     "batch") words='--help --out --jobs --part --list' ;;
+    "bench") words='--help --board --table --out --minutes --name' ;;
     "calibrate") words='--help --name --model --size --lens --out --config --run --camera --map --chessboard --aprilgrid --charuco --dictionary --square --second --second-name --floor --tag --gap --every --most --picture' ;;
     "compare") words='--help --out --json --alpha --tolerate --no-reports' ;;
     "detect") words='--help --detector --config --set --out --draw --rate --camera --calibration --landmarks --poses --every' ;;
