@@ -437,8 +437,11 @@ wm_status camera_device_make(const wm_camera_device_config *config, const wm_cam
   self->io_context = io_context;
   self->clock.readout_ns = camera->readout_ns;
   self->clock.latency_ns = wm_ns_from_seconds(config->latency_ms * 1e-3);
+  _Static_assert(sizeof self->identity.path == sizeof config->gst, "a pipeline fits");
   (void)snprintf(self->identity.path, sizeof self->identity.path, "%s",
-                 config->libcamera[0] ? config->libcamera : config->device);
+                 config->libcamera[0] ? config->libcamera
+                 : config->gst[0]     ? config->gst
+                                      : config->device);
   (void)snprintf(self->identity.card, sizeof self->identity.card, "%s", config->card);
   (void)snprintf(self->identity.bus, sizeof self->identity.bus, "%s", config->bus);
   self->grey = calloc((size_t)self->width * self->height + 1, 1);
@@ -463,8 +466,16 @@ int wm_camera_has_libcamera(void) {
 wm_status wm_camera_device_open(const wm_camera_device_config *config, const wm_camera *camera, int32_t index,
                                 wm_warn_fn warn, void *context, wm_camera_device **out, wm_error *err) {
   *out = NULL;
-  const camera_io *io = config->libcamera[0] ? &kCameraProcess : &kV4l2;
+  const camera_io *io = config->libcamera[0] || config->gst[0] ? &kCameraProcess : &kV4l2;
+  static char by_libcamera[] = CAMERA_BY_LIBCAMERA, by_gstreamer[] = CAMERA_BY_GSTREAMER;
   if (config->libcamera[0] && !wm_camera_has_libcamera())
     return wm_fail(err, WM_BAD_CONFIG, "camera %s: " WM_WITHOUT_LIBCAMERA, config->name);
-  return camera_device_make(config, camera, index, warn, context, io, NULL, out, err);
+  if (config->gst[0] && !camera_process_is_there(by_gstreamer))
+    return wm_fail(
+        err, WM_BAD_CONFIG,
+        "camera %s: gst: the program waymark-gst is missing: install the package waymark-gst, or build where "
+        "libgstreamer-plugins-base1.0-dev is installed",
+        config->name);
+  return camera_device_make(config, camera, index, warn, context, io, config->gst[0] ? by_gstreamer : by_libcamera, out,
+                            err);
 }

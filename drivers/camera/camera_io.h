@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The system calls of a camera as a table: V4L2's, libcamera's, or a test's.
+// The system calls of a camera as a table: V4L2's, libcamera's, GStreamer's, or a test's.
 #ifndef WM_CAMERA_IO_H
 #define WM_CAMERA_IO_H
 
@@ -8,13 +8,14 @@
 
 #include "waymark/time.h"
 
+#define CAMERA_PATH_MAX 1024  // WM_CAMERA_PIPELINE_MAX
 #define CAMERA_BUFFERS_MAX 8  // twice the requested number, for drivers that give more
 
 // Identity of a camera, which may come back under another number.
 typedef struct camera_identity {
-  char path[128];  // to open: /dev/video0, /dev/v4l/by-id/..., or libcamera's identifier
-  char card[48];   // the model's name, "" unknown
-  char bus[48];    // where it is plugged in, "" unknown
+  char path[CAMERA_PATH_MAX];  // to open: /dev/video0, /dev/v4l/by-id/..., libcamera's identifier, a pipeline
+  char card[48];               // the model's name, "" unknown
+  char bus[48];                // where it is plugged in, "" unknown
 } camera_identity;
 
 typedef struct camera_mode {
@@ -57,5 +58,6 @@ typedef struct camera_io {
 
 extern const camera_io kV4l2;
 extern const camera_io kLibcamera;  // of the program waymark-camera
+extern const camera_io kGstreamer;  // of the program waymark-gst
 
 #endif

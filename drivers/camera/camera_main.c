@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The process of a camera by libcamera (camera_process.h). A program of its own: libcamera brings 22 libraries along,
-// whose loading would delay each start of waymark.
+// The process of a camera by libcamera or GStreamer (camera_process.h). Programs of their own: libcamera brings 22
+// libraries along, whose loading would delay each start of waymark.
 #include <stdio.h>
 #include <string.h>
 
@@ -8,10 +8,11 @@
 
 int main(int argc, char **argv) {
   if (argc != 2 || strcmp(argv[1], CAMERA_PROCESS) != 0) {
-    (void)fputs("waymark starts this program for each camera that its configuration names with the key libcamera\n",
+    (void)fputs("waymark starts this program for each camera that its configuration names with the key " CAMERA_KEY
+                "\n",
                 stderr);
     return 2;
   }
-  camera_process_serve(&kLibcamera);
+  camera_process_serve(&CAMERA_IO);
   return 0;
 }

@@ -120,25 +120,31 @@ static int ask(camera_process *self, message *m, int within_ms) {
 }
 
 // Of this program's folder: bin/waymark and lib/waymark/waymark-camera are installed, and built, side by side.
-static int path_of_program(char out[PATH_MAX]) {
-  static const char kBesideBin[] = "/../lib/waymark/waymark-camera";
+static int path_of_program(const char *name, char out[PATH_MAX]) {
+  char beside_bin[64];
+  (void)snprintf(beside_bin, sizeof beside_bin, "/../lib/waymark/%s", name);
   const ssize_t length = readlink("/proc/self/exe", out, PATH_MAX - 1);
   if (length <= 0) return -errno;
   out[length] = '\0';
   char *end = strrchr(out, '/');
-  if (!end || (size_t)(end - out) + sizeof kBesideBin > PATH_MAX) return -ENAMETOOLONG;
-  memcpy(end, kBesideBin, sizeof kBesideBin);
+  if (!end || (size_t)(end - out) + sizeof beside_bin > PATH_MAX) return -ENAMETOOLONG;
+  memcpy(end, beside_bin, sizeof beside_bin);
   return 0;
+}
+
+int camera_process_is_there(const char *program) {
+  char path[PATH_MAX];
+  return path_of_program(program, path) == 0 && access(path, X_OK) == 0;
 }
 
 static int spawn(camera_process *self, const char *program, int its_socket) {
   posix_spawn_file_actions_t files;
   char path[PATH_MAX], argument[] = CAMERA_PROCESS;
   char *const arguments[] = {path, argument, NULL};
-  if (program) {
+  if (strchr(program, '/')) {
     (void)snprintf(path, sizeof path, "%s", program);
   } else {
-    const int unknown = path_of_program(path);
+    const int unknown = path_of_program(program, path);
     if (unknown) return unknown;
   }
   if (posix_spawn_file_actions_init(&files) != 0) return -ENOMEM;

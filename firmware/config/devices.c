@@ -88,28 +88,33 @@ static wm_status camera_is_new(const wm_yaml_node *item, const wm_config *config
     if (camera->libcamera[0] && strcmp(other->libcamera, camera->libcamera) == 0)
       return wm_yaml_fail(item, err, "libcamera's '%s' appears twice (first in line %d)", camera->libcamera,
                           other->line);
+    if (camera->gst[0] && strcmp(other->gst, camera->gst) == 0)
+      return wm_yaml_fail(item, err, "the pipeline '%s' appears twice (first in line %d)", camera->gst, other->line);
     if (camera->device[0] && strcmp(other->device, camera->device) == 0)
       return wm_yaml_fail(item, err, "the device '%s' appears twice (first in line %d)", camera->device, other->line);
   }
   return WM_OK;
 }
 
-// Which camera: by libcamera's identifier, or by V4L2's path, card or bus.
+// Which camera: by libcamera's identifier, a pipeline, or V4L2's path, card or bus.
 static wm_status read_which(const wm_yaml_node *item, wm_camera_device_config *out, wm_error *err) {
   wm_status status = text(item, "device", out->device, sizeof out->device, err);
   if (status == WM_OK) status = text(item, "card", out->card, sizeof out->card, err);
   if (status == WM_OK) status = text(item, "bus", out->bus, sizeof out->bus, err);
   if (status == WM_OK) status = text(item, "libcamera", out->libcamera, sizeof out->libcamera, err);
+  if (status == WM_OK) status = text(item, "gst", out->gst, sizeof out->gst, err);
   if (status != WM_OK) return status;
   int is_v4l2 = out->device[0] || out->card[0] || out->bus[0];
-  if (!is_v4l2 && !out->libcamera[0])
+  if (!is_v4l2 && !out->libcamera[0] && !out->gst[0])
     return wm_yaml_fail(
         item, err,
         "device: is missing: a path (/dev/v4l/by-id/... stays the same when it is plugged in again), or "
-        "card or bus as `v4l2-ctl -D` prints them, or libcamera: an identifier as `cam -l` prints it");
-  wm_yaml_node node = wm_yaml_get(item, "libcamera");
-  if (is_v4l2 && out->libcamera[0])
-    return wm_yaml_fail(&node, err, "device, card and bus are V4L2's; name the camera by them or by libcamera:");
+        "card or bus as `v4l2-ctl -D` prints them, or libcamera: an identifier as `cam -l` prints it, or gst: a "
+        "pipeline");
+  wm_yaml_node node = wm_yaml_get(item, out->libcamera[0] ? "libcamera" : "gst");
+  if (is_v4l2 + !!out->libcamera[0] + !!out->gst[0] > 1)
+    return wm_yaml_fail(&node, err,
+                        "device, card and bus are V4L2's; name the camera by them, or by libcamera:, or by gst:");
   if (out->libcamera[0] && !wm_camera_has_libcamera()) return wm_yaml_fail(&node, err, WM_WITHOUT_LIBCAMERA);
   return WM_OK;
 }

@@ -208,6 +208,8 @@ const config_key kConfigCameraDeviceKeys[] = {
     {"bus", CONFIG_TEXT, "as first opened", .about = "Where it is plugged in, as `v4l2-ctl -D` prints it."},
     {"libcamera", CONFIG_TEXT, "by V4L2",
      .about = "Instead of device, card and bus: libcamera's identifier, as `cam -l` prints it in brackets (live.md)."},
+    {"gst", CONFIG_TEXT, "by V4L2",
+     .about = "Instead of device, card and bus: a GStreamer pipeline, e.g. `v4l2src ! videoconvert` (live.md)."},
     {"format", CONFIG_CHOICE, "the driver's", .about = "What the camera sends.", .names = wm_camera_formats},
     {"rate_hz", CONFIG_NUMBER, "the driver's", .about = "Pictures a second.", .max = 1000},
     {"exposure_ms", CONFIG_NUMBER, "the driver's",

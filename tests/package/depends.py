@@ -56,7 +56,7 @@ def main():
     bridge, library = BUILD / "bin/waymark-ros2", BUILD / "lib/libwaymark.so.0"
     tools = sorted(p for p in (BUILD / "bin").glob("waymark-*") if "montecarlo" not in p.name and p not in (page, player, bridge, calibrate, simulate) and p.open("rb").read(2) != b"#!")
     components = [("RUNTIME", [BUILD / "bin/waymark", player, *(p for p in (page, camera) if p.exists())]), ("TOOLS", tools), ("CALIBRATE", [calibrate])]
-    components += [(name, [program]) for name, program in (("SIM", simulate), ("ROS2", bridge), ("LIBRARY", library)) if program.exists()]
+    components += [(name, [program]) for name, program in (("SIM", simulate), ("GST", BUILD / "lib/waymark/waymark-gst"), ("ROS2", bridge), ("LIBRARY", library)) if program.exists()]
     for component, programs in components:
         says, needs = declared(component), needed(programs)
         if component == "RUNTIME":

@@ -35,17 +35,19 @@ void wm_can_listener_close(wm_can_listener *self);  // NULL is fine
 
 typedef enum wm_stamp_point { WM_STAMP_AUTO, WM_STAMP_START, WM_STAMP_END } wm_stamp_point;
 
-#define WM_CAMERA_CONTROLS_MAX 16  // of a camera in the configuration
+#define WM_CAMERA_CONTROLS_MAX 16    // of a camera in the configuration
+#define WM_CAMERA_PIPELINE_MAX 1024  // bytes of a pipeline's text
 typedef struct wm_camera_device_config {
-  char name[WM_NAME_MAX];  // of the camera in calibration.yaml, which gives its size
-  char device[128];        // /dev/video0, /dev/v4l/by-id/...
-  char libcamera[128];     // instead: libcamera's identifier by `cam -l`; "": V4L2
-  char card[48], bus[48];  // identity by `v4l2-ctl -D`; "": taken at the first opening
-  char format[8];          // one of wm_camera_formats; "": the driver's
-  double rate_hz;          // 0: the driver's
-  double exposure_ms;      // 0: by the driver, where it reports it
-  double latency_ms;       // from the exposure's start or end to the driver's stamp
-  int32_t stamp;           // wm_stamp_point: what the driver's stamp marks
+  char name[WM_NAME_MAX];            // of the camera in calibration.yaml, which gives its size
+  char device[128];                  // /dev/video0, /dev/v4l/by-id/...
+  char libcamera[128];               // instead: libcamera's identifier by `cam -l`; "": V4L2
+  char gst[WM_CAMERA_PIPELINE_MAX];  // instead: a pipeline as gst-launch-1.0 takes it
+  char card[48], bus[48];            // identity by `v4l2-ctl -D`; "": taken at the first opening
+  char format[8];                    // one of wm_camera_formats; "": the driver's
+  double rate_hz;                    // 0: the driver's
+  double exposure_ms;                // 0: by the driver, where it reports it
+  double latency_ms;                 // from the exposure's start or end to the driver's stamp
+  int32_t stamp;                     // wm_stamp_point: what the driver's stamp marks
   uint32_t control_count;
   struct {
     char name[32];  // by `v4l2-ctl -l`, or libcamera's ("ExposureTime")
@@ -81,8 +83,8 @@ int wm_camera_has_libcamera(void);
 #define WM_WITHOUT_LIBCAMERA \
   "this waymark is built without libcamera; build it where libcamera-dev is installed, or name the camera by device:"
 
-// A camera by V4L2 or libcamera, with its calibration (`camera`, at `index` of the rig). It may be absent. `warn` (may
-// be NULL) gets the driver's changes of the requested mode, once. Allocates; so does reopening.
+// A camera by V4L2, libcamera or GStreamer, with its calibration (`camera`, at `index` of the rig). It may be absent.
+// `warn` (may be NULL) gets the driver's changes of the requested mode, once. Allocates; so does reopening.
 wm_status wm_camera_device_open(const wm_camera_device_config *config, const wm_camera *camera, int32_t index,
                                 wm_warn_fn warn, void *context, wm_camera_device **out, wm_error *err);
 // The newest picture; older ones are counted as skipped. Waits for up to WM_DEVICE_WAIT_MS, then WM_AGAIN. `number` is

@@ -272,8 +272,18 @@ TEST(cameras_of_libcamera) {
             "dir/x.yaml:3: devices.cameras[0].libcamera: " WM_WITHOUT_LIBCAMERA);
   }
   refused(HEAD "devices: {cameras: [{name: a, device: /dev/video0, libcamera: b}]}\n",
-          "dir/x.yaml:3: devices.cameras[0].libcamera: device, card and bus are V4L2's; name the camera by them or by "
-          "libcamera:");
+          "dir/x.yaml:3: devices.cameras[0].libcamera: device, card and bus are V4L2's; name the camera by them, or by "
+          "libcamera:, or by gst:");
+}
+
+TEST(cameras_of_gstreamer) {
+  parse(HEAD "devices: {cameras: [{name: front, gst: \"v4l2src ! appsink\"}]}\n");
+  TEST_ASSERT_EQUAL_STRING("v4l2src ! appsink", config.devices.cameras[0].gst);
+  refused(HEAD "devices: {cameras: [{name: a, gst: b}, {name: c, gst: b}]}\n",
+          "dir/x.yaml:3: devices.cameras[1]: the pipeline 'b' appears twice (first in line 3)");
+  refused(HEAD "devices: {cameras: [{name: a, device: /dev/video0, gst: b}]}\n",
+          "dir/x.yaml:3: devices.cameras[0].gst: device, card and bus are V4L2's; name the camera by them, or by "
+          "libcamera:, or by gst:");
 }
 
 TEST(misspelt) {
