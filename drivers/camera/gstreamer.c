@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cameras by a GStreamer pipeline (camera_io.h), in a process of their own (camera_process.h): a plugin that crashes ends
-// no more than that. A camera's path is the pipeline's text, as gst-launch-1.0 takes it.
+// Cameras by a GStreamer pipeline (camera_io.h), in a process of their own (camera_process.h): a plugin that crashes
+// ends no more than that. A camera's path is the pipeline's text, as gst-launch-1.0 takes it.
 //
-// The pipeline runs on CLOCK_MONOTONIC, so that its base time and a buffer's running time add up to a stamp. Every buffer
-// that reaches the sink gets a number there; those that the sink drops are missing in it.
+// The pipeline runs on CLOCK_MONOTONIC, so that its base time and a buffer's running time add up to a stamp. Every
+// buffer that reaches the sink gets a number there; those that the sink drops are missing in it.
 #include <errno.h>
 #include <gst/app/gstappsink.h>
 #include <gst/gst.h>
@@ -174,7 +174,8 @@ static int set_mode(void *camera, camera_mode *mode) {
   const GstStateChangeReturn state = gst_element_set_state(self->pipeline, GST_STATE_PAUSED);
   // What is not live (a file) would come as fast as it is read.
   if (state != GST_STATE_CHANGE_FAILURE) g_object_set(self->sink, "sync", state != GST_STATE_CHANGE_NO_PREROLL, NULL);
-  if (state == GST_STATE_CHANGE_FAILURE || gst_element_set_state(self->pipeline, GST_STATE_PLAYING) == GST_STATE_CHANGE_FAILURE)
+  if (state == GST_STATE_CHANGE_FAILURE ||
+      gst_element_set_state(self->pipeline, GST_STATE_PLAYING) == GST_STATE_CHANGE_FAILURE)
     return look_for_end(self) ? -ENODEV : -EIO;
   for (int waited_ms = 0; !self->first && waited_ms < FIRST_MS; waited_ms += 100) {
     self->first = gst_app_sink_try_pull_sample(GST_APP_SINK(self->sink), ns_of(100));
@@ -202,7 +203,8 @@ static int start(void *camera, uint32_t buffers) {
 
 static wm_time_ns stamp_of(const gst_camera *self, GstSample *sample, const GstBuffer *buffer) {
   if (!GST_BUFFER_PTS_IS_VALID(buffer)) return 0;
-  const guint64 running = gst_segment_to_running_time(gst_sample_get_segment(sample), GST_FORMAT_TIME, GST_BUFFER_PTS(buffer));
+  const guint64 running =
+      gst_segment_to_running_time(gst_sample_get_segment(sample), GST_FORMAT_TIME, GST_BUFFER_PTS(buffer));
   return running == GST_CLOCK_TIME_NONE ? 0 : (wm_time_ns)(gst_element_get_base_time(self->pipeline) + running);
 }
 
@@ -224,7 +226,8 @@ static int hand_out(gst_camera *self, GstSample *sample, camera_buffer *out) {
   guint index = 0;
   while (index < CAMERA_BUFFERS_MAX && self->taken[index].sample) index++;
   GstBuffer *buffer = gst_sample_get_buffer(sample);
-  *out = (camera_buffer){.index = index, .sequence = (uint32_t)GST_BUFFER_OFFSET(buffer), .stamp_ns = stamp_of(self, sample, buffer)};
+  *out = (camera_buffer){
+      .index = index, .sequence = (uint32_t)GST_BUFFER_OFFSET(buffer), .stamp_ns = stamp_of(self, sample, buffer)};
   if (index == CAMERA_BUFFERS_MAX || !map(self, &self->taken[index], buffer, out)) {
     gst_sample_unref(sample);
     return index == CAMERA_BUFFERS_MAX ? -EBUSY : -ENODEV;  // opened again, it tells its mode anew

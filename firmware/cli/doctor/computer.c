@@ -14,6 +14,8 @@
 
 #include "cli/doctor/doctor.h"
 
+#define PTP_CLOCKS_MAX 16  // one for each network card that stamps
+
 // The first line of a small file; 0 where it is missing.
 static int line_of(const char *root, const char *path, char *out, size_t capacity) {
   char whole[512];
@@ -52,6 +54,24 @@ void doctor_kernel(const char *root, wm_findings *out) {
             "CPUs kept free of other work: %s (realtime.cpu takes one)", text);
 }
 
+// PTP's clocks of network cards count TAI; `tai_s` is what the kernel knows of its lead of UTC (37 s since 2017).
+static void ptp_clocks(const char *root, int tai_s, wm_findings *out) {
+  char names[128] = "", name[64], path[64];
+  for (int i = 0; i < PTP_CLOCKS_MAX; i++) {
+    (void)snprintf(path, sizeof path, "/sys/class/ptp/ptp%d/clock_name", i);
+    const size_t length = strlen(names);
+    if (line_of(root, path, name, sizeof name))
+      (void)snprintf(names + length, sizeof names - length, "%s/dev/ptp%d (%.40s)", length ? ", " : "", i, name);
+  }
+  if (names[0] && tai_s == 0)
+    wm_find(
+        out, WM_FOUND_COMPUTER_CLOCK, WM_SEVERITY_NOTE, "ptp", "phc2sys or chronyd sets it (leapsectz right/UTC)",
+        "%s: this computer does not know by how much TAI is ahead of UTC; stamps of PTP are mapped by their arrival",
+        names);
+  else if (names[0])
+    wm_find(out, WM_FOUND_COMPUTER_CLOCK, WM_SEVERITY_GOOD, "ptp", "", "%s; TAI is %d s ahead of UTC", names, tai_s);
+}
+
 void doctor_clocks(const char *root, wm_findings *out) {
   char text[256];
   if (line_of(root, "/sys/devices/system/clocksource/clocksource0/current_clocksource", text, sizeof text)) {
@@ -64,7 +84,9 @@ void doctor_clocks(const char *root, wm_findings *out) {
       wm_find(out, WM_FOUND_COMPUTER_CLOCK, WM_SEVERITY_GOOD, "clock", "", "the clock source is %s", text);
   }
   struct timex state = {0};
-  if (adjtimex(&state) == TIME_ERROR || (state.status & STA_UNSYNC))
+  const int is_synchronised = adjtimex(&state) != TIME_ERROR && !(state.status & STA_UNSYNC);
+  ptp_clocks(root, state.tai, out);
+  if (!is_synchronised)
     wm_find(out, WM_FOUND_COMPUTER_CLOCK, WM_SEVERITY_NOTE, "time of day", "timedatectl set-ntp true",
             "UTC is not synchronised: stamps of the monotonic clock are right, utc_offset_ns is not");
   else

@@ -305,6 +305,28 @@ TEST(a_camera_clock_29_s_off_is_followed_and_said) {
   TEST_ASSERT_LESS_OR_EQUAL_UINT64(3, counts()->bad_stamps);
 }
 
+// PTP's stamps count TAI. A grandmaster that is set by an hour costs a few pictures, and gives none a wrong time.
+static void follow_over_a_step(wm_time_ns step_ns, uint64_t most_lost) {
+  stale(AT(0), 0);
+  for (int i = 0; i < 60; i++)
+    picture(AT(10 + 33 * i), 1 + (uint32_t)i)->stamp_ns += 1800000037 * WM_NS_PER_S + (i < 30 ? 0 : step_ns);
+  make();
+  uint64_t given = 0;
+  wm_time_ns last_ns = 0;
+  while (next_within(500 * MS) == WM_OK) {
+    const wm_time_ns since_ns = (frame.t_ns - AT(10)) % (33 * MS);
+    TEST_ASSERT_TRUE_MESSAGE(since_ns < 10 * MS || since_ns > 23 * MS, "between two pictures");
+    TEST_ASSERT_TRUE(frame.t_ns > last_ns && frame.t_ns < AT(10 + 33 * 60));
+    last_ns = frame.t_ns, given++;
+  }
+  TEST_ASSERT_INT64_WITHIN(10 * MS, AT(10 + 33 * 59), last_ns);
+  TEST_ASSERT_GREATER_OR_EQUAL_UINT64(60 - most_lost, given);
+  TEST_ASSERT_TRUE(counts()->is_foreign_clock);
+}
+
+TEST(a_clock_of_ptp_that_is_set_ahead_by_an_hour) { follow_over_a_step(3600 * WM_NS_PER_S, 1); }
+TEST(a_clock_of_ptp_that_is_set_back_by_an_hour) { follow_over_a_step(-3600 * WM_NS_PER_S, 8); }
+
 TEST(jpegs_are_decoded_and_garbage_is_not) {
   static uint8_t grey[FAKE_WIDTH * FAKE_HEIGHT];
   unsigned char *jpeg = NULL;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cameras by GStreamer: real pipelines of videotestsrc, in this process. Pixels are those that gst-launch-1.0 writes into a
-// file; stamps, drops, errors, the end and a second start.
+// Cameras by GStreamer: real pipelines of videotestsrc, in this process. Pixels are those that gst-launch-1.0 writes
+// into a file; stamps, drops, errors, the end and a second start.
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -47,7 +47,8 @@ static void next(void) { TEST_ASSERT_EQUAL(1, kIo->take(camera, WAIT_MS, &buffer
 static void same_as_launched(const char *name, int format, size_t row_bytes, size_t picture_bytes) {
   char pipeline[300], command[700];
   (void)folder_make();
-  (void)snprintf(pipeline, sizeof pipeline, "videotestsrc num-buffers=5 pattern=ball ! video/x-raw,format=%s,framerate=50/1," SIZE, name);
+  (void)snprintf(pipeline, sizeof pipeline,
+                 "videotestsrc num-buffers=5 pattern=ball ! video/x-raw,format=%s,framerate=50/1," SIZE, name);
   (void)snprintf(command, sizeof command, "gst-launch-1.0 -q %s ! filesink location=%s", pipeline, folder_path("raw"));
   TEST_ASSERT_EQUAL(0, system(command));
   FILE *file = fopen(folder_path("raw"), "rb");
@@ -83,7 +84,9 @@ TEST(pixels_are_those_of_the_pipeline) {
 
 TEST(stamps_are_of_the_monotonic_clock) {
   const wm_time_ns begin_ns = now();
-  TEST_ASSERT_EQUAL(0, open_pipeline("videotestsrc is-live=true ! video/x-raw,format=GRAY8,framerate=50/1," SIZE " ! appsink", PIXELS_GREY));
+  TEST_ASSERT_EQUAL(
+      0, open_pipeline("videotestsrc is-live=true ! video/x-raw,format=GRAY8,framerate=50/1," SIZE " ! appsink",
+                       PIXELS_GREY));
   wm_time_ns before_ns = 0;
   for (int i = 0; i < 25; i++) {
     next();
@@ -96,7 +99,8 @@ TEST(stamps_are_of_the_monotonic_clock) {
 }
 
 TEST(what_the_sink_drops_is_missing_in_the_numbers) {
-  TEST_ASSERT_EQUAL(0, open_pipeline("videotestsrc is-live=true ! video/x-raw,format=NV12,framerate=50/1," SIZE, PIXELS_NV12));
+  TEST_ASSERT_EQUAL(
+      0, open_pipeline("videotestsrc is-live=true ! video/x-raw,format=NV12,framerate=50/1," SIZE, PIXELS_NV12));
   next();
   const uint32_t first = buffer.sequence;
   TEST_ASSERT_EQUAL(0, kIo->give_back(camera, buffer.index));
@@ -109,7 +113,8 @@ TEST(what_the_sink_drops_is_missing_in_the_numbers) {
 
 TEST(a_file_comes_at_its_own_speed) {
   const wm_time_ns begin_ns = now();
-  TEST_ASSERT_EQUAL(0, open_pipeline("videotestsrc num-buffers=26 ! video/x-raw,format=GRAY8,framerate=50/1," SIZE, PIXELS_GREY));
+  TEST_ASSERT_EQUAL(
+      0, open_pipeline("videotestsrc num-buffers=26 ! video/x-raw,format=GRAY8,framerate=50/1," SIZE, PIXELS_GREY));
   for (int i = 0; i < 26; i++) {
     next();
     TEST_ASSERT_EQUAL(0, kIo->give_back(camera, buffer.index));
@@ -131,7 +136,8 @@ TEST(errors_and_another_try) {
   TEST_ASSERT_EQUAL(-EINVAL, open_pipeline("", -1));
   TEST_ASSERT_EQUAL(-ENODEV, open_pipeline("filesrc location=/nowhere/video.avi ! avidemux", -1));
   shut();
-  TEST_ASSERT_EQUAL(-ENODEV, open_pipeline("videotestsrc ! video/x-raw,format=RGB16," SIZE, -1));  // a format that nobody reads
+  TEST_ASSERT_EQUAL(-ENODEV,
+                    open_pipeline("videotestsrc ! video/x-raw,format=RGB16," SIZE, -1));  // a format that nobody reads
   shut();
   for (int i = 0; i < 3; i++) {
     TEST_ASSERT_EQUAL(0, open_pipeline("videotestsrc is-live=true ! video/x-raw,format=GRAY8," SIZE, -1));

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The doctor's findings on a computer that the test breaks.
+#include <sys/timex.h>
+
 #include "cli/doctor/doctor.h"
 #include "common/folder.h"
 #include "common/suite.h"
@@ -31,6 +33,7 @@ static wm_finding_id id_of(const char *what) {
               {"interrupts", WM_FOUND_COMPUTER_REALTIME},
               {"latency", WM_FOUND_COMPUTER_REALTIME},
               {"clock", WM_FOUND_COMPUTER_CLOCK},
+              {"ptp", WM_FOUND_COMPUTER_CLOCK},
               {"governor", WM_FOUND_COMPUTER_SLOW},
               {"temperature", WM_FOUND_COMPUTER_SLOW},
               {"memory l", WM_FOUND_COMPUTER_MEMORY},
@@ -51,6 +54,17 @@ static void expect(const char *what, wm_severity level, const char *text) {
   TEST_ASSERT_EQUAL_MESSAGE(id_of(what), f->id, f->text);
   TEST_ASSERT_NOT_NULL_MESSAGE(strstr(f->text, text), f->text);
   TEST_ASSERT_EQUAL_MESSAGE(level == WM_SEVERITY_GOOD, f->fix[0] == '\0', f->fix);
+}
+
+TEST(clocks_of_ptp) {
+  struct timex state = {0};
+  (void)adjtimex(&state);
+  put("/sys/class/ptp/ptp0/clock_name", "igb\n");
+  put("/sys/class/ptp/ptp3/clock_name", "mlx5_p2p\n");
+  doctor_clocks(root, &found);
+  const wm_severity level = state.tai ? WM_SEVERITY_GOOD : WM_SEVERITY_NOTE;
+  expect("ptp", level, "/dev/ptp0 (igb), /dev/ptp3 (mlx5_p2p)");
+  expect("ptp", level, state.tai ? "s ahead of UTC" : "does not know by how much TAI is ahead of UTC");
 }
 
 TEST(limits_of_the_control_group_and_of_those_around_it) {
