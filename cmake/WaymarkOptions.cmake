@@ -30,9 +30,11 @@ target_compile_options(wm_rules INTERFACE
   # The same bits on every machine: no fused multiply-add, no reordering (docs/design.md, numbers).
   -ffp-contract=off -fno-fast-math
   -fno-omit-frame-pointer)
+set(WM_PREFIX_MAP "") # also for sources that are generated, which have no wm_rules
 if(WM_REPRODUCIBLE) # the last one that fits is taken: a build folder below the sources has one name, whatever its own is
-  target_compile_options(wm_rules INTERFACE -ffile-prefix-map=${CMAKE_SOURCE_DIR}=. -ffile-prefix-map=${CMAKE_BINARY_DIR}=./build)
+  set(WM_PREFIX_MAP -ffile-prefix-map=${CMAKE_SOURCE_DIR}=. -ffile-prefix-map=${CMAKE_BINARY_DIR}=./build)
 endif()
+target_compile_options(wm_rules INTERFACE ${WM_PREFIX_MAP})
 # As Debian builds its packages (dpkg-buildflags, hardening=+all). All programs: addresses are resolved and read-only before
 # they begin; the robot's rooms, also checked copies and canaries on the stack (of code with the property WM_HARDENED). Sanitizers
 # bring their own checks. tests/package/hardening.py looks for it in the programs.

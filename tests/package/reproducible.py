@@ -4,7 +4,8 @@
 
 The installed part of a build is packed twice, from copies in two folders: the second one deeper, with other times of all files, written
 in another order, in another time zone, by a user whose umask is 077. Then sources are compiled in both by the commands of the build with
-WM_REPRODUCIBLE: the objects, which have the names of their sources in them, are the same. Skipped (77) without cpack or dpkg-deb.
+WM_REPRODUCIBLE: the objects, which have the names of their sources in them, are the same; every source has these options. Skipped (77)
+without cpack or dpkg-deb.
 
 --whole: everything is built in both (below FOLDER, which stays), one after the other without a compiler's cache, the second with another
 number of compilers at once; all packages are compared, and what differs is named by package and file. What is there is built on."""
@@ -88,6 +89,14 @@ def check_package(deb):
         assert mode.startswith("l") or mode[7] == "r", (deb.name, mode, name)  # everybody reads
 
 
+def check_commands(folder):
+    """Every source of a build for packages, generated ones as well, is compiled without this computer's paths."""
+    run(["cmake", "--preset", "release", "-B", folder, "-DWM_TESTS=OFF", "-DWM_REPRODUCIBLE=ON"], ROOT, 0o022, "UTC")
+    maps = f"-ffile-prefix-map={ROOT}=. -ffile-prefix-map={folder}=./build"
+    bare = [entry["file"] for entry in json.loads((folder / "compile_commands.json").read_text()) if maps not in entry["command"]]
+    assert not bare, f"compiled with paths of this computer (WM_PREFIX_MAP): {bare}"
+
+
 def compare(first, second, a, b):
     """Names what differs in packages {name: sum} of two places; how many do."""
     assert a and a.keys() == b.keys(), (a, b)
@@ -99,6 +108,7 @@ def compare(first, second, a, b):
                 if x != y:
                     print("  differs:", *x, "|", *y)
             for place in (first, second):
+                (place / "unpacked").mkdir(exist_ok=True)
                 run(["dpkg-deb", "-R", place / "out" / deb, place / "unpacked" / deb], place, 0o022, "UTC")
             for path in files_of(first / "unpacked" / deb):
                 other = second / "unpacked" / deb / path.relative_to(first / "unpacked" / deb)
@@ -144,9 +154,8 @@ def main():
     if not (shutil.which("cpack") and shutil.which("dpkg-deb")) or not (BUILD / "lib/libwaymark.so").exists():
         print("skipped: no cpack or dpkg-deb here, or no libwaymark.so in this build")
         return 77
-    options = (ROOT / "cmake/WaymarkOptions.cmake").read_text()
-    assert "-ffile-prefix-map=${CMAKE_SOURCE_DIR}=. -ffile-prefix-map=${CMAKE_BINARY_DIR}=./build" in options
     with tempfile.TemporaryDirectory(prefix="waymark-reproducible-") as name:
+        check_commands(pathlib.Path(name) / "configured")
         first, second = pathlib.Path(name) / "a", pathlib.Path(name) / "another/and/deeper"
         for place in (first, second):
             copy(of_sources(place) + of_build(place), place, place == second)
