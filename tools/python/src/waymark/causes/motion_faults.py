@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Rows of motion: wheels, twists, gyros, the CAN bus."""
 
+import functools
 import math
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
@@ -140,6 +141,14 @@ def _speed(said: str, edits: Callable[[Size], Sequence[Edit]], more: Sequence[fl
                  settled=lambda s, states: (s[0] * states.get("motion.speed_scale", 1.0),))
 
 
+def _all_scaled(robot: Robot, items: Sequence[int], size: Size) -> list[Edit]:
+    return [_scaled(robot, item, size[0]) for item in items]
+
+
+def _columns_scaled(file: str, names: Sequence[str], size: Size) -> list[Edit]:
+    return [column(file, name, size[0]) for name in names]
+
+
 def _can(robot: Robot, bound: dict[str, int]) -> Iterator[Fault]:
     quantities: list[tuple[tuple[str, ...], tuple[float, ...], bool]] = [(("yaw_rate",), TURNS, True), (("vehicle_speed",), SPEEDS, False), (("steering_wheel",), (-1.0, DEG, 1 / DEG), True),
                   (("road_wheel",), (-1.0, DEG, 1 / DEG), True)]
@@ -150,7 +159,7 @@ def _can(robot: Robot, bound: dict[str, int]) -> Iterator[Fault]:
             continue
         said = names[0] + (" with the other side's" if len(names) > 1 else "")
         if not is_angle:
-            yield _speed(said, lambda s, i=tuple(items): [_scaled(robot, item, s[0]) for item in i], NEAR)
+            yield _speed(said, functools.partial(_all_scaled, robot, tuple(items)), NEAR)
         for f in sizes if is_angle else sizes[:1]:
             yield discrete(f"{names[0]} times {f:.4g}", lambda _, i=tuple(items), f=f: [_scaled(robot, item, f) for item in i],
                            lambda _, n=said, f=f, a=is_angle: _rate_words(n, f, a), group=f"scale of {names[0]}")
@@ -182,7 +191,7 @@ def _twists(robot: Robot) -> Iterator[Fault]:
             yield discrete(f"turn rate times {f:.4g}", lambda _, f=f, file=file, names=turns: [column(file, n, f) for n in (names[:1] if f < 0 else names)],
                            lambda _, f=f: _rate_words("the turn rate", f, True))
         yield discrete("speed times -1", lambda _, file=file, name=speeds[0]: [column(file, name, -1)], lambda _: _rate_words("the speed", -1, False))
-        yield _speed("the speed", lambda s, file=file, names=speeds: [column(file, n, s[0]) for n in names], (0.001, 0.01, *NEAR))
+        yield _speed("the speed", functools.partial(_columns_scaled, file, speeds), (0.001, 0.01, *NEAR))
         if file == "motion.csv":
             yield discrete("columns of motion.csv", lambda _: [swapped("motion.csv", "v_mps", "w_radps")], lambda _: "speed and turn rate of motion are swapped")
         else:

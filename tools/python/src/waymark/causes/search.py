@@ -93,7 +93,8 @@ class Search:
         self.cost = 0.0  # processor time of a second of the drive
         self.duration_s = 0.0
         self.trial_cost, self.stood_s = 0.0, 0.0  # the same of trials that do not search for their pose; what was spent on a standing robot
-        self.moved_at_s, self.moved_s = np.zeros(0), np.zeros(0)  # times from the start, and for how long the robot has moved until then
+        self.moved_at_s: Array = np.zeros(0)
+        self.moved_s: Array = np.zeros(0)  # times from the start, and for how long the robot has moved until then
         self.screen_most_s, self.screened_s, self.starts = SCREEN_MAX_S, 0.0, 0  # of the drive; its part that was screened last, and by how many trials
 
     def left_s(self) -> float:
@@ -190,7 +191,7 @@ class Search:
         self.trials.spent_s += cpu_s
         before = self.trials.run([[]], keeps=True, has_states=True)[0]
         self.trials.sources = before.sources if before else ()
-        self.trial_cost, self.stood_s = 0.0, 0.0  # the same of trials that do not search for their pose; what was spent on a standing robot
+        self.trial_cost, self.stood_s = 0.0, 0.0
         self.moved_at_s, self.moved_s = _moving(estimate.published)
         self.trials.settings = self._without_search()
         short = self._plain([], FIT_MAX_S) if FIT_MAX_S < self.duration_s else None
