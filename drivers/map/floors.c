@@ -11,8 +11,10 @@
 
 static const char *const kSiteKeys[] = {"format", "name", "origin", "floors", "connections", NULL};
 static const char *const kFloorKeys[] = {"name", "landmarks", "map", "points", "origin", NULL};
-static const char *const kConnectionKeys[] = {"name", "kind", "ends", NULL};
+static const char *const kConnectionKeys[] = {"name", "kind", "radius_m", "ends", NULL};
 static const char *const kEndKeys[] = {"floor", "x_m", "y_m", "heading_deg", NULL};
+// A cabin of a lift is 1.1 to 2.5 m long; the robot's own size comes to it.
+#define RADIUS_DEFAULT_M 1.5
 static const char *const kKinds[] = {"lift", "ramp", "door", NULL};  // wm_connection_kind
 
 // "FOLDER/FILE"; `out` "" where FILE is "".
@@ -114,12 +116,15 @@ static wm_status read_connection(const wm_yaml_node *node, wm_floors *out, wm_er
   if (out->connection_count == WM_CONNECTIONS_MAX)
     return wm_yaml_fail(node, err, "more than %d connections; make a site of each building", WM_CONNECTIONS_MAX);
   wm_connection *connection = &out->connections[out->connection_count++];
-  wm_yaml_node kind = wm_yaml_get(node, "kind"), ends = wm_yaml_get(node, "ends");
+  wm_yaml_node kind = wm_yaml_get(node, "kind"), ends = wm_yaml_get(node, "ends"),
+               radius = wm_yaml_get(node, "radius_m");
   int32_t chosen = 0;
+  connection->radius_m = RADIUS_DEFAULT_M;
   connection->line = wm_yaml_line(node);
   wm_status status = wm_yaml_check_keys(node, kConnectionKeys, WM_YAML_STRICT, NULL, err);
   if (status == WM_OK) status = read_name(node, connection->name, err);
   if (status == WM_OK) status = wm_yaml_choice(&kind, kKinds, &chosen, err);
+  if (status == WM_OK && wm_yaml_there(&radius)) status = wm_yaml_f64(&radius, 0.1, 100, &connection->radius_m, err);
   connection->kind = (wm_connection_kind)chosen;
   for (size_t i = 0; status == WM_OK && i < wm_yaml_count(&ends); i++) {
     wm_yaml_node end = wm_yaml_item(&ends, i);
@@ -255,18 +260,15 @@ wm_status wm_floor_choose(const char *path, wm_chosen_floor *out, wm_error *err)
   memset(out, 0, sizeof *out);
   wm_status status = wm_floors_current(folder, &site, err);
   if (status != WM_OK) return status;
-  const int chosen = name ? floor_of(site, name) : site->floor_count == 1 ? 0 : -1;
-  for (int i = 0; chosen < 0 && i < site->floor_count; i++)
-    (void)snprintf(names + strlen(names), sizeof names - strlen(names), "%s%s", i ? ", " : "", site->floors[i].name);
-  if (chosen >= 0) {
-    out->floor = site->floors[chosen];
-    memcpy(out->version, site->version, sizeof out->version);
-  } else if (name) {
-    status = wm_fail(err, WM_BAD_CONFIG, "%s has no floor '%s'; its floors are %s", folder, name, names);
-  } else {
-    status = wm_fail(err, WM_BAD_CONFIG, "%s has %d floors; name one: %s/FLOOR, of %s", folder, site->floor_count,
-                     folder, names);
+  out->index = name ? floor_of(site, name) : site->floor_count == 1 ? 0 : -1;
+  if (name && out->index < 0) {
+    for (int i = 0; i < site->floor_count; i++)
+      (void)snprintf(names + strlen(names), sizeof names - strlen(names), "%s%s", i ? ", " : "", site->floors[i].name);
+    free(site);
+    return wm_fail(err, WM_BAD_CONFIG, "%s has no floor '%s'; its floors are %s", folder, name, names);
   }
-  free(site);
-  return status;
+  out->floor = site->floors[out->index < 0 ? 0 : out->index];
+  memcpy(out->version, site->version, sizeof out->version);
+  out->site = site;
+  return WM_OK;
 }

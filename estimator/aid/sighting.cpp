@@ -120,6 +120,13 @@ void sighting_aid::release(planar_filter *filter) {
   for (int k = 0; k < 2 && tilt_state_ >= 0; k++) filter->forget(tilt_state_ + k, 0.0, square(params().tilt_sigma_rad));
 }
 
+void sighting_aid::take_up(const sighting_aid &from, planar_filter *filter) {
+  slots_ = from.slots_;
+  for (size_t i = 0; i < setup_->landmark_count; i++) seen_ns_[i] = WM_TIME_NONE;
+  tilt_ns_ = WM_TIME_NONE;
+  release(filter);
+}
+
 double sighting_aid::map_sigma(int landmark) const {
   return larger(setup_->landmarks[landmark].sigma_m, params().map_sigma_min_m);
 }
@@ -156,6 +163,7 @@ wm_verdict sighting_aid::look_at(const planar_filter &filter, bool tracking, vie
   const wm_sighting &s = out->s;
   const mounted_sensor &seen_by = sensor_[s.sensor];
   out->yaw_rad = out->yaw_variance = std::nan("");
+  out->nearest = 0.0;
   out->reading = read_sighting(s, seen_by, params());
   if (!out->reading.bearing && !out->reading.range) return WM_REJECTED_BY_CONFIG;
   if (!std::isnan(s.range_m) && s.range_m > seen_by.max_range_m) return WM_REJECTED_OUT_OF_RANGE;
@@ -164,7 +172,7 @@ wm_verdict sighting_aid::look_at(const planar_filter &filter, bool tracking, vie
     out->landmark = find(s.landmark_id);
     if (out->landmark < 0) return WM_REJECTED_UNKNOWN_ID;
   } else {
-    out->landmark = params().use_unidentified && tracking ? find_nearest(filter, *out) : -1;
+    out->landmark = params().use_unidentified && tracking ? find_nearest(filter, *out, &out->nearest) : -1;
     if (out->landmark < 0) return WM_REJECTED_NO_ASSOCIATION;
   }
   out->elevation = wm_sighting_has_elevation(&s) && params().use_elevation && out->reading.bearing &&
@@ -203,12 +211,13 @@ wm_verdict sighting_aid::look_at(const wm_marker &m, const planar_filter &filter
 }
 
 // The one landmark that a sighting without identity fits: within half the gate, and no other within the gate.
-int sighting_aid::find_nearest(const planar_filter &filter, const view &at) const {
+int sighting_aid::find_nearest(const planar_filter &filter, const view &at, double *nearest) const {
   const wm_sighting &s = at.s;
   const mounted_sensor &seen_by = sensor_[s.sensor];
   const sensor_errors errors = errors_of(filter, s.sensor);
   int best = -1, fitting = 0;
   double least = params().gate_soft;
+  *nearest = HUGE_VAL;
   for (int i = 0; i < static_cast<int>(setup_->landmark_count); i++) {
     const expected_sighting e =
         wm::expect(seen_by, errors, at.past.pose, setup_->landmarks[i].p_m, kBearing | kRange | components_);
@@ -228,6 +237,7 @@ int sighting_aid::find_nearest(const planar_filter &filter, const view &at) cons
     test(s.range_m, e.range_m, e.range_by,
          square(at.reading.range_sigma_m) + square(params().range_sigma_rel * e.range_m), false);
     fitting += chi2 < params().gate_soft;
+    if (chi2 < *nearest) *nearest = chi2;
     if (chi2 < kClearlyBest * least) {
       least = chi2 / kClearlyBest;
       best = i;

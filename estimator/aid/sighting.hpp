@@ -36,6 +36,8 @@ class sighting_aid {
   void init(const wm_setup &setup, const arrays &behind);
   void add_calibration(planar_filter *filter);  // the sensors' errors
   void add_lent(planar_filter *filter);         // the other states
+  // The sensors' calibration goes on as that of `from`, of another map; their states are at the same place.
+  void take_up(const sighting_aid &from, planar_filter *filter);
   // The lent states are nobody's again.
   void release(planar_filter *filter);
 
@@ -48,6 +50,7 @@ class sighting_aid {
     past_pose past;
     // A marker's direction in levelled axes along the sensor's yaw, where it is fused; NaN: it is not.
     double yaw_rad, yaw_variance;
+    double nearest;  // chi-square of the landmark that fits a sighting without identity best; 0: none was looked for
   };
   // Whether the event's sighting or marker is in order. *record: what is known of it.
   wm_status check(const wm_event &event, wm_innovation *record) const;
@@ -104,7 +107,7 @@ class sighting_aid {
   double heading_nis(const planar_filter &filter, const view &at, const tag_reading &tag) const;
   void put_heading_row(const view &at, const lent_slots &lent, const wm_innovation &record, planar_filter *filter,
                        residual *r) const;
-  int find_nearest(const planar_filter &filter, const view &at) const;
+  int find_nearest(const planar_filter &filter, const view &at, double *chi2) const;
   lent_slots lend_states(const view &at, planar_filter *filter);
   void decay_tilt(planar_filter *filter);
   void put_row(const view &at, const lent_slots &lent, const row_of &of, const wm_innovation &record,

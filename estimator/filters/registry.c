@@ -27,6 +27,10 @@ const wm_keeper *wm_keeper_of(const wm_estimator *estimator) {
   return estimator == &wm_stereo_ekf_estimator ? &wm_stereo_ekf_keeper : NULL;
 }
 
+const wm_carrier *wm_carrier_of(const wm_estimator *estimator) {
+  return estimator == &wm_landmark_ekf_estimator ? &wm_landmark_ekf_carrier : NULL;
+}
+
 const wm_estimator *wm_estimator_find(const char *name) {
   for (size_t i = 0; i < kCount; i++)
     if (strcmp(kEstimators[i]->name, name) == 0) return kEstimators[i];

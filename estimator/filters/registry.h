@@ -3,6 +3,7 @@
 #ifndef WAYMARK_ESTIMATOR_REGISTRY_H
 #define WAYMARK_ESTIMATOR_REGISTRY_H
 
+#include "waymark/carrier.h"
 #include "waymark/estimator.h"
 #include "waymark/keeper.h"
 
@@ -18,6 +19,7 @@ extern const wm_estimator wm_stereo_ekf_estimator;
 extern const wm_estimator wm_slam_estimator;
 extern const wm_keeper wm_slam_keeper;
 extern const wm_keeper wm_stereo_ekf_keeper;
+extern const wm_carrier wm_landmark_ekf_carrier;
 
 #ifdef __cplusplus
 }

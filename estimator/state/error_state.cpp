@@ -48,6 +48,15 @@ const filled_states &error_state::filled() {
   return filled_;
 }
 
+void error_state::take_up(const error_state &from, int count) {
+  touch();
+  filled_.count = 0;
+  for (int i = 0; i < count; i++) {
+    mean()[i] = from.value(i);
+    for (int j = i; j < n_; j++) p().set(i, j, j < count ? from.covariance(i, j) : 0.0);
+  }
+}
+
 // ---- read ----
 
 double error_state::dot(const sparse_row &row, const double *vector) {

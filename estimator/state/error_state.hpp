@@ -98,6 +98,8 @@ class error_state {
   }
   // x := factor x + noise, for a state that no other one's motion depends on.
   void fade(int state, double factor, double added_variance);
+  // The first `count` states are those of `from`, independent of the others, which stay.
+  void take_up(const error_state &from, int count);
   // Scales the sigmas of these states; correlations remain.
   void scale(int first, int count, double factor);
   // P += share d d', d = of(state).

@@ -262,7 +262,7 @@ static int run(const arguments *args) {
   if (open_all(args, &now, &err) != WM_OK) return complain(&err);
   wm_run_options options = args->run;
   wm_start start;
-  char out_dir[WM_PATH_MAX + 16], record_dir[WM_PATH_MAX + 16];
+  char out_dir[WM_PATH_MAX + 16], record_dir[WM_PATH_MAX + 16], last_floor[WM_NAME_MAX];
   reload.args = args;
   options.reload = open_next;
   options.reload_context = &reload;
@@ -279,6 +279,8 @@ static int run(const arguments *args) {
     close_all(&now);
     now = reload.next;
     options.start = NULL;
+    options.start_floor = report.has_floors ? last_floor : NULL;
+    (void)snprintf(last_floor, sizeof last_floor, "%s", report.last_floor);
     if (report.has_last && wm_saved_pose_is_worth_it(&report.last)) {
       wm_start_from_estimate(&report.last, now.config.motion, BLIND_S, &start);
       options.start = &start;

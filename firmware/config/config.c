@@ -415,6 +415,8 @@ wm_status wm_config_decide(wm_config *config, const wm_estimator *estimator, con
 void wm_config_free(wm_config *config) {
   free(config->text);
   free(config->estimator_params);
+  free(config->floor.site);
+  config->floor.site = NULL;
   for (int i = 0; i < WM_CONFIG_SHARED; i++) {
     free(wm_config_params(config, i));
     set_params(config, i, NULL);

@@ -14,7 +14,7 @@
 //   can_signals: FILE
 //   devices: {can: [{interface: can0}]}    # the robot's own, where there is no recording
 //   map: FILE                      # a map.yaml
-//   site: FOLDER/FLOOR             # landmarks and map are those of this floor
+//   site: FOLDER/FLOOR             # landmarks and map are those of this floor; the others are beside it
 //   initial_pose: {x_m: 0, y_m: 0, heading_rad: 0, sigma_xy_m: 0.05, sigma_heading_rad: 0.05}
 //   merge: {horizon_ms: 300, ...}  # wm_runtime_params
 //   publish: {rate_hz: 50, ...}
@@ -67,7 +67,7 @@ typedef struct wm_runtime_params {
   double publish_jump_m, publish_jump_deg;  // map against odom: larger moves are announced as jumps
   double publish_motion_stale_ms;
   int32_t publish_lcm;       // 0: no LCM
-  int32_t commands_lcm;      // 0: SET_POSE and RESET are not taken
+  int32_t commands_lcm;      // 0: SET_POSE, SET_FLOOR and RESET are not taken
   double publish_useless_m;  // sigma of position above which a pose is useless
   double integrity_risk_per_pose;
   double integrity_alert_limit_m, integrity_alert_limit_heading_deg;  // 0: none
@@ -131,7 +131,7 @@ typedef struct wm_config {
   wm_runtime_params runtime;
   int32_t lateness_is_stated;  // merge.lateness_max_ms
   wm_recording_overrides overrides;
-  wm_chosen_floor floor;  // of `site`; without a name: none
+  wm_chosen_floor floor;  // of `site`; without a name: none. Its site is the configuration's
   wm_vision_config vision[WM_VISION_MAX];
   size_t vision_count;
   wm_devices_config devices;

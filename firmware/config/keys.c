@@ -39,8 +39,9 @@ const config_key kConfigKeys[] = {
     {"map", CONFIG_FILE, "the recording's map/map.yaml",
      .about = "Raster map (a map.yaml) to take instead of the recording's."},
     {"site", CONFIG_PATH, "none",
-     .about = "A building's folder and a floor of it, `SITE/FLOOR`: its landmarks, map, origin and saved points "
-              "(docs/building.md)."},
+     .about =
+         "A building's folder and the floor where the robot begins, `SITE/FLOOR`: its landmarks, map, origin and saved "
+         "points; `SITE` alone: one of its floors. landmark_ekf changes between floors (docs/building.md)."},
     {"initial_pose", CONFIG_MAP, "the recording's",
      .about = "Start pose: `t_ns`, `x_m`, `y_m`, `z_m`, `heading_rad` or `heading_deg`, `qx`, `qy`, `qz`, `qw`, "
               "`sigma_xy_m`, "
@@ -75,7 +76,8 @@ const config_key kConfigKeys[] = {
     {"publish.lcm_url", CONFIG_TEXT, "LCM's own", .about = "LCM provider, e.g. `udpm://239.255.76.67:7667?ttl=0`."},
     {"publish.channel_prefix", CONFIG_TEXT, "WAYMARK_", .about = "What each channel's name begins with."},
     {"commands.socket", CONFIG_PATH, "none",
-     .about = "Local datagram socket (a file) on which a run takes set_pose_t and reset_t, encoded as for LCM: from "
+     .about = "Local datagram socket (a file) on which a run takes set_pose_t, set_floor_t and reset_t, encoded as for "
+              "LCM: from "
               "programs of "
               "this computer that may write the file (owner and group)."},
     {0},

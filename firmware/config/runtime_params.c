@@ -30,7 +30,8 @@ static const wm_param kParams[] = {
         "send every 10 to 50 ms."),
     BOOL("publish.lcm", publish_lcm, 1, "Whether poses are sent over LCM. Without a network the run continues."),
     BOOL("commands.lcm", commands_lcm, 0,
-         "Whether SET_POSE and RESET are taken over LCM. Any program that reaches its port can then move the pose: LCM "
+         "Whether SET_POSE, SET_FLOOR and RESET are taken over LCM. Any program that reaches its port can then move "
+         "the pose: LCM "
          "listens on all of this computer's networks, whatever its ttl."),
     F64("publish.useless_m", publish_useless_m, 1.0, 1e-3, 1000,
         "m. Sigma of the position above which a pose is useless: health has the metres and seconds of dead reckoning "

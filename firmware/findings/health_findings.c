@@ -164,7 +164,8 @@ const char *wm_cause_text(unsigned cause) {
                                                      "has unknown identities",
                                                      "is silent",
                                                      "does not reach the pose",
-                                                     "turns to the other side than the motion, or by a fraction of it"};
+                                                     "turns to the other side than the motion, or by a fraction of it",
+                                                     "fit other floors, too"};
   return cause < WM_CAUSE_COUNT ? kTexts[cause] : "";
 }
 

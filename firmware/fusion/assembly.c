@@ -33,7 +33,7 @@ static wm_unused *leave_to_others(wm_assembly *self, const char *name, uint32_t 
 
 // A source that the estimator can't use is not opened: it would only hold the watermark back.
 static int is_left_out(wm_assembly *self, const wm_source *source, const wm_source_config *wanted, int is_listed) {
-  const uint32_t takes = self->config->estimator->takes | WM_MOTION_EVENTS;
+  const uint32_t takes = wm_assembly_estimator(self)->takes | WM_MOTION_EVENTS;
   if (wanted->use && (source->kinds & takes)) return 0;
   if (wanted->use) {
     wm_unused *one = leave_to_others(self, source->name, source->kinds);
@@ -111,7 +111,7 @@ static void choose_quantities(wm_assembly *self) {
 static wm_status check_estimator(const wm_assembly *self, wm_error *err) {
   const wm_config *config = self->config;
   const char *why = NULL;
-  if (config->estimator->state_bytes(config->estimator_params, &self->setup, &why) == 0)
+  if (wm_assembly_estimator(self)->state_bytes(config->estimator_params, &self->setup, &why) == 0)
     return wm_fail(err, WM_BAD_CONFIG, "%s: estimator '%s' can't work with '%s': %s", config->path,
                    config->estimator->name, self->recording, why ? why : "no reason given");
   return WM_OK;
@@ -142,6 +142,32 @@ static wm_status add_map(wm_assembly *self, wm_recording *recording, wm_error *e
   if (!(self->config->estimator->takes & WM_EVENT_BIT(WM_EVENT_POINTS))) return WM_OK;
   self->map_path = wm_site_map_path(wm_recording_site(recording));
   return wm_site_map(wm_recording_site(recording), &self->setup.map, err);
+}
+
+// The other floors of the site, beside. An estimator without them stays on the stated one.
+static wm_status add_building(wm_assembly *self, wm_error *err) {
+  const wm_config *config = self->config;
+  const wm_chosen_floor *chosen = &config->floor;
+  if (!chosen->site || chosen->site->floor_count < 2) return WM_OK;
+  self->start_floor = chosen->index;
+  if (wm_carrier_of(config->estimator))
+    return wm_building_open(config->estimator, chosen->site, NULL, NULL, &self->building, err);
+  if (chosen->index >= 0) return WM_OK;
+  return wm_fail(err, WM_BAD_CONFIG,
+                 "%s: site: has %d floors, and the estimator '%s' takes one: write FOLDER/FLOOR; landmark_ekf takes "
+                 "them all",
+                 config->path, chosen->site->floor_count, config->estimator->name);
+}
+
+// A receiver's positions are on the axes of one floor.
+static wm_status check_axes(const wm_assembly *self, wm_error *err) {
+  const uint32_t on_axes =
+      WM_EVENT_BIT(WM_EVENT_POSITION) | WM_EVENT_BIT(WM_EVENT_HEADING) | WM_EVENT_BIT(WM_EVENT_LOCALIZED);
+  if (!self->building || !(self->kinds & on_axes) || wm_building_has_same_axes(self->building)) return WM_OK;
+  return wm_fail(err, WM_BAD_CONFIG,
+                 "%s: site: positions, headings and poses of others are on the axes of one floor: draw the floors on "
+                 "one grid (equal ends of each connection), or leave these sources out",
+                 self->config->path);
 }
 
 static wm_status add_vision(wm_assembly *self, wm_recording *recording, wm_error *err) {
@@ -177,6 +203,7 @@ wm_status wm_assemble(const wm_config *config, wm_recording *recording, uint64_t
   setup->seed = seed;
 
   wm_status status = add_map(out, recording, err);
+  if (status == WM_OK) status = add_building(out, err);
   if (status != WM_OK) return status;
   size_t count;
   wm_source *const *sources = wm_recording_sources(recording, &count);
@@ -191,13 +218,25 @@ wm_status wm_assemble(const wm_config *config, wm_recording *recording, uint64_t
     return wm_fail(err, WM_BAD_CONFIG, "%s: no motion and no observation is there or used",
                    wm_recording_dir(recording));
   status = wm_assembly_choose_motion(out, err);
+  if (status == WM_OK) status = check_axes(out, err);
   if (status != WM_OK) return status;
+  wm_assembly_follow(out);
   out->driving = wm_driving_choose(out->kinds, wm_recording_quantities(recording));
   status = check_motion(out, wm_recording_quantities(recording), err);
   return status == WM_OK ? check_estimator(out, err) : status;
 }
 
+const wm_estimator *wm_assembly_estimator(const wm_assembly *self) {
+  return self->building ? &self->building->estimator : self->config->estimator;
+}
+
+void wm_assembly_follow(wm_assembly *self) {
+  if (self->building) wm_building_follow(self->building, &self->setup, self->start_floor);
+}
+
 void wm_assembly_close(wm_assembly *self) {
+  wm_building_close(self->building);
+  self->building = NULL;
   free(self->own_motion);
   self->own_motion = NULL;
   wm_vision_close(self->vision);

@@ -8,6 +8,7 @@
 #include <stdint.h>
 
 #include "config/config.h"
+#include "fusion/building.h"
 #include "fusion/fuser.h"
 #include "fusion/merge.h"
 #include "sources/vision.h"
@@ -54,6 +55,8 @@ typedef struct wm_assembly {
   size_t calibration_length;
   const wm_mounting *imu;  // of calibration.yaml
   wm_vision *vision;       // sources of pictures; NULL where there are none
+  wm_building *building;   // of a site with several floors; NULL: one floor
+  int start_floor;         // of setup.start; -1: unknown
   const void *kept;        // map of an earlier run for the estimator (waymark/keeper.h); NULL: none
   size_t kept_bytes;
   const char *map_path;               // NULL where the estimator takes no map
@@ -70,6 +73,10 @@ wm_status wm_assembly_choose_motion(wm_assembly *self, wm_error *err);
 // Closes the pictures. Before the recording and the run's memory are closed.
 void wm_assembly_close(wm_assembly *self);
 
+// The estimator of the run: the configuration's, or the one over the floors of a building.
+const wm_estimator *wm_assembly_estimator(const wm_assembly *self);
+// The floors' setups follow the assembly's, which may have changed. Before the estimator's state is made.
+void wm_assembly_follow(wm_assembly *self);
 // Whether the estimator takes any observation; one that takes none is chosen for dead reckoning.
 int wm_assembly_observes(const wm_assembly *self);
 // Bit for each source that gives observations for the estimator.

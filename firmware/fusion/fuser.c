@@ -57,11 +57,31 @@ void wm_fuser_init(wm_fuser *self, const wm_estimator *estimator, void *state, w
 
 void wm_fuser_watch(wm_fuser *self, const wm_setup *setup, uint64_t observers) {
   wm_monitor_init(&self->monitor, setup, observers);
+  self->floors = setup->floors;
+  self->observers = observers;
+  double probability;
+  self->floor = self->floors ? self->estimator->floor(self->state, &probability) : -1;
 }
 
 void wm_fuser_estimate(const wm_fuser *self, wm_estimate *out) {
   self->estimator->estimate(self->state, out);
   wm_monitor_judge(&self->monitor, out);
+}
+
+uint32_t wm_fuser_floor_flags(const wm_fuser *self) {
+  double probability;
+  if (!self->floors) return 0;
+  const uint32_t floor = (uint32_t)self->estimator->floor(self->state, &probability);
+  return ((floor + 1) << WM_PUB_FLOOR_SHIFT) | ((uint32_t)(100.0 * probability) << WM_PUB_FLOOR_PERCENT_SHIFT);
+}
+
+// Another floor has another map, and what was monitored on the one before says nothing of it.
+static void follow_floor(wm_fuser *self) {
+  double probability;
+  if (!self->floors) return;
+  const int floor = self->estimator->floor(self->state, &probability);
+  if (floor != self->floor) wm_monitor_init(&self->monitor, &self->floors->setups[floor], self->observers);
+  self->floor = floor;
 }
 
 static uint32_t at_most(size_t count, uint32_t most) { return count < most ? (uint32_t)count : most; }
@@ -93,6 +113,7 @@ void wm_fuser_health(const wm_fuser *self, wm_health *out) {
   out->lost_probability = estimate.lost_probability;
   out->resets = estimate.resets;
   if (e->motion_health) out->motion_health = e->motion_health(self->state);
+  out->floor = self->floors ? e->floor(self->state, &out->floor_probability) : -1;
   // They return how many there are, possibly more than were written.
   put_calibration(self, out);
   out->alarm_count = list_alarms(self, out->alarms);
@@ -204,6 +225,7 @@ void wm_fuser_feed(wm_fuser *self, const wm_event *event) {
   wm_fuser_counts *counts = &self->counts[event->source];
   const int is_motion = wm_event_is_motion(event);
   const wm_status status = is_motion ? predict(self, event) : correct(self, event);
+  follow_floor(self);
   if (status != WM_OK) {
     counts->refused[status]++;
     note_unused(counts, status, event->t_ns, -1);

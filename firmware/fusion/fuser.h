@@ -58,6 +58,9 @@ typedef struct wm_fuser {
   wm_driving driving;
   wm_output output;
   wm_monitor monitor;
+  const wm_floor_plan *floors;  // NULL: one floor
+  int64_t floor;                // that the monitor has the map of
+  uint64_t observers;
   wm_time_ns row_ns;       // stamp whose pose is written at the next later event; WM_TIME_NONE: none
   wm_time_ns last_row_ns;  // of the pose written last
   wm_time_ns until_ns;     // stamp of the newest event that the estimator took
@@ -73,10 +76,13 @@ typedef struct wm_fuser {
 
 // `state` is initialised by estimator->init.
 void wm_fuser_init(wm_fuser *self, const wm_estimator *estimator, void *state, wm_driving driving, wm_output output);
-// Sources by index that may give observations, and the map that they observe. After wm_fuser_init, before events.
+// Sources by index that may give observations, and the map that they observe, with its floors. After wm_fuser_init,
+// before events.
 void wm_fuser_watch(wm_fuser *self, const wm_setup *setup, uint64_t observers);
 // The present estimate, with the monitor's doubts.
 WM_REALTIME void wm_fuser_estimate(const wm_fuser *self, wm_estimate *out);
+// The floor of the present estimate, as bits of wm_published.status_flags; 0 without floors.
+WM_REALTIME uint32_t wm_fuser_floor_flags(const wm_fuser *self);
 // The next event in the order of the merge; event->source < WM_SOURCES_MAX.
 WM_REALTIME void wm_fuser_feed(wm_fuser *self, const wm_event *event);
 // After the last event: writes the pose of the pending row.

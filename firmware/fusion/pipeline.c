@@ -22,9 +22,9 @@ void wm_pipeline_needs(wm_pipeline *self, const wm_assembly *assembly, wm_arena_
   size_t slot_bytes = wm_merge_slot_bytes(assembly->kinds);
   needs[0] = (wm_arena_need){"merge", wm_merge_bytes(assembly->source_count, queue_events(assembly), slot_bytes),
                              &self->merge_memory};
-  needs[1] =
-      (wm_arena_need){"estimator", config->estimator->state_bytes(config->estimator_params, &assembly->setup, &why),
-                      &self->state_memory};
+  needs[1] = (wm_arena_need){
+      "estimator", wm_assembly_estimator(assembly)->state_bytes(config->estimator_params, &assembly->setup, &why),
+      &self->state_memory};
   needs[2] = (wm_arena_need){"odometry", wm_odometry_bytes(), &self->odometry_memory};
 }
 
@@ -38,7 +38,8 @@ wm_status wm_pipeline_start(wm_pipeline *self, wm_output output, wm_error *err) 
   self->merge = wm_merge_init(self->merge_memory, sources, assembly->source_count, queue_events(assembly),
                               wm_merge_slot_bytes(assembly->kinds), ns_from_ms(config->runtime.merge_horizon_ms));
 
-  wm_status status = config->estimator->init(self->state_memory, config->estimator_params, &assembly->setup);
+  const wm_estimator *estimator = wm_assembly_estimator(assembly);
+  wm_status status = estimator->init(self->state_memory, config->estimator_params, &assembly->setup);
   if (status != WM_OK)
     return wm_fail(err, status, "%s: estimator '%s' can't start: %s", config->path, config->estimator->name,
                    wm_status_text(status));
@@ -46,7 +47,7 @@ wm_status wm_pipeline_start(wm_pipeline *self, wm_output output, wm_error *err) 
   if (status != WM_OK)
     return wm_fail(err, status, "%s: motion: odometry can't start: %s", config->path, wm_status_text(status));
 
-  wm_fuser_init(&self->fuser, config->estimator, self->state_memory, assembly->driving, output);
+  wm_fuser_init(&self->fuser, estimator, self->state_memory, assembly->driving, output);
   wm_fuser_watch(&self->fuser, &assembly->setup, wm_assembly_observers(assembly));
   wm_predictor_params params = {.jump_m = config->runtime.publish_jump_m,
                                 .jump_rad = config->runtime.publish_jump_deg * M_PI / 180,
@@ -85,6 +86,7 @@ static void tell_predictor(wm_pipeline *self) {
   wm_motion_calibration calibration;
   wm_fuser_estimate(&self->fuser, &fused);
   self->fuser.estimator->motion(self->fuser.state, &calibration);
+  self->predictor.floor_flags = wm_fuser_floor_flags(&self->fuser);
   wm_predictor_fused(&self->predictor, &fused, &calibration);
 }
 
@@ -178,6 +180,11 @@ void wm_pipeline_health(wm_pipeline *self, wm_time_ns now_ns, wm_health *out) {
   wm_fuser_estimate(&self->fuser, &estimate);
   out->t_ns = now_ns;
   wm_fuser_health(&self->fuser, out);
+  if (self->assembly->building) {
+    out->floor_count = (uint32_t)self->assembly->building->plan.count;
+    (void)snprintf(out->floor_name, sizeof out->floor_name, "%s",
+                   wm_building_floor_name(self->assembly->building, out->floor));
+  }
   out->jumps = self->predictor.jumps;
   out->published = self->published;
   reckoning_left(self, &estimate, out);

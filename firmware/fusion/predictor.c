@@ -77,7 +77,7 @@ int wm_predictor_publish(wm_predictor *self, wm_time_ns now_ns, wm_published *ou
   out->fused_until_ns = self->fused.t_ns;
   out->pose_odom_base = odom.pose_odom_base;
   out->utc_uncertainty_ns = -1;
-  out->status_flags = (uint32_t)out->now.cause << WM_PUB_CAUSE_SHIFT;
+  out->status_flags = ((uint32_t)out->now.cause << WM_PUB_CAUSE_SHIFT) | self->floor_flags;
   wm_time_ns newest_ns = wm_odometry_newest_ns(self->odometry);
   if (newest_ns == WM_TIME_NONE || now_ns - newest_ns > self->params.motion_stale_ns)
     out->status_flags |= WM_PUB_MOTION_STALE;

@@ -28,6 +28,7 @@ typedef struct wm_predictor {
   uint64_t odometry_refused;  // motion events that the odometry refused
   wm_time_ns fed_ns;          // newest motion, of all sources and of each; WM_TIME_NONE: none
   wm_time_ns source_ns[WM_SOURCES_MAX];
+  uint32_t floor_flags;  // of the fused pose, as in wm_published
 } wm_predictor;
 
 // `odometry` is initialised and outlives the predictor.

@@ -152,6 +152,11 @@ const char *waymark_source_name(const waymark_session *handle, uint32_t source) 
   return self && source < self->assembly.source_count ? self->assembly.sources[source].name : "";
 }
 
+const char *waymark_floor_name(const waymark_session *handle, uint32_t floor) {
+  const session *self = entry_look(ENTRY_SESSION, handle);
+  return self && self->assembly.building ? wm_building_floor_name(self->assembly.building, (int)floor) : "";
+}
+
 wm_status waymark_close(waymark_session *handle, wm_error *err) {
   session *self;
   if (!handle) return WM_OK;

@@ -46,7 +46,7 @@ static const struct {
                {"increments", WM_EVENT_BIT(WM_EVENT_INCREMENT), 0},
                {"stereo", WM_EVENT_BIT(WM_EVENT_STEREO), 0},
                {"points", WM_EVENT_BIT(WM_EVENT_POINTS), 0},
-               {"commands", WM_EVENT_BIT(WM_EVENT_SET_POSE) | WM_EVENT_BIT(WM_EVENT_RESET), 0}};
+               {"commands", WM_COMMAND_EVENTS, 0}};
 #define OTHERS (sizeof kOthers / sizeof kOthers[0])
 
 static int is_named(const char *name, const char *kind, int has_sensor) {

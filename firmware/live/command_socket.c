@@ -21,6 +21,7 @@
 
 typedef struct command_socket {
   wm_source base;
+  const wm_floors *floors;
   int fd;
   struct sockaddr_un at;
   uint32_t seq;
@@ -37,6 +38,8 @@ static wm_status next_command(wm_source *base, wm_event *out, wm_error *err) {
   if (bytes < 0) return WM_AGAIN;
   const char *why = wm_lcm_read_set_pose(datagram, (size_t)bytes, out);
   if (why && !wm_lcm_read_reset(datagram, (size_t)bytes, out)) why = NULL;
+  char floor[WM_NAME_MAX];
+  if (why && !wm_lcm_read_set_floor(datagram, (size_t)bytes, floor, out)) why = lcm_floor_of(self->floors, floor, out);
   char text[160];
   if (!why) why = lcm_stamp_command(out, text, sizeof text);
   if (why) {
@@ -88,14 +91,15 @@ static wm_status listen_on(command_socket *self, wm_error *err) {
   return status;
 }
 
-wm_status command_socket_open(const char *path, wm_source **out, wm_error *err) {
+wm_status command_socket_open(const char *path, const wm_floors *floors, wm_source **out, wm_error *err) {
   *out = NULL;
   command_socket *self = calloc(1, sizeof *self);
   if (!self) return wm_fail(err, WM_IO, "no memory to listen to commands");
   self->base.ops = &kOps;
   self->base.is_live = self->base.event_driven = 1;
   self->base.lateness_max_ms = LATENESS_MS;
-  self->base.kinds = WM_EVENT_BIT(WM_EVENT_SET_POSE) | WM_EVENT_BIT(WM_EVENT_RESET);
+  self->base.kinds = WM_COMMAND_EVENTS;
+  self->floors = floors;
   self->fd = -1;
   self->at.sun_family = AF_UNIX;
   (void)snprintf(self->base.name, sizeof self->base.name, "commands:local");

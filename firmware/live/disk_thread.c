@@ -14,9 +14,10 @@
 
 static void keep_pose(live *run, const wm_published *published) {
   live_disk *self = &run->disk;
-  black_box_pose(&self->box, &published->now, wm_monotonic_ns());
+  black_box_pose(&self->box, &published->now, wm_published_floor(published), wm_monotonic_ns());
   if (!self->keeps_pose || !wm_saved_pose_is_one(&published->now)) return;
   self->last_pose = published->now;
+  self->last_floor = wm_published_floor(published);
   self->has_last_pose = 1;
 }
 
@@ -111,7 +112,10 @@ static void save_pose(live *run) {
   wm_error err;
   if (!self->has_last_pose) return;
   self->has_last_pose = 0;
-  if (wm_saved_pose_write(run->config->saved_pose, &self->last_pose, live_utc_s(), &err) == WM_OK || self->said_unsaved)
+  const wm_building *building = run->assembly.building;
+  const char *floor = building ? wm_building_floor_name(building, self->last_floor) : NULL;
+  if (wm_saved_pose_write(run->config->saved_pose, &self->last_pose, floor, live_utc_s(), &err) == WM_OK ||
+      self->said_unsaved)
     return;
   self->said_unsaved = 1;
   live_say(run, "%s. Localization continues; the next start will begin without a saved pose", err.text);

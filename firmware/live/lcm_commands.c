@@ -16,6 +16,7 @@
 typedef struct lcm_commands {
   wm_source base;
   lcm_subscriber subscriber;
+  const wm_floors *floors;
   wm_event waiting[WAITING_MAX];
   size_t waiting_count;
   uint32_t seq;
@@ -45,6 +46,14 @@ static void on_reset(const lcm_recv_buf_t *message, const char *channel, void *c
   take(context, channel, wm_lcm_read_reset(message->data, message->data_size, &event), &event);
 }
 
+static void on_set_floor(const lcm_recv_buf_t *message, const char *channel, void *context) {
+  wm_event event;
+  char name[WM_NAME_MAX];
+  const char *why = wm_lcm_read_set_floor(message->data, message->data_size, name, &event);
+  if (!why) why = lcm_floor_of(((const lcm_commands *)context)->floors, name, &event);
+  take(context, channel, why, &event);
+}
+
 static lcm_commands *commands_of(lcm_subscriber *subscriber) {
   return (lcm_commands *)(void *)((char *)subscriber - offsetof(lcm_commands, subscriber));
 }
@@ -52,6 +61,7 @@ static lcm_commands *commands_of(lcm_subscriber *subscriber) {
 static void subscribe(lcm_subscriber *subscriber) {
   lcm_subscriber_add(subscriber, "SET_POSE", on_set_pose, commands_of(subscriber));
   lcm_subscriber_add(subscriber, "RESET", on_reset, commands_of(subscriber));
+  lcm_subscriber_add(subscriber, "SET_FLOOR", on_set_floor, commands_of(subscriber));
 }
 
 static wm_status next_command(wm_source *base, wm_event *out, wm_error *err) {
@@ -75,14 +85,16 @@ static void close_commands(wm_source *base) {
 
 static const wm_source_ops kCommands = {next_command, close_commands};
 
-wm_status lcm_commands_open(const char *url, const char *channel_prefix, lcm_t *lent, wm_source **out, wm_error *err) {
+wm_status lcm_commands_open(const char *url, const char *channel_prefix, const wm_floors *floors, lcm_t *lent,
+                            wm_source **out, wm_error *err) {
   *out = NULL;
   lcm_commands *self = calloc(1, sizeof *self);
   if (!self) return wm_fail(err, WM_IO, "no memory for an LCM subscription");
   self->base.ops = &kCommands;
   self->base.is_live = self->base.event_driven = 1;
   self->base.lateness_max_ms = LATENESS_MS;
-  self->base.kinds = WM_EVENT_BIT(WM_EVENT_SET_POSE) | WM_EVENT_BIT(WM_EVENT_RESET);
+  self->base.kinds = WM_COMMAND_EVENTS;
+  self->floors = floors;
   (void)snprintf(self->base.name, sizeof self->base.name, "commands");
   lcm_subscriber_open(&self->subscriber, url, channel_prefix, lent, subscribe);
   *out = &self->base;

@@ -3,6 +3,7 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 
 #include "rt/clock.h"
 
@@ -24,4 +25,13 @@ const char *lcm_stamp_command(wm_event *event, char *text, size_t capacity) {
   event->arrival_ns = wm_monotonic_ns();
   if (event->t_ns == 0) event->t_ns = event->arrival_ns;
   return lcm_stamp_fault(event->t_ns, event->arrival_ns, text, capacity);
+}
+
+const char *lcm_floor_of(const wm_floors *floors, const char *name, wm_event *event) {
+  for (int i = 0; floors && i < floors->floor_count; i++)
+    if (strcmp(floors->floors[i].name, name) == 0) {
+      event->as.set_floor.floor = i;
+      return NULL;
+    }
+  return floors ? "is of a floor that site.yaml does not have" : "sets a floor; the configuration has no `site`";
 }

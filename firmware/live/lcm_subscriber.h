@@ -10,7 +10,7 @@
 // Messages of a channel that may wait for this thread: a second of a sensor with 1000 messages a second. LCM's own 30
 // are 30 ms of that.
 #define LCM_QUEUED 1000
-#define LCM_CHANNELS_MAX 2
+#define LCM_CHANNELS_MAX 3  // of commands
 
 typedef struct lcm_channel {
   struct lcm_subscriber *subscriber;

@@ -88,6 +88,7 @@ typedef struct live_publish {
   wm_time_ns next_landmarks_ns;
   int has_published;
   wm_estimate last_published;
+  int last_floor;        // of it (wm_published_floor)
   wm_histogram send_ns;  // from a pose made to its message handed to LCM
   // As last reported, so that only changes are reported.
   uint8_t said_stale[WM_SOURCES_MAX];
@@ -106,6 +107,7 @@ typedef struct live_disk {
   uint64_t said_lines_lost;
   // The last pose that can be saved, and whether it is on the disk.
   wm_estimate last_pose;
+  int last_floor;  // of it (wm_published_floor)
   int keeps_pose, has_last_pose;
   int keeps_map, said_map;
   wm_map_identity map_identity;

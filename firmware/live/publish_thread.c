@@ -54,6 +54,7 @@ static void send_pose(live *run, const wm_published *record) {
   wm_histogram_add(&self->send_ns, sent_ns - published.made_ns);
   lcm_sink_pose(&self->lcm, &published, sent_ns);
   self->last_published = published.now;
+  self->last_floor = wm_published_floor(&published);
   self->has_published = 1;
   notify_pose(&self->notify);
 }

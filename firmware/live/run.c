@@ -101,6 +101,11 @@ static wm_status take_memory(live *self, wm_error *err) {
 
 // ── start ───────────────────────────────────────────────────────────────────────────────────────────────────────────
 
+// Of a start that another run left: NULL: the configuration's.
+static void start_on_floor(live *self, const char *name) {
+  if (self->assembly.building && name) self->assembly.start_floor = wm_building_find(self->assembly.building, name);
+}
+
 // The saved pose (1) where it is valid; else the configuration's start (0).
 static int start_where_it_was(live *self) {
   const wm_runtime_params *params = &self->config->runtime;
@@ -124,6 +129,7 @@ static int start_where_it_was(live *self) {
     live_say(self, "start: the saved pose is %.0f s old, more than start.max_age_s; it is not used", age_s);
     return 0;
   }
+  start_on_floor(self, saved.has_floor ? saved.floor : NULL);
   char age[64];
   (void)snprintf(age, sizeof age, age_s >= 0 ? "%.0f s ago" : "an unknown age, as this clock is %.0f s behind it",
                  fabs(age_s));
@@ -163,10 +169,12 @@ static void take_up_what_was(live *self) {
   const wm_config *config = self->config;
   const wm_chosen_floor *chosen = &config->floor;
   if (chosen->floor.name[0])
-    live_say(self, "map: floor %s, version %s", chosen->floor.name, chosen->version[0] ? chosen->version : "none");
+    live_say(self, "map: %s%s, version %s", chosen->index < 0 ? "the floor is unknown" : "floor ",
+             chosen->index < 0 ? "" : chosen->floor.name, chosen->version[0] ? chosen->version : "none");
   int has_pose = self->options->start != NULL;
   if (has_pose) {
     self->assembly.setup.start = *self->options->start;
+    start_on_floor(self, self->options->start_floor);
   } else {
     has_pose = start_where_it_was(self);
   }
@@ -198,7 +206,7 @@ static void save_last_map(live *self) {
 static wm_status add_local_commands(live *self, wm_recording *recording, wm_error *err) {
   wm_source *commands;
   if (!self->config->commands[0]) return WM_OK;
-  wm_status status = command_socket_open(self->config->commands, &commands, err);
+  wm_status status = command_socket_open(self->config->commands, self->config->floor.site, &commands, err);
   return status == WM_OK ? wm_recording_add_device(recording, commands, 0, err) : status;
 }
 
@@ -206,7 +214,8 @@ static wm_status add_commands(live *self, wm_recording *recording, wm_error *err
   wm_status local = add_local_commands(self, recording, err);
   if (local != WM_OK || !self->config->runtime.commands_lcm) return local;
   wm_source *commands;
-  wm_status status = lcm_commands_open(self->config->lcm_url, self->config->channel_prefix, NULL, &commands, err);
+  wm_status status = lcm_commands_open(self->config->lcm_url, self->config->channel_prefix, self->config->floor.site,
+                                       NULL, &commands, err);
   return status == WM_OK ? wm_recording_add_device(recording, commands, 0, err) : status;
 }
 
@@ -229,6 +238,7 @@ static wm_status prepare(live *self, wm_recording *recording, wm_error *err) {
   if (status == WM_OK) status = add_commands(self, recording, err);
   if (status == WM_OK) status = wm_assemble(self->config, recording, self->options->seed, &self->assembly, err);
   if (status == WM_OK) take_up_what_was(self);
+  if (status == WM_OK) wm_assembly_follow(&self->assembly);
   if (status == WM_OK) status = take_memory(self, err);
   if (status == WM_OK) status = wm_pipeline_start(&self->estimator.pipeline, estimator_output(&self->estimator), err);
   if (status == WM_OK) wm_pipeline_take_kept(&self->estimator.pipeline, self->map.image, self->map.bytes);
@@ -408,6 +418,10 @@ static void fill_report(live *self, wm_live_report *report) {
   run->page_faults_after_start = e->page_faults;
   report->has_last = self->publish.has_published;
   report->last = self->publish.last_published;
+  const wm_building *building = self->assembly.building;
+  report->has_floors = building != NULL;
+  (void)snprintf(report->last_floor, sizeof report->last_floor, "%s",
+                 building ? wm_building_floor_name(building, self->publish.last_floor) : "");
   report->deadlines_missed = e->deadlines_missed;
   report->deadlines_total = e->loops + e->deadlines_missed;
   report->wake_p99_ns = wm_histogram_quantile(&e->wake_ns, 0.99);

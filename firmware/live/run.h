@@ -27,7 +27,8 @@ typedef struct wm_run_options {
   atomic_int *reload_asked;
   wm_status (*reload)(void *context, wm_error *err);
   void *reload_context;
-  const wm_start *start;  // NULL: the saved pose, or the configuration's
+  const wm_start *start;    // NULL: the saved pose, or the configuration's
+  const char *start_floor;  // of `start`: its name, "" unknown; NULL: the configuration's
   // Receives notes for a person or a log, a line each; from any of the run's normal threads.
   wm_line_fn say;
   void *say_context;
@@ -44,6 +45,8 @@ typedef struct wm_live_report {
   int wants_restart;
   int has_last;      // a pose was published
   wm_estimate last;  // the last one
+  int has_floors;
+  char last_floor[WM_NAME_MAX];  // of it; "": unknown
 } wm_live_report;
 
 // Returns when the recording is over, the duration is reached or *stop is set, and all output is written. Blocks the

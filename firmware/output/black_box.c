@@ -137,15 +137,17 @@ static void create_log(black_box *self) {
 }
 
 // Starts a new log at this pose; the previous one is renamed to "before".
-static void begin_log(black_box *self, const wm_estimate *pose, wm_time_ns now_ns) {
+static void begin_log(black_box *self, const wm_estimate *pose, int floor, wm_time_ns now_ns) {
   char now[NAME_MAX_BYTES], before[NAME_MAX_BYTES];
   path_of(self, "now", now);
   path_of(self, "before", before);
   close_log(self);
   if (self->rotate_ns != WM_TIME_NONE && rename(now, before) != 0 && errno != ENOENT) unwritable(self, strerror(errno));
   self->rotate_ns = now_ns + self->keep_ns;
-  if (pose->state == WM_STATE_TRACKING || pose->state == WM_STATE_DEAD_RECKONING)
+  if (pose->state == WM_STATE_TRACKING || pose->state == WM_STATE_DEAD_RECKONING) {
     wm_start_from_estimate(pose, self->assembly.setup.motion, 0, &self->assembly.setup.start);
+    self->assembly.start_floor = floor;
+  }
   create_log(self);
 }
 
@@ -196,12 +198,12 @@ void black_box_map(black_box *self, const void *image, size_t bytes) {
   self->assembly.kept_bytes = bytes;
 }
 
-void black_box_pose(black_box *self, const wm_estimate *pose, wm_time_ns now_ns) {
+void black_box_pose(black_box *self, const wm_estimate *pose, int floor, wm_time_ns now_ns) {
   if (!self->folder[0]) return;
   if (self->rotate_ns == WM_TIME_NONE && self->is_open)
     self->rotate_ns = now_ns + self->keep_ns;  // the run's first log
   else if (self->rotate_ns == WM_TIME_NONE || now_ns >= self->rotate_ns)
-    begin_log(self, pose, now_ns);
+    begin_log(self, pose, floor, now_ns);
   int is_lost = pose->state == WM_STATE_LOST;
   // After a fault the log goes on for a quarter of keep_s.
   if (is_lost && self->was_tracking && self->kept_from_ns == WM_TIME_NONE)

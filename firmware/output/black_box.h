@@ -37,8 +37,8 @@ void black_box_open(black_box *self, const char *folder, double keep_s, double p
 void black_box_event(black_box *self, const wm_event *event);
 // The newest map (waymark/keeper.h), of which it makes a copy. May allocate.
 void black_box_map(black_box *self, const void *image, size_t bytes);
-// The newest pose: starts a log, and detects a loss. `now_ns`: monotonic.
-void black_box_pose(black_box *self, const wm_estimate *pose, wm_time_ns now_ns);
+// The newest pose and its floor (wm_published_floor): starts a log, and detects a loss. `now_ns`: monotonic.
+void black_box_pose(black_box *self, const wm_estimate *pose, int floor, wm_time_ns now_ns);
 // Subscribes to the pictures of each camera of `rig`, until it is closed.
 wm_status black_box_open_pictures(black_box *self, wm_pictures *pictures, const wm_rig *rig, wm_error *err);
 // Writes the pictures that have arrived. Every few milliseconds.

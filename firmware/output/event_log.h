@@ -39,11 +39,17 @@ typedef enum wm_log_tag {
   WM_LOG_MAP_HASH,       // u64; absent where there was no map
   WM_LOG_MAP_PATH,       // text: where the map was; it is not in the log
   WM_LOG_HEAD_END,
-  WM_LOG_EVENT,   // struct
-  WM_LOG_GAP,     // u64: events that are missing here, because they found no room in the ring to the disk thread
-  WM_LOG_CLOSED,  // u64: events in the file; regular end of the run
-  WM_LOG_KEPT,    // of the head: map of an earlier run that this one began with (waymark/keeper.h); absent without one
-  WM_LOG_DECODER  // of the head, text: what decoded the run's JPEG pictures (wm_video_decoder); absent without pictures
+  WM_LOG_EVENT,    // struct
+  WM_LOG_GAP,      // u64: events that are missing here, because they found no room in the ring to the disk thread
+  WM_LOG_CLOSED,   // u64: events in the file; regular end of the run
+  WM_LOG_KEPT,     // of the head: map of an earlier run that this one began with (waymark/keeper.h); absent without one
+  WM_LOG_DECODER,  // of the head, text: what decoded the run's JPEG pictures (wm_video_decoder); absent without
+                   // pictures
+  // Of the head, of a building with several floors:
+  WM_LOG_FLOOR,           // text: name, one record a floor
+  WM_LOG_FLOOR_LANDMARK,  // floor u32, struct: one record a landmark of each floor
+  WM_LOG_FLOOR_END,       // floor, connection, kind u32; x, y, heading, radius f64: one record an end of a connection
+  WM_LOG_START_FLOOR      // u64: floor of the start plus 1; 0: unknown
 } wm_log_tag;
 
 // ── writing ─────────────────────────────────────────────────────────────────────────────────────────────────────────
@@ -86,6 +92,8 @@ typedef struct wm_log_head {
   wm_driving driving;
   const void *kept;  // NULL: none
   size_t kept_bytes;
+  wm_building *building;  // NULL: one floor; its estimator is not set
+  int start_floor;        // -1: unknown
   uint32_t source_count;
   struct {
     char name[WM_SOURCE_NAME_MAX];

@@ -20,6 +20,9 @@ struct wm_log_reader {
   wm_sensor *sensors;
   wm_landmark *landmarks;
   size_t sensor_capacity, landmark_capacity;
+  wm_landmark *floor_landmarks;  // of all floors, one floor behind the other
+  size_t floor_landmark_count, floor_landmark_capacity;
+  size_t landmarks_on[WM_FLOORS_MAX];
   char *config_text, *calibration_text;
   void *kept;
   uint64_t events;
@@ -134,6 +137,58 @@ static wm_status take_landmark(wm_log_reader *self, const record *r, wm_error *e
   return WM_OK;
 }
 
+static wm_status take_floor(wm_log_reader *self, const record *r, wm_error *err) {
+  char name[WM_NAME_MAX];
+  wm_status status = WM_OK;
+  if (!self->head.building) status = wm_building_make(NULL, &self->head.building, err);
+  get_text(name, sizeof name, r);
+  return status == WM_OK ? wm_building_add_floor(self->head.building, name, err) : status;
+}
+
+// In the order of the floors.
+static wm_status take_floor_landmark(wm_log_reader *self, const record *r, wm_error *err) {
+  wm_reader bytes = wm_reader_of(r->content, r->count);
+  const uint32_t floor = wm_get_u32(&bytes);
+  if (bytes.bad || !self->head.building || floor >= self->head.building->plan.count)
+    return bad(self, err, "a landmark of a floor that the head doesn't name");
+  for (size_t i = floor + 1; i < WM_FLOORS_MAX; i++)
+    if (self->landmarks_on[i] > 0) return bad(self, err, "landmarks out of the order of their floors");
+  wm_landmark *grown =
+      grow(self->floor_landmarks, self->floor_landmark_count, &self->floor_landmark_capacity, sizeof *grown);
+  if (!grown) return wm_fail(err, WM_IO, "%s: no memory for its landmarks", self->path);
+  self->floor_landmarks = grown;
+  size_t used;
+  if (wm_landmark_decode(r->content + bytes.used, r->count - bytes.used, &grown[self->floor_landmark_count], &used) !=
+      WM_OK)
+    return bad(self, err, "a landmark that can't be read");
+  self->floor_landmark_count++;
+  self->landmarks_on[floor]++;
+  return WM_OK;
+}
+
+static wm_status take_floor_end(wm_log_reader *self, const record *r, wm_error *err) {
+  wm_reader bytes = wm_reader_of(r->content, r->count);
+  wm_floor_end end = {0};
+  end.floor = (int32_t)wm_get_u32(&bytes);
+  end.connection = (int32_t)wm_get_u32(&bytes);
+  end.kind = (int32_t)wm_get_u32(&bytes);
+  end.x_m = wm_get_f64(&bytes);
+  end.y_m = wm_get_f64(&bytes);
+  end.heading_rad = wm_get_f64(&bytes);
+  end.radius_m = wm_get_f64(&bytes);
+  if (bytes.bad || !self->head.building) return bad(self, err, "an end of a connection that can't be read");
+  return wm_building_add_end(self->head.building, &end, err);
+}
+
+static void give_landmarks(wm_log_reader *self) {
+  wm_building *b = self->head.building;
+  const wm_landmark *at = self->floor_landmarks;
+  for (size_t i = 0; b && i < b->plan.count; at += self->landmarks_on[i++]) {
+    b->floors[i].landmarks = at;
+    b->floors[i].landmark_count = self->landmarks_on[i];
+  }
+}
+
 static wm_status take_source(wm_log_reader *self, const record *r, wm_error *err) {
   wm_log_head *h = &self->head;
   wm_reader bytes = wm_reader_of(r->content, r->count);
@@ -190,6 +245,10 @@ static wm_status take_head_record(wm_log_reader *self, const record *r, wm_error
     case WM_LOG_SENSOR: return take_sensor(self, r, err);
     case WM_LOG_LANDMARK: return take_landmark(self, r, err);
     case WM_LOG_SOURCE: return take_source(self, r, err);
+    case WM_LOG_FLOOR: return take_floor(self, r, err);
+    case WM_LOG_FLOOR_LANDMARK: return take_floor_landmark(self, r, err);
+    case WM_LOG_FLOOR_END: return take_floor_end(self, r, err);
+    case WM_LOG_START_FLOOR: h->start_floor = (int)wm_get_u64(&bytes) - 1; break;
     case WM_LOG_KEPT:
       free(self->kept);
       h->kept = self->kept = copy_text(r);
@@ -215,11 +274,11 @@ static wm_status read_head(wm_log_reader *self, wm_error *err) {
     if (status == WM_END) return bad(self, err, "the file ends within its head; nothing can be replayed from it");
     if (status != WM_OK) return status;
     if (r.tag == WM_LOG_HEAD_END) break;
-    if (r.tag >= WM_LOG_EVENT && r.tag != WM_LOG_KEPT && r.tag != WM_LOG_DECODER)
-      return bad(self, err, "an event before the end of the head");
+    if (r.tag >= WM_LOG_EVENT && r.tag < WM_LOG_KEPT) return bad(self, err, "an event before the end of the head");
     status = take_head_record(self, &r, err);
     if (status != WM_OK) return status;
   }
+  give_landmarks(self);
   const wm_log_head *h = &self->head;
   if (!h->config_text || !h->calibration_text || !h->estimator[0] || !self->saw_wheels || !self->saw_start ||
       !self->saw_hash || h->source_count == 0)
@@ -302,6 +361,8 @@ void wm_log_reader_close(wm_log_reader *self) {
   free(self->content);
   free(self->sensors);
   free(self->landmarks);
+  free(self->floor_landmarks);
+  wm_building_close(self->head.building);
   free(self->config_text);
   free(self->calibration_text);
   free(self->kept);

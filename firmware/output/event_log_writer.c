@@ -58,6 +58,31 @@ static void write_map(wm_log_writer *self, const wm_assembly *assembly) {
   if (assembly->map_path) write_text(self, WM_LOG_MAP_PATH, assembly->map_path);
 }
 
+static void write_building(wm_log_writer *self, const wm_assembly *assembly) {
+  const wm_building *b = assembly->building;
+  uint8_t bytes[WM_RIG_ENCODED_MAX];
+  if (!b) return;
+  for (size_t i = 0; i < b->plan.count; i++) write_text(self, WM_LOG_FLOOR, b->floors[i].name);
+  for (size_t i = 0; i < b->plan.count; i++)
+    for (size_t k = 0; k < b->floors[i].landmark_count; k++) {
+      wm_writer w = wm_writer_of(bytes, sizeof bytes);
+      wm_put_u32(&w, (uint32_t)i);
+      const size_t used = wm_landmark_encode(&b->floors[i].landmarks[k], bytes + w.used, sizeof bytes - w.used);
+      write_record(self, WM_LOG_FLOOR_LANDMARK, bytes, w.used + used);
+    }
+  for (size_t i = 0; i < b->plan.end_count; i++) {
+    const wm_floor_end *e = &b->ends[i];
+    wm_writer w = wm_writer_of(bytes, sizeof bytes);
+    wm_put_u32(&w, (uint32_t)e->floor);
+    wm_put_u32(&w, (uint32_t)e->connection);
+    wm_put_u32(&w, (uint32_t)e->kind);
+    const double numbers[] = {e->x_m, e->y_m, e->heading_rad, e->radius_m};
+    wm_put_f64s(&w, numbers, 4);
+    write_record(self, WM_LOG_FLOOR_END, bytes, w.used);
+  }
+  write_u64(self, WM_LOG_START_FLOOR, (uint64_t)(assembly->start_floor + 1));
+}
+
 static void write_sources(wm_log_writer *self, const wm_assembly *assembly) {
   uint8_t bytes[4 + WM_SOURCE_NAME_MAX];
   wm_writer w = wm_writer_of(bytes, sizeof bytes);
@@ -90,6 +115,7 @@ wm_status wm_log_create(wm_log_writer *self, const char *path, const wm_assembly
   write_record(self, WM_LOG_CALIBRATION, assembly->calibration_text, assembly->calibration_length);
   write_setup(self, &assembly->setup);
   write_map(self, assembly);
+  write_building(self, assembly);
   write_sources(self, assembly);
   if (assembly->decoder[0]) write_text(self, WM_LOG_DECODER, assembly->decoder);
   if (assembly->kept) write_record(self, WM_LOG_KEPT, assembly->kept, assembly->kept_bytes);

@@ -210,6 +210,12 @@ wm_status wm_write_health_json(const char *dir, const wm_assembly *assembly, con
   string(f, wm_cause_name(h->cause));
   (void)fputs(",\n  \"lost_probability\": ", f);
   number(f, h->lost_probability);
+  if (h->floor_count > 0) {
+    (void)fputs(",\n  \"floor\": ", f);
+    string(f, h->floor_name);
+    (void)fputs(",\n  \"floor_probability\": ", f);
+    number(f, h->floor_probability);
+  }
   (void)fputs(",\n  \"t_ns\": ", f);
   time_or_null(f, h->t_ns);
   (void)fputs(",\n  \"reckoning_left_m\": ", f);

@@ -41,6 +41,7 @@ struct wm_run_folder {
   uint64_t bytes_max;     // 0: no limit
   wm_assembly continued;  // of the run, with the start of a log that begins later
   wm_estimate newest;     // published; WM_TIME_NONE: none
+  int newest_floor;       // of it; -1: unknown, or there is one
   wm_bound bound;         // of the pose that is published next
   drive_evidence evidence;
 };
@@ -119,6 +120,7 @@ static void published_head(wm_run_folder *self, int dof) {
   pose_head(head, dof);
   wm_row_text(head, ",odom_x_m,odom_y_m,odom_heading_rad,resets,lost_probability,cause");
   wm_row_text(head, ",bound_m,bound_heading_rad,usable,unusable");
+  if (self->assembly->building) wm_row_text(head, ",floor,floor_percent");
   end(self, PUBLISHED);
   self->published_has_head = 1;
 }
@@ -177,6 +179,12 @@ static void published(wm_run_folder *self, const wm_published *p) {
   wm_row_char(line, ',');
   wm_row_text(line, wm_cause_name(p->now.cause));
   bound_columns(line, &self->bound);
+  if (self->assembly->building) {
+    wm_row_char(line, ',');
+    wm_row_text(line, wm_building_floor_name(self->assembly->building, WM_PUB_FLOOR(p->status_flags)));
+    wm_row_char(line, ',');
+    wm_row_int(line, WM_PUB_FLOOR_PERCENT(p->status_flags));
+  }
   end(self, PUBLISHED);
 }
 
@@ -248,6 +256,7 @@ static void put(void *context, wm_output_kind kind, const void *record, size_t b
     case WM_OUTPUT_INNOVATION: innovation(self, record); break;
     case WM_OUTPUT_PUBLISHED:
       self->newest = ((const wm_published *)record)->now;
+      self->newest_floor = wm_published_floor(record);
       published(self, record);
       break;
     case WM_OUTPUT_BOUND: self->bound = *(const wm_bound *)record; break;
@@ -378,8 +387,10 @@ static wm_status begin_log_again(wm_run_folder *self, wm_error *err) {
   if (failed) return wm_fail(err, WM_IO, "%s: can't be put aside: %s", path, strerror(failed));
   self->continued = *self->assembly;
   self->continued.kept = NULL;
-  if (self->newest.t_ns != WM_TIME_NONE)
+  if (self->newest.t_ns != WM_TIME_NONE) {
     wm_start_from_estimate(&self->newest, self->continued.setup.motion, 0, &self->continued.setup.start);
+    self->continued.start_floor = self->newest_floor;
+  }
   status = wm_log_create(&self->log, path, &self->continued, err);
   if (status != WM_OK) self->log.failed = EIO;
   return status;

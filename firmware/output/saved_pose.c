@@ -45,19 +45,19 @@ static const char kLost[] = "lost";
 
 static double finite_or_0(double value) { return isfinite(value) ? value : 0; }
 
-wm_status wm_saved_pose_write(const char *path, const wm_estimate *e, double utc_s, wm_error *err) {
-  char text[640];
+wm_status wm_saved_pose_write(const char *path, const wm_estimate *e, const char *floor, double utc_s, wm_error *err) {
+  char text[720];
   const double *p = e->pose_map_base.p_m, *q = e->pose_map_base.q_xyzw;
-  int length =
-      snprintf(text, sizeof text,
-               "# Where the robot was last; written and read by waymark run.\n"
-               "format: waymark-pose/1\nutc_s: %.3f\n"
-               "pose: {x_m: %.6f, y_m: %.6f, z_m: %.6f, heading_rad: %.9f, qx: %.12f, qy: %.12f, qz: %.12f, "
-               "qw: %.12f, sigma_xy_m: %.6f, sigma_heading_rad: %.6f}\n"
-               "state: %s\nspeed_mps: %.4f\nrate_radps: %.5f\n",
-               utc_s, p[0], p[1], p[2], e->heading_rad, q[0], q[1], q[2], q[3], fmax(sigma_xy(e->covariance), 1e-6),
-               fmax(sigma_heading(e->covariance), 1e-6), wm_saved_pose_is_worth_it(e) ? "known" : kLost,
-               finite_or_0(e->v_mps[0]), finite_or_0(e->w_radps[2]));
+  int length = snprintf(text, sizeof text,
+                        "# Where the robot was last; written and read by waymark run.\n"
+                        "format: waymark-pose/1\nutc_s: %.3f\n"
+                        "pose: {x_m: %.6f, y_m: %.6f, z_m: %.6f, heading_rad: %.9f, qx: %.12f, qy: %.12f, qz: %.12f, "
+                        "qw: %.12f, sigma_xy_m: %.6f, sigma_heading_rad: %.6f}\n"
+                        "state: %s\nspeed_mps: %.4f\nrate_radps: %.5f\n%s%s%s",
+                        utc_s, p[0], p[1], p[2], e->heading_rad, q[0], q[1], q[2], q[3],
+                        fmax(sigma_xy(e->covariance), 1e-6), fmax(sigma_heading(e->covariance), 1e-6),
+                        wm_saved_pose_is_worth_it(e) ? "known" : kLost, finite_or_0(e->v_mps[0]),
+                        finite_or_0(e->w_radps[2]), floor ? "floor: \"" : "", floor ? floor : "", floor ? "\"\n" : "");
   const file_part part = {text, (size_t)length < sizeof text ? (size_t)length : sizeof text - 1};
   return replace_file(path, &part, 1, err);
 }
@@ -68,7 +68,8 @@ static wm_status read_root(const wm_yaml_node *root, wm_saved_pose *out, wm_erro
   char format[64], state[16] = "";
   wm_yaml_node version = wm_yaml_get(root, "format"), utc = wm_yaml_get(root, "utc_s"),
                pose = wm_yaml_get(root, "pose"), speed = wm_yaml_get(root, "speed_mps"),
-               rate = wm_yaml_get(root, "rate_radps"), known = wm_yaml_get(root, "state");
+               rate = wm_yaml_get(root, "rate_radps"), known = wm_yaml_get(root, "state"),
+               floor = wm_yaml_get(root, "floor");
   if (!wm_yaml_is_map(root) || !wm_yaml_there(&version) || !wm_yaml_there(&utc) || !wm_yaml_there(&pose))
     return wm_yaml_fail(root, err, "is not a saved pose (format, utc_s, pose)");
   wm_status status = wm_yaml_string(&version, format, sizeof format, err);
@@ -79,6 +80,8 @@ static wm_status read_root(const wm_yaml_node *root, wm_saved_pose *out, wm_erro
   if (status == WM_OK && wm_yaml_there(&speed)) status = wm_yaml_f64(&speed, -1000, 1000, &out->speed_mps, err);
   if (status == WM_OK && wm_yaml_there(&rate)) status = wm_yaml_f64(&rate, -1000, 1000, &out->rate_radps, err);
   if (status == WM_OK && wm_yaml_there(&known)) status = wm_yaml_string(&known, state, sizeof state, err);
+  out->has_floor = wm_yaml_there(&floor);
+  if (status == WM_OK && out->has_floor) status = wm_yaml_string(&floor, out->floor, sizeof out->floor, err);
   out->is_lost = strcmp(state, kLost) == 0;
   out->start.t_ns = WM_TIME_NONE;
   if (status == WM_OK && !isfinite(out->start.p_m[0] + out->start.p_m[1] + out->start.heading_rad))

@@ -13,11 +13,15 @@ typedef struct wm_saved_pose {
   double utc_s;                  // when it was saved, by this computer's clock at that time
   double speed_mps, rate_radps;  // of base_link at that time, along its x axis and about z
   int is_lost;                   // the pose was lost, or too vague for a start
+  int has_floor;                 // of a building with several
+  char floor[WM_NAME_MAX];       // "": unknown
 } wm_saved_pose;
 
 // Replaces the file atomically (output/replace_file.h), marked as lost where the pose is not worth it. A few ms, on a
-// memory card up to seconds: not on the real-time thread. WM_IO with the reason.
-wm_status wm_saved_pose_write(const char *path, const wm_estimate *pose, double utc_s, wm_error *err);
+// memory card up to seconds: not on the real-time thread. WM_IO with the reason. `floor`: its name, "" where it is not
+// known, NULL where there is one.
+wm_status wm_saved_pose_write(const char *path, const wm_estimate *pose, const char *floor, double utc_s,
+                              wm_error *err);
 // WM_NOT_FOUND: no file. WM_BAD_CONFIG: it can't be read. Allocates.
 wm_status wm_saved_pose_read(const char *path, wm_saved_pose *out, wm_error *err);
 // Whether there is a pose: finite, not searching.

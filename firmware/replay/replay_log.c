@@ -37,6 +37,12 @@ static void assemble(log_replay *self, const wm_config *config, const wm_log_hea
                         .start = head->start,
                         .seed = head->seed};
   wm_config_give_params(config, &a->setup);
+  // Another estimator may know the start's floor alone.
+  if (head->building && wm_carrier_of(config->estimator)) {
+    a->building = head->building;
+    a->start_floor = head->start_floor;
+    wm_building_run(a->building, config->estimator);
+  }
   a->kept = head->kept;
   a->kept_bytes = head->kept_bytes;
   a->map_path = head->map_path;
@@ -85,14 +91,16 @@ static void put(void *context, wm_output_kind kind, const void *record, size_t b
 static wm_status start(log_replay *self, const wm_replay_options *options, wm_error *err) {
   const wm_config *config = self->assembly.config;
   const char *why = NULL;
-  size_t bytes = config->estimator->state_bytes(config->estimator_params, &self->assembly.setup, &why);
+  wm_assembly_follow(&self->assembly);
+  const wm_estimator *estimator = wm_assembly_estimator(&self->assembly);
+  size_t bytes = estimator->state_bytes(config->estimator_params, &self->assembly.setup, &why);
   if (bytes == 0)
     return wm_fail(err, WM_BAD_CONFIG, "%s: estimator '%s' can't work with this log: %s", config->path,
                    config->estimator->name, why ? why : "no reason given");
   wm_arena_need need = {"estimator", bytes, &self->state};
   wm_status status = wm_arena_fill(&self->arena, &need, 1, 0, err);
   if (status != WM_OK) return status;
-  status = config->estimator->init(self->state, config->estimator_params, &self->assembly.setup);
+  status = estimator->init(self->state, config->estimator_params, &self->assembly.setup);
   if (status != WM_OK)
     return wm_fail(err, status, "estimator '%s' can't start: %s", config->estimator->name, wm_status_text(status));
   status = take_kept(self, err);
@@ -101,7 +109,7 @@ static wm_status start(log_replay *self, const wm_replay_options *options, wm_er
   if (status != WM_OK) return status;
   if (self->folder) self->file = wm_run_folder_output(self->folder);
   if (options->watch) self->watch = *options->watch;
-  wm_fuser_init(&self->fuser, config->estimator, self->state, self->assembly.driving, (wm_output){put, self});
+  wm_fuser_init(&self->fuser, estimator, self->state, self->assembly.driving, (wm_output){put, self});
   wm_fuser_watch(&self->fuser, &self->assembly.setup, wm_assembly_observers(&self->assembly));
   return WM_OK;
 }
@@ -125,6 +133,11 @@ static wm_status play(log_replay *self, wm_log_reader *log, const wm_replay_opti
 static void fill_health(const log_replay *self, wm_health *out) {
   wm_fuser_health(&self->fuser, out);
   out->t_ns = self->last_ns;
+  if (self->assembly.building) {
+    out->floor_count = (uint32_t)self->assembly.building->plan.count;
+    (void)snprintf(out->floor_name, sizeof out->floor_name, "%s",
+                   wm_building_floor_name(self->assembly.building, out->floor));
+  }
   out->source_count = (uint32_t)self->assembly.source_count;
   for (uint32_t i = 0; i < out->source_count; i++) {
     wm_source_health *s = &out->sources[i];
@@ -191,6 +204,7 @@ wm_status wm_replay_log(const wm_config *config, wm_log_reader *log, const wm_re
     if (err) *err = close_error;
   }
   wm_arena_close(&self->arena);
+  self->assembly.building = NULL;  // the log's
   wm_assembly_close(&self->assembly);
   free(self);
   return status;

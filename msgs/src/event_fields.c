@@ -51,6 +51,8 @@ static const wm_event_field kSetPose[] = {
     NUMBERS(set_pose, pose_map_base.q_xyzw, 4, 4, -1.001, 1.001), NUMBERS(set_pose, sigma_xy_m, 1, 1, WM_SIGMA_LIMITS),
     NUMBERS(set_pose, sigma_heading_rad, 1, 1, WM_SIGMA_LEAST, WM_HEADING_SIGMA_MOST_RAD)};
 
+static const wm_event_field kSetFloor[] = {WHOLE(set_floor, floor, I32)};
+
 #define HOLDS(rows) rows, sizeof(rows) / sizeof((rows)[0])
 #define HOLDS_NO_FIELDS NULL, 0
 
@@ -74,6 +76,7 @@ static const struct {
     [WM_EVENT_RESET] = {"reset", HOLDS_NO_FIELDS},
     [WM_EVENT_INCREMENT] = {"increment", HOLDS(kIncrement)},
     [WM_EVENT_LOCALIZED] = {"localized", HOLDS(kLocalized)},
+    [WM_EVENT_SET_FLOOR] = {"set_floor", HOLDS(kSetFloor)},
 };
 _Static_assert(sizeof kKinds / sizeof kKinds[0] == WM_EVENT_KIND_COUNT, "a row for each kind");
 

@@ -6,6 +6,7 @@
 #include "lcm_bytes.h"
 #include "waymark/lcm_messages.h"
 #include "waymark_reset_t.h"
+#include "waymark_set_floor_t.h"
 #include "waymark_set_pose_t.h"
 
 static void begin(wm_event *out, unsigned kind, wm_time_ns t_ns) {
@@ -46,6 +47,22 @@ const char *wm_lcm_read_reset(const void *message, size_t length, wm_event *out)
   if (waymark_reset_t_decode(message, 0, given(message, length), &m) < 0) return "is not a reset_t of this version";
   begin(out, WM_EVENT_RESET, m.t_ns);
   return NULL;
+}
+
+const char *wm_lcm_read_set_floor(const void *message, size_t length, char name[WM_NAME_MAX], wm_event *out) {
+  waymark_set_floor_t m;
+  if (waymark_set_floor_t_decode(message, 0, given(message, length), &m) < 0)
+    return "is not a set_floor_t of this version";
+  take_name(name, WM_NAME_MAX, m.floor, sizeof m.floor);
+  begin(out, WM_EVENT_SET_FLOOR, m.t_ns);
+  out->as.set_floor.floor = -1;
+  return NULL;
+}
+
+size_t wm_lcm_set_floor(const char *name, wm_time_ns t_ns, void *out, size_t capacity) {
+  waymark_set_floor_t m = {.t_ns = t_ns};
+  put_name(m.floor, sizeof m.floor, name);
+  return written(waymark_set_floor_t_encode(out, 0, room(capacity), &m));
 }
 
 size_t wm_lcm_set_pose(const wm_set_pose *pose, wm_time_ns t_ns, void *out, size_t capacity) {

@@ -25,7 +25,9 @@ _Static_assert(sizeof(((waymark_health_t *)0)->counters) / sizeof(waymark_counte
                "a place each");
 _Static_assert(WAYMARK_POSE_T_STATUS_JUMPED == WM_PUB_JUMPED &&
                    WAYMARK_POSE_T_STATUS_CAUSE_SHIFT == WM_PUB_CAUSE_SHIFT &&
-                   WAYMARK_POSE_T_STATE_DEGRADED == WM_STATE_DEGRADED && WAYMARK_POSE_T_CAUSE_TURN == WM_CAUSE_TURN &&
+                   WAYMARK_POSE_T_STATE_DEGRADED == WM_STATE_DEGRADED && WAYMARK_POSE_T_CAUSE_FLOOR == WM_CAUSE_FLOOR &&
+                   WAYMARK_POSE_T_STATUS_FLOOR_SHIFT == WM_PUB_FLOOR_SHIFT &&
+                   WAYMARK_POSE_T_STATUS_FLOOR_PERCENT_SHIFT == WM_PUB_FLOOR_PERCENT_SHIFT &&
                    WAYMARK_BOUND_T_UNUSABLE_HEADING == WM_UNUSABLE_HEADING,
                "the messages' numbers are the structs' numbers");
 

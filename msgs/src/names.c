@@ -28,7 +28,8 @@ static const char *const kQuantities[] = {"wheel_ticks_left",
                                           "acceleration_z"};
 static const char *const kStates[] = {"searching", "tracking", "dead_reckoning", "lost", "degraded"};
 static const char *const kCauses[] = {"",           "contradicted",       "refused", "inconsistent", "biased",
-                                      "lost_again", "unknown_identities", "silent",  "off_map",      "turn"};
+                                      "lost_again", "unknown_identities", "silent",  "off_map",      "turn",
+                                      "floor"};
 static const char *const kUnusable[] = {"", "no_pose", "unmonitored", "doubt", "untested", "position", "heading"};
 static const char *const kResiduals[] = {"bearing", "range",      "x",     "y",        "z",
                                          "heading", "standstill", "pixel", "elevation"};

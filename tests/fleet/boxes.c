@@ -32,7 +32,7 @@ static void put(void *context, wm_output_kind kind, const void *record, size_t b
   const wm_published *published = record;
   const wm_time_ns now_ns = published->now.t_ns;
   if (self->first_ns == WM_TIME_NONE) self->first_ns = self->flushed_ns = now_ns;
-  black_box_pose(&self->box, &published->now, now_ns);
+  black_box_pose(&self->box, &published->now, -1, now_ns);
   if (now_ns - self->flushed_ns < WM_NS_PER_S) return;
   self->flushed_ns = now_ns;
   black_box_flush(&self->box);

@@ -32,7 +32,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
   wm_event event;
   if (size == 0) return 0;
   while (wm_stream_names[streams]) streams++;
-  const size_t kind = data[0] % (streams + 3);
+  const size_t kind = data[0] % (streams + 4);
   data++, size--;
   if (kind < streams) {
     read_row(wm_stream_names[kind], data, size);
@@ -40,6 +40,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     if (!wm_lcm_read_sightings(data, size, sensor, &t_ns, sightings, &count)) check(count <= WM_LCM_OBSERVATIONS_MAX);
   } else if (kind == streams + 1) {
     if (!wm_lcm_read_set_pose(data, size, &event)) check(isfinite(event.as.set_pose.pose_map_base.p_m[0]));
+  } else if (kind == streams + 2) {
+    if (!wm_lcm_read_set_floor(data, size, sensor, &event)) check(memchr(sensor, 0, WM_NAME_MAX) != NULL);
   } else {
     if (!wm_lcm_read_reset(data, size, &event)) check(event.kind == WM_EVENT_RESET);
   }

@@ -33,6 +33,7 @@ wm_script_test(run_check_sources COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/che
 wm_script_test(run_frames_of COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/frames_of.py LABELS release-only)
 wm_script_test(run_survey_landmarks COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/survey_landmarks.py LABELS release-only)
 wm_script_test(run_buildings COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/buildings.py 20 LABELS release-only)
+wm_script_test(run_floors COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/floors.py 2 LABELS release-only WAITS COST 20)
 wm_script_test(run_merge_maps COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/merge_maps.py LABELS release-only)
 wm_script_test(run_landmarks_from_pixels COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/landmarks_from_pixels.py LABELS slow release-only)
 wm_script_test(run_office_lost COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/office_lost.py LABELS slow release-only TIMEOUT 1200)

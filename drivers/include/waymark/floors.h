@@ -17,8 +17,6 @@
 extern "C" {
 #endif
 
-#define WM_FLOORS_MAX 64
-#define WM_CONNECTIONS_MAX 256
 #define WM_MAP_VERSION_NAME 17  // bytes: 16 hexadecimal digits, terminated
 
 typedef struct wm_floor {
@@ -37,12 +35,11 @@ typedef struct wm_connection_end {
   double x_m, y_m, heading_rad;
 } wm_connection_end;
 
-typedef enum wm_connection_kind { WM_CONNECTION_LIFT, WM_CONNECTION_RAMP, WM_CONNECTION_DOOR } wm_connection_kind;
-
 // The same place on two floors or more. Its ends give the transform from one floor's axes to another's.
 typedef struct wm_connection {
   char name[WM_NAME_MAX];
   wm_connection_kind kind;
+  double radius_m;  // of the area about an end, in which a robot changes floors
   wm_connection_end ends[WM_FLOORS_MAX];
   int end_count;
   int line;
@@ -68,9 +65,11 @@ wm_status wm_floors_current(const char *folder, wm_floors **out, wm_error *err);
 // Version `name`, likewise.
 wm_status wm_floors_of_version(const char *folder, const char *name, wm_floors **out, wm_error *err);
 
-// A floor as a configuration names it: SITE/FLOOR, or SITE with one floor. Of the current version.
+// A floor as a configuration names it: SITE/FLOOR, or SITE alone. Of the current version.
 typedef struct wm_chosen_floor {
-  wm_floor floor;
+  wm_floor floor;   // the first one where it is unknown
+  wm_floors *site;  // with all floors; NULL: none was chosen. Freed by free()
+  int index;        // of the floor; -1: SITE alone, with several floors
   char version[WM_MAP_VERSION_NAME];
 } wm_chosen_floor;
 wm_status wm_floor_choose(const char *path, wm_chosen_floor *out, wm_error *err);

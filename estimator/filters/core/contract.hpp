@@ -12,7 +12,8 @@
 //  - where it has any: list_counters(wm_counter *, size_t), list_landmarks(), list_particles(), list_hypotheses()
 //
 // `keeper_of<filter, params>()` does so for a filter that keeps its map (waymark/keeper.h): kept_bytes_max(), keep(),
-// why_not_kept(), take_kept().
+// why_not_kept(), take_kept(). `carrier_of<filter>()` for one that changes between floors (waymark/carrier.h): carry(),
+// misfit().
 #ifndef WAYMARK_ESTIMATOR_CONTRACT_HPP
 #define WAYMARK_ESTIMATOR_CONTRACT_HPP
 
@@ -21,6 +22,7 @@
 #include "filters/core/calibration_list.hpp"
 #include "filters/core/counter_list.hpp"
 #include "filters/core/record_list.hpp"
+#include "waymark/carrier.h"
 #include "waymark/estimator.h"
 #include "waymark/keeper.h"
 
@@ -98,6 +100,14 @@ constexpr wm_keeper keeper_of() {
             return filter::why_not_kept(*static_cast<const params *>(p), *setup, image, bytes);
           },
           [](void *state, const void *image, size_t) { static_cast<filter *>(state)->take_kept(image); }};
+}
+
+template <class filter>
+constexpr wm_carrier carrier_of() {
+  return {[](void *to, const void *from, const wm_pose2 *by) {
+            static_cast<filter *>(to)->carry(*static_cast<const filter *>(from), by);
+          },
+          [](const void *state) { return static_cast<const filter *>(state)->misfit(); }};
 }
 
 }  // namespace wm

@@ -139,6 +139,34 @@ void landmark_ekf::begin_at(const localizer_aid::view &at) {
   begin_life(true);
 }
 
+// From another floor's filter. Its landmarks are not here: what of them was buffered, or is a state, stays behind.
+void landmark_ekf::carry(const landmark_ekf &from, const wm_pose2 *by) {
+  const wm_setup *setup = setup_;
+  filter_.take_up(from.filter_, calibration_states_ + localizer_aid::count_states(*setup));
+  aid_.take_up(from.aid_, &filter_);
+  positions_ = from.positions_;
+  localizer_ = from.localizer_;
+  localizer_.release();
+  rollback_ = from.rollback_;
+  life_ = from.life_;
+  first_ = from.first_;
+  inflated_ns_ = from.inflated_ns_;
+  start_tested_ns_ = vague_ns_ = WM_TIME_NONE;
+  misfit_ = 0.0;
+  if (by) {
+    filter_.change_axes(*by);
+    observations_.clear();
+    prior_count_ = 0;
+    start_.close();
+    evidence_.begin(from.evidence_.log_odds());
+    return;
+  }
+  const double xy = square(kUnknownPosition_m);
+  const double covariance[3][3] = {{xy, 0, 0}, {0, xy, 0}, {0, 0, square(kUnknownHeading_rad)}};
+  filter_.set_pose(filter_.pose(), covariance);
+  begin_life(false);
+}
+
 wm_status landmark_ekf::predict(const wm_event &motion) {
   const wm_status status = filter_.check_motion(motion);
   if (status != WM_OK) return status;
@@ -238,3 +266,4 @@ const wm_estimator wm_landmark_ekf_estimator = wm::estimator_of<wm::landmark_ekf
         WM_EVENT_BIT(WM_EVENT_HEADING) | WM_EVENT_BIT(WM_EVENT_LOCALIZED) | WM_EVENT_BIT(WM_EVENT_LOOKED) |
         WM_EVENT_BIT(WM_EVENT_SET_POSE) | WM_EVENT_BIT(WM_EVENT_RESET),
     wm_landmark_ekf_params_table, wm::kReads);
+const wm_carrier wm_landmark_ekf_carrier = wm::carrier_of<wm::landmark_ekf>();

@@ -36,6 +36,8 @@ class landmark_ekf {
   size_t list_counters(wm_counter *out, size_t capacity) const;
   const wm_motion_calibration &motion_calibration() const { return filter_.calibration(); }
   uint32_t motion_health() const { return filter_.motion_health(); }
+  void carry(const landmark_ekf &from, const wm_pose2 *by);
+  double misfit() const { return misfit_; }
 
  private:
   static constexpr int kMaxCalibration =
@@ -123,6 +125,7 @@ class landmark_ekf {
   uint32_t moved_;
   int32_t moved_id_;        // of the last one
   double map_variance_m2_;  // of a place anywhere among the landmarks, each axis
+  double misfit_;           // of the newest sighting, to the map
 };
 
 }  // namespace wm

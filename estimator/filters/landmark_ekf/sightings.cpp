@@ -8,6 +8,17 @@ namespace wm {
 namespace {
 
 constexpr double kWidenEvery_s = 1.0;  // the pose's covariance in doubt; not swept
+// Chi-square beyond which a sighting without identity is surely of no landmark: 10 sigmas. Nearer, the association's
+// gate would decide by chance.
+constexpr double kNowhere = 100.0;
+
+// Of a sighting that is not compared with a landmark; 0: it is.
+double misfit_of(wm_verdict verdict, bool tracking, double nearest) {
+  const double nowhere = landmark_evidence::max_log_bayes_factor();
+  if (verdict == WM_REJECTED_UNKNOWN_ID) return nowhere;  // wherever the robot is on this map
+  if (verdict != WM_REJECTED_NO_ASSOCIATION || !tracking) return 0.0;
+  return nearest > kNowhere ? nowhere : std::nan("");
+}
 
 }  // namespace
 
@@ -23,6 +34,7 @@ wm_status landmark_ekf::fuse_landmark(const wm_event &event, record_list records
   sighting_aid::view at;
   const bool tracking = life_.tracking();
   const wm_verdict verdict = aid_.look(event, filter_, tracking, &at, &record);
+  misfit_ = misfit_of(verdict, tracking, at.nearest);
   if (verdict != WM_FUSED) return reject(records, record, verdict);
   // A tracked pose is not doubted by one marker's heading: that one may have been turned.
   const bool has_heading = finite(at.yaw_rad);
@@ -45,11 +57,9 @@ wm_status landmark_ekf::fuse_landmark(const wm_event &event, record_list records
   const bool usable = !records_[static_cast<size_t>(at.landmark)].moved && !evidence_.biased(at.landmark, event.t_ns);
   const double log_bayes = took(aid_.fuse(at, e, record, policy(usable), &filter_, rows, &count, records));
   if (usable) test_calibration(at, rows, count - has_heading);
-  if (at.reading.bearing)
-    note(event.t_ns, at.landmark, log_bayes, rows[0].innovation,
-         rows[0].innovation / std::sqrt(rows[0].record.variance));
-  else
-    note(event.t_ns, at.landmark, log_bayes);
+  if (usable && tracking) misfit_ = log_bayes;
+  const double off_rad = at.reading.bearing ? rows[0].innovation : std::nan("");
+  note(event.t_ns, at.landmark, log_bayes, off_rad, off_rad / std::sqrt(rows[0].record.variance));
   return WM_OK;
 }
 

@@ -229,6 +229,37 @@ void planar_filter::set_pose(const wm_pose2 &pose, const double covariance[3][3]
   wheels_.restart();
 }
 
+void planar_filter::take_up(const planar_filter &from, int count) {
+  const error_state own = state_;
+  *this = from;
+  state_ = own;
+  state_.take_up(from.state_, count);
+}
+
+void planar_filter::turn_values(int first, const sin_cos &by) {
+  if (first < 0) return;
+  const double x = value(first), y = value(first + 1);
+  set_value(first, by.cos * x - by.sin * y);
+  set_value(first + 1, by.sin * x + by.cos * y);
+}
+
+void planar_filter::change_axes(const wm_pose2 &by) {
+  const sin_cos turn = sincos(by.heading_rad), half = sincos(0.5 * wrap(by.heading_rad));
+  const int velocity = has_velocity() ? motion_state(kVelocityX) : -1;
+  for (const int first : {static_cast<int>(kX), correlated_, velocity}) {
+    turn_values(first, turn);
+    for (int k = 0; k < 2; k++)
+      turn_errors(first, 0.5 * wrap(by.heading_rad));  // half of it: shears of a turn are finite
+  }
+  for (int k = 0; k < 2; k++) noise_.turn(half.sin, half.cos);
+  set_value(kX, value(kX) + by.x_m);
+  set_value(kY, value(kY) + by.y_m);
+  set_value(kHeading, wrap(value(kHeading) + by.heading_rad));
+  if (has_velocity()) heading_rad_ = value(kHeading);
+  twist_heading_rad_ = wrap(twist_heading_rad_ + by.heading_rad);
+  wheels_.restart();
+}
+
 void planar_filter::inflate_pose(double variance_m2, double variance_rad2) {
   planar_motion::inflate_pose(variance_m2, variance_rad2);
   wheels_.restart();

@@ -57,6 +57,10 @@ class planar_filter : public planar_motion {
   void put_adapted(const sparse_row &row, double by[noise_adaption::kBlock]) const;
 
   void set_pose(const wm_pose2 &pose, const double covariance[3][3]);
+  // All of `from` but the states from `count` on, which are this filter's own and become independent.
+  void take_up(const planar_filter &from, int count);
+  // The pose, and what else is on the map's axes, in the axes of another map: `by` is this map in those.
+  void change_axes(const wm_pose2 &by);
   void inflate_pose(double variance_m2, double variance_rad2);
   // Covariance of a mixture: with this probability, the states differ by `off`.
   void add_chance(double probability, const double *off);
@@ -86,6 +90,7 @@ class planar_filter : public planar_motion {
   };
   delayed delay_of(const innovation &of);                   // between the update's solution and its step
   void bend_step(double turn_rad, double x_m, double y_m);  // the place's step (x_m, y_m), beside a turn, along an arc
+  void turn_values(int first, const sin_cos &by);
   void turn_errors(int first, double by_rad);  // of a vector on map's axes, two states from `first` on; not its value
   void turn_delay(const delayed &d, double turn_rad);
   void turn_delay(const delayed &d, double turn_rad, int first, int count);

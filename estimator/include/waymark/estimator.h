@@ -33,6 +33,8 @@ extern const wm_param_table wm_marker_params_table;
 typedef struct wm_localizer_params wm_localizer_params;
 extern const wm_param_table wm_localizer_params_table;
 
+typedef struct wm_floor_plan wm_floor_plan;
+
 // What belongs to a robot and a place. Must live, unchanged, as long as the estimator's state.
 typedef struct wm_setup {
   const wm_motion_params *motion;
@@ -49,7 +51,18 @@ typedef struct wm_setup {
   const wm_raster *map;  // NULL where there is none
   wm_start start;
   uint64_t seed;
+  const wm_floor_plan *floors;  // of a robot that changes between floors; NULL: the map above is its only one
 } wm_setup;
+
+// The floors of a building, for an estimator over several (waymark/carrier.h).
+struct wm_floor_plan {
+  const struct wm_estimator *estimator;  // of each floor
+  const wm_setup *setups;                // a floor each: they differ in landmarks and map alone, and have no `floors`
+  size_t count;                          // at most WM_FLOORS_MAX
+  const wm_floor_end *ends;              // those of one connection stand together
+  size_t end_count;
+  int64_t start;  // floor of the start; -1: unknown. 64 bits: no padding
+};
 
 // A particle: one possible pose.
 typedef struct wm_particle {
@@ -104,6 +117,8 @@ typedef struct wm_estimator {
   // Other poses that explain the observations about as well as the estimate; returns how many there are.
   // NULL where the estimator has none.
   size_t (*hypotheses)(const void *state, wm_hypothesis *out, size_t capacity);
+  // The floor of the estimate, and its probability. NULL where the estimator knows one floor alone.
+  int (*floor)(const void *state, double *probability);
 } wm_estimator;
 
 #define WM_INNOVATIONS_PER_EVENT_MAX 8

@@ -35,11 +35,14 @@ typedef enum wm_event_kind {
   WM_EVENT_RESET,       // start again from the start pose of the setup
   WM_EVENT_INCREMENT,   // motion: how base_link moved from one time to another
   WM_EVENT_LOCALIZED,   // base_link's pose by another localizer
+  WM_EVENT_SET_FLOOR,   // the robot's floor, given by a person or a program
   WM_EVENT_KIND_COUNT
 } wm_event_kind;
 
 #define WM_EVENT_BIT(kind) (UINT32_C(1) << (kind))
 #define WM_TWIST_EVENTS (WM_EVENT_BIT(WM_EVENT_TWIST2) | WM_EVENT_BIT(WM_EVENT_TWIST6))
+#define WM_COMMAND_EVENTS \
+  (WM_EVENT_BIT(WM_EVENT_SET_POSE) | WM_EVENT_BIT(WM_EVENT_RESET) | WM_EVENT_BIT(WM_EVENT_SET_FLOOR))
 #define WM_MOTION_EVENTS (WM_EVENT_BIT(WM_EVENT_QUANTITIES) | WM_TWIST_EVENTS | WM_EVENT_BIT(WM_EVENT_INCREMENT))
 
 // Quantities that CAN signals are bound to (recording-format: can-signals.yaml). SI units, forwards and left positive.
@@ -167,6 +170,11 @@ typedef struct wm_set_pose {
   double sigma_heading_rad;
 } wm_set_pose;
 
+// The pose goes along by the connection between the two floors (docs/building.md).
+typedef struct wm_set_floor {
+  int32_t floor;  // index into the floors of site.yaml
+} wm_set_floor;
+
 typedef struct wm_event {
   wm_time_ns t_ns;        // time of validity
   wm_time_ns arrival_ns;  // time of arrival at this computer
@@ -187,6 +195,7 @@ typedef struct wm_event {
     wm_stereo stereo;
     wm_looked looked;
     wm_set_pose set_pose;
+    wm_set_floor set_floor;
     wm_points points;  // the only large one
   } as;
 } wm_event;

@@ -95,6 +95,10 @@ typedef struct wm_health {
   uint32_t alarm_count;
   wm_alarm alarms[WM_ALARMS_MAX];
   char refused_because[WM_HEALTH_SOURCES_MAX][WM_HEALTH_REASON_MAX];  // of each source's first unusable datum; "": none
+  int32_t floor;                        // of a building with several: its index in site.yaml; -1: there are none
+  uint32_t floor_count;                 // 0: there are none
+  double floor_probability;             // that the robot is there
+  char floor_name[WM_HEALTH_NAME_MAX];  // ""
 } wm_health;
 
 static inline uint32_t wm_health_calibration_count(const wm_health *health) {

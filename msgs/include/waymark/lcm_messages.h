@@ -34,6 +34,8 @@ size_t wm_lcm_refused(const wm_health *health, uint32_t index, void *out, size_t
 // Messages to the robot: NULL and *out (t_ns 0: now; arrival unset), or a text with the fault. Constant cost.
 const char *wm_lcm_read_set_pose(const void *message, size_t length, wm_event *out);
 const char *wm_lcm_read_reset(const void *message, size_t length, wm_event *out);
+// The floor's name; its index is left to the caller.
+const char *wm_lcm_read_set_floor(const void *message, size_t length, char name[WM_NAME_MAX], wm_event *out);
 // `sensor` has room for WM_NAME_MAX bytes, `out` for WM_LCM_OBSERVATIONS_MAX; the caller sets their `sensor`. Bearings
 // are wrapped, sigmas are NaN: the sensor's own. A sighting without bearing and range, or with a number out of its
 // limits, refuses the whole message.
@@ -49,6 +51,7 @@ const char *wm_lcm_read_refused(const void *message, size_t length, char source[
 const char *wm_lcm_read_innovation(const void *message, size_t length, wm_innovation *out);
 // A message to the robot (`t_ns` 0: now).
 size_t wm_lcm_set_pose(const wm_set_pose *pose, wm_time_ns t_ns, void *out, size_t capacity);
+size_t wm_lcm_set_floor(const char *name, wm_time_ns t_ns, void *out, size_t capacity);
 
 size_t wm_lcm_innovation(const wm_innovation *innovation, void *out, size_t capacity);
 

@@ -33,6 +33,7 @@ typedef enum wm_cause {
   WM_CAUSE_SILENT,        // a source gives no observations any more
   WM_CAUSE_OFF_MAP,       // the pose is outside of the map
   WM_CAUSE_TURN,          // the measured turn has another sign or unit than the observations show
+  WM_CAUSE_FLOOR,         // the robot may be on another floor
   WM_CAUSE_COUNT
 } wm_cause;
 
@@ -126,6 +127,17 @@ typedef struct wm_published {
 #define WM_PUB_JUMPED (1u << 2)        // map against odom moved since the last message
 #define WM_PUB_CAUSE_SHIFT 8           // bits 8 to 15: now.cause
 #define WM_PUB_CAUSE(flags) (((flags) >> WM_PUB_CAUSE_SHIFT) & 255u)
+// Bits 16 to 23: the floor, its index in site.yaml plus 1; 0: a robot with one floor. Bits 24 to 30: its probability in
+// percent, rounded down.
+#define WM_PUB_FLOOR_SHIFT 16
+#define WM_PUB_FLOOR_PERCENT_SHIFT 24
+#define WM_PUB_FLOOR(flags) ((int)(((flags) >> WM_PUB_FLOOR_SHIFT) & 255u) - 1)  // -1: there are none
+#define WM_PUB_FLOOR_PERCENT(flags) (((flags) >> WM_PUB_FLOOR_PERCENT_SHIFT) & 127u)
+
+// The floor of a pose where it is known for sure, else -1.
+static inline int wm_published_floor(const wm_published *published) {
+  return WM_PUB_FLOOR_PERCENT(published->status_flags) >= 99 ? WM_PUB_FLOOR(published->status_flags) : -1;
+}
 
 // A calibration state for health and report.
 typedef struct wm_calibration_value {

@@ -113,6 +113,21 @@ typedef struct wm_appearance {
   double yaw_rad;  // direction in the map from its left edge to its right edge, seen from the front
 } wm_appearance;
 
+#define WM_FLOORS_MAX 64
+#define WM_CONNECTIONS_MAX 256
+
+typedef enum wm_connection_kind { WM_CONNECTION_LIFT, WM_CONNECTION_RAMP, WM_CONNECTION_DOOR } wm_connection_kind;
+
+// An end of a connection between floors: the connection's place and direction in the axes of one floor.
+typedef struct wm_floor_end {
+  int32_t floor;       // index
+  int32_t connection;  // number; the ends of one connection are the same place
+  int32_t kind;        // wm_connection_kind
+  int32_t unused;      // no padding
+  double x_m, y_m, heading_rad;
+  double radius_m;  // of the area in which a robot may change floors
+} wm_floor_end;
+
 // Start pose. NaN where unknown.
 typedef struct wm_start {
   wm_time_ns t_ns;  // WM_TIME_NONE: the first motion event

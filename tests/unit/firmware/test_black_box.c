@@ -54,7 +54,7 @@ static void drive(int seconds, wm_state state) {
     wm_estimate pose = {.t_ns = now_ns, .state = (uint8_t)state, .dof = 3};
     pose.pose_map_base.p_m[0] = x_m;
     pose.pose_map_base.q_xyzw[3] = 1;
-    black_box_pose(&box, &pose, now_ns);
+    black_box_pose(&box, &pose, -1, now_ns);
     black_box_event(&box, &event);
     if (i % 10 == 0) black_box_flush(&box);
     x_m += 0.1;

@@ -495,6 +495,7 @@ TEST(test_each_misuse_has_a_status_and_a_text) {
   // Names have no status: "" where there are none.
   const waymark_session *no_session[] = {NULL, closed, (waymark_session *)(void *)opened_log};
   for (size_t i = 0; i < 3; i++) TEST_ASSERT_EQUAL_STRING("", waymark_source_name(no_session[i], 0));
+  for (size_t i = 0; i < 3; i++) TEST_ASSERT_EQUAL_STRING("", waymark_floor_name(no_session[i], 0));
   const waymark_log *no_log[] = {NULL, closed_log, (waymark_log *)(void *)started};
   for (size_t i = 0; i < 3; i++) {
     TEST_ASSERT_EQUAL_STRING("", waymark_log_source_name(no_log[i], 0));

@@ -219,7 +219,7 @@ static void close_source(void) {
 
 static void open_commands(void) {
   lcm = lcm_create("memq://");
-  TEST_ASSERT_EQUAL(WM_OK, lcm_commands_open("memq://", "T_", lcm, &source, &err));
+  TEST_ASSERT_EQUAL(WM_OK, lcm_commands_open("memq://", "T_", NULL, lcm, &source, &err));
 }
 
 static void publish(const char *channel, size_t length) { lcm_publish(lcm, channel, bytes, (unsigned)length); }
@@ -249,6 +249,24 @@ TEST(poses_and_resets_that_are_told_become_events) {
   TEST_ASSERT_EQUAL(WM_EVENT_RESET, event.kind);
   TEST_ASSERT_EQUAL_INT64(before_ns, event.t_ns);
   TEST_ASSERT_EQUAL_UINT32(1, event.seq);
+  close_source();
+}
+
+TEST(a_floor_that_is_told_by_its_name_becomes_an_event) {
+  static wm_floors floors = {.floor_count = 2, .floors = {{.name = "ground"}, {.name = "first"}}};
+  lcm = lcm_create("memq://");
+  TEST_ASSERT_EQUAL(WM_OK, lcm_commands_open("memq://", "T_", &floors, lcm, &source, &err));
+  TEST_ASSERT_TRUE(source->kinds & WM_EVENT_BIT(WM_EVENT_SET_FLOOR));
+  publish("T_SET_FLOOR", wm_lcm_set_floor("first", 0, bytes, sizeof bytes));
+  TEST_ASSERT_EQUAL(WM_OK, source->ops->next(source, &event, &err));
+  TEST_ASSERT_EQUAL(WM_EVENT_SET_FLOOR, event.kind);
+  TEST_ASSERT_EQUAL(1, event.as.set_floor.floor);
+  publish("T_SET_FLOOR", wm_lcm_set_floor("attic", 0, bytes, sizeof bytes));
+  expect_refusal("T_SET_FLOOR: is of a floor that site.yaml does not have");
+  close_source();
+  open_commands();
+  publish("T_SET_FLOOR", wm_lcm_set_floor("first", 0, bytes, sizeof bytes));
+  expect_refusal("T_SET_FLOOR: sets a floor; the configuration has no `site`");
   close_source();
 }
 

@@ -42,7 +42,7 @@ static wm_start start;
 
 // Saves a pose and reads it again.
 static void save(const wm_estimate *e, double utc_s) {
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_saved_pose_write(path, e, utc_s, &err), err.text);
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_saved_pose_write(path, e, NULL, utc_s, &err), err.text);
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_saved_pose_read(path, &saved, &err), err.text);
 }
 
@@ -156,7 +156,7 @@ TEST(a_file_that_is_none_is_refused_with_its_line) {
 
 TEST(where_it_cant_be_written_the_old_one_stays) {
   wm_estimate e = tracking(1, 0.3);
-  TEST_ASSERT_EQUAL(WM_IO, wm_saved_pose_write("/proc/nowhere/pose.yaml", &e, 1, &err));
+  TEST_ASSERT_EQUAL(WM_IO, wm_saved_pose_write("/proc/nowhere/pose.yaml", &e, NULL, 1, &err));
   TEST_ASSERT_NOT_NULL(strstr(err.text, "/proc/nowhere/pose.yaml: can't be written"));
 }
 

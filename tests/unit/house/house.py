@@ -54,6 +54,7 @@ FOLDER_MAY_USE = {
     "filters/relocalize": ["math", "memory", "maps", "sensors", "filters/core"],
     "aid": ["", "math", "memory", "state", "motion", "maps", "sensors", "filters/core", "filters/planar", "filters/relocalize"],
     "filters/edge_mcl": FILTER,
+    "filters/floors": FILTER,
     "filters/landmark_ekf": FILTER,
     "filters/odometry": FILTER,
     "filters/pf_edges": FILTER,

@@ -75,7 +75,8 @@ TEST(fields_cover_their_structs) {
       [WM_EVENT_INCREMENT] = sizeof none->as.increment, [WM_EVENT_SIGHTING] = sizeof none->as.sighting,
       [WM_EVENT_POSITION] = sizeof none->as.position,   [WM_EVENT_HEADING] = sizeof none->as.heading,
       [WM_EVENT_MARKER] = sizeof none->as.marker,       [WM_EVENT_STEREO] = sizeof none->as.stereo,
-      [WM_EVENT_LOOKED] = sizeof none->as.looked,       [WM_EVENT_SET_POSE] = sizeof none->as.set_pose};
+      [WM_EVENT_LOOKED] = sizeof none->as.looked,       [WM_EVENT_SET_POSE] = sizeof none->as.set_pose,
+      [WM_EVENT_SET_FLOOR] = sizeof none->as.set_floor};
   for (unsigned kind = 1; kind < WM_EVENT_KIND_COUNT; kind++) {
     size_t count, covered = 0, widest = 1;
     const wm_event_field *fields = wm_event_fields(kind, &count);

@@ -206,6 +206,18 @@ TEST(a_pose_that_is_set) {
   TEST_ASSERT_NOT_NULL(wm_lcm_read_set_pose(bytes, length - 1, &read));
 }
 
+TEST(a_floor_goes_there_and_back_by_its_name) {
+  char name[WM_NAME_MAX];
+  wm_event read;
+  const size_t length = wm_lcm_set_floor("first floor", 77, bytes, sizeof bytes);
+  TEST_ASSERT_NULL(wm_lcm_read_set_floor(bytes, length, name, &read));
+  TEST_ASSERT_EQUAL_STRING("first floor", name);
+  TEST_ASSERT_EQUAL(WM_EVENT_SET_FLOOR, read.kind);
+  TEST_ASSERT_EQUAL_INT64(77, read.t_ns);
+  TEST_ASSERT_EQUAL(0, wm_lcm_set_floor("first floor", 77, bytes, length - 1));
+  TEST_ASSERT_NOT_NULL(wm_lcm_read_set_floor(bytes, length - 1, name, &read));
+}
+
 static const char *set_pose_with(double sigma_xy_m, double sigma_heading_rad) {
   const wm_set_pose pose = {
       .pose_map_base.q_xyzw = {0, 0, 0, 1}, .sigma_xy_m = sigma_xy_m, .sigma_heading_rad = sigma_heading_rad};

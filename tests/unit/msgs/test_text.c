@@ -47,7 +47,7 @@ static void check_names(const char *(*name)(unsigned), unsigned count, const cha
 TEST(names_have_bounds) {
   check_names(wm_quantity_name, WM_Q_COUNT, "wheel_ticks_left", "acceleration_z");
   check_names(wm_state_name, WM_STATE_COUNT, "searching", "degraded");
-  check_names(wm_cause_name, WM_CAUSE_COUNT, "", "turn");
+  check_names(wm_cause_name, WM_CAUSE_COUNT, "", "floor");
   check_names(wm_residual_name, WM_RESIDUAL_COUNT, "bearing", "elevation");
   check_names(wm_verdict_name, WM_VERDICT_COUNT, "fused", "numeric");
   check_names(wm_counter_name, WM_COUNTER_KIND_COUNT, "landmarks", "explained_permille");

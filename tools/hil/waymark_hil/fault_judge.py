@@ -13,7 +13,7 @@ _AS_BEFORE = 3
 _COUNTED_S = 0.2  # a gap is counted when the next datum comes
 _STAYS_S = 1.0  # a pose is well again when it stays so: one that the search has just found may be doubted by its next picture
 FLAGS = {"motion_stale": 1, "fusion_stale": 2, "jumped": 4}
-CAUSES = ["none", "contradicted", "refused", "inconsistent", "biased", "lost_again", "unknown_identities", "silent", "off_map", "turn"]
+CAUSES = ["none", "contradicted", "refused", "inconsistent", "biased", "lost_again", "unknown_identities", "silent", "off_map", "turn", "floor"]
 
 
 def plain(text):

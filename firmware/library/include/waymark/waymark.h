@@ -130,6 +130,8 @@ wm_status waymark_pose(waymark_session *session, wm_time_ns now_ns, wm_published
 wm_status waymark_bound(waymark_session *session, wm_bound *out, size_t bytes, wm_error *err);
 // Counts of the sources, calibration states, state of the pose. Tens of microseconds.
 wm_status waymark_health(waymark_session *session, wm_health *out, size_t bytes, wm_error *err);
+// A floor of the configuration's site by its index, as in WM_EVENT_SET_FLOOR and WM_PUB_FLOOR; "" beyond.
+const char *waymark_floor_name(const waymark_session *session, uint32_t floor);
 // Name of a source of a wm_innovation or wm_health, "" beyond.
 const char *waymark_source_name(const waymark_session *session, uint32_t source);
 
