@@ -7,9 +7,10 @@
 namespace wm {
 namespace {
 
-constexpr double kNear_m = 0.1;       // floor of a distance that an error across the line of sight is divided by
-constexpr double kBeyondRange = 1.5;  // times the sensor's range; beyond, no landmark is associated
-constexpr double kStepsMost = 0.2;    // share of the counts' steps in a row's noise; not swept
+constexpr double kNear_m = 0.1;        // floor of a distance that an error across the line of sight is divided by
+constexpr double kMountError_m = 1.0;  // of a sensor's place, far more than any
+constexpr double kBeyondRange = 1.5;   // times the sensor's range; beyond, no landmark is associated
+constexpr double kStepsMost = 0.2;     // share of the counts' steps in a row's noise; not swept
 // A landmark in view is seen again within kKept_s: it needs its slot. A robot passes it within kVisit_s, over which its
 // error on the map acts the same way. Not swept.
 constexpr double kKept_s = 3.0, kVisit_s = 10.0;
@@ -218,9 +219,13 @@ int sighting_aid::find_nearest(const planar_filter &filter, const view &at, doub
   int best = -1, fitting = 0;
   double least = params().gate_soft;
   *nearest = HUGE_VAL;
+  // Far landmarks are left out by their plain distance, which costs a hundredth of an expectation.
+  const double lever_m = std::fabs(seen_by.x_m) + std::fabs(seen_by.y_m) + kMountError_m;
+  const double reach_m = kBeyondRange * seen_by.max_range_m + lever_m;
   for (int i = 0; i < static_cast<int>(setup_->landmark_count); i++) {
-    const expected_sighting e =
-        wm::expect(seen_by, errors, at.past.pose, setup_->landmarks[i].p_m, kBearing | kRange | components_);
+    const double *p = setup_->landmarks[i].p_m;
+    if (square(p[0] - at.past.pose.x_m) + square(p[1] - at.past.pose.y_m) > square(reach_m)) continue;
+    const expected_sighting e = wm::expect(seen_by, errors, at.past.pose, p, kBearing | kRange | components_);
     if (!e.possible || e.distance_m > kBeyondRange * seen_by.max_range_m) continue;
     double chi2 = 0.0;
     const auto test = [&](double observed, double expected, const double by[kCauses], double variance, bool angle) {

@@ -381,7 +381,7 @@ int command_check(int argc, char *const *argv) {
   else
     fact("config       %s: estimator by sources and maps\n", words[0]);
   if (config.floor.floor.name[0])
-    fact("floor        %s%s%s\n", config.floor.floor.name,
+    fact("floor        %s%s%s\n", config.floor.index < 0 ? "unknown" : config.floor.floor.name,
          config.floor.version[0] ? ", version " : ", without versions", config.floor.version);
   wm_status status = override_path(config.overrides.landmarks, landmarks, &err);
   if (status == WM_OK) status = override_path(config.overrides.calibration, calibration, &err);

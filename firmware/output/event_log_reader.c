@@ -283,6 +283,8 @@ static wm_status read_head(wm_log_reader *self, wm_error *err) {
   if (!h->config_text || !h->calibration_text || !h->estimator[0] || !self->saw_wheels || !self->saw_start ||
       !self->saw_hash || h->source_count == 0)
     return bad(self, err, "the head lacks configuration, setup or sources");
+  if (h->building && (h->start_floor < -1 || h->start_floor >= (int)h->building->plan.count))
+    return bad(self, err, "the start is on a floor that the head doesn't name");
   if (wm_landmarks_hash(h->landmarks, h->landmark_count) != h->landmark_hash)
     return bad(self, err, "the landmarks don't have the head's hash");
   return WM_OK;

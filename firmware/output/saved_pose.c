@@ -45,8 +45,21 @@ static const char kLost[] = "lost";
 
 static double finite_or_0(double value) { return isfinite(value) ? value : 0; }
 
+// In single quotes, of which YAML doubles one inside.
+static void quote(const char *name, char out[2 * WM_NAME_MAX + 4]) {
+  size_t n = 0;
+  out[n++] = '\'';
+  for (size_t i = 0; i < WM_NAME_MAX && name[i]; i++) {
+    if (name[i] == '\'') out[n++] = '\'';
+    out[n++] = name[i];
+  }
+  out[n++] = '\'';
+  out[n] = '\0';
+}
+
 wm_status wm_saved_pose_write(const char *path, const wm_estimate *e, const char *floor, double utc_s, wm_error *err) {
-  char text[720];
+  char text[720], quoted[2 * WM_NAME_MAX + 4];
+  if (floor) quote(floor, quoted);
   const double *p = e->pose_map_base.p_m, *q = e->pose_map_base.q_xyzw;
   int length = snprintf(text, sizeof text,
                         "# Where the robot was last; written and read by waymark run.\n"
@@ -57,7 +70,7 @@ wm_status wm_saved_pose_write(const char *path, const wm_estimate *e, const char
                         utc_s, p[0], p[1], p[2], e->heading_rad, q[0], q[1], q[2], q[3],
                         fmax(sigma_xy(e->covariance), 1e-6), fmax(sigma_heading(e->covariance), 1e-6),
                         wm_saved_pose_is_worth_it(e) ? "known" : kLost, finite_or_0(e->v_mps[0]),
-                        finite_or_0(e->w_radps[2]), floor ? "floor: \"" : "", floor ? floor : "", floor ? "\"\n" : "");
+                        finite_or_0(e->w_radps[2]), floor ? "floor: " : "", floor ? quoted : "", floor ? "\n" : "");
   const file_part part = {text, (size_t)length < sizeof text ? (size_t)length : sizeof text - 1};
   return replace_file(path, &part, 1, err);
 }

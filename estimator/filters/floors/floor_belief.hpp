@@ -14,8 +14,8 @@ namespace wm {
 
 class floor_belief {
  public:
-  void begin(int count);       // any of so many floors, all as likely
-  void decide(int floor);      // this one
+  void begin(int count);                     // any of so many floors, all as likely
+  void decide(int floor);                    // this one
   void open(int floor, double probability);  // with so much of the others' probability, at least
   void close(int floor);
   bool is_open(int floor) const { return open_ >> floor & 1u; }

@@ -14,11 +14,11 @@ constexpr double kLookEvery_s = 0.1;
 // A ride takes 10 s and more, doors included; a ramp or a door is passed within a second.
 constexpr double kRides_per_s = 0.1, kPasses_per_s = 1.0;
 // Slower, the robot stands in the lift: below the noise of wheels and gyros that stand, above it are no rides.
-constexpr double kStands_mps = 0.05, kStands_radps = 0.05;
+constexpr double kStands_mps = 0.05, kStands_radps = 0.05, kStandsFor_s = 1.0;
 constexpr double kAreaSigmas = 2.0;  // of the place, beside the area's radius
 // A floor in doubt whose filter is contradicted takes up the pose again, so often, while the robot may still change.
 constexpr double kContradicted = 0.01, kRefreshEvery_s = 1.0;
-constexpr double kDecided = 1e-3;  // the others' probability in all, below which they are closed
+constexpr double kDecided = 1e-4;  // the others' probability in all, below which they are closed
 constexpr double kSure = 0.99;     // below, the state is DEGRADED
 constexpr double kClearly = 2.0;   // times as likely as the present floor is another one that becomes it
 // Carried to another floor unnoticed: once in a thousand identities that only another floor has (others are misread);
@@ -26,6 +26,11 @@ constexpr double kClearly = 2.0;   // times as likely as the present floor is an
 constexpr double kCarried = 1e-3, kLostElsewhere = 0.1, kLostFor_s = 2.0;
 
 bool has_place(const wm_estimate &e) { return e.state == WM_STATE_TRACKING || e.state == WM_STATE_DEAD_RECKONING; }
+
+bool stands(const wm_estimate &e) {
+  return std::fabs(e.v_mps[0]) < kStands_mps && std::fabs(e.v_mps[1]) < kStands_mps &&
+         std::fabs(e.w_radps[2]) < kStands_radps;
+}
 
 int64_t key_of(const wm_event &event) {
   const int32_t id = event.kind == WM_EVENT_SIGHTING ? event.as.sighting.landmark_id : event.as.marker.id;
@@ -59,7 +64,7 @@ wm_status floors::init(const void *params, const wm_setup &setup) {
   belief_.begin(count());
   if (plan_->start >= 0) belief_.decide(static_cast<int>(plan_->start));
   here_ = belief_.most_probable();
-  looked_ns_ = lost_ns_ = refreshed_ns_ = WM_TIME_NONE;
+  looked_ns_ = lost_ns_ = stood_ns_ = refreshed_ns_ = WM_TIME_NONE;
   return WM_OK;
 }
 
@@ -107,7 +112,7 @@ wm_status floors::correct(const wm_event &event, wm_innovation *out, size_t capa
 }
 
 // An identity that only other floors have: the robot may have been carried there. Where the floors' axes are known to
-// each other, to the same place: from another one the floor's own filter finds the pose.
+// each other, to the same place, if that fits; else its pose is searched there.
 void floors::open_where_known(const wm_event &event, int32_t id) {
   wm_estimate e;
   std::memset(&e, 0, sizeof e);
@@ -118,10 +123,13 @@ void floors::open_where_known(const wm_event &event, int32_t id) {
     for (size_t k = 0; k < there.landmark_count && !known; k++) known = there.landmarks[k].id == id;
     if (!known || belief_.is_open(i)) continue;
     wm_innovation records[WM_INNOVATIONS_PER_EVENT_MAX];
-    size_t ignored;
+    size_t known_rows = 0;
     carry_along(i, e);
     belief_.open(i, kCarried);
-    (void)inner().correct(state(i), &event, records, WM_INNOVATIONS_PER_EVENT_MAX, &ignored);
+    (void)inner().correct(state(i), &event, records, WM_INNOVATIONS_PER_EVENT_MAX, &known_rows);
+    if (known_rows > 0 && records[0].verdict == WM_FUSED) continue;
+    carry(i, nullptr);  // at another place
+    (void)inner().correct(state(i), &event, records, WM_INNOVATIONS_PER_EVENT_MAX, &known_rows);
   }
 }
 
@@ -161,7 +169,10 @@ void floors::look_around(wm_time_ns t_ns) {
     carry(i, nullptr);
     belief_.open(i, kLostElsewhere / count());
   }
-  const ways from = ways_from(e);
+  if (!stands(e)) stood_ns_ = WM_TIME_NONE;
+  if (stands(e) && stood_ns_ == WM_TIME_NONE) stood_ns_ = t_ns;
+  const bool rides = stood_ns_ != WM_TIME_NONE && wm_seconds_between(stood_ns_, t_ns) > kStandsFor_s;
+  const ways from = ways_from(e, rides);
   if (from.floors != 0) {
     open_ways(from, e, t_ns);
     belief_.change(from.floors, from.rate_per_s, dt_s);
@@ -171,16 +182,14 @@ void floors::look_around(wm_time_ns t_ns) {
   }
 }
 
-floors::ways floors::ways_from(const wm_estimate &e) const {
+floors::ways floors::ways_from(const wm_estimate &e, bool rides) const {
   ways out{};
   if (!has_place(e)) return out;
-  const bool stands = std::fabs(e.v_mps[0]) < kStands_mps && std::fabs(e.v_mps[1]) < kStands_mps &&
-                      std::fabs(e.w_radps[2]) < kStands_radps;
   const double *p = e.pose_map_base.p_m;
   const double sigma_m = std::sqrt(e.covariance[wm_cov_index(0, 0)] + e.covariance[wm_cov_index(1, 1)]);
   for (size_t i = 0; i < plan_->end_count; i++) {
     const wm_floor_end &end = plan_->ends[i];
-    if (end.floor != here_ || (end.kind == WM_CONNECTION_LIFT && !stands)) continue;
+    if (end.floor != here_ || (end.kind == WM_CONNECTION_LIFT && !rides)) continue;
     const double reach_m = end.radius_m + kAreaSigmas * sigma_m;
     if (square(p[0] - end.x_m) + square(p[1] - end.y_m) > square(reach_m)) continue;
     for (size_t k = 0; k < plan_->end_count; k++)
@@ -192,8 +201,7 @@ floors::ways floors::ways_from(const wm_estimate &e) const {
 }
 
 void floors::open_ways(const ways &from, const wm_estimate &e, wm_time_ns t_ns) {
-  const bool refreshes =
-      refreshed_ns_ == WM_TIME_NONE || wm_seconds_between(refreshed_ns_, t_ns) > kRefreshEvery_s;
+  const bool refreshes = refreshed_ns_ == WM_TIME_NONE || wm_seconds_between(refreshed_ns_, t_ns) > kRefreshEvery_s;
   if (refreshes) refreshed_ns_ = t_ns;
   for (int i = 0; i < count(); i++) {
     if (i == here() || !(from.floors >> i & 1u)) continue;
@@ -279,19 +287,19 @@ int wm_floor_way(const wm_floor_plan *plan, int from, int to, double x_m, double
 }
 
 // What the estimator lists of itself is that of the most probable floor.
-#define WM_FORWARD(name, values, ...)                               \
-  if (inner.name)                                                   \
-  out->name = [](const void *state, __VA_ARGS__, size_t capacity) { \
+#define WM_FORWARD(name, values, ...)                                \
+  if (inner.name)                                                    \
+  out->name = [](const void *state, __VA_ARGS__, size_t capacity) {  \
     const wm::floors *self = static_cast<const wm::floors *>(state); \
-    return self->inner().name values;                               \
+    return self->inner().name values;                                \
   }
 static void list_of_present(const wm_estimator &inner, wm_estimator *out) {
-  WM_FORWARD(calibration, (self->state(), at, capacity), wm_calibration_value *at);
-  WM_FORWARD(alarms, (self->state(), at, capacity), wm_alarm *at);
-  WM_FORWARD(counters, (self->state(), at, capacity), wm_counter *at);
-  WM_FORWARD(landmarks, (self->state(), at, covariance, capacity), wm_landmark *at, double (*covariance)[4]);
-  WM_FORWARD(particles, (self->state(), at, capacity), wm_particle *at);
-  WM_FORWARD(hypotheses, (self->state(), at, capacity), wm_hypothesis *at);
+  WM_FORWARD(calibration, (self->state(), at, capacity), wm_calibration_value * at);
+  WM_FORWARD(alarms, (self->state(), at, capacity), wm_alarm * at);
+  WM_FORWARD(counters, (self->state(), at, capacity), wm_counter * at);
+  WM_FORWARD(landmarks, (self->state(), at, covariance, capacity), wm_landmark * at, double(*covariance)[4]);
+  WM_FORWARD(particles, (self->state(), at, capacity), wm_particle * at);
+  WM_FORWARD(hypotheses, (self->state(), at, capacity), wm_hypothesis * at);
 }
 #undef WM_FORWARD
 

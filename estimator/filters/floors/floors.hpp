@@ -36,7 +36,7 @@ class floors {
   wm_status set_floor(const wm_event &event);
   wm_status take_pose(const wm_event &event);
   void look_around(wm_time_ns t_ns);
-  ways ways_from(const wm_estimate &e) const;
+  ways ways_from(const wm_estimate &e, bool rides) const;
   void open_ways(const ways &from, const wm_estimate &e, wm_time_ns t_ns);
   void open_where_known(const wm_event &event, int32_t id);
   void weigh(const wm_event &event);
@@ -47,7 +47,7 @@ class floors {
   relative_array<uint8_t> state_[WM_FLOORS_MAX];
   floor_belief belief_;
   int64_t here_;  // 64 bits: no padding
-  wm_time_ns looked_ns_, lost_ns_, refreshed_ns_;
+  wm_time_ns looked_ns_, lost_ns_, stood_ns_, refreshed_ns_;
 };
 
 }  // namespace wm

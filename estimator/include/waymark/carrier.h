@@ -16,16 +16,16 @@ typedef struct wm_carrier {
   // in those of to's, by which the pose and its covariance go along; NULL: the robot may be anywhere on to's map. No
   // longer than a few corrections.
   void (*carry)(void *to, const void *from, const wm_pose2 *by);
-  // Log Bayes factor of the newest sighting or marker, "anywhere" against "as expected of this pose on this map", nats. 0: it
-  // shows nothing of the floor. NaN: whether it fits can't be told, and it is not compared.
+  // Log Bayes factor of the newest sighting or marker, "anywhere" against "as expected of this pose on this map", nats.
+  // 0: it shows nothing of the floor. NaN: whether it fits can't be told, and it is not compared.
   double (*misfit)(const void *state);
 } wm_carrier;
 
 // NULL: the estimator has one floor.
 const wm_carrier *wm_carrier_of(const wm_estimator *estimator);
 
-// Makes *out the estimator over floors that runs `inner`, of which there is a carrier, for each: setup->floors has them.
-// It takes WM_EVENT_SET_FLOOR, too. docs/building.md has how it finds the floor.
+// Makes *out the estimator over floors that runs `inner`, of which there is a carrier, for each: setup->floors has
+// them. It takes WM_EVENT_SET_FLOOR, too. docs/building.md has how it finds the floor.
 void wm_estimator_over_floors(const wm_estimator *inner, wm_estimator *out);
 
 // The axes of floor `from`, in those of floor `to`, by the connection with an end nearest to (x_m, y_m) on `from`. 0:

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // A robot on two floors that look alike but for a tag each, and a lift between them: the pose goes along when the floor
 // changes, and the floor is in doubt until something shows it.
+#include "common/suite.h"
 #include "events.hpp"
 #include "math/arc.hpp"
-#include "common/suite.h"
 #include "waymark/carrier.h"
 
 namespace {
@@ -110,8 +110,7 @@ TEST(the_pose_and_its_covariance_go_along) {
     for (int k = 0; k < 3; k++) {
       double expected = 0;
       for (int m = 0; m < 3; m++)
-        for (int n = 0; n < 3; n++)
-          expected += turn[i][m] * before.covariance[wm_cov_index(at[m], at[n])] * turn[k][n];
+        for (int n = 0; n < 3; n++) expected += turn[i][m] * before.covariance[wm_cov_index(at[m], at[n])] * turn[k][n];
       TEST_ASSERT_DOUBLE_WITHIN(1e-12, expected, after.covariance[wm_cov_index(at[i], at[k])]);
     }
   TEST_ASSERT_EQUAL(before.resets, after.resets);

@@ -63,6 +63,19 @@ TEST(a_pose_is_there_again) {
   TEST_ASSERT_FALSE(wm_saved_pose_start(&saved, 2700, 600, 0, 0, motion, &start));
 }
 
+TEST(the_floor_of_a_pose_is_there_again) {
+  const wm_estimate e = tracking(1, 0.1);
+  const char *const floors[] = {"first", "", "the cook's \"own\""};
+  save(&e, 1);
+  TEST_ASSERT_FALSE(saved.has_floor);
+  for (size_t i = 0; i < sizeof floors / sizeof floors[0]; i++) {
+    TEST_ASSERT_EQUAL(WM_OK, wm_saved_pose_write(path, &e, floors[i], 1, &err));
+    TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_saved_pose_read(path, &saved, &err), err.text);
+    TEST_ASSERT_TRUE(saved.has_floor);
+    TEST_ASSERT_EQUAL_STRING(floors[i], saved.floor);
+  }
+}
+
 // Killed while it drove: it is where it would be by now, as far off as it may have driven. An hour later it stands.
 TEST(a_pose_that_was_moving_goes_on) {
   wm_estimate e = tracking(10, 0.3);
