@@ -4,6 +4,7 @@
 #ifndef WAYMARK_FUSION_BUILDING_H
 #define WAYMARK_FUSION_BUILDING_H
 
+#include "rt/realtime.h"
 #include "waymark/carrier.h"
 #include "waymark/floors.h"
 
@@ -38,7 +39,7 @@ void wm_building_follow(wm_building *self, wm_setup *setup, int start);
 int wm_building_has_same_axes(const wm_building *self);
 // Index of the floor of this name; -1: there is none. "" beyond the last one.
 int wm_building_find(const wm_building *self, const char *name);
-const char *wm_building_floor_name(const wm_building *self, int floor);
+WM_REALTIME const char *wm_building_floor_name(const wm_building *self, int floor);
 void wm_building_close(wm_building *self);  // NULL is fine
 
 #endif
