@@ -6,7 +6,7 @@
 
 In it are the package and the shared libraries that its programs are linked with, of the Debian in ROOT (default: this computer's), with
 their licences, and nothing else: no shell, no package manager. It runs as user 65532 (waymark). /var/lib/dpkg/status.d names the packages
-that the files are of, for scanners. The same packages give the same bytes; their time is SOURCE_DATE_EPOCH. config/compose.yaml runs it."""
+that the files are of, for scanners. The same packages give the same bytes; their time is SOURCE_DATE_EPOCH. compose.yaml beside it runs it."""
 import argparse
 import gzip
 import hashlib

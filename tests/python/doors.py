@@ -16,8 +16,8 @@ from pathlib import Path
 
 import cantools
 import numpy as np
-from door_drives import (AFFINE, CX, CY, DEGREE, EDGE_M, FX, FY, OCAM, T0, TAGS, Way, corner_rows, distance, double_sphere,
-                         equidistant, floor_picture, hall, mei, ocam, off, on_earth, plain, rational, replay, run, table, turn, turned_by, wrapped,
+from door_drives import (AFFINE, CX, CY, DEGREE, EDGE_M, FX, FY, LONG, OCAM, T0, TAGS, Way, corner_rows, distance,
+                         double_sphere, equidistant, floor_picture, hall, mei, ocam, off, on_earth, plain, rational, replay, run, table, turn, turned_by, wrapped,
                          write)
 from evo.tools.file_interface import read_tum_trajectory_file
 from PIL import Image
@@ -265,7 +265,7 @@ def imported_lens(name, lens, text):
     door(f"`calibrate import`: {name}", "its numbers in its order; the nearest of our models where it has another")(measured)
 
 
-K = f"[{FX}, 0., {CX}, 0., {FY}, {CY}, 0., 0., 1.]"
+K = f"[{LONG * FX}, 0., {CX}, 0., {LONG * FY}, {CY}, 0., 0., 1.]"
 imported_lens("OpenCV, eight coefficients", rational, "%YAML:1.0\n---\nimage_width: 640\nimage_height: 480\ncamera_matrix: !!opencv-matrix\n   rows: 3\n"
               f"   cols: 3\n   dt: d\n   data: {K}\ndistortion_coefficients: !!opencv-matrix\n   rows: 8\n   cols: 1\n   dt: d\n"
               "   data: [0.31, 0.12, 0.001, -0.002, 0.01, 0.62, 0.21, 0.03]\n")
