@@ -467,15 +467,15 @@ wm_status wm_camera_device_open(const wm_camera_device_config *config, const wm_
                                 wm_warn_fn warn, void *context, wm_camera_device **out, wm_error *err) {
   *out = NULL;
   const camera_io *io = config->libcamera[0] || config->gst[0] ? &kCameraProcess : &kV4l2;
-  static char by_libcamera[] = CAMERA_BY_LIBCAMERA, by_gstreamer[] = CAMERA_BY_GSTREAMER;
+  const char *program = config->gst[0] ? CAMERA_BY_GSTREAMER : CAMERA_BY_LIBCAMERA;
   if (config->libcamera[0] && !wm_camera_has_libcamera())
     return wm_fail(err, WM_BAD_CONFIG, "camera %s: " WM_WITHOUT_LIBCAMERA, config->name);
-  if (config->gst[0] && !camera_process_is_there(by_gstreamer))
+  if (config->gst[0] && !camera_process_is_there(program))
     return wm_fail(
         err, WM_BAD_CONFIG,
         "camera %s: gst: the program waymark-gst is missing: install the package waymark-gst, or build where "
         "libgstreamer-plugins-base1.0-dev is installed",
         config->name);
-  return camera_device_make(config, camera, index, warn, context, io, config->gst[0] ? by_gstreamer : by_libcamera, out,
-                            err);
+  // A process only reads its context.
+  return camera_device_make(config, camera, index, warn, context, io, (void *)program, out, err);
 }
