@@ -286,7 +286,7 @@ WITHOUT = {
                                  "verdict.Checks.add",
     },
     "waymark_fleet": {
-        "starts programs": "cell.* incidents.* wmlog.*",
+        "starts programs with drives that it draws, and shows what they measured": "bench.* bench_drives.* cell.* incidents.* wmlog.*",
         "a grid of what is drawn, which is finite": "html.round_steps",
         "files, names and text": "sums.* plan.* html.style html.escape html.page html.section html.tiles html.table mine_page.* compare_page.*",
         "whole batches, out of the functions that have a case": "batch.* compare.* mine.* comparison.load comparison.pairs_of comparison.name_of comparison.difference comparison.worst",
