@@ -80,7 +80,7 @@ static void write_building(wm_log_writer *self, const wm_assembly *assembly) {
     wm_put_f64s(&w, numbers, 4);
     write_record(self, WM_LOG_FLOOR_END, bytes, w.used);
   }
-  write_u64(self, WM_LOG_START_FLOOR, (uint64_t)(assembly->start_floor + 1));
+  write_u64(self, WM_LOG_START_FLOOR, (uint64_t)((int64_t)assembly->start_floor + 1));
 }
 
 static void write_sources(wm_log_writer *self, const wm_assembly *assembly) {
