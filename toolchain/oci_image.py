@@ -20,7 +20,7 @@ import sys
 import tarfile
 import tempfile
 
-USER = 65532  # nobody's on Debian, and what other images without a shell take
+USER = 65532  # no user of Debian has it; other images without a shell use it, too
 TRIPLETS = {"amd64": "x86_64-linux-gnu", "arm64": "aarch64-linux-gnu", "armhf": "arm-linux-gnueabihf"}
 # Loaded by name while libcamera runs; there where the package has waymark-camera.
 LIBCAMERA = "libcamera"

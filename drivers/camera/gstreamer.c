@@ -230,7 +230,7 @@ static int hand_out(gst_camera *self, GstSample *sample, camera_buffer *out) {
       .index = index, .sequence = (uint32_t)GST_BUFFER_OFFSET(buffer), .stamp_ns = stamp_of(self, sample, buffer)};
   if (index == CAMERA_BUFFERS_MAX || !map(self, &self->taken[index], buffer, out)) {
     gst_sample_unref(sample);
-    return index == CAMERA_BUFFERS_MAX ? -EBUSY : -ENODEV;  // opened again, it tells its mode anew
+    return index == CAMERA_BUFFERS_MAX ? -EBUSY : -ENODEV;  // its mode changed: it has to be opened again
   }
   if (GST_BUFFER_FLAG_IS_SET(buffer, GST_BUFFER_FLAG_CORRUPTED)) out->flags |= CAMERA_BUFFER_ERROR;
   self->taken[index].sample = sample;

@@ -75,7 +75,7 @@ uint32_t wm_fuser_floor_flags(const wm_fuser *self) {
   return ((floor + 1) << WM_PUB_FLOOR_SHIFT) | ((uint32_t)(100.0 * probability) << WM_PUB_FLOOR_PERCENT_SHIFT);
 }
 
-// Another floor has another map, and what was monitored on the one before says nothing of it.
+// Another floor has another map: statistics of the one before do not hold there.
 static void follow_floor(wm_fuser *self) {
   double probability;
   if (!self->floors) return;

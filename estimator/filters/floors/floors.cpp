@@ -152,7 +152,7 @@ void floors::choose() {
   if (belief_.probability(best) > kClearly * belief_.probability(here())) here_ = best;
 }
 
-// Once in kLookEvery_s: what the pose says of the floor.
+// Once in kLookEvery_s: opens the floors to which the pose allows a change, or decides for the present one.
 void floors::look_around(wm_time_ns t_ns) {
   const double dt_s = looked_ns_ == WM_TIME_NONE ? 0.0 : wm_seconds_between(looked_ns_, t_ns);
   if (looked_ns_ != WM_TIME_NONE && dt_s < kLookEvery_s) return;

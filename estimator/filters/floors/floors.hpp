@@ -32,7 +32,6 @@ class floors {
   void *state(int floor) { return state_[floor].get(); }
   void carry(int to, const wm_pose2 *by);
   void carry_along(int to, const wm_estimate &e);
-  void carry_others();
   wm_status set_floor(const wm_event &event);
   wm_status take_pose(const wm_event &event);
   void look_around(wm_time_ns t_ns);

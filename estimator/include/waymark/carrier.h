@@ -17,7 +17,7 @@ typedef struct wm_carrier {
   // longer than a few corrections.
   void (*carry)(void *to, const void *from, const wm_pose2 *by);
   // Log Bayes factor of the newest sighting or marker, "anywhere" against "as expected of this pose on this map", nats.
-  // 0: it shows nothing of the floor. NaN: whether it fits can't be told, and it is not compared.
+  // 0: no evidence of the floor. NaN: the fit is unknown, and the observation is not compared.
   double (*misfit)(const void *state);
 } wm_carrier;
 

@@ -136,8 +136,8 @@ TEST(errors_and_another_try) {
   TEST_ASSERT_EQUAL(-EINVAL, open_pipeline("", -1));
   TEST_ASSERT_EQUAL(-ENODEV, open_pipeline("filesrc location=/nowhere/video.avi ! avidemux", -1));
   shut();
-  TEST_ASSERT_EQUAL(-ENODEV,
-                    open_pipeline("videotestsrc ! video/x-raw,format=RGB16," SIZE, -1));  // a format that nobody reads
+  TEST_ASSERT_EQUAL(
+      -ENODEV, open_pipeline("videotestsrc ! video/x-raw,format=RGB16," SIZE, -1));  // a format that is not supported
   shut();
   for (int i = 0; i < 3; i++) {
     TEST_ASSERT_EQUAL(0, open_pipeline("videotestsrc is-live=true ! video/x-raw,format=GRAY8," SIZE, -1));
