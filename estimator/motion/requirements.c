@@ -17,7 +17,7 @@ static int counts_ticks(const wm_wheels *wheels, uint32_t quantities) {
 }
 
 static const char *ticks_lack(const wm_wheels *wheels, uint32_t quantities) {
-  if ((quantities & BOTH_TICKS) != BOTH_TICKS) return "wheel_ticks_left and wheel_ticks_right over CAN";
+  if ((quantities & BOTH_TICKS) != BOTH_TICKS) return "both wheels' ticks (ticks.csv; over CAN wheel_ticks_left and wheel_ticks_right)";
   if (!counts_ticks(wheels, quantities)) return "wheels.radius_m and wheels.ticks_per_turn in calibration.yaml";
   return isfinite(wheels->track_m) ? NULL : "wheels.track_m in calibration.yaml";
 }
@@ -26,11 +26,11 @@ static const char *speed_lacks(const wm_wheels *wheels, uint32_t kinds, uint32_t
   if ((kinds & WM_TWIST_EVENTS) && (quantities & BIT(WM_Q_YAW_RATE))) return NULL;
   if ((quantities & SPEEDS) || counts_ticks(wheels, quantities)) return NULL;
   if ((quantities & BOTH_TICKS) == BOTH_TICKS) return "wheels.radius_m and wheels.ticks_per_turn in calibration.yaml";
-  return "a speed over CAN (wheel_speed_..., vehicle_speed or both wheels' ticks)";
+  return "a speed (motion.csv, speeds.csv, ticks.csv; over CAN wheel_speed_..., vehicle_speed or both wheels' ticks)";
 }
 
 static const char *steering_lacks(const wm_wheels *wheels, uint32_t quantities) {
-  if (!(quantities & STEERING)) return "steering over CAN (road_wheel, steering_wheel or steering_actuator)";
+  if (!(quantities & STEERING)) return "steering (steering.csv; over CAN road_wheel, steering_wheel or steering_actuator)";
   if (!isfinite(wheels->wheelbase_m)) return "wheels.wheelbase_m in calibration.yaml";
   if (quantities & BIT(WM_Q_ROAD_WHEEL)) return NULL;
   if ((quantities & BIT(WM_Q_STEERING_ACTUATOR)) && wheels->steering_table_count >= 2) return NULL;
@@ -45,7 +45,7 @@ static const char *model_lacks(int model, const wm_wheels *wheels, uint32_t kind
     case WM_MOTION_TICKS: return ticks_lack(wheels, quantities);
     case WM_MOTION_SPEED_YAW_RATE:
       lacks = speed_lacks(wheels, kinds, quantities);
-      return lacks || quantities & BIT(WM_Q_YAW_RATE) ? lacks : "yaw_rate over CAN";
+      return lacks || quantities & BIT(WM_Q_YAW_RATE) ? lacks : "a turn rate (imu.csv; over CAN yaw_rate)";
     case WM_MOTION_ACKERMANN:
       lacks = speed_lacks(wheels, kinds, quantities);
       return lacks ? lacks : steering_lacks(wheels, quantities);

@@ -200,6 +200,19 @@ def stuck(table, since_s):
     return "\n".join(",".join(row) for row in [head, *rows[:last], *([row[0], *rows[last][1:]] for row in rows[last:])]) + "\n"
 
 
+def cut_off(table, at_s):
+    """A table without its first seconds; below 0: without its last ones."""
+    head, *rows = table.splitlines()
+    first, last = (ns(at_s), ns(SECONDS)) if at_s > 0 else (0, ns(SECONDS + at_s))
+    return "\n".join([head, *(row for row in rows if first <= int(row.partition(",")[0]) <= last)]) + "\n"
+
+
+def shifted(table, by_s):
+    """A table whose stamps are later by so much."""
+    head, *rows = table.splitlines()
+    return "\n".join([head, *(f"{int(stamp) + round(by_s * 1e9)},{rest}" for stamp, _, rest in (row.partition(",") for row in rows))]) + "\n"
+
+
 def cut(table, share=(0.3, 0.6)):
     """A table whose parts change places: the first one stands between the others."""
     head, *rows = table.splitlines()
@@ -347,6 +360,7 @@ FAULTS = [
     ("rows in the order of another column", both(imu_csv="\n".join([imu().splitlines()[0], *sorted(imu().splitlines()[1:], key=lambda row: row.split(",")[3])]) + "\n"), ("bad", "rows-disordered", "imu"), "older", "sort the rows by t_ns"),
     ("gyro of another clock", both(imu_csv=imu(stamp=lambda t: ns(t) + 3600 * 10**9)), ("bad", "clocks-apart", "imu"), "3600.000 s after", "difference"),
     ("gyro of the time since boot", both(imu_csv=imu(stamp=lambda t: round((t + 85) * 1e9))), ("bad", "clocks-apart", "imu"), "don't overlap", "one clock"),
+    *[(f"positions {abs(by)} s too {word}", {"motion.csv": motion(), "gnss.csv": shifted(gnss(sigma=1, stated=1), by), **EKF}, ("bad", "clocks-apart", "gnss"), f"it begins {abs(by):.2f} s", "one clock") for by, word in ((2.5, "late"), (-4.0, "early"))],
     ("stamps of whole seconds", both(motion_csv=motion(stamp=grid(1.0))), ("bad", "clock-coarse", "motion"), "have the stamp of the one before", "grid of about 1 s"),
     ("stamps of 16 ms at 200 Hz", both(imu_csv=imu(200, stamp=grid(0.016))), ("bad", "clock-coarse", "imu"), "have the stamp", "0.016 s"),
     ("stamps of 10 ms at 200 Hz", both(imu_csv=imu(200, stamp=grid(0.01))), ("note", "clock-coarse", "imu"), "have the stamp", "0.01 s"),
@@ -382,6 +396,7 @@ RIGHT = [
     ("sightings of posts on the map", sighted()),
     ("positions at one speed, the antenna's place unknown", {"motion.csv": motion(steady=True), "gnss.csv": gnss(sigma=0.03, steady=True), "heading.csv": headings(), "recording.yaml": RECORDING.format("motion.csv, gnss.csv, heading.csv").split("vehicle:")[0], "config.yaml": "format: waymark-config/1\nestimator: landmark_ekf\n"}, "not-observable"),
     ("bearings alone in a map of its own", mapped(), "not-observable"),
+    ("positions from 4 s on, and 1.5 s longer than the motion", {"motion.csv": cut_off(motion(), -1.5), "gnss.csv": cut_off(gnss(), 4), **EKF}, "not-observable"),
     ("a compass as a landmark far in the north", sighted() | {"landmarks.csv": "id,x_m,y_m,z_m,sigma_m\n1000000,0,1e7,0,1\n", "sightings.csv": "t_ns,sensor,id,bearing_rad\n" + "".join(
         f"{ns(k / 5)},eye,1000000,{math.pi / 2 - heading_at[20 * k]:.5f}\n" for k in range(99))}),
     ("bearings in a map that is given", mapped() | {"landmarks.csv": sighted()["landmarks.csv"]}),

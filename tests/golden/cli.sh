@@ -98,8 +98,8 @@ expect 1 "motion.csv:2: t_ns: '0.5' is not a whole number" replay "$work/halves"
 
 # A model whose input the recording doesn't have is refused, not silently left without motion.
 sed 's/^estimator.*/&\nmotion: {model: speed_yaw_rate}/' "$work/good.yaml" >"$work/model.yaml"
-expect 2 "it needs a speed over CAN" replay "$work/rec" --config "$work/model.yaml" --out "$work/out"
-expect 2 "it needs a speed over CAN" check "$work/model.yaml" "$work/rec"
+expect 2 "it needs a speed (motion.csv" replay "$work/rec" --config "$work/model.yaml" --out "$work/out"
+expect 2 "it needs a speed (motion.csv" check "$work/model.yaml" "$work/rec"
 
 # Without a start pose, odometry finds none: that is said, and the tables have their heads.
 mkdir "$work/lost"

@@ -116,6 +116,12 @@ class Rows(unittest.TestCase):
             return [row.is_fact for name, row in self.rows_of(imu=turns, ticks=self.ticks(range(9))).items() if name == "order of imu"]
         self.assertEqual((stamped([*range(20, 40), *range(20)]), stamped([0, 2, 1, 3, 4])), ([True], []))
 
+    def test_a_source_that_begins_and_ends_later_by_as_much_is_a_fact(self):
+        def late(begin_s, end_s):
+            rows = self.rows_of(ticks=self.ticks(range(1000)), gnss=["t_ns,x_m,y_m,z_m,sigma_xy_m,sigma_z_m", *(f"{round((1 + s) * 1e9)},0,0,0,1,1" for s in np.arange(begin_s, 10 + end_s, 0.1))])
+            return [round(row.start[0][0], 1) for name, row in rows.items() if name == "clock of gnss" and row.is_fact]
+        self.assertEqual((late(2, 2), late(-3, -3), late(2, 0), late(2, 3), late(0.5, 0.5)), ([-2.0], [3.0], [], [], []))
+
     def test_counters_of_fewer_bits_are_a_fact_and_a_restart_is_none(self):
         counters = [name for name in self.rows_of(ticks=self.ticks(20 * k % 256 for k in range(60))) if name.startswith("counters")]
         self.assertEqual(counters, ["counters of 8 bits"])

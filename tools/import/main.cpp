@@ -84,7 +84,11 @@ bool is_value(const char *before) {
   return option.substr(0, 2) == "--" && option != "--as-is" && option.find('=') == std::string_view::npos;
 }
 
+// The program beside this one, else that of the path.
 int run_bag_import(char **argv) {
+  std::error_code ignored;
+  const auto self = std::filesystem::read_symlink("/proc/self/exe", ignored);
+  (void)execv((self.parent_path() / "waymark-import-bag").c_str(), argv);
   (void)execvp("waymark-import-bag", argv);
   (void)std::fprintf(stderr,
                      "waymark import: bags are read by the Python package, and there is no program waymark-import-bag; "
@@ -99,10 +103,10 @@ int main(int argc, char **argv) {
     if (!is_value(argv[i - 1]) && is_bag(argv[i])) return run_bag_import(argv);
   wm::tools::ImportWish wish;
   wm::cli::App app(
-      "Makes a video of any kind (H.264 and others, by libav) into what a recording holds: MJPEG in AVI, with its "
-      "stamps.",
+      "Makes a recording of a bag (ROS 1, ROS 2, MCAP), or a video of any kind (H.264 and others) part of one: MJPEG in "
+      "AVI, with its stamps.",
       "waymark import");
-  app.add_option("VIDEO", wish.video, "the video")->required();
+  app.add_option("INPUT", wish.video, "the bag or the video")->required();
   app.add_option("--out", wish.out, "folder of the recording: video/CAMERA.avi and .csv are written there")->required();
   app.add_option("--camera", wish.camera, "the camera's name")->default_val("front");
   app.add_option(
@@ -113,8 +117,10 @@ int main(int argc, char **argv) {
   app.add_option("--quality", wish.quality, "of the JPEGs")->check(wm::cli::range(1, 100))->capture_default_str();
   app.footer(
       "Pictures become grey, which is what the robot reads.\n"
-      "A ROS bag or an MCAP file becomes a whole recording (docs/stack.md): waymark import BAG --out FOLDER\n"
+      "The options, but --out, are of a video; those of a bag: waymark import BAG --help\n"
       "Exit code: 0 done, 1 the work failed, 2 usage.\n"
-      "Example: waymark import phone.mp4 --camera front --out recordings/drive");
+      "Examples:\n"
+      "  waymark import drive.mcap --out recordings/drive\n"
+      "  waymark import phone.mp4 --camera front --out recordings/drive");
   return wm::tools::run_program(app, argc, argv, [&] { return run(wish); });
 }

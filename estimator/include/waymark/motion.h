@@ -35,7 +35,7 @@ extern const wm_param_table wm_motion_params_table;
 const char *wm_motion_params_clash(const wm_motion_params *params, const char **key);
 
 // Data that the chosen model needs and the sources (`kinds`: WM_EVENT_BIT; `quantities`: a bit per wm_quantity) or the
-// wheels' calibration do not have, as a text ("yaw_rate over CAN"); NULL: none. `auto` needs data only where no model
+// wheels' calibration do not have, as a text ("increments.csv"); NULL: none. `auto` needs data only where no model
 // is possible. Constant cost.
 const char *wm_motion_lacks(const wm_motion_params *params, const wm_wheels *wheels, uint32_t kinds,
                             uint32_t quantities);

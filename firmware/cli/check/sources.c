@@ -214,6 +214,38 @@ static void silent_at_an_end(const char *name, const source_facts *facts, const 
           ->size = silent_s[end];
 }
 
+static int is_motion(const wm_assembled_source *s) { return (s->kinds & WM_MOTION_EVENTS) != 0; }
+
+// A recorder begins and ends its streams together. One that begins and ends later than the motion, or earlier, by as
+// much is of a clock that is off by that: by a second at least, and known to a tenth by its rate. Of two motions turns
+// show it.
+#define SHIFT_MIN_S 1.0
+#define SHIFT_ALIKE 0.1
+
+static double period_s(const source_facts *facts) {
+  if (facts->stamps < 2) return (double)INFINITY;
+  return wm_seconds_between(facts->first_ns, facts->last_ns) / (double)(facts->stamps - 1);
+}
+
+static int shifted_as_a_whole(const char *name, const source_facts *facts, const source_facts *motion,
+                              wm_findings *out) {
+  const double begins_s = wm_seconds_between(motion->first_ns, facts->first_ns);
+  const double ends_s = wm_seconds_between(motion->last_ns, facts->last_ns), shift_s = (begins_s + ends_s) / 2;
+  const double known_s = SHIFT_ALIKE * fabs(shift_s);
+  if (fmin(fabs(begins_s), fabs(ends_s)) < SHIFT_MIN_S || !(fabs(begins_s - ends_s) <= known_s) ||
+      facts->events < EVENTS_MIN || fmax(period_s(facts), period_s(motion)) > known_s)
+    return 0;
+  char mend[160];
+  (void)snprintf(mend, sizeof mend,
+                 "all stamps must be of one clock: add %.2f s to its t_ns and arrival_ns, if that is why", -shift_s);
+  wm_find(out, WM_FOUND_CLOCKS_APART, WM_SEVERITY_BAD, name, mend,
+          "it begins %.2f s %s the motion, and ends %.2f s %s it, as if its stamps were %.1f s too %s", fabs(begins_s),
+          shift_s > 0 ? "after" : "before", fabs(ends_s), shift_s > 0 ? "after" : "before", fabs(shift_s),
+          shift_s > 0 ? "late" : "early")
+      ->size = shift_s;
+  return 1;
+}
+
 static void spans(const source_data *self, size_t i, const source_facts *motion, wm_findings *out) {
   static const struct {
     double factor;
@@ -224,7 +256,8 @@ static void spans(const source_data *self, size_t i, const source_facts *motion,
   const double m0 = (double)motion->first_ns, m1 = (double)motion->last_ns;
   const double t0 = (double)f->first_ns, t1 = (double)f->last_ns;
   if (overlap(t0, t1, m0, m1) >= OVERLAP_MIN) {
-    silent_at_an_end(name, f, motion, out);
+    if (is_motion(&self->assembly->sources[i]) || !shifted_as_a_whole(name, f, motion, out))
+      silent_at_an_end(name, f, motion, out);
     return;
   }
   for (size_t k = 0; k < sizeof kUnits / sizeof kUnits[0]; k++)
@@ -242,8 +275,6 @@ static void spans(const source_data *self, size_t i, const source_facts *motion,
           "motion lasts %.1f s",
           (t0 - m0) * 1e-9, (t1 - t0) * 1e-9, (m1 - m0) * 1e-9);
 }
-
-static int is_motion(const wm_assembled_source *s) { return (s->kinds & WM_MOTION_EVENTS) != 0; }
 
 // ── interface ───────────────────────────────────────────────────────────────────────────────────────────────────────
 

@@ -25,13 +25,13 @@ TEST(test_what_a_model_lacks) {
   wm_wheels unknown = {NAN, NAN, NAN, NAN, NAN, NAN, 0, {}, {}};
 
   TEST_ASSERT_EQUAL_STRING("nothing", lacks(WM_MOTION_TICKS, make::two_wheels(), ticks));
-  TEST_ASSERT_EQUAL_STRING("wheel_ticks_left and wheel_ticks_right over CAN",
+  TEST_ASSERT_EQUAL_STRING("both wheels' ticks (ticks.csv; over CAN wheel_ticks_left and wheel_ticks_right)",
                            lacks(WM_MOTION_TICKS, make::two_wheels(), bits({WM_Q_WHEEL_TICKS_LEFT}), true));
   TEST_ASSERT_EQUAL_STRING("wheels.radius_m and wheels.ticks_per_turn in calibration.yaml",
                            lacks(WM_MOTION_TICKS, unknown, ticks));
   TEST_ASSERT_EQUAL_STRING("nothing", lacks(WM_MOTION_SPEED_YAW_RATE, unknown, speed | rate));
   TEST_ASSERT_EQUAL_STRING("nothing", lacks(WM_MOTION_SPEED_YAW_RATE, make::two_wheels(), ticks | rate));
-  TEST_ASSERT_EQUAL_STRING("yaw_rate over CAN", lacks(WM_MOTION_SPEED_YAW_RATE, unknown, speed));
+  TEST_ASSERT_EQUAL_STRING("a turn rate (imu.csv; over CAN yaw_rate)", lacks(WM_MOTION_SPEED_YAW_RATE, unknown, speed));
   TEST_ASSERT_EQUAL_STRING("nothing", lacks(WM_MOTION_ACKERMANN, make::car(), speed | actuator));
   TEST_ASSERT_EQUAL_STRING("wheels.wheelbase_m in calibration.yaml",
                            lacks(WM_MOTION_ACKERMANN, unknown, speed | actuator));
@@ -42,7 +42,7 @@ TEST(test_what_a_model_lacks) {
   TEST_ASSERT_EQUAL_STRING("nothing", lacks(WM_MOTION_TWIST, make::car(), 0, true));
   TEST_ASSERT_EQUAL_STRING("increments.csv", lacks(WM_MOTION_INCREMENTS, make::car(), 0, true));
   TEST_ASSERT_EQUAL_STRING("nothing", lacks(WM_MOTION_AUTO, make::car(), speed, true));
-  TEST_ASSERT_EQUAL_STRING("yaw_rate over CAN", lacks(WM_MOTION_AUTO, make::car(), speed));
+  TEST_ASSERT_EQUAL_STRING("a turn rate (imu.csv; over CAN yaw_rate)", lacks(WM_MOTION_AUTO, make::car(), speed));
 }
 
 // Front wheels roll along the road wheels. By the angle or by the gyro it is the rear axle that moves; on the spot it

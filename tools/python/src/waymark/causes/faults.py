@@ -11,6 +11,7 @@ import numpy as np
 
 from ..native import WaymarkError
 from ..replaying import parameters
+from ..tables import Array
 from . import motion_faults
 from .changes import CONFIG, TURNS, Edit, Seen, Sorted, Turned, Value, column, degrees, identities, numbers, stretched, swapped
 from .fault import DEG, LENGTHS, NEAR, Clock, Fault, Size, discrete, factor_words
@@ -24,6 +25,7 @@ CLOCK_MOST_S = 60.0
 CLOCKS_S = tuple(sign * s for s in (0.15, 0.4, 0.8, 1.2, 1.6, 2.0, 2.5, 3.0, 3.5, 4.0, 5.0, 10.0, 18.0, 37.0) for sign in (-1, 1))
 """The last ones: leap seconds of GPS, of TAI."""
 CLOCKS_FEWER_S = (-4.0, -1.6, -0.8, -0.3, 0.3, 0.8, 1.6, 4.0)  # of scans, with which a drive is slow to begin, and of motion
+SHIFT_MIN_S, SHIFT_ALIKE = 1.0, 0.1  # of both ends of a source against the motion's, and the share by which they may differ
 STAMPS = ("t_ns", "from_ns", "arrival_ns")
 DISORDER_MIN_NS = 500_000_000  # of a step back: a smaller one is a late datum
 DRIFTS = (-0.01, 0.01, 0.02, 0.03, 0.04, 0.05)  # of a clock that is too fast, or of a lag that grows, s/s
@@ -69,6 +71,15 @@ def _stamps(source: Source, factor: float, offset_ns: float) -> list[Edit]:
     return [column(source.file, name, factor, offset_ns, only, name != "t_ns") for name in STAMPS]
 
 
+def _shifted_s(stamps: Array, span: tuple[int, int] | None) -> float:
+    """By how much stamps begin and end later than the motion, s, as `waymark check` finds it; 0: not by as much, or not at all."""
+    ends = np.array([stamps.min() - span[0], stamps.max() - span[1]]) * 1e-9 if span and len(stamps) > 1 else np.zeros(2)
+    shift_s = float(ends.mean())
+    known_s = SHIFT_ALIKE * abs(shift_s)
+    is_shifted = np.abs(ends).min() >= SHIFT_MIN_S and max(abs(ends[1] - ends[0]), np.ptp(stamps) * 1e-9 / (len(np.unique(stamps)) - 1 or 1)) <= known_s
+    return shift_s if is_shifted else 0.0
+
+
 def _clocks(robot: Robot, source: Source) -> Iterator[Fault]:
     stamps = robot.rows(source).get("t_ns")
     if stamps is None or not len(stamps):
@@ -90,6 +101,10 @@ def _clocks(robot: Robot, source: Source) -> Iterator[Fault]:
             yield discrete(f"unit of the stamps of {name}, {unit}", lambda _, f=factor: _stamps(source, f, 0),
                            lambda _, u=unit: f"the stamps of {name} are in {u}", group=f"clock of {name}")
         yield Fault(f"clock of {name}", ((gap,), (float(round(gap)),)), shift, late)
+        return
+    shifted_s = _shifted_s(stamps, span) if source.file in OBSERVED else 0.0
+    if shifted_s:
+        yield Fault(f"clock of {name}", ((-shifted_s,),), shift, late, clock=Clock(name, int(stamps.min())), group=f"along the way of {name}", is_fact=True)
         return
     is_shown = robot.clocks_apart and source.file in MOTION
     begin, only, offset = int(stamps.min()), source.sensor if source.kind != "pictures" else "", f"{source.sensor or source.kind}.time_offset_s"
