@@ -17,7 +17,8 @@ static int counts_ticks(const wm_wheels *wheels, uint32_t quantities) {
 }
 
 static const char *ticks_lack(const wm_wheels *wheels, uint32_t quantities) {
-  if ((quantities & BOTH_TICKS) != BOTH_TICKS) return "both wheels' ticks (ticks.csv; over CAN wheel_ticks_left and wheel_ticks_right)";
+  if ((quantities & BOTH_TICKS) != BOTH_TICKS)
+    return "both wheels' ticks (ticks.csv; over CAN wheel_ticks_left and wheel_ticks_right)";
   if (!counts_ticks(wheels, quantities)) return "wheels.radius_m and wheels.ticks_per_turn in calibration.yaml";
   return isfinite(wheels->track_m) ? NULL : "wheels.track_m in calibration.yaml";
 }
@@ -30,7 +31,8 @@ static const char *speed_lacks(const wm_wheels *wheels, uint32_t kinds, uint32_t
 }
 
 static const char *steering_lacks(const wm_wheels *wheels, uint32_t quantities) {
-  if (!(quantities & STEERING)) return "steering (steering.csv; over CAN road_wheel, steering_wheel or steering_actuator)";
+  if (!(quantities & STEERING))
+    return "steering (steering.csv; over CAN road_wheel, steering_wheel or steering_actuator)";
   if (!isfinite(wheels->wheelbase_m)) return "wheels.wheelbase_m in calibration.yaml";
   if (quantities & BIT(WM_Q_ROAD_WHEEL)) return NULL;
   if ((quantities & BIT(WM_Q_STEERING_ACTUATOR)) && wheels->steering_table_count >= 2) return NULL;

@@ -103,7 +103,8 @@ int main(int argc, char **argv) {
     if (!is_value(argv[i - 1]) && is_bag(argv[i])) return run_bag_import(argv);
   wm::tools::ImportWish wish;
   wm::cli::App app(
-      "Makes a recording of a bag (ROS 1, ROS 2, MCAP), or a video of any kind (H.264 and others) part of one: MJPEG in "
+      "Makes a recording of a bag (ROS 1, ROS 2, MCAP), or a video of any kind (H.264 and others) part of one: MJPEG "
+      "in "
       "AVI, with its stamps.",
       "waymark import");
   app.add_option("INPUT", wish.video, "the bag or the video")->required();
