@@ -5,7 +5,7 @@
 # Exit code 1 where a count left its record by more than 2 % (other compilers' patches and libm's variants stay below that): more
 # is slower; fewer is recorded anew, so that the next loss is seen.
 set -euo pipefail
-program=${1:-build/tests/wm_instructions}
+program=${1:-build/bench/wm_bench_works}
 record=$(dirname "$(readlink -f "$0")")/instructions.txt
 command -v valgrind >/dev/null || { echo "instructions: not counted, there is no valgrind (Debian: valgrind)"; exit 0; }
 fresh=$(mktemp)

@@ -13,4 +13,4 @@ for bench in "${benches[@]}"; do
   "$bench"
 done
 echo "== instructions"
-bash "$(dirname "$0")/instructions.sh" "$folder/../tests/wm_instructions"
+bash "$(dirname "$0")/instructions.sh" "$folder/wm_bench_works"

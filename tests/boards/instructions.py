@@ -5,7 +5,7 @@ tables of Markdown.
 
     instructions.py [BUILD...]      (build build-jetson-tx1 build-odroid-xu4)
 
-Counted are whole runs of wm_instructions, by callgrind here and by a plugin of qemu-user (count.c) for other machines:
+Counted are whole runs of wm_bench_works, by callgrind here and by a plugin of qemu-user (count.c) for other machines:
 what more repetitions take, divided by their number, is what one takes. The same binary counts the same on every machine,
 however busy. Times are count / (clock x instructions a cycle), no more: caches, memory and the other cores are left out."""
 import os
@@ -54,7 +54,7 @@ def plugin(folder):
 
 def total(build, counter, work, times):
     clean = {"PATH": os.environ["PATH"], "LC_ALL": "C"}  # the environment's size is counted, too
-    program = "tests/wm_instructions"
+    program = "bench/wm_bench_works"
     if build.qemu:
         out = counter.parent / "count.txt"
         words = build.command(program, work, times, emulator_options=("-plugin", counter))
