@@ -19,14 +19,6 @@ constexpr double kDegree = kPi / 180;
 
 bool all;
 
-struct Sum {
-  double n = 0, sum = 0, squares = 0;
-  void add(double v) { n++, sum += v, squares += v * v; }
-  double mean() const { return sum / n; }
-  double rms() const { return std::sqrt(squares / n); }
-  double deviation() const { return std::sqrt(std::max(0.0, squares / n - mean() * mean())); }
-};
-
 // A label: where a landmark of the map is in a picture that was taken at t_s.
 struct Label {
   double t_s;

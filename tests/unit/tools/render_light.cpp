@@ -224,27 +224,6 @@ TEST(test_mirror_shows_what_stands_on_it) {
   TEST_ASSERT_FLOAT_WITHIN(0.002f, static_cast<float>(0.1 + 0.9 * rise), floor_value(0.1));
 }
 
-TEST(test_motion_blur_smears_what_moves) {
-  Scene scene;
-  Material glow;
-  glow.albedo = Colour(0.0f), glow.emission = Colour(1.0f);
-  const uint32_t g = scene.add(glow);
-  scene.add(quad({1, -2, -2}, {4, 0, 0}, {0, 0, 4}, g));  // an edge at x = 1, seen from the side
-  scene.sky = {Colour(0.0f), Colour(0.0f), Colour(0.0f)};
-  commit(scene);
-  Camera camera = pinhole(201, 11, 100);
-  Quality quality{.samples = 64, .psf_sigma_px = 0};
-  auto width = [&](int64_t exposure_ns) {  // of the step from a tenth to nine tenths
-    const Image image = render(scene, camera, quality, at({1, 0, 0}, -kPi / 2, exposure_ns));
-    int n = 0;
-    for (size_t x = 0; x < 201; x++) n += image.values[5 * 201 + x] > 0.1f && image.values[5 * 201 + x] < 0.9f;
-    return n;
-  };
-  // 1 m/s at 2 m and 100 px: 0.4 s smear 20 px, of which eight tenths.
-  TEST_ASSERT_LESS_OR_EQUAL_INT(1, width(0));
-  TEST_ASSERT_INT_WITHIN(2, 16, width(400000000));
-}
-
 // Somebody who turns round within the exposure is still there in its middle, where a single ray looks.
 TEST(test_who_turns_round_at_once_stays_whole) {
   Scene scene;

@@ -17,35 +17,6 @@ Image even(int width, int height, float value) {
   return out;
 }
 
-// Mean and standard deviation of grey values.
-struct Spread {
-  double mean, deviation;
-};
-Spread spread_of(const Picture8 &p) {
-  double sum = 0, sum2 = 0;
-  for (uint8_t b : p.bytes) sum += b, sum2 += double(b) * b;
-  const double n = static_cast<double>(p.bytes.size());
-  return {sum / n, std::sqrt(sum2 / n - sum / n * sum / n)};
-}
-
-TEST(test_noise_is_shot_and_read) {
-  SensorModel model;
-  model.vignetting = 0, model.response_power = 1, model.shoulder = 1;  // linear: the signal is grey / 255
-  model.shot = 1.0 / 2000, model.read = 0.006;
-  const Sensor sensor(model, 11, 400, 300, {199.5, 149.5});
-  Picture8 picture;
-  for (double gain : {1.0, 4.0}) {
-    for (double signal : {0.1, 0.3, 0.6}) {
-      sensor.develop(even(400, 300, static_cast<float>(signal / gain)), {.gain = gain}, 0, picture);
-      const Spread found = spread_of(picture);
-      const double noise = std::sqrt(model.shot * gain * signal + model.read * model.read * gain * gain);
-      const double expected = std::sqrt(noise * noise * 255 * 255 + 1.0 / 12);  // rounding adds its own
-      TEST_ASSERT_DOUBLE_WITHIN(0.15, 255 * signal, found.mean);
-      TEST_ASSERT_DOUBLE_WITHIN(0.02 * expected, expected, found.deviation);
-    }
-  }
-}
-
 TEST(test_noise_is_the_frames_own_and_the_same_again) {
   const Sensor sensor(SensorModel{}, 11, 64, 64, {31.5, 31.5});
   Picture8 a, b, c;

@@ -28,4 +28,19 @@ inline Recording driven(const Scenario &scenario, uint64_t seed, size_t landmark
   return out;
 }
 
+// Mean and spread of what is added.
+struct Sum {
+  double n = 0, sum = 0, squares = 0;
+  void add(double v) { n++, sum += v, squares += v * v; }
+  double mean() const { return sum / n; }
+  double rms() const { return std::sqrt(squares / n); }
+  double deviation() const { return std::sqrt(std::fmax(0.0, squares / n - mean() * mean())); }
+};
+
+// Within four sigma of the share that so many draws have.
+inline void check_share(double wanted, double part, double all) {
+  TEST_ASSERT_GREATER_THAN(500, all);
+  TEST_ASSERT_DOUBLE_WITHIN(4 * std::sqrt(wanted * (1 - wanted) / all), wanted, part / all);
+}
+
 }  // namespace wm::sim

@@ -18,11 +18,6 @@ Recording make(const Faults &faults, uint64_t seed) {
   return driven(scenario, seed);
 }
 
-void check_share(double wanted, double part, double all) {
-  TEST_ASSERT_TRUE(all > 500);
-  TEST_ASSERT_DOUBLE_WITHIN(4 * std::sqrt(wanted * (1 - wanted) / all), wanted, part / all);
-}
-
 bool on_map(const Recording &r, int32_t id) {
   return std::any_of(r.map.begin(), r.map.end(), [id](const wm_landmark &l) { return l.id == id; });
 }

@@ -93,7 +93,7 @@ Eigen::Vector3d fitted(const Scenario &s, const Recording &r) {
 void wheels_are_off_as_said(const char *name, double percent) {
   Scenario s = eight(name);
   s.errors.slip = 0;
-  double radius = 0, track = 0;
+  double radius = 0, track = 0, start = 0;
   const int runs = 60;
   for (uint64_t seed = 1; seed <= runs; seed++) {
     const Recording r = driven(s, seed);
@@ -103,9 +103,11 @@ void wheels_are_off_as_said(const char *name, double percent) {
     TEST_ASSERT_DOUBLE_WITHIN(2e-3, r.drawn.track, found[2]);
     radius += 0.5 * (square(found[0]) + square(found[1])) / runs;
     track += square(found[2]) / runs;
+    start += square(r.start.heading_rad - r.drive.at(0).heading_rad) / runs;
   }
   TEST_ASSERT_DOUBLE_WITHIN(0.25, 1, std::sqrt(radius) * 100 / percent);
   TEST_ASSERT_DOUBLE_WITHIN(0.37, 1, std::sqrt(track) * 100 / percent);
+  TEST_ASSERT_DOUBLE_WITHIN(0.37, 1, std::sqrt(start) / s.errors.start_heading_rad);
 }
 TEST(test_wheels_are_off_as_said) {
   wheels_are_off_as_said("hall-easy", 1);

@@ -34,21 +34,59 @@ Vector3d place(int32_t id) {
   return {};
 }
 
-// Mean and variance of what is added.
-struct Sum {
-  double n = 0, sum = 0, squares = 0;
-  void add(double v) { n++, sum += v, squares += v * v; }
-  double mean() const { return sum / n; }
-  double rms() const { return std::sqrt(squares / n); }
-};
-
 void check_rms(double wanted, const Sum &s) {
   TEST_ASSERT_GREATER_THAN(200, s.n);
   TEST_ASSERT_DOUBLE_WITHIN(4 / std::sqrt(2 * s.n), 1, s.rms() / wanted);
   TEST_ASSERT_DOUBLE_WITHIN(4 * wanted / std::sqrt(s.n), 0, s.mean());
 }
-void check_share(double wanted, double part, double all) {
-  TEST_ASSERT_DOUBLE_WITHIN(4 * std::sqrt(wanted * (1 - wanted) / all), wanted, part / all);
+// Bearings against those of a perfect camera, and what arrives of them where some are lost, doubled and late.
+TEST(test_bearings_have_their_noise_and_their_faults) {
+  load("crossing");
+  Sum noise;
+  double outliers = 0, all = 0, plain = 0, late = 0;
+  for (uint64_t seed = 1; seed <= 10; seed++) {
+    make(seed);
+    for (const Sighting &s : made.sightings) {
+      const Camera &c = scenario.cameras[s.sensor];
+      const State at = made.drive.at(since_start(s.t_ns));
+      const Eigen::Rotation2Dd turn(at.heading_rad);
+      const Eigen::Vector2d to =
+          place(s.id).head<2>() - Eigen::Vector2d(at.x_m, at.y_m) - turn * Eigen::Vector2d(c.xyz_m[0], c.xyz_m[1]);
+      all++;
+      outliers += s.outlier;
+      TEST_ASSERT_EQUAL_INT64(150000000, s.arrival_ns - s.t_ns);
+      TEST_ASSERT_DOUBLE_WITHIN(0.5 * c.field_of_view_rad + 0.05, 0.0, s.bearing_rad);
+      if (!s.outlier) noise.add(wrap(s.bearing_rad - wrap(std::atan2(to.y(), to.x()) - at.heading_rad - c.yaw_rad)));
+    }
+    plain += static_cast<double>(made.sightings.size()) / 10;
+  }
+  check_rms(0.3 * kDegree, noise);
+  check_share(0.05, outliers, all);
+  scenario.faults.sightings_lost = 0.2;
+  scenario.faults.sightings_duplicated = 0.1;
+  scenario.faults.frames_late = 0.3;
+  scenario.faults.frames_late_s = 0.1;
+  make(3);
+  const auto count = static_cast<double>(made.sightings.size());
+  TEST_ASSERT_DOUBLE_WITHIN(0.06, 0.8 * 1.1, count / plain);
+  for (size_t i = 1; i < made.sightings.size(); i++) {
+    TEST_ASSERT_GREATER_OR_EQUAL_INT64(made.sightings[i - 1].arrival_ns, made.sightings[i].arrival_ns);
+    late += made.sightings[i].arrival_ns - made.sightings[i].t_ns == 250000000;
+  }
+  TEST_ASSERT_DOUBLE_WITHIN(0.06, 0.3, late / count);
+}
+
+// Of a camera's clock that runs ahead and a start that is stated wrongly.
+TEST(test_clock_offset_and_start_error) {
+  load("crossing");
+  make_perfect(scenario);
+  scenario.faults.camera_clock_offset_s = 0.05;
+  scenario.faults.start_x_m = 2;
+  scenario.faults.start_heading_rad = -0.5;
+  make(1);
+  TEST_ASSERT_EQUAL_INT64(100000000, made.sightings[0].arrival_ns - made.sightings[0].t_ns);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 2, made.start.p_m[0]);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, -0.5, made.start.heading_rad);
 }
 
 TEST(test_markers_have_their_noise) {
@@ -321,6 +359,10 @@ TEST(test_a_landmark_less_changes_nothing_of_the_others) {
     TEST_ASSERT_EQUAL_DOUBLE(s.bearing_rad, ten.sightings[next++].bearing_rad);
   }
   TEST_ASSERT_EQUAL(ten.sightings.size(), next);
+  load("crossing");
+  const std::vector<wm_can_frame> with = driven(scenario, 7).can, without = driven(scenario, 7, 0).can;
+  TEST_ASSERT_EQUAL(with.size(), without.size());
+  for (size_t i = 0; i < with.size(); i++) TEST_ASSERT_EQUAL_MEMORY(with[i].data, without[i].data, with[i].length);
 }
 
 void refuse(const char *extra, const char *wanted) {
