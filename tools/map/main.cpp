@@ -19,7 +19,6 @@
 #include "map/site_commands.h"
 #include "map/survey.h"
 #include "map/survey_bearings.h"
-#include "map/train_cascade.h"
 
 namespace {
 
@@ -223,32 +222,6 @@ void parse_look(wm::cli::App &app, LookAtPicture &a) {
       "Exit code: 0 something was found, 1 nothing was, 2 usage.");
 }
 
-void parse_train(wm::cli::App &app, TrainCascade &a) {
-  app.description("Trains a cascade (LBP, OpenCV's format) for the detector `cascade` from labelled recordings.");
-  app.add_option("RECORDING", a.recordings, "recordings with video, truth.csv and labels/landmarks.csv")->required();
-  app.add_option("--size", a.size_m, "WIDTH,HEIGHT, m: the class is the landmarks of this size")
-      ->delimiter(',')
-      ->expected(2)
-      ->check(wm::cli::range(0.01, 100.0))
-      ->required();
-  app.add_option("--out", a.out, "the file to write (.xml)")->required();
-  app.add_option("--rows", a.rows_px, "px: height of a window")->check(wm::cli::range(12, 60))->capture_default_str();
-  app.add_option("--margin", a.margin, "share of the landmark's size that a window shows on each side of it")
-      ->check(wm::cli::range(0.0, 1.0))
-      ->capture_default_str();
-  app.add_option("--size-min", a.size_min_px, "px: the smallest window, as size_min_px of the detector")
-      ->check(wm::cli::range(4.0, 200.0))
-      ->capture_default_str();
-  app.add_option("--stages", a.stages, "at most")->check(wm::cli::range(1, 60))->capture_default_str();
-  app.add_option("--pictures", a.pictures, "about so many of all that there are")
-      ->check(wm::cli::range(10, 20000))
-      ->capture_default_str();
-  app.add_option("--seed", a.seed, "of the choice of windows")->capture_default_str();
-  app.footer(
-      "example: waymark map train-cascade drives/* --size 0.7,0.7 --out sign.xml\n"
-      "Labelled recordings are what `waymark simulate` writes for crossings. More: docs/landmarks.md.");
-}
-
 void write_layer(const fs::path &file, const Layers &layers, const std::vector<uint8_t> &layer) {
   std::string error;
   if (!wm::images::write_png(file, {layers.width, layers.height, 1, layer}, error)) throw Failure(error);
@@ -386,10 +359,6 @@ int main(int argc, char **argv) {
   wm::cli::App *print_app = app.add_subcommand("print-markers", "prints coded markers at true scale");
   parse_print(*print_app, print_arguments);
 #endif
-  TrainCascade train_arguments;
-  wm::cli::App *train_app =
-      app.add_subcommand("train-cascade", "trains a detector for a class of landmarks from labelled pictures");
-  parse_train(*train_app, train_arguments);
   parse_make(*make_app, make_arguments);
   parse_check(*check_app, check_arguments);
   return run_program(app, argc, argv, [&] {
@@ -398,10 +367,6 @@ int main(int argc, char **argv) {
     if (survey_app->parsed()) return survey(survey_arguments);
     if (look_app->parsed()) return look_at_picture(look_arguments) > 0 ? kDone : kFailed;
     if (add_app->parsed()) return add(add_arguments);
-    if (train_app->parsed()) {
-      train_cascade(train_arguments);
-      return kDone;
-    }
 #ifdef WM_HAS_HARU
     if (print_app->parsed()) return print_markers(print_arguments);
 #endif

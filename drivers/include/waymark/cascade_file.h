@@ -11,7 +11,7 @@ extern "C" {
 
 #define WM_CASCADE_BYTES_MAX (16u << 20)  // usual files are some hundred kB to some MB
 
-// Reads a cascade in the format of opencv_traincascade (or `waymark map train-cascade`); `height_m` is left 0. Without
+// Reads a cascade in the format of opencv_traincascade; `height_m` is left 0. Without
 // OpenCV: the format is small, and its library would be 230 MB on a robot. WM_BAD_CONFIG with file and line for other
 // files, truncated ones, invalid numbers, tilted HAAR features, or the format of OpenCV 1 (type_id
 // opencv-haar-classifier). At start only; allocates memory for wm_cascade_free (also a cascade of zeros).

@@ -9,7 +9,7 @@ _waymark() {
   fi
   case $command in
     calibrate) [ "$COMP_CWORD" -eq 2 ] && more='import mounting camera' ;;
-    map) [ "$COMP_CWORD" -eq 2 ] && more='merge version make check survey add-landmark look print-markers train-cascade' ;;
+    map) [ "$COMP_CWORD" -eq 2 ] && more='merge version make check survey add-landmark look print-markers' ;;
   esac
   case "$command ${COMP_WORDS[2]:-}" in
     "calibrate import") words='--help --name --model --size --lens --out' ;;
@@ -23,7 +23,6 @@ _waymark() {
     "map add-landmark") words='--help --id --picture --at --sigma --size --yaw --from --corners --calibration --camera' ;;
     "map look") words='--help --picture --calibration --camera --pose --sigma --sigma-deg --mounting-deg --draw' ;;
     "map print-markers") words='--help --family --ids --size --paper --out' ;;
-    "map train-cascade") words='--help --size --out --rows --margin --size-min --stages --pictures --seed' ;;
   esac
   [ -n "$words" ] || case "$command" in
     "run") words='--config --recording --out --record --force --out-max-mb --duration --speed --seed --resume --landmarks --map --calibration' ;;
