@@ -8,10 +8,11 @@
 #include "detectors.h"
 #include "waymark/detectors.h"
 
+#define CONTRAST_MIN_GREY 20  // smallest difference of a print's white and black
+
 typedef struct apriltag_params {
   int32_t family;
-  int32_t contrast_min;
-  int32_t id_max, id_offset;
+  int32_t id_max, id_offset, unused;
   double size_m;
 } apriltag_params;
 
@@ -21,8 +22,6 @@ static const wm_param kParams[] = {
     {"size_m", WM_PARAM_F64, offsetof(apriltag_params, size_m), 0, 0, 10, NULL,
      "m. Outer edge of the black square (tag16h5 to tag36h11, ArUco), or of the white one inside of the black ring "
      "(tagCircle, tagCustom, tagStandard). 0: markers.size_m of calibration.yaml."},
-    {"contrast_min", WM_PARAM_I32, offsetof(apriltag_params, contrast_min), 20, 2, 254, NULL,
-     "Grey levels. Smallest difference of a print's white and black."},
     {"id_max", WM_PARAM_I32, offsetof(apriltag_params, id_max), 4095, 0, 65535, NULL,
      "Largest accepted identity. Fewer identities make false detections rarer and more wrong modules correctable."},
     {"id_offset", WM_PARAM_I32, offsetof(apriltag_params, id_offset), 0, 0, 1000000000, NULL,
@@ -31,8 +30,9 @@ static const wm_param kParams[] = {
 
 static const wm_param_old kOld[] = {
     {"decimate", NULL, "pictures are searched at full resolution now"},
-    {"margin_min", NULL, "contrast_min, which is about twice that, is the limit now"},
+    {"margin_min", NULL, "a least contrast of 20 grey levels is the limit now"},
     {"bits_corrected", NULL, "follows from the family's distance and its number of identities now"},
+    {"contrast_min", NULL, "a constant now: 20 grey levels"},
     {NULL, NULL, NULL},
 };
 
@@ -82,7 +82,7 @@ static wm_status init(void *state, const void *params, const wm_view *view) {
   memset(state, 0, STATE_BYTES);
   ((apriltag_state *)state)->id_offset = p->id_offset;
   const char *why =
-      wm_square_reader_init(reader_of(state), camera_of(view), &family, size_of(p, view->rig), p->contrast_min);
+      wm_square_reader_init(reader_of(state), camera_of(view), &family, size_of(p, view->rig), CONTRAST_MIN_GREY);
   free(codes);
   return why ? WM_BAD_CONFIG : WM_OK;
 }

@@ -9,6 +9,7 @@ namespace {
 
 // Gauss-Newton steps of one descent; in the first ones a point's gate includes the prior's spread. Not swept.
 constexpr int kRounds = 4, kCoarseRounds = 2;
+constexpr double kGate_m = 0.15;          // from the map's edge; a point farther off is not aligned
 constexpr double kCoarseGateMax_m = 0.5;  // below edge_map's reach of 0.6 m
 // Along an axis that the prediction leaves open, descents start this far apart (door recesses are 0.1 m to 0.3 m deep)
 // and up to so many sigmas, so many on each side at most. Not swept.
@@ -171,8 +172,7 @@ void edge_mcl::count_unexplained(const matched_point &p, const capture &from, no
 // Adds a point's cost and counts it. `near`: an edge is within the gate, on the side that is seen.
 void edge_mcl::count_point(const matched_point &p, const scan_point &own, bool near, double mapped, const capture &from,
                            double correlated, normal_equations *out) const {
-  const double residual2 = square(p.residual_m),
-               unmatched = student_cost(square(params_.gate_m), p.sigma2) / correlated;
+  const double residual2 = square(p.residual_m), unmatched = student_cost(square(kGate_m), p.sigma2) / correlated;
   out->seen += (int)own.on_line;
   out->cost += unmatched;
   if (near) {
@@ -272,7 +272,7 @@ double edge_mcl::descend(const wm_points &points, const prediction &whole, const
     // The gate narrows from the uncertainty of pose and camera to that of a point.
     const bool coarse = round < kCoarseRounds;
     const prediction &prior = coarse ? part : whole;
-    const double gate = params_.gate_m + (coarse ? slack_m : 0.0);
+    const double gate = kGate_m + (coarse ? slack_m : 0.0);
     const descent_pass pass = round == 0             ? descent_pass::kFirst
                               : round + 1 == kRounds ? descent_pass::kLast
                                                      : descent_pass::kNext;
@@ -436,7 +436,7 @@ void edge_mcl::update_walls(const wm_points &points, int camera) {
   matched_point p;
   walls_.begin();
   for (uint32_t i = 0; i < points.count; i += kWallsStride)
-    if (match(points, i, a, from, &p) && p.line.found && p.same_side && p.line.distance_m <= params_.gate_m)
+    if (match(points, i, a, from, &p) && p.line.found && p.same_side && p.line.distance_m <= kGate_m)
       walls_.add(p.line, p.x_m, p.y_m);
   const uint32_t changed = walls_.replace();
   for (int k = 0; k < wall_list::kCapacity; k++)

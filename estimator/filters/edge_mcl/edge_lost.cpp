@@ -123,8 +123,8 @@ void edge_mcl::update_aliases(double dt_s) {
   nominal_ = nominal;
   const int share = params_.search_poses / (nominal ? kAliasNominal : kAliasOtherwise);
   const int poses = share > hypotheses::kPosesMin ? share : hypotheses::kPosesMin;
-  others_.update_aliased(map_, search_.field(), scan_, way, fit_.mean_explained(),
-                         sure ? params_.kidnapped_per_s * dt_s : 0.0, sure ? poses : 0);
+  others_.update_aliased(map_, search_.field(), scan_, way, fit_.mean_explained(), sure ? kKidnapped_per_s * dt_s : 0.0,
+                         sure ? poses : 0);
   if (life_.searching()) return;
   constexpr double kNoError[kMountingAll] = {};
   const auto offer = [&](const hypothesis &alias) { others_.offer(alias.pose, alias.explained, kNoError); };

@@ -14,7 +14,9 @@
 namespace wm {
 namespace {
 
-constexpr double kMotionGap_s = 1.0;      // between two motion messages, beyond which the way is unknown; not swept
+constexpr double kMotionGap_s = 1.0;  // between two motion messages, beyond which the way is unknown; not swept
+// Added to the published covariance: systematic errors of a drive, as of the camera's position.
+constexpr double kSystematic_m = 0.01, kSystematic_rad = 0.0005;
 constexpr double kUnknownSigma_m = 0.03;  // of a point without a sigma and a camera: a pixel at 4 m
 
 const char *const kReads[] = {"!motion.noise.adapt", "!markers.stamp", "!markers.correlated", "motion.", "sightings.",
@@ -189,8 +191,8 @@ void edge_mcl::check_odometry() {
     odometry_.clear();
     return;
   }
-  const double position_m2 = 0.5 * (filter_.variance(kX) + filter_.variance(kY)) + square(params_.systematic_xy_m);
-  const double heading_rad2 = filter_.variance(kHeading) + square(params_.systematic_heading_rad);
+  const double position_m2 = 0.5 * (filter_.variance(kX) + filter_.variance(kY)) + square(kSystematic_m);
+  const double heading_rad2 = filter_.variance(kHeading) + square(kSystematic_rad);
   const int scale = filter_.motion_state(kSpeedScale);
   odometry_.add({filter_.pose(), filter_.odom(), position_m2, heading_rad2, filter_.travelled_m(),
                  filter_.calibration().value[kSpeedScale], scale >= 0 ? filter_.variance(scale) : 0.0});
@@ -248,9 +250,9 @@ void edge_mcl::estimate(wm_estimate *out) const {
   out->state = life_.state(filter_.now_ns(), params_.dead_reckoning_after_s);
   if (!life_.searching()) add_hypotheses_spread(out);
   if (life_.fused_ns() == WM_TIME_NONE) return;  // still the given pose with the given covariance
-  out->covariance[wm_cov_index(0, 0)] += square(params_.systematic_xy_m);
-  out->covariance[wm_cov_index(1, 1)] += square(params_.systematic_xy_m);
-  out->covariance[wm_cov_index(5, 5)] += square(params_.systematic_heading_rad);
+  out->covariance[wm_cov_index(0, 0)] += square(kSystematic_m);
+  out->covariance[wm_cov_index(1, 1)] += square(kSystematic_m);
+  out->covariance[wm_cov_index(5, 5)] += square(kSystematic_rad);
   const double *disagreement = odometry_.covariance();
   out->covariance[wm_cov_index(0, 0)] += disagreement[0];
   out->covariance[wm_cov_index(0, 1)] += disagreement[1];

@@ -24,7 +24,6 @@ void fit_evidence::init(const wm_edge_mcl_params &params) {
   lost_explained_ = params.lost_explained;
   lost_margin_ = params.lost_margin;
   lost_beyond_ = params.lost_beyond_weight;
-  kidnapped_per_s_ = params.kidnapped_per_s;
   mean_explained_ = true_share_ = params.lost_explained;
   false_points_ = kFalsePoints;
   averaged_s_ = 0.0;
@@ -62,7 +61,7 @@ double fit_evidence::add(const normal_equations &scan, double dt_s, double way) 
   const double factor = fresh * log_bayes_factor(scan, explained);
   // Unclamped until the hazard of being carried off is in.
   odds_.reset(odds_.value() + factor);
-  odds_.add_hazard(kidnapped_per_s_ * dt_s);
+  odds_.add_hazard(kKidnapped_per_s * dt_s);
   if (!(odds_.value() > kLeastLogOdds)) odds_.set(kLeastLogOdds);
   return factor;
 }

@@ -11,6 +11,7 @@
 
 namespace wm {
 
+inline constexpr double kKidnapped_per_s = 1e-4;  // prior rate of kidnapping, and of aliased poses
 // Of n points of a scan about kFalsePoints are no edge of the map, wherever it was taken: the fraction of true edges,
 // and the weight as explained of a point that lies before an edge. Chosen on corridor-hard drives; not swept.
 inline constexpr double kFalsePoints = 60.0;
@@ -41,7 +42,7 @@ class fit_evidence {
   double log_bayes_factor(const normal_equations &scan, double explained) const;
 
   evidence odds_;
-  double lost_explained_, lost_margin_, lost_beyond_, kidnapped_per_s_;
+  double lost_explained_, lost_margin_, lost_beyond_;
   double explained_;
   double false_points_, true_share_;     // unexplained points of a scan, and its fraction explained, over 10 s
   double mean_explained_, averaged_s_;   // over the last minute, and over how much of it

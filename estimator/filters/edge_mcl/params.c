@@ -22,11 +22,6 @@ static const wm_param kParams[] = {
     F64("points.common_px", common_px, 0.6, 0, 10,
         "Sigma of the error that all points of one wall share, pixels: blur, the wall's reflection in a glossy floor."),
     F64("points.range_max_m", range_max_m, 6.0, 0.5, 50, "Points farther from the camera are not used, m."),
-    F64("points.gate_m", gate_m, 0.15, 0.01, 0.6, "A point farther from the map's edge than this is not aligned, m."),
-    F64("systematic.xy_m", systematic_xy_m, 0.01, 0, 1,
-        "Sigma of the position that is added to the published covariance, m: systematic errors of a drive, as of the "
-        "camera's position."),
-    F64("systematic.heading_rad", systematic_heading_rad, 0.0005, 0, 1, "The same of the heading, rad."),
 
     F64("lost.explained", lost_explained, 0.5, 0.05, 0.95,
         "Fraction of a scan's points that the map explains at which the scan is evidence neither for nor against being "
@@ -37,8 +32,6 @@ static const wm_param kParams[] = {
     F64("lost.beyond_weight", lost_beyond_weight, 3, 1, 100,
         "Weight of an unexplained point beyond an edge of the map, where a camera at the estimated pose cannot see; "
         "less 4 times their usual fraction. 1: as any other (glass walls, lines on the floor that the map has)."),
-    F64("lost.kidnapped_per_s", kidnapped_per_s, 0.0001, 0, 1,
-        "Rate of kidnapping, a prior, per s; the prior of perceptually aliased poses, too."),
     I32("search.poses", search_poses, 80000, EDGE_MCL_SEARCH_POSES_LEAST, 10000000,
         "Largest work of a scan while suspicious or lost, in poses that a sweep over the map scores by 24 points. An "
         "eighth of it otherwise, and a quarter to a half for aliased poses. Aligning a place counts 8704, weighing it "
@@ -53,10 +46,10 @@ static const wm_param kParams[] = {
 static const wm_param_old kOld[] = {
     {"states.angle_walk_rad", NULL, "nothing read it"},
     {"states.*", "/motion.states.*", NULL},
-    {"lasting.*", "systematic.*", NULL},
+    {"lasting.*", NULL, CONSTANT},
     {"lost.below", "lost.margin", NULL},
     {"lost.through", "lost.beyond_weight", NULL},
-    {"lost.per_s", "lost.kidnapped_per_s", NULL},
+    {"lost.per_s", NULL, CONSTANT},
     {"points.correlated", NULL, CONSTANT},
     {"particles", NULL, NO_PARTICLES},
     {"weight", NULL, NO_PARTICLES},
@@ -79,6 +72,10 @@ static const wm_param_old kOld[] = {
     {"lost.gain", NULL, CONSTANT},
     {"search.explained", NULL, CONSTANT},
     {"search.share", NULL, CONSTANT},
+    {"points.gate_m", NULL, CONSTANT},
+    {"systematic.xy_m", NULL, CONSTANT},
+    {"systematic.heading_rad", NULL, CONSTANT},
+    {"lost.kidnapped_per_s", NULL, CONSTANT},
     {NULL, NULL, NULL},
 };
 

@@ -18,10 +18,9 @@ typedef struct wm_edge_mcl_params {
   double sigma[WM_CAMERA_ROWS];  // at the start, of each state; 0: not a state
   double wall_sigma_m;           // the same of each wall's offset
 
-  double pixel_px, point_sigma_m, common_px, range_max_m, gate_m;
-  double systematic_xy_m, systematic_heading_rad;
+  double pixel_px, point_sigma_m, common_px, range_max_m;
 
-  double lost_explained, lost_margin, lost_beyond_weight, kidnapped_per_s;
+  double lost_explained, lost_margin, lost_beyond_weight;
   int32_t search_poses, unused;
   double dead_reckoning_after_s;
 } wm_edge_mcl_params;

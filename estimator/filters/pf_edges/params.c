@@ -18,8 +18,6 @@ static const wm_param kParams[] = {
         "Sigma of the likelihood field besides the point's own, m: map, mounting, coarseness of a small set."),
     F64("false_points", false_points, 0.3, 0.0001, 0.9,
         "Fraction of points that are not an edge of the map: furniture, joints of the floor."),
-    F64("resample_below", resample_below, 0.5, 0, 1,
-        "Resampling when the effective number of particles is below this fraction of them. 1: after each scan."),
     F64("noise.way_rel", noise_way_rel, 0.0, 0, 2,
         "Motion noise along the way, as a fraction of the step (Abramov et al.: 0.5, steps of 0.5 s)."),
     F64("noise.way", noise_way, 0.02, 0, 1, "Motion noise along the way, m per sqrt(m)."),
@@ -32,4 +30,9 @@ static const wm_param kParams[] = {
         "The state is dead reckoning when no scan was fused for this time, s."),
 };
 
-const wm_param_table wm_pf_edges_params_table = {kParams, sizeof kParams / sizeof kParams[0], sizeof(params), NULL};
+static const wm_param_old kOld[] = {
+    {"resample_below", NULL, "a constant now: half of the particles"},
+    {NULL, NULL, NULL},
+};
+
+const wm_param_table wm_pf_edges_params_table = {kParams, sizeof kParams / sizeof kParams[0], sizeof(params), kOld};

@@ -17,6 +17,7 @@ namespace {
 // Sigmas of a point for which the map has a baked layer; the last one serves larger sigmas, too.
 constexpr double kClassSigma_m[kSigmaClasses] = {0.01, 0.03, 0.06, 0.12};
 constexpr double kUnknownSigma_m = 0.03;  // of a point whose detector gives none: a pixel at 4 m
+constexpr double kResampleBelow = 0.5;    // effective particles, of all
 constexpr int kPointsMin = 5;             // of a scan: fewer leave a pose open
 // The published mean is that of particles about the heaviest one. Half a corridor's width, 20 degrees; not swept.
 constexpr double kCluster_m = 0.5, kCluster_rad = 0.35;
@@ -175,7 +176,7 @@ double pf_edges::unexplained() const {
 }
 
 void pf_edges::resample() {
-  if (particles_.effective() < params_.resample_below * particles_.count()) particles_.resample();
+  if (particles_.effective() < kResampleBelow * particles_.count()) particles_.resample();
 }
 
 // The scan's points in the order of their classes of sigma.

@@ -19,6 +19,8 @@ namespace {
 
 constexpr double kSigma_px = 0.3;      // of a detection's middle: the mean of its windows
 constexpr double kSigmaOfSize = 0.05;  // the same, in sizes: windows are coarse. From rendered streets; not swept
+constexpr double kSigmaOfRange = 0.2;  // of the distance, which follows from the window's height
+constexpr int kNeighboursMin = 3;      // overlapping windows of a detection (OpenCV's minNeighbors)
 constexpr size_t kCascadesMax = 8;     // each costs a pass over the panorama
 
 struct cascade_state {
@@ -157,7 +159,7 @@ bool emit(const cascade_state &self, const wm_frame &frame, const window_hit &se
   s.bearing_rad = sensor_bearing(self.camera, self.is_steep, ray);
   s.range_m = range_m;
   s.bearing_sigma_rad = sigma(seen.width);
-  s.range_sigma_m = self.params.sigma_range * range_m;
+  s.range_sigma_m = kSigmaOfRange * range_m;
   s.elevation_rad = sensor_elevation(self.camera, self.is_steep, ray);
   s.elevation_sigma_rad = sigma(seen.height);
   return true;
@@ -174,7 +176,7 @@ wm_status detect(void *memory, const wm_frame *frames, const wm_estimate *, wm_e
   self->groups.count = 0;
   for (size_t i = 0; i < self->count; i++)
     for (const cylinder &c : self->around.cylinders) scan(self, i, c);
-  self->groups.finish(self->params.neighbours_min);
+  self->groups.finish(kNeighboursMin);
   for (size_t i = 0; i < self->groups.count && *count < capacity; i++)
     *count += emit(*self, frame, self->groups.list[i].mean, &out[*count]);
   sort_events(out, *count);

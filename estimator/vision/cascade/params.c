@@ -9,18 +9,16 @@
 static const wm_param kParams[] = {
     F64("size_min_px", size_min_px, 10, 4, 200,
         "px. Height of the smallest windows, in the middle of the picture; the largest ones are eight times as high."),
-    {"neighbours_min", WM_PARAM_I32, offsetof(struct wm_cascade_params, neighbours_min), 3, 1, 1000, NULL,
-     "Smallest number of overlapping windows of a detection (OpenCV's minNeighbors)."},
     F64("mounting_sigma_rad", mounting_sigma_rad, 0.007, 0, 0.1,
         "rad. Error of the camera's mounting: extends the searched band between the map's lowest and highest "
         "landmark."),
-    F64("sigma_range", sigma_range, 0.2, 0.001, 10,
-        "Relative error of the distance, which follows from the window's height."),
 };
 
 static const wm_param_old kOld[] = {
     {"sigma_px", NULL, "a constant now: 0.3 px"},
     {"sigma_size", NULL, "a constant now: 0.05 of the window's size"},
+    {"neighbours_min", NULL, "a constant now: 3 windows"},
+    {"sigma_range", NULL, "a constant now: 0.2 of the distance"},
     {NULL, NULL, NULL},
 };
 

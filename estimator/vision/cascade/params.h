@@ -12,8 +12,6 @@ extern "C" {
 
 struct wm_cascade_params {
   double size_min_px, mounting_sigma_rad;
-  double sigma_range;
-  int32_t neighbours_min;
 };
 
 extern const wm_param_table wm_cascade_params_table;

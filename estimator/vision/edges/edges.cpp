@@ -191,9 +191,8 @@ found floor_point(const edges_state &state, const ray_edge &edge, const wm_frame
                gy = (gu * (at_y.u - at.u) + gv * (at_y.v - at.v)) / step;
   const double picture = std::sqrt(gu * gu + gv * gv), floor = std::sqrt(gx * gx + gy * gy);
   if (!(picture > kSlopeMin_grey_per_px) || !(floor > 0)) return found::kNothing;
-  // rays.line_rel is a length along the ray; its width across the edge.
-  const double along = gx * r.cos + gy * r.sin,
-               board_px = state.params.rays_line_rel * range * std::fabs(along) / picture,
+  // kLineOfRange is a length along the ray; its width across the edge.
+  const double along = gx * r.cos + gy * r.sin, board_px = kLineOfRange * range * std::fabs(along) / picture,
                line_px = kBlur_px + kJoint_m * floor / picture;
   const double sign = edge.is_fall ? -1 : 1;  // down the slope of a fall, up that of a rise
   const pixels_behind across = {frame, at.u, at.v, sign * gu / picture, sign * gv / picture};

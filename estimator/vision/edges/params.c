@@ -23,11 +23,6 @@ static const wm_param kParams[] = {
      "edges have the other sign and are not the joint of wall and floor."},
     F64("rays.contrast_grey", rays_contrast_grey, 6.0, 0.5, 255,
         "Grey levels. Smallest difference of both sides, averaged over four pixels each: above noise and compression."),
-    F64("rays.line_rel", rays_line_rel, 0.05, 0.0, 1,
-        "Fraction of the range. A narrower dark band on the floor is a line (a joint of tiles, a cable), not a wall: "
-        "the "
-        "height of a board over the camera's height, less than half of the lowest skirting."),
-    F64("bird.px_per_m", hough.bird_px_per_m, 75, 10, 500, "px/m of the bird's-eye view; the paper's."),
     F64("bird.x_min_m", hough.bird_x_min_m, 1.5, -20, 50, "m ahead of base_link. Near end of the bird's-eye view."),
     F64("bird.x_max_m", hough.bird_x_max_m, 7.1, -20, 50, "m ahead of base_link. Far end of the bird's-eye view."),
     F64("bird.side_m", hough.bird_side_m, 3.0, 0.2, 50,
@@ -53,6 +48,8 @@ static const wm_param_old kOld[] = {
     {"windows.straight_px", NULL, "a constant now: the paper's 3 px"},
     {"windows.straight_share", NULL, "a constant now: the paper's third"},
     {"windows.spacing_m", NULL, "a constant now: 0.1 m"},
+    {"rays.line_rel", NULL, "a constant now: 0.05 of the range"},
+    {"bird.px_per_m", NULL, "a constant now: the paper's 75 px/m"},
     {NULL, NULL, NULL},
 };
 

@@ -15,7 +15,7 @@ struct wm_edges_params {
   int32_t mode;  // edges_mode
   double rays_range_min_m, rays_range_max_m;
   int32_t rays_sign;  // edges_sign
-  double rays_contrast_grey, rays_line_rel;
+  double rays_contrast_grey;
   struct wm_edges_hough_params hough;
   double sigma_px, noise_grey;
 };

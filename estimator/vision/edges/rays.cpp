@@ -107,8 +107,8 @@ struct profile_step {
 };
 
 // Whether the band behind the step is a line on the floor: the brightness returns within `narrow_rel` of the range.
-bool is_line(const profile &p, const profile_step &s, double narrow_rel) {
-  const double middle = 0.5 * (s.level + s.after), until = p.range(s.at) * (1 + narrow_rel);
+bool is_line(const profile &p, const profile_step &s) {
+  const double middle = 0.5 * (s.level + s.after), until = p.range(s.at) * (1 + kLineOfRange);
   for (int k = s.at + 2; k < p.count && p.range(k) < until; k++)
     if (s.is_fall ? p.grey[k] > middle : p.grey[k] < middle) return true;
   return false;
@@ -127,7 +127,7 @@ bool find_first_step(const profile &p, double usual_grey, const wm_edges_params 
     *out = {i, level, p.after(i), is_fall};
     const double change = is_fall ? out->level - out->after : out->after - out->level;
     if (change < params.rays_contrast_grey * 256 || change < kContrastMin * (out->level + out->after)) continue;
-    if (!is_line(p, *out, params.rays_line_rel)) return true;
+    if (!is_line(p, *out)) return true;
   }
   return false;
 }

@@ -9,6 +9,9 @@
 
 namespace wm {
 
+// Fraction of the range. A narrower dark band on the floor is a line (a joint of tiles, a cable), not a wall: the
+// height of a board over the camera's height, less than half of the lowest skirting.
+inline constexpr double kLineOfRange = 0.05;
 inline constexpr int kRaySamplesMax = 2048;  // of a ray: a step is a pixel, so above a picture's diagonal
 
 struct ray {

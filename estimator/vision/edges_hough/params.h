@@ -4,7 +4,7 @@
 
 // Parameters `bird.*` of the detector `edges`.
 struct wm_edges_hough_params {
-  double bird_px_per_m, bird_x_min_m, bird_x_max_m, bird_side_m;
+  double bird_x_min_m, bird_x_max_m, bird_side_m;
 };
 
 #endif

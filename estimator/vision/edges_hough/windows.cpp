@@ -9,6 +9,7 @@ namespace {
 
 constexpr int32_t kWindow_px = 50, kOverlap_px = 10, kStep_px = kWindow_px - kOverlap_px;  // the paper's
 static_assert(kWindow_px <= kHoughSideMax);
+constexpr double kPixelsPerM = 75;    // of the bird's-eye view; the paper's
 constexpr float kVarianceMin = 5000;  // of the Hough sums over the offsets of one slope; the paper's
 
 int windows_along(int32_t size) { return size < kWindow_px ? 0 : (size - kWindow_px) / kStep_px + 1; }
@@ -92,11 +93,11 @@ bool find_in_window(const bird_view &view, int32_t x0, int32_t y0, line_piece *o
 
 void bird_view_size(const wm_edges_hough_params &params, bird_view *out) {
   *out = bird_view{};
-  out->px_per_m = params.bird_px_per_m;
+  out->px_per_m = kPixelsPerM;
   out->x_min_m = params.bird_x_min_m;
   out->y_min_m = -params.bird_side_m;
-  out->width = static_cast<int32_t>((params.bird_x_max_m - params.bird_x_min_m) * params.bird_px_per_m);
-  out->height = static_cast<int32_t>(2 * params.bird_side_m * params.bird_px_per_m);
+  out->width = static_cast<int32_t>((params.bird_x_max_m - params.bird_x_min_m) * kPixelsPerM);
+  out->height = static_cast<int32_t>(2 * params.bird_side_m * kPixelsPerM);
   out->windows = windows_along(out->width) * windows_along(out->height);
 }
 

@@ -18,9 +18,10 @@ namespace {
 constexpr size_t kFoundMax = 128;      // sightings of a picture: bounds the memory
 constexpr double kWindowSigmas = 3.5;  // half width of the search window: 1 in 2000 landmarks outside
 constexpr double kWindowMax_px = 64;   // a landmark with a larger window is not searched: cost, look-alikes
-constexpr int kTries = 8;          // hypotheses verified at full resolution per picture at kRate_hz: bounds the cost
-constexpr size_t kAgreeing = 3;    // landmarks that one pose must explain where the first one is not alike enough alone
-constexpr double kRate_hz = 30.0;  // of pictures, for which search_places is given
+constexpr int kTries = 8;        // hypotheses verified at full resolution per picture at kRate_hz: bounds the cost
+constexpr size_t kAgreeing = 3;  // landmarks that one pose must explain where the first one is not alike enough alone
+constexpr double kSearchAfter_s = 0.5;   // without a landmark that the pose led to: the whole picture is searched, too
+constexpr double kRate_hz = 30.0;        // of pictures, for which search_places is given
 constexpr double kBudgetMax = 8.0;       // times that budget at lower rates
 constexpr size_t kExpectedPerFound = 5;  // a pose that finds less than 1 in 5 expected landmarks is doubtful. Not swept
 constexpr double kStep_px = 0.5;         // of the numerical derivative of a bearing
@@ -388,7 +389,7 @@ wm_status detect(void *memory, const wm_frame *frames, const wm_estimate *predic
   clear_looks(self);
   if (guessed) match_by(self, frame, guess, true, 0, &found);
   if (confirms(*self, found) || self->found_ns == WM_TIME_NONE) self->found_ns = frame.t_ns;
-  const bool blind = wm_seconds_between(self->found_ns, frame.t_ns) > self->eye.params.search_after_s;
+  const bool blind = wm_seconds_between(self->found_ns, frame.t_ns) > kSearchAfter_s;
   if ((!guessed || blind) && self->eye.params.search_places > 0) {
     const size_t by_pose = found.count;
     search_all(self, frame, prediction, &found);

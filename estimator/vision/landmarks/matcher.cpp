@@ -11,6 +11,7 @@ constexpr double kSmall_px2 = 30;   // a landmark of n px^2 needs a likeness of 
 constexpr double kApartMin = 0.06;  // likeness of the best place above the second one. Not swept
 constexpr double kSigmaFactor = 1.3;    // of the fit's sigma: errors of neighbouring pixels are correlated
 constexpr double kSigmaOfSize = 0.002;  // of the middle, in sizes: errors of the learnt picture, other light
+constexpr double kBlur_px = 0.6;        // sigma of the picture's blur: lens and compression
 constexpr double kMargin_px = 2;        // from the edge of the picture
 constexpr double kFits = 1.1;           // of the longer side, beside 4 px: room in the drawn view for a tilted landmark
 constexpr double kBeforeAlign = 0.1;    // likeness on whole pixels may be this much below the needed one
@@ -61,7 +62,7 @@ wm_look expect_landmark(const matcher &self, const camera_guess &guess, const ap
 wm_look match_landmark(matcher *self, const expected_view &one, double across_px, double down_px, bool is_final,
                        landmark_match *out) {
   out->likeness = std::numeric_limits<double>::quiet_NaN();
-  if (!draw(*one.what, one.view, self->rays, one.corners, one.level, self->params.blur_px, &self->drawn))
+  if (!draw(*one.what, one.view, self->rays, one.corners, one.level, kBlur_px, &self->drawn))
     return WM_LOOK_NOT_IN_VIEW;
   const double step = 1 << one.level;
   const double across = across_px / step + 1, down = down_px / step + 1;

@@ -20,8 +20,6 @@ static const wm_param kParams[] = {
         "lower rates up to 8 times as many. 0: no search without a pose."),
     F64("search_area_px2", search_area_px2, 140, 0, 1e6,
         "px^2. Smallest area of a landmark in the picture without a pose: a smaller one has look-alikes near by."),
-    F64("search_after_s", search_after_s, 0.5, 0, 3600,
-        "s. The whole picture is searched, too, after the pose has led to no landmark for this long."),
     F64("likeness_alone", likeness_alone, 0.93, 0.3, 1,
         "Normalised correlation from which a landmark found without a pose needs no others; below, two others must "
         "agree "
@@ -30,7 +28,6 @@ static const wm_param kParams[] = {
         "Normalised correlation needed where the window reaches 32 px and more from the expected place; likeness_min "
         "is "
         "for 8 px and less."),
-    F64("blur_px", blur_px, 0.6, 0, 5, "px. Blur (sigma) of the picture: lens and compression."),
     F64("sigma_px", sigma_px, 0.05, 0, 10,
         "px. Error of a landmark's middle beside that of its fit: compression, the camera's response."),
 };
@@ -43,6 +40,8 @@ static const wm_param_old kOld[] = {
     {"sigma_factor", NULL, "a constant now: 1.3"},
     {"facing_min", NULL, "a constant now: a cosine of 0.17"},
     {"contrast_grey", NULL, "a constant now: 4 grey levels"},
+    {"search_after_s", NULL, "a constant now: 0.5 s"},
+    {"blur_px", NULL, "a constant now: 0.6 px"},
     {NULL, NULL, NULL},
 };
 

@@ -14,8 +14,8 @@ struct wm_landmarks_params {
   double range_max_m, size_min_px;
   double mounting_sigma_rad;
   double likeness_min;
-  double search_places, search_area_px2, search_after_s, likeness_alone, likeness_far;
-  double blur_px, sigma_px;
+  double search_places, search_area_px2, likeness_alone, likeness_far;
+  double sigma_px;
 };
 
 extern const wm_param_table wm_landmarks_params_table;

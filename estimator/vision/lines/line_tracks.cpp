@@ -8,7 +8,8 @@ namespace wm {
 namespace {
 
 constexpr double kBin_rad = 0.004;       // of the histogram of rotations: about a pixel of a 160 degree fisheye
-constexpr int kBinsMax = 1024;           // half of them: 2 rad, above the largest turn_max_rad
+constexpr double kTurnMax_rad = 0.3;     // largest rotation of the robot between pictures
+constexpr int kBinsMax = 1024;           // half of them: 2 rad, above the largest rotation
 constexpr int kSmoothing_bins = 3;       // half width of the triangular kernel: parallax spreads the votes. Not swept
 constexpr double kGate_rad = 0.02;       // of the azimuth about its prediction: parallax of a picture. Not swept
 constexpr double kAppearance_grey = 20;  // sigma of a side's brightness from picture to picture: exposure, backgrounds
@@ -68,11 +69,10 @@ int best_bin(const double *votes, int half) {
 
 // Common rotation of the azimuths since the last picture, rad: the mode of a histogram over all pairs, refined to the
 // weighted mean about it.
-double find_turn(const line_tracks &self, const radial_edge *edges, int count, double dt_s,
-                 const wm_lines_params &params) {
+double find_turn(const line_tracks &self, const radial_edge *edges, int count, double dt_s) {
   double votes[kBinsMax] = {};
   constexpr int kHalfMax = kBinsMax / 2 - kSmoothing_bins - 1;
-  const int wanted = static_cast<int>(params.turn_max_rad / kBin_rad), half = wanted < kHalfMax ? wanted : kHalfMax;
+  const int wanted = static_cast<int>(kTurnMax_rad / kBin_rad), half = wanted < kHalfMax ? wanted : kHalfMax;
   const double expected = -self.turn_radps * dt_s;
   each_pair(self, edges, count, dt_s, expected, [&](double moved, double weight) {
     const int bin = static_cast<int>(std::floor(moved / kBin_rad + 0.5));
@@ -179,12 +179,12 @@ void line_tracks::clear() {
   last_ns = WM_TIME_NONE;
 }
 
-void line_tracks::follow(const radial_edge *edges, int count, wm_time_ns t_ns, const wm_lines_params &params) {
+void line_tracks::follow(const radial_edge *edges, int count, wm_time_ns t_ns) {
   const double dt_s = last_ns == WM_TIME_NONE ? kStale_s : wm_seconds_between(last_ns, t_ns);
   const bool is_stale = !(dt_s > 0 && dt_s < kStale_s);
   if (is_stale)
     for (line_track &t : track) t.id = 0;
-  const double turn = is_stale ? 0 : find_turn(*this, edges, count, dt_s, params);
+  const double turn = is_stale ? 0 : find_turn(*this, edges, count, dt_s);
   last_ns = t_ns;
   turn_radps = is_stale ? 0 : -turn / dt_s;
 

@@ -28,7 +28,7 @@ struct line_tracks {
 
   void clear();
   // Continues, begins and ends tracks by the lines of a picture.
-  void follow(const radial_edge *edges, int count, wm_time_ns t_ns, const wm_lines_params &params);
+  void follow(const radial_edge *edges, int count, wm_time_ns t_ns);
 
  private:
   void begin(const radial_edge *edges, int count, const bool *taken);

@@ -28,6 +28,7 @@ struct lines_state {
 };
 
 constexpr double kZenithWalk_rad = 2e-5;  // random walk a picture: springs and load. Not swept
+constexpr int32_t kConfirmSeen = 3;       // pictures that must show a line before it is published
 constexpr int kLeanSeen = 3;              // pictures that must show a line before it corrects the zenith: no false ones
 constexpr double kTiltMin_rad = 1e-6;     // floor of tilt_sigma_rad, so that its variance is positive
 
@@ -114,13 +115,13 @@ wm_status detect(void *memory, const wm_frame *frames, const wm_estimate *, wm_e
   if (frame.width_px != state->camera.width_px || frame.height_px != state->camera.height_px) return WM_BAD_DATA;
   polar_fill(&state->polar, frame);
   const int found = find_radial_edges(state->polar, state->params, state->up, &state->work, state->edges);
-  state->tracks.follow(state->edges, found, frame.t_ns, state->params);
+  state->tracks.follow(state->edges, found, frame.t_ns);
   if (state->params.tilt_sigma_rad > 0) {
     state->up.xx += square(kZenithWalk_rad);
     state->up.yy += square(kZenithWalk_rad);
   }
   for (const line_track &track : state->tracks.track) {
-    if (track.id == 0 || track.edge < 0 || track.seen < state->params.confirm_seen) continue;
+    if (track.id == 0 || track.edge < 0 || track.seen < kConfirmSeen) continue;
     if (state->params.tilt_sigma_rad > 0 && track.seen >= kLeanSeen)
       correct_zenith(state->edges[track.edge], &state->up);
     if (*count == capacity) return WM_FULL;

@@ -5,8 +5,6 @@
 
 #define F64(key, field, initial, min, max, about) \
   { key, WM_PARAM_F64, offsetof(struct wm_lines_params, field), initial, min, max, NULL, about }
-#define I32(key, field, initial, min, max, about) \
-  { key, WM_PARAM_I32, offsetof(struct wm_lines_params, field), initial, min, max, NULL, about }
 
 static const wm_param kParams[] = {
     F64("elevation_min_rad", elevation_min_rad, -0.12, -1.5, 1.5,
@@ -16,18 +14,12 @@ static const wm_param kParams[] = {
         "resemble "
         "lines."),
     F64("contrast_grey", contrast_grey, 6, 1, 255, "Grey levels. Smallest difference of a line's two sides."),
-    F64("length_min_rad", length_min_rad, 0.09, 0.01, 2, "rad of elevation. Shortest line."),
-    F64("begin_max_rad", begin_max_rad, 0.3, -1.5, 1.5,
-        "rad above the camera's horizon. Highest lower end of a line: what begins higher hangs (lamps, beams)."),
-    F64("blur_px", blur_px, 0.75, 0.1, 10, "px. Blur (sigma) of the picture's edges: lens, pixel and compression."),
     F64("sigma_px", sigma_px, 0.12, 0, 10,
         "px. Error of a line beside that of its fit: compression, the camera's response, the lens model."),
     F64("tilt_sigma_rad", tilt_sigma_rad, 0.01, 0, 0.1,
         "rad. Error of the mounting's roll and pitch, which is estimated from the lean of upright lines. 0: the "
         "mounting "
         "is exact."),
-    F64("turn_max_rad", turn_max_rad, 0.3, 0.01, 1.5, "rad. Largest rotation of the robot between pictures."),
-    I32("confirm_seen", confirm_seen, 3, 1, 100, "Pictures that must show a line before it is published."),
 };
 
 static const wm_param_old kOld[] = {
@@ -35,6 +27,11 @@ static const wm_param_old kOld[] = {
     {"gate_rad", NULL, "a constant now: 0.02 rad"},
     {"appearance_grey", NULL, "a constant now: 20 grey levels"},
     {"keep_unseen", NULL, "a constant now: 10 pictures"},
+    {"length_min_rad", NULL, "a constant now: 0.09 rad"},
+    {"begin_max_rad", NULL, "a constant now: 0.3 rad"},
+    {"blur_px", NULL, "a constant now: 0.75 px"},
+    {"turn_max_rad", NULL, "a constant now: 0.3 rad"},
+    {"confirm_seen", NULL, "a constant now: 3 pictures"},
     {NULL, NULL, NULL},
 };
 

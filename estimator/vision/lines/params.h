@@ -12,11 +12,9 @@ extern "C" {
 
 struct wm_lines_params {
   double elevation_min_rad, elevation_max_rad;
-  double contrast_grey, length_min_rad, begin_max_rad;
-  double blur_px, sigma_px;
+  double contrast_grey;
+  double sigma_px;
   double tilt_sigma_rad;
-  double turn_max_rad;
-  int32_t confirm_seen;
 };
 
 extern const wm_param_table wm_lines_params_table;

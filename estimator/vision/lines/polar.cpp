@@ -57,7 +57,7 @@ const char *polar_size(const mounted_camera &camera, const wm_lines_params &para
     out->rows++;
     if (scale > largest) largest = scale;
   });
-  if (out->rows * kRowStep_rad < params.length_min_rad)
+  if (out->rows * kRowStep_rad < kLengthMin_rad)
     return "the camera sees too little between elevation_min_rad and elevation_max_rad: is its mounting right?";
   const int wanted = static_cast<int>(kTwoPi * largest) / 16 * 16;
   out->columns = wanted < 256 ? 256 : wanted > kPolarColumnsMax ? kPolarColumnsMax : wanted;

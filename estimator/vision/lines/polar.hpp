@@ -9,11 +9,12 @@
 
 namespace wm {
 
-inline constexpr int kPolarPad = 32;           // columns repeated from the other end: more than any window reaches
-inline constexpr int kPolarRowsMax = 320;      // at most 0.01 rad a row from horizon to zenith and below
-inline constexpr int kPolarColumnsMax = 4096;  // 1.5 mrad: finer than the lenses of the fisheyes known
-inline constexpr double kRowStep_rad = 0.01;   // elevation from row to row: finer than segments of six rows need
-inline constexpr int kPolarScale = 16;         // levels of the polar picture per grey level
+inline constexpr int kPolarPad = 32;            // columns repeated from the other end: more than any window reaches
+inline constexpr int kPolarRowsMax = 320;       // at most 0.01 rad a row from horizon to zenith and below
+inline constexpr int kPolarColumnsMax = 4096;   // 1.5 mrad: finer than the lenses of the fisheyes known
+inline constexpr double kRowStep_rad = 0.01;    // elevation from row to row: finer than segments of six rows need
+inline constexpr double kLengthMin_rad = 0.09;  // of elevation, of a line: nine rows
+inline constexpr int kPolarScale = 16;          // levels of the polar picture per grey level
 
 struct polar_row {
   double elevation_rad, tan;

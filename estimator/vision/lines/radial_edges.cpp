@@ -11,6 +11,8 @@ constexpr int kApart = 3;        // columns between two lines of one sign; less 
 constexpr int kSegmentRows = 6;  // rows that are averaged before the edge is placed: noise against curvature. Not swept
 constexpr int kSegmentsMax = (kPolarRowsMax + kSegmentRows - 1) / kSegmentRows;
 constexpr int kReachMax_columns = 20;      // on each side of the edge that is fitted: bounds the cost
+constexpr double kBlur_px = 0.75;          // sigma of the picture's edges: lens, pixel and compression
+constexpr double kBeginMax_rad = 0.3;      // highest lower end of a line: what begins higher hangs (lamps, beams)
 constexpr double kReach_blurs = 5;         // the same in sigmas of the edge's blur: the tails below 1e-6 are left out
 constexpr double kRamp_grey_per_px = 0.5;  // prior sigma of the shading along a wall, from rendered halls
 constexpr int kGaussNewtonSteps = 4;       // converged to 1e-3 px from half a column off
@@ -181,7 +183,7 @@ bool measure_segments(const polar_view &view, const wm_lines_params &params, con
     const int from = line.first + rows * i / tried, to = line.first + rows * (i + 1) / tried - 1;
     const double guess = line.column - 0.5 + lean * (view.row[(from + to) / 2].tan - middle_tan);
     edge_segment &s = out->item[out->count];
-    if (!measure_segment(view, from, to, guess, params.blur_px, &s)) continue;
+    if (!measure_segment(view, from, to, guess, kBlur_px, &s)) continue;
     if (line.sign * (s.high - s.low) < 0.5 * params.contrast_grey) continue;
     s.variance += square(params.sigma_px / view.row[(from + to) / 2].px_per_column);
     out->used[out->count++] = true;
@@ -288,14 +290,14 @@ void add_edge(const radial_edge &edge, double step_rad, radial_edge *list, int *
 // Measures the peaks among the votes of one sign. Returns how many edges were found.
 int find_edges(const polar_view &view, const wm_lines_params &params, const zenith &up, const votes &v, int sign,
                radial_edge *out, int capacity) {
-  const int rows_min = static_cast<int>(params.length_min_rad / kRowStep_rad + 0.5);
+  const int rows_min = static_cast<int>(kLengthMin_rad / kRowStep_rad + 0.5);
   const double threshold = 0.5 * params.contrast_grey;
   const int score_min = static_cast<int>(threshold * kVoteScale * rows_min);
   int count = 0;
   for (int c = 0; c < view.columns && count < capacity; c++) {
     const int score = v.sum[c], first = v.first[c], last = v.last[c];
     if (score < score_min || last - first + 1 < rows_min) continue;
-    if (view.row[first].elevation_rad > params.begin_max_rad) continue;
+    if (view.row[first].elevation_rad > kBeginMax_rad) continue;
     radial_edge edge;
     if (!is_peak(v, c, view.columns) || !measure_line(view, params, up, {c, first, last, sign}, &edge)) continue;
     // The measured edge must be the one that was voted for, not a neighbour's flank: compare their contrasts.

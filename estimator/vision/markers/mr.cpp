@@ -14,6 +14,8 @@ namespace wm {
 
 namespace {
 
+constexpr int kContrastMin_grey = 20;  // smallest difference of a print's white and black
+
 struct mr_state {
   wm_mr_params params;
   outline_work outlines;
@@ -72,8 +74,7 @@ bool read_region(mr_state *state, const wm_frame &frame, uint32_t region, wm_mar
   mr_reading reading;
   double corners_px[5][2];
   if (!find_outline(&state->outlines, region, 5, &view, corner) ||
-      !mr_read(view, frame, corner, static_cast<uint32_t>(state->params.id_max), state->params.contrast_min,
-               &reading) ||
+      !mr_read(view, frame, corner, static_cast<uint32_t>(state->params.id_max), kContrastMin_grey, &reading) ||
       !outline_in_picture(state->outlines, view, corner, 5, reading.tip, corners_px))
     return false;
   out->id = static_cast<int32_t>(reading.id) + state->params.id_offset;
@@ -87,7 +88,7 @@ wm_status detect(void *memory, const wm_frame *frames, const wm_estimate *, wm_e
   *count = 0;
   if (frame.width_px != state->outlines.width_px || frame.height_px != state->outlines.height_px) return WM_BAD_DATA;
   const dark_work &regions = state->outlines.regions;
-  find_regions(&state->outlines.regions, frame, state->params.contrast_min, false);
+  find_regions(&state->outlines.regions, frame, kContrastMin_grey, false);
   const uint32_t runs = run_count(regions);
   for (uint32_t i = 0; i < runs && *count < capacity; i++) {
     if (!is_region(regions, i)) continue;

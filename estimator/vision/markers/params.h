@@ -12,7 +12,7 @@ extern "C" {
 
 struct wm_mr_params {
   double size_m;
-  int32_t contrast_min, id_max, id_offset;
+  int32_t id_max, id_offset;
 };
 
 extern const wm_param_table wm_mr_params_table;

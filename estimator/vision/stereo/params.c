@@ -11,15 +11,12 @@
 static const wm_param kParams[] = {
     I32("tracks", tracks, 100, 8, STEREO_TRACKS_MAX,
         "Points tracked at the same time. The filter's slam.points should have room for them."),
-    I32("confirm_seen", confirm_seen, 2, 1, 100,
-        "Pictures in which a point must follow the common motion before it is published: suspended particles do not."),
     F64("noise_grey", noise_grey, 2.0, 0.1, 100,
         "Grey levels. Noise of a pixel, compression included; with a patch's contrast it gives a corner's error."),
     F64("disparity_min_px", disparity_min_px, 4, 0.5, 2000,
         "px. Smallest disparity: farther points have no useful range."),
     F64("disparity_max_px", disparity_max_px, 160, 4, 2000,
         "px. Largest disparity: focal length times baseline over the smallest distance."),
-    F64("row_px", row_px, 1.0, 0.05, 20, "px. Largest distance of a match from its epipolar line."),
 };
 
 static const wm_param_old kOld[] = {
@@ -27,6 +24,8 @@ static const wm_param_old kOld[] = {
     {"sigma_max_px", NULL, "a constant now: 0.25 px"},
     {"fit_min", NULL, "a constant now: 0.5"},
     {"agree_px", NULL, "a constant now: 1 px"},
+    {"confirm_seen", NULL, "a constant now: 2 pictures"},
+    {"row_px", NULL, "a constant now: 1 px"},
     {NULL, NULL, NULL},
 };
 

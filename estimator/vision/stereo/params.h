@@ -13,9 +13,9 @@ extern "C" {
 #define STEREO_TRACKS_MAX 240  // bounds the memory and the time of a picture
 
 struct wm_stereo_params {
-  int32_t tracks, confirm_seen;
+  int32_t tracks, unused;
   double noise_grey;
-  double disparity_min_px, disparity_max_px, row_px;
+  double disparity_min_px, disparity_max_px;
 };
 
 extern const wm_param_table wm_stereo_params_table;

@@ -14,9 +14,11 @@ namespace wm {
 
 namespace {
 
-constexpr int32_t kFirstId = 1 << 30;   // landmarks of maps have smaller ids
-constexpr int32_t kCell_px = 40;        // side of a cell, each with a track: points are spread over the picture
-constexpr double kAgree_px = 1.0;       // from the common motion, each coordinate. Not swept
+constexpr int32_t kFirstId = 1 << 30;  // landmarks of maps have smaller ids
+constexpr int32_t kCell_px = 40;       // side of a cell, each with a track: points are spread over the picture
+constexpr double kAgree_px = 1.0;      // from the common motion, each coordinate. Not swept
+// Pictures in which a point follows the common motion before it is published: suspended particles do not.
+constexpr int32_t kConfirmSeen = 2;
 constexpr double kMemory_s = 1.0;       // after a longer gap all tracks end
 constexpr int32_t kMargin_px = 12;      // of the full picture: half a patch
 constexpr double kCrowded_cells = 0.6;  // smallest distance of two tracks, in cells
@@ -233,7 +235,7 @@ size_t emit(const stereo_state &self, wm_time_ns t_ns, wm_event *out, size_t cap
   size_t count = 0;
   for (int32_t i = 0; i < self.track_count && count < capacity; i++) {
     const track &one = self.tracks[i];
-    if (one.seen < self.params.confirm_seen) continue;
+    if (one.seen < kConfirmSeen) continue;
     wm_event &event = out[count++];
     std::memset(static_cast<void *>(&event), 0, WM_EVENT_SMALL_BYTES);
     event.t_ns = t_ns;

@@ -9,6 +9,7 @@ namespace {
 constexpr int kRounds = 8;                // of an alignment; most settle in 4
 constexpr double kCoarseReach_px = 10.0;  // of its level: half a patch
 constexpr double kFineReach_px = 4.0;     // at full resolution: two pixels of the level above, and the prediction
+constexpr double kRow_px = 1.0;           // largest distance of a match from its epipolar line
 constexpr double kSlopeMax = 0.6;         // of a disparity, px per px: steeper surfaces are seen too obliquely
 constexpr double kPeakMin = 0.4;          // squared correlation of the first match. Not swept
 constexpr double kRatioMax = 0.85;        // second best over best: above, the match is ambiguous. Not swept
@@ -56,7 +57,7 @@ bool take_pair(const pair_geometry &rig, const wm_stereo_params &params, const p
                track *self) {
   const double disparity = left.u - right.u;
   if (!(disparity >= params.disparity_min_px) || !(disparity <= params.disparity_max_px)) return false;
-  if (!(std::fabs(left.v - right.v) <= params.row_px)) return false;
+  if (!(std::fabs(left.v - right.v) <= kRow_px)) return false;
   self->left = left;
   self->right = right;
   self->place = place_of(rig, {left.u, left.v, right.u});

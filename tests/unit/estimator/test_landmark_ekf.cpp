@@ -306,37 +306,6 @@ TEST(test_a_maps_error_is_not_averaged_away) {
 
 // ---- lost and found ----
 
-TEST(test_given_a_wrong_start_when_landmarks_contradict_it_then_it_is_said_and_mended) {
-  setup.start.p_m[0] = -3;
-  setup.start.p_m[1] = 2;
-  setup.start.heading_rad = -1;
-  begin();
-  bool lost = false;
-  for (int i = 0; i < 40 && off() > 0.3; i++) {
-    drive(0.2, kBearings | kRanges);
-    lost = lost || estimate().state == WM_STATE_LOST;
-  }
-  TEST_ASSERT_TRUE(lost);
-  TEST_ASSERT_LESS_THAN_DOUBLE(0.3, off());
-  TEST_ASSERT_EQUAL_UINT32(2, estimate().resets);
-  drive(20, kBearings | kRanges);
-  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, estimate().state);
-  TEST_ASSERT_EQUAL_UINT32(2, estimate().resets);
-  TEST_ASSERT_LESS_THAN_DOUBLE(0.06, off());
-}
-
-TEST(test_given_a_kidnapped_robot_when_it_sees_bearings_only_then_it_finds_itself) {
-  begin();
-  drive(20, kBearings);
-  TEST_ASSERT_LESS_THAN_DOUBLE(0.1, off());
-  truth = {-2, -2, 2.5};
-  drive(15, kBearings);
-  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, estimate().state);
-  TEST_ASSERT_GREATER_THAN(1, estimate().resets);
-  TEST_ASSERT_LESS_THAN_DOUBLE(0.15, off());
-  TEST_ASSERT_LESS_THAN_DOUBLE(0.05, heading_off());
-}
-
 // What of the start is known, what is seen for how long, and how far off place and heading may be then.
 TEST(test_a_start_of_which_something_is_unknown_is_found) {
   const struct {

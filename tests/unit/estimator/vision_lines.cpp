@@ -260,12 +260,11 @@ TEST(identities_of_tracks_begin_anew) {
   static wm::line_tracks tracks;
   wm::radial_edge edges[3] = {};
   for (int i = 0; i < 3; i++) edges[i] = {-1.0 + i, 0.001, 0, 0.1, 60.0 + 50 * i, 200.0 - 50 * i, 0, 100, 1000};
-  const auto &wish = lines->as<wm_lines_params>();
   constexpr int32_t kEnd = INT32_MAX / 16;
   tracks.clear();
   tracks.next_id = kEnd - 2;
   for (int shown = 0; shown < 3; shown++) {  // they keep it
-    tracks.follow(edges, 3, WM_NS_PER_S + shown * 50 * WM_NS_PER_MS, wish);
+    tracks.follow(edges, 3, WM_NS_PER_S + shown * 50 * WM_NS_PER_MS);
     const int32_t want[3] = {kEnd - 2, kEnd - 1, 1};
     for (int i = 0; i < 3; i++) {
       TEST_ASSERT_EQUAL_INT32(want[i], tracks.track[i].id);
