@@ -60,11 +60,10 @@ wm_status pushed_source_open(const char *name, wm_site *site, pushed_source **ou
   size_t other = 0;
   while (!stream && other < OTHERS && !is_named(name, kOthers[other].name, kOthers[other].has_sensor)) other++;
   if (!stream && other == OTHERS)
-    return wm_fail(
-        err, WM_NOT_FOUND,
-        "'%.40s' is not a source: motion, motion6, ticks, speeds, steering, imu, heading, depth, gnss, localizer, "
-        "increments, stereo, points, sightings:SENSOR, markers:SENSOR, commands and can are",
-        name);
+    return wm_fail(err, WM_NOT_FOUND,
+                   "'%.40s' is not a source: motion, motion6, ticks, speeds, steering, imu, heading, depth, gnss, "
+                   "localizer, increments, stereo, points, sightings:SENSOR, markers:SENSOR, commands and can are",
+                   name);
   wm_status status = make(name, out, err);
   if (status != WM_OK) return status;
   pushed_source *self = *out;

@@ -26,11 +26,10 @@ wm_status library_take_options(const char *function, const void *given, size_t b
   for (size_t i = full_bytes; i < bytes;
        i++)  // of a program with a newer header: fine while it doesn't use the new part
     if (((const unsigned char *)given)[i] != 0)
-      return wm_fail(
-          err, WM_BAD_USAGE,
-          "%s: its options have %zu bytes and use what this library (%s) lacks, at byte %zu: install the version "
-          "of the program's headers",
-          function, bytes, WM_VERSION, i);
+      return wm_fail(err, WM_BAD_USAGE,
+                     "%s: its options have %zu bytes and use what this library (%s) lacks, at byte %zu: install the "
+                     "version of the program's headers",
+                     function, bytes, WM_VERSION, i);
   memset(out, 0, full_bytes);
   memcpy(out, given, bytes < full_bytes ? bytes : full_bytes);
   return WM_OK;

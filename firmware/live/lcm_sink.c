@@ -14,11 +14,10 @@ static void say_once(lcm_sink *self, const char *what, const char *why) {
   if (self->said_trouble) return;
   self->said_trouble = 1;
   char line[300];
-  (void)snprintf(
-      line, sizeof line,
-      "LCM: %s on %s: %s. Localization continues; trying again every 2 s. (`ip route add 224.0.0.0/4 dev lo` "
-      "makes a route on this computer; `publish: {lcm: false}` turns LCM off)",
-      what, self->url, why);
+  (void)snprintf(line, sizeof line,
+                 "LCM: %s on %s: %s. Localization continues; trying again every 2 s. (`ip route add 224.0.0.0/4 dev "
+                 "lo` makes a route on this computer; `publish: {lcm: false}` turns LCM off)",
+                 what, self->url, why);
   self->say(self->say_context, line);
 }
 

@@ -185,11 +185,10 @@ static void take_up_what_was(live *self) {
   if (map[0] == '\0' || !wm_keeper_of(config->estimator)) return;
   const size_t largest_bytes = map_slot_bytes(self);
   if (largest_bytes > WM_SAVED_MAP_BYTES_MAX)
-    live_say(
-        self,
-        "start: a map of as many landmarks as the configuration allows would take %.0f MB, more than a saved map may "
-        "have (%.0f MB): one that grows so large is not saved. Lower the landmarks' capacity",
-        (double)largest_bytes * 1e-6, (double)WM_SAVED_MAP_BYTES_MAX * 1e-6);
+    live_say(self,
+             "start: a map of as many landmarks as the configuration allows would take %.0f MB, more than a saved map "
+             "may have (%.0f MB): one that grows so large is not saved. Lower the landmarks' capacity",
+             (double)largest_bytes * 1e-6, (double)WM_SAVED_MAP_BYTES_MAX * 1e-6);
   self->disk.map_identity = wm_map_identity_of(config, &self->assembly.setup);
   go_on_with_map(self, map, has_pose);
 }
@@ -301,8 +300,8 @@ static void steady_memory(live *self, wm_live_report *report) {
     report->memory_locked = wm_lock_memory();
     if (!report->memory_locked)
       live_say(self,
-               "memory could not be locked (it needs CAP_IPC_LOCK or a larger `ulimit -l`): page faults are "
-               "possible when memory is short");
+               "memory could not be locked (it needs CAP_IPC_LOCK or a larger `ulimit -l`): page faults are possible "
+               "when memory is short");
   }
   wm_prefault_program();
 }
@@ -327,8 +326,8 @@ static wm_status start_threads(live *self, thread_list *threads, wm_live_report 
   threads->estimator_started = 1;
   if (!report->is_realtime && self->config->runtime.realtime_priority > 0)
     live_say(self,
-             "no right to real-time priority (it needs CAP_SYS_NICE or `ulimit -r`): the estimator runs as a "
-             "normal thread; deadlines may be missed");
+             "no right to real-time priority (it needs CAP_SYS_NICE or `ulimit -r`): the estimator runs as a normal "
+             "thread; deadlines may be missed");
   for (size_t i = 0; i < self->assembly.source_count && status == WM_OK; i++) {
     status = thread_start(THREAD_SOURCE, i, self->config, source_thread, &self->sources[i], &threads->source[i],
                           &is_realtime, err);

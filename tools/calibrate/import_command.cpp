@@ -43,10 +43,9 @@ std::function<int()> import_command(wm::cli::App &app) {
   auto a = std::make_shared<ImportArguments>();
   app.description(
       "Turns a camera calibration of OpenCV, Kalibr, ROS, PhotonVision or OCamCalib into entries of calibration.yaml.");
-  app.add_option(
-         "FILE", a->file,
-         "YAML or XML of OpenCV, Kalibr's camchain, ROS camera_info (also ost.ini and `topic echo`), PhotonVision's "
-         "JSON, OCamCalib's calib_results.txt; also packed (.gz)")
+  app.add_option("FILE", a->file,
+                 "YAML or XML of OpenCV, Kalibr's camchain, ROS camera_info (also ost.ini and `topic echo`), "
+                 "PhotonVision's JSON, OCamCalib's calib_results.txt; also packed (.gz)")
       ->required();
   app.add_option("--name", a->name, "the camera's name; default: the file's, else 'camera'");
   app.add_option("--model", a->model,

@@ -23,15 +23,14 @@ void parse(wm::cli::App *app, DetectWish *a) {
   app->add_option("--detector", a->detector, "this detector, by its defaults")
       ->check(wm::cli::one_of(detector_names()));
   app->add_option("--set", a->sets,
-                  "KEY=VALUE: a parameter of --detector (docs/config.md), as often as needed; family=all "
-                  "tries every family of square markers");
+                  "KEY=VALUE: a parameter of --detector (docs/config.md), as often as needed; family=all tries every "
+                  "family of square markers");
   app->add_option("--config", a->config, "instead of --detector: all detectors of a configuration's `vision:`")
       ->excludes("--detector")
       ->excludes("--set");
   app->add_option("--out", a->out, "folder: detections/CAMERA-DETECTOR.csv and drawn/ are written there")->required();
   app->add_option("--draw", a->draw,
-                  "the pictures with what was found: avi, jpg, png, none; auto: avi, and jpg of a "
-                  "folder of pictures")
+                  "the pictures with what was found: avi, jpg, png, none; auto: avi, and jpg of a folder of pictures")
       ->check(wm::cli::one_of({"auto", "avi", "jpg", "png", "none"}))
       ->capture_default_str();
   app->add_option("--rate", a->rate_hz, "pictures a second of the AVI")
@@ -41,9 +40,9 @@ void parse(wm::cli::App *app, DetectWish *a) {
   app->add_option("--calibration", a->input.calibration,
                   "the cameras' calibration.yaml, where FROM is not a recording, or instead of the recording's");
   app->add_option("--landmarks", a->input.landmarks, "landmarks.csv of a map with pictures of landmarks");
-  app->add_option("--poses", a->poses,
-                  "a run, or a recording with truth: its poses guide the detector of known landmarks; without, it "
-                  "searches");
+  app->add_option(
+      "--poses", a->poses,
+      "a run, or a recording with truth: its poses guide the detector of known landmarks; without, it searches");
   app->add_option("--every", a->every, "only each N-th picture")->check(wm::cli::range(1, 1000000));
   app->footer(
       "examples:\n"

@@ -59,10 +59,9 @@ void parse(wm::cli::App *app, Arguments *a) {
                   "--detector landmarks: recall is of those whose shorter side has so many pixels")
       ->check(wm::cli::range(1.0, 1000.0))
       ->capture_default_str();
-  app->add_option(
-         "--view", a->view_m,
-         "--detector: the part of the floor that is judged, x from, x to, y from, y to in base_link, m: true edges "
-         "outside are left out")
+  app->add_option("--view", a->view_m,
+                  "--detector: the part of the floor that is judged, x from, x to, y from, y to in base_link, m: true "
+                  "edges outside are left out")
       ->delimiter(',')
       ->expected(4);
   app->footer(

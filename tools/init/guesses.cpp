@@ -52,16 +52,15 @@ void name_cameras(Robot &robot) {
     RobotCamera &camera = robot.cameras[i];
     if (camera.device.empty()) {
       camera.device = "/dev/video" + std::to_string(2 * i);
-      robot.guesses.push_back(
-          "device of camera " + camera.entry.name + ": " + camera.device +
-          ", in the order of the cameras (each has two nodes); `v4l2-ctl --list-devices` lists them, "
-          "--camera NAME=DEVICE names another one");
+      robot.guesses.push_back("device of camera " + camera.entry.name + ": " + camera.device +
+                              ", in the order of the cameras (each has two nodes); `v4l2-ctl --list-devices` lists "
+                              "them, --camera NAME=DEVICE names another one");
     }
     if (!camera.shift_s || *camera.shift_s == 0) continue;
     if (*camera.shift_s < 0)
-      robot.guesses.push_back("latency of camera " + camera.entry.name + ": " + plain_number(-1000 * *camera.shift_s) +
-                              " ms, by Kalibr's timeshift_cam_imu; it holds for the driver that Kalibr's recording was "
-                              "made with");
+      robot.guesses.push_back(
+          "latency of camera " + camera.entry.name + ": " + plain_number(-1000 * *camera.shift_s) +
+          " ms, by Kalibr's timeshift_cam_imu; it holds for the driver that Kalibr's recording was made with");
     else
       robot.unknown.push_back("time offset of camera " + camera.entry.name +
                               ": Kalibr's timeshift_cam_imu has its stamps " + plain_number(1000 * *camera.shift_s) +
@@ -79,8 +78,7 @@ void name_defaults(Robot &robot) {
     w.tag_family = "tag36h11";
     robot.guesses.emplace_back(
         "markers.family tag36h11: the most frequent one; `waymark detect` of a picture shows what it finds, "
-        "--tag-family "
-        "names another one");
+        "--tag-family names another one");
   }
   if (robot.tags)
     robot.guesses.push_back(

@@ -35,8 +35,7 @@ void parse_motion(wm::cli::App *app, Wish *w) {
 void parse(wm::cli::App *app, Wish *w) {
   app->description(
       "Makes a folder with the configuration of a new robot: robot.yaml, calibration.yaml, can-signals.yaml. It reads "
-      "what is "
-      "there (DBC, CAN log, URDF, camera calibrations, layout of tags) and asks for the rest.");
+      "what is there (DBC, CAN log, URDF, camera calibrations, layout of tags) and asks for the rest.");
   app->add_option("FOLDER", w->out, "the new folder")->required();
   parse_motion(app, w);
   app->add_option("--sees", w->sees,
@@ -68,8 +67,7 @@ void parse(wm::cli::App *app, Wish *w) {
       "  waymark init my-robot --motion ticks --imu --urdf robot.urdf --calibration camchain-imucam.yaml --sees tags "
       "--tag-size 0.16\n"
       "  waymark init field --motion twist --imu --tag-layout 2024-crescendo.json --tag-size 0.1651 --calibration "
-      "front.yaml "
-      "--mounting front=0.25,0,0.5,0,-20,0 --yes\n"
+      "front.yaml --mounting front=0.25,0,0.5,0,-20,0 --yes\n"
       "docs/init.md explains what is read and proposed. Exit code: 0 done, 1 the work failed, 2 usage.");
 }
 

@@ -120,10 +120,9 @@ class Mountings {
     if (!robot.urdf) return;
     const Ground ground(*robot.urdf);
     if (!ground.found()) {
-      robot.guesses.push_back(
-          "base_link: the URDF's " + robot.urdf->base +
-          ", since the URDF has no two driven wheels with a radius; it must be on the ground, under "
-          "the middle of the driven (rear) axle");
+      robot.guesses.push_back("base_link: the URDF's " + robot.urdf->base +
+                              ", since the URDF has no two driven wheels with a radius; it must be on the ground, "
+                              "under the middle of the driven (rear) axle");
       return;
     }
     shift_.translation() = -ground.origin();
@@ -269,8 +268,7 @@ void mount(Robot &robot, const Mountings &mountings, std::vector<Imported> &of_c
   if (robot.wish.imu && !imu)
     robot.guesses.emplace_back(
         "mounting of the IMU: axes of base_link (x ahead, y left, z up), since no file has it; a turn to the left must "
-        "be "
-        "positive in imu.csv's wz_radps, else give --mounting imu=X,Y,Z,ROLL,PITCH,YAW or --urdf");
+        "be positive in imu.csv's wz_radps, else give --mounting imu=X,Y,Z,ROLL,PITCH,YAW or --urdf");
 }
 
 }  // namespace
@@ -337,9 +335,9 @@ void read_geometry(Robot &robot) {
   if (robot.log.track_m > 0 && !wish.track_m) {
     wish.track_m = std::round(robot.log.track_m * 100) / 100;
     robot.wheels_by["track_m"] = std::filesystem::path(wish.can_log).filename().string();
-    robot.guesses.push_back(format("wheels.track_m %.2f", *wish.track_m) +
-                            ": difference of the wheels' speeds over the "
-                            "yaw rate in the log; measure it between the wheels' middles");
+    robot.guesses.push_back(
+        format("wheels.track_m %.2f", *wish.track_m) +
+        ": difference of the wheels' speeds over the yaw rate in the log; measure it between the wheels' middles");
   }
   const Mountings mountings(robot);
   std::vector<Imported> imported = import_all(wish), of_camera;

@@ -27,11 +27,10 @@ std::string contradiction(const wm_floors &site, const wm_connection &one, const
                           &other_b = *end_on(other, b);
   const double way_a = (place(one_a) - place(other_a)).norm(), way_b = (place(one_b) - place(other_b)).norm();
   if (std::abs(way_a - way_b) > kMeet_m + kScale * std::max(way_a, way_b))
-    return name_of(site, other) +
-           text(
-               ": is %.2f m from '%s' on floor '%s', but %.2f m on floor '%s': one of the two maps has a wrong scale "
-               "(`resolution`), or an end a wrong place",
-               way_a, one.name, site.floors[a].name, way_b, site.floors[b].name);
+    return name_of(site, other) + text(
+                                      ": is %.2f m from '%s' on floor '%s', but %.2f m on floor '%s': one of the two "
+                                      "maps has a wrong scale (`resolution`), or an end a wrong place",
+                                      way_a, one.name, site.floors[a].name, way_b, site.floors[b].name);
   const double off_m = (carry(one_a, one_b, place(other_a)) - place(other_b)).norm();
   const double turn_deg =
       std::remainder((other_b.heading_rad - other_a.heading_rad) - (one_b.heading_rad - one_a.heading_rad),

@@ -184,10 +184,9 @@ void parse_merge(cli::App &app, MergeArguments &a) {
   app.add_option("DRIVE", a.drives, "runs of `slam` (their map-estimate.wmmap), or files of start.saved_map")
       ->required();
   app.add_option("--out", a.out, "folder for landmarks.csv and landmarks-covariance.npy");
-  app.add_option(
-      "--site", a.site,
-      "SITE/FLOOR: the floor's landmarks, and a new version of the building. The floor's landmarks of before "
-      "are --surveyed, where nothing else is");
+  app.add_option("--site", a.site,
+                 "SITE/FLOOR: the floor's landmarks, and a new version of the building. The floor's landmarks of "
+                 "before are --surveyed, where nothing else is");
   app.add_option("--surveyed", a.surveyed, "landmarks.csv with sigmas: they give the map's frame");
   app.add_flag("--one-frame", a.options.one_frame,
                "all drives began in one frame, each with its start's sigma; without: each has a frame of its own, and "

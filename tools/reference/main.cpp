@@ -76,8 +76,7 @@ int run(const Arguments &a) {
   const std::vector<SmootherStep> steps = steps_of(a, published.rows);
   if (steps.size() < 10)
     throw Failure(a.run + ": " + std::to_string(steps.size()) +
-                  " pictures with edge points in its events.wmlog; nothing to "
-                  "make a reference of");
+                  " pictures with edge points in its events.wmlog; nothing to make a reference of");
   const PublishedRow &first = published.rows.front();
   const Eigen::Vector3d start(first.pose.p_m.x(), first.pose.p_m.y(), heading_rad(first.pose.q));
   const EdgeField field(*raster, kEdgeReach_m);

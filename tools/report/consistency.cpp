@@ -61,8 +61,7 @@ std::string consistency_section(const ReportData &data) {
       "NEES compares each error with the uncertainty that was stated for it, all of x, y and heading at once: " +
           std::to_string(dof) +
           " is as expected, more is surer than right, less is more careful than needed. It should lie below the dashed "
-          "line 95 % of "
-          "the time. The scale is logarithmic.",
+          "line 95 % of the time. The scale is logarithmic.",
       "<figure>" +
           box.html({.title = "<span>NEES</span><small>" + figures + "</small>",
                     .describes = "NEES over time: " + figures,

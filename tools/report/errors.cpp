@@ -142,10 +142,8 @@ std::string error_section(const ReportData &data) {
   return section("Errors",
                  data.trajectory.has_covariance
                      ? "The line is the error; the band is where the robot itself said that the error would be. The "
-                       "line should lie "
-                       "in the band nearly always, and fill a good part of it: a band much wider than the line is "
-                       "timid, a narrower "
-                       "one is careless. Time runs from the first pose."
+                       "line should lie in the band nearly always, and fill a good part of it: a band much wider than "
+                       "the line is timid, a narrower one is careless. Time runs from the first pose."
                      : "The line is the error. This run stated no uncertainty. Time runs from the first pose.",
                  "<figure>" + body + legend(marks) + "</figure>");
 }
@@ -170,8 +168,7 @@ std::string uncertainty_section(const ReportData &data) {
   };
   return section("Uncertainty",
                  "There is no truth in this recording, so this is the robot’s own word: in 95 of 100 moments it should "
-                 "be nearer to "
-                 "its stated pose than this line.",
+                 "be nearer to its stated pose than this line.",
                  "<figure>" + draw("Position", radius, unit_for(max_abs(radius), false), false) +
                      draw("Heading", heading, {1, "°"}, true) + "</figure>");
 }

@@ -184,11 +184,9 @@ std::string innovation_section(const ReportData &data) {
             " more kinds with fewer data are not drawn.</p>";
   return section(
       "Observations",
-      "Each measurement is compared with its prediction from the estimated pose. The differences "
-      "should "
-      "scatter evenly about zero, within the band, in the shape of the bell; a constant offset means that something is "
-      "mounted or timed otherwise than stated. NIS sums them up: about 1, within the shaded bounds, is right; above, "
-      "the sensor "
+      "Each measurement is compared with its prediction from the estimated pose. The differences should scatter evenly "
+      "about zero, within the band, in the shape of the bell; a constant offset means that something is mounted or "
+      "timed otherwise than stated. NIS sums them up: about 1, within the shaded bounds, is right; above, the sensor "
       "is noisier than stated (or its errors are not independent), below, it is better.",
       "<figure>" + body +
           legend({{"<path stroke=\"var(--blue)\" stroke-width=\"1.5\" d=\"M6 4V-5M12 6V-3M18 3V-6M24 5V-4\"/>",

@@ -83,17 +83,16 @@ std::string looked_for_section(const ReportData &data) {
             " that were seldom expected are not listed.";
   std::string head;
   for (const wm_look reason : kReasons) head += "<th>" + plain(wm_look_name(reason)) + "</th>";
-  return section("Landmarks looked for",
-                 "Each landmark of the map once for each picture. Expected: in the picture, large enough, seen from "
-                 "its front, and its "
-                 "place known well enough to look there. Unlike: something else is there, the landmark is hidden, "
-                 "moved or replaced. "
-                 "A landmark that is often unlike needs a new picture or a new place. The last four columns "
-                 "count pictures in which it could not be seen, or its place was too uncertain.",
-                 "<div class=\"wide\"><table><tr><th>landmark</th><th>expected</th><th>found</th>" + head + "</tr>" +
-                     rows + "</table></div><p class=\"note\">" + note + "</p>" +
-                     legend({{"<i class=\"key\" style=\"background:var(--blue)\"></i>", "found"},
-                             {"<i class=\"key\" style=\"background:var(--amber)\"></i>", "expected and not found"}}));
+  return section(
+      "Landmarks looked for",
+      "Each landmark of the map once for each picture. Expected: in the picture, large enough, seen from its front, "
+      "and its place known well enough to look there. Unlike: something else is there, the landmark is hidden, moved "
+      "or replaced. A landmark that is often unlike needs a new picture or a new place. The last four columns count "
+      "pictures in which it could not be seen, or its place was too uncertain.",
+      "<div class=\"wide\"><table><tr><th>landmark</th><th>expected</th><th>found</th>" + head + "</tr>" + rows +
+          "</table></div><p class=\"note\">" + note + "</p>" +
+          legend({{"<i class=\"key\" style=\"background:var(--blue)\"></i>", "found"},
+                  {"<i class=\"key\" style=\"background:var(--amber)\"></i>", "expected and not found"}}));
 }
 
 }  // namespace wm::tools

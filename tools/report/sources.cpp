@@ -256,11 +256,9 @@ std::string source_section(const ReportData &data) {
   return section(
       "Data by source",
       "Nothing is lost silently: each datum that a source gave was used, or is counted here with the reason why not. A "
-      "refused datum "
-      "contradicted what the robot knew; late ones came after their moment was closed; lost ones are missing by the "
-      "sender’s own count.",
-      "<div "
-      "class=\"wide\"><table><tr><th>source</th><th>received</th><th>used</th><th>refused</th><th>late</"
+      "refused datum contradicted what the robot knew; late ones came after their moment was closed; lost ones are "
+      "missing by the sender’s own count.",
+      "<div class=\"wide\"><table><tr><th>source</th><th>received</th><th>used</th><th>refused</th><th>late</"
       "th><th>dropped</th><th>lost</th>"
       "<th>unreadable</th>" +
           std::string(has_lateness ? "<th>lateness, 99&nbsp;%</th>" : "") +

@@ -149,8 +149,7 @@ std::string timing_section(const ReportData &data) {
   if (!rows.empty()) body += "<table>" + rows + "</table>";
   return section("Time",
                  "Each row is a stage of the work, from fast on the left to slow on the right, on a logarithmic scale. "
-                 "What matters in a "
-                 "robot is not the mean but the slowest case: the last orange line.",
+                 "What matters in a robot is not the mean but the slowest case: the last orange line.",
                  body);
 }
 

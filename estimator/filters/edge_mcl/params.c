@@ -13,9 +13,8 @@ static const wm_param kParams[] = {
 
         F64("states.wall_sigma_m", wall_sigma_m, 0.02, 0, 0.3,
             "Start sigma of the distance across a wall between it and the map's, m, of each of the last six walls: "
-            "errors "
-            "of the map. Of 0.015 to 0.025 each is right for flats whose map is exact and with a wall 0.1 m off. 0: "
-            "off."),
+            "errors of the map. Of 0.015 to 0.025 each is right for flats whose map is exact and with a wall 0.1 m "
+            "off. 0: off."),
     F64("points.pixel_px", pixel_px, 0.5, 0.01, 10,
         "Sigma of an edge in the picture, pixels, where the detector gives none in metres."),
     F64("points.sigma_m", point_sigma_m, 0.012, 0.001, 1, "Sigma of a point besides: map and edge, m."),

@@ -13,8 +13,7 @@ static const char *const kMethods[] = {"unscented", "linear", "inverse_distance"
 static const wm_param kParams[] = {
     F64("states.wheel_slip_sigma", wheel_slip_sigma, 0, 0, 1,
         "For ticks: sigma of each wheel's scale about its mean, Gauss-Markov; the mean is a state, too. Slip that "
-        "lasts "
-        "for seconds, where noise.ticks_per_sqrt_m is independent with each tick. 0: off."),
+        "lasts for seconds, where noise.ticks_per_sqrt_m is independent with each tick. 0: off."),
     F64("states.wheel_slip_tau_s", wheel_slip_tau_s, 5, 0.01, 1e6, "Time constant of that, s."),
     F64("states.sensor_stamp_sigma_s", sensor_stamp_sigma_s, 0, 0, 1,
         "Sigma of the error of each picture's stamp, s: the same for all that is seen in it, independent between "
@@ -24,15 +23,13 @@ static const wm_param kParams[] = {
          "covariance, and new ones join; frozen: they are considered, not corrected, and only the robot is located."),
     I32("landmarks.capacity", landmark_capacity, 700, 1, 2000,
         "Largest number of landmarks; a further one is counted and left out. Memory grows with its square, the cost of "
-        "a "
-        "correction with the square of the number in the state."),
+        "a correction with the square of the number in the state."),
     I32("landmarks.confirm_seen", confirm_seen, 3, 1, 1000, "Observations after which a landmark is confirmed."),
     F64("landmarks.leave_after_s", leave_after_s, 10, 0.1, 1e6,
         "An unconfirmed landmark that was not seen for so long is removed, s."),
     I32("landmarks.moved_after", moved_after, 12, 2, 1000,
         "Outliers of a landmark in a row, while others fit, after which it has moved: it is removed, counted, and "
-        "joins "
-        "anew where it is."),
+        "joins anew where it is."),
     F64("association.gate", associate_gate, 9.2, 1, 1000,
         "Largest NIS at which a sighting without identity (sightings.use.unidentified) is associated with the nearest "
         "landmark; no other landmark may be near, and no other sighting of the same stamp associated with it."),
@@ -44,8 +41,8 @@ static const wm_param kParams[] = {
         "Largest range of a sighting without identity, m: far ones are few pixels or one beam wide."),
     I32("lines.clones", line_clones, 30, 0, 40,
         "Largest number of past poses kept in the state for landmarks seen by bearings alone, from the first such "
-        "bearing on; fewer where the robot's 192 states have no room for them. 12 to 24 suffice. 0: such landmarks "
-        "are not used."),
+        "bearing on; fewer where the robot's 192 states have no room for them. 12 to 24 suffice. 0: such landmarks are "
+        "not used."),
     I32("lines.poses", line_poses, 6, 3, 8, "Largest number of poses from which a landmark is initialised."),
     ENUM("lines.method", line_method, WM_SLAM_LINE_INVERSE_DISTANCE, WM_SLAM_LINE_INVERSE_DISTANCE, kMethods,
          "How such a landmark joins. unscented: once the parallax suffices, by the unscented transform over poses and "
@@ -62,8 +59,8 @@ static const wm_param kParams[] = {
         "Largest sigma of a landmark's place before it joins, as a part of its distance."),
     ENUM("lines.rejoin", line_rejoin, WM_SLAM_REJOIN_AUTO, WM_SLAM_REJOIN_AUTO, kRejoin,
          "A line's number is its tracker's own and changes when it was lost. Two landmarks, one lost before the other "
-         "was first seen, are merged where their places agree within their covariance. auto: so for bearings without "
-         "a range, on no given map, until two identities come back after 5 s out of sight."),
+         "was first seen, are merged where their places agree within their covariance. auto: so for bearings without a "
+         "range, on no given map, until two identities come back after 5 s out of sight."),
     ENUM("consistency", consistency, WM_SLAM_INVARIANT, WM_SLAM_PLAIN, kConsistency,
          "invariant: the right-invariant filter, consistent in the unobservable heading and place of the map; plain: "
          "the textbook's, which gains false certainty of its heading (for comparison)."),

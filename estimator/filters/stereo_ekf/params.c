@@ -30,8 +30,7 @@ static const wm_param kParams[] = {
     F64("constant_velocity.w_walk", cv_w_walk, 0.5, 0, 100, "Random walk of the turn rates, rad/s per sqrt(s)."),
     F64("constant_velocity.tau_s", cv_tau_s, 0, 0, 1e6,
         "Above 0: velocity and rates are Gauss-Markov processes with these sigmas and this time constant, s, instead "
-        "of "
-        "random walks (a head that is swung, a vehicle in still water)."),
+        "of random walks (a head that is swung, a vehicle in still water)."),
     F64("states.rate_bias_sigma_radps", rate_bias_sigma, 0.002, 0, 1,
         "Start sigma of the turn rates' bias on each axis, rad/s. 0: off."),
     F64("states.rate_bias_walk", rate_bias_walk, 0.0001, 0, 1, "Random walk of that bias, rad/s per sqrt(s)."),
@@ -66,8 +65,7 @@ static const wm_param kParams[] = {
         "Sigma of the pair's principal point, across and down, px. 0: off."),
     F64("states.increment_scale_sigma", increment_scale_sigma, 0.02, 0, 1,
         "Sigma of the share by which motion between two pictures is too long: disparities that are all off by 0.2 px "
-        "at "
-        "10 px. 0: off."),
+        "at 10 px. 0: off."),
     F64("states.increment_direction_sigma_rad", increment_direction_sigma, 0.02, 0, 1,
         "Sigma of the angle by which that motion is turned, rad: cameras that are not quite parallel. 0: off."),
     F64("states.range_bias_sigma_m", range_bias_sigma, 0.05, 0, 10, "Start sigma of acoustic ranges' bias, m. 0: off."),
@@ -89,8 +87,7 @@ static const wm_param kParams[] = {
         "that."),
     F64("gate.soft", gate_soft, 7, 1, 1e6,
         "Normalised innovation squared of one row above which its variance is inflated, as for a distribution with "
-        "long "
-        "tails. 99 % of correct rows lie below 6.6."),
+        "long tails. 99 % of correct rows lie below 6.6."),
     F64("gate.hard", gate_hard, 20, 1, 1e6,
         "Normalised innovation squared of one row above which the whole observation is an outlier."),
     BOOL("increments.on", increments, 1,
@@ -98,8 +95,7 @@ static const wm_param kParams[] = {
          "odometry)."),
     I32("slam.points", points_max, 250, 0, 256,
         "Capacity of the state for points: points found by stereo, and points of the map, whose error on it (sigma_m) "
-        "is "
-        "the same in each picture. 0: known points only, with an independent error in each picture."),
+        "is the same in each picture. 0: known points only, with an independent error in each picture."),
     I32("slam.keep_unseen_steps", keep_unseen_steps, 5, 0, 1000000,
         "Pictures in which a point of the state may be missing although it should be in view; then it is removed."),
     F64("slam.keep_outside_s", keep_outside_s, 600, 0, 1e6,

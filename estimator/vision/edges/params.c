@@ -11,8 +11,7 @@ static const char *const kModes[] = {"rays", "windows", NULL};
 static const wm_param kParams[] = {
     {"mode", WM_PARAM_ENUM, offsetof(struct wm_edges_params, mode), EDGES_BY_RAYS, 0, EDGES_BY_WINDOWS, kModes,
      "rays: the first edge along each ray over the floor, in the raw picture. windows: the strongest line in each "
-     "window "
-     "of the bird's-eye view, the paper's method. Rays are more accurate and distinguish walls from joints."},
+     "window of the bird's-eye view, the paper's method. Rays are more accurate and distinguish walls from joints."},
     F64("rays.range_min_m", rays_range_min_m, 0.2, 0.0, 50,
         "m from the camera's foot point. Nearer floor is not searched."),
     F64("rays.range_max_m", rays_range_max_m, 6.0, 0.1, 100,

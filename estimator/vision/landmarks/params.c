@@ -16,18 +16,15 @@ static const wm_param kParams[] = {
         "Smallest normalised correlation of picture and appearance; small landmarks need more."),
     F64("search_places", search_places, 250000, 0, 1e8,
         "Places compared per picture while no pose predicts the landmarks, some 20 ns each, at 30 pictures a second; "
-        "at "
-        "lower rates up to 8 times as many. 0: no search without a pose."),
+        "at lower rates up to 8 times as many. 0: no search without a pose."),
     F64("search_area_px2", search_area_px2, 140, 0, 1e6,
         "px^2. Smallest area of a landmark in the picture without a pose: a smaller one has look-alikes near by."),
     F64("likeness_alone", likeness_alone, 0.93, 0.3, 1,
         "Normalised correlation from which a landmark found without a pose needs no others; below, two others must "
-        "agree "
-        "with its pose."),
+        "agree with its pose."),
     F64("likeness_far", likeness_far, 0.88, 0.3, 1,
         "Normalised correlation needed where the window reaches 32 px and more from the expected place; likeness_min "
-        "is "
-        "for 8 px and less."),
+        "is for 8 px and less."),
     F64("sigma_px", sigma_px, 0.05, 0, 10,
         "px. Error of a landmark's middle beside that of its fit: compression, the camera's response."),
 };

@@ -11,15 +11,13 @@ static const wm_param kParams[] = {
         "rad above the camera's horizon. Lower parts of the picture are not searched."),
     F64("elevation_max_rad", elevation_max_rad, 1.1, -1.5, 1.5,
         "rad above the camera's horizon. Higher parts are not searched: there a pixel is a wide angle, and lamps "
-        "resemble "
-        "lines."),
+        "resemble lines."),
     F64("contrast_grey", contrast_grey, 6, 1, 255, "Grey levels. Smallest difference of a line's two sides."),
     F64("sigma_px", sigma_px, 0.12, 0, 10,
         "px. Error of a line beside that of its fit: compression, the camera's response, the lens model."),
     F64("tilt_sigma_rad", tilt_sigma_rad, 0.01, 0, 0.1,
         "rad. Error of the mounting's roll and pitch, which is estimated from the lean of upright lines. 0: the "
-        "mounting "
-        "is exact."),
+        "mounting is exact."),
 };
 
 static const wm_param_old kOld[] = {

@@ -144,8 +144,7 @@ static const bad_input kTable[] = {
      "DBC"},
     {"multiplexed by nothing", BINDING, "{quantity: yaw_rate, message: YAW, signal: LOST}",
      "can-signals.yaml:1: yaw_rate: LOST (car.dbc:10) is multiplexed, but the file does not state by which signal: one "
-     "M "
-     "in the message, or SG_MUL_VAL_ lines without a ring, are needed"},
+     "M in the message, or SG_MUL_VAL_ lines without a ring, are needed"},
     {"gear without names", BINDING, "{quantity: gear, message: GEARBOX, signal: GEAR}",
      "can-signals.yaml:1: gear: the DBC has no VAL_ names for this signal; write `values: {forward: [1], reverse: [2], "
      "neutral: [0]}` with the signal's raw values"},

@@ -106,23 +106,22 @@ TEST(start_pose) {
 TEST(whole_calibration) {
   folder_write(
       "calibration.yaml",
-      "sensors:\n  laser: {mounting: {xyz_m: [1, 2, 3], rpy_deg: [0, 90, -45]}, bearing_sigma_deg: 1, "
-      "range_sigma_m: 0.1,"
-      " max_range_m: 30, range_is: depth}\n  sonar: {x_maker: Acme}\n  f: {range_sigma_m: 1}\n"
+      "sensors:\n  laser: {mounting: {xyz_m: [1, 2, 3], rpy_deg: [0, 90, -45]}, bearing_sigma_deg: 1, range_sigma_m: "
+      "0.1, max_range_m: 30, range_is: depth}\n  sonar: {x_maker: Acme}\n  f: {range_sigma_m: 1}\n"
       "wheels: {radius_m: 0.1, ticks_per_turn: 2048, track_m: 0.6, wheelbase_m: 1.0, steering_ratio: 13.0, "
       "encoder_offset_m: -0.2,\n"
       "  steering_table: {actuator_mm: [98, 50, 8], road_wheel_deg: [30, 0, -30]}}\n"
-      "cameras:\n  a: {model: equidistant, size: [640, 480], intrinsics: [3, 3, 320, 240], distortion: [0, 0, "
-      "0, 0], readout_ns: 10}\n"
-      "  b: {model: pinhole-radtan, size: [640, 480], intrinsics: [3, 3, 320, 240], distortion: [0, 0, 0, 0, "
-      "0], mounting: {}}\n"
+      "cameras:\n  a: {model: equidistant, size: [640, 480], intrinsics: [3, 3, 320, 240], distortion: [0, 0, 0, 0], "
+      "readout_ns: 10}\n"
+      "  b: {model: pinhole-radtan, size: [640, 480], intrinsics: [3, 3, 320, 240], distortion: [0, 0, 0, 0, 0], "
+      "mounting: {}}\n"
       "  c: {model: omni, size: [640, 480], intrinsics: [1.2, 3, 3, 320, 240]}\n"
       "  d: {model: double-sphere, size: [640, 480], intrinsics: [-0.2, 0.6, 3, 3, 320, 240]}\n"
       "  e: {model: ocam, size: [640, 480], intrinsics: [1, 2, 3, 4, 5]}\n"
       "  f: {model: equidistant, size: [640, 480], intrinsics: [3, 3, 320, 240], mounting: {xyz_m: [9, 0, 0]}}\n"
       "stereo: {left: a, right: b, baseline_m: 0.2, rectified: [3, 3, 320, 240], sigma_px: [1, 1, 1, 1]}\n"
-      "markers: {family: tag36h11, size_m: 0.2}\nmotion6: {sigma_v_mps: [1, 1, 1], sigma_w_radps: [1, 1, "
-      "1]}\nlidar_x: 5\n");
+      "markers: {family: tag36h11, size_m: 0.2}\nmotion6: {sigma_v_mps: [1, 1, 1], sigma_w_radps: [1, 1, 1]}\nlidar_x: "
+      "5\n");
   open_it();
   size_t count;
   const wm_sensor *sensors = wm_site_sensors(wm_recording_site(recording), &count);

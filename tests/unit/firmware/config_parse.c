@@ -74,8 +74,7 @@ TEST(a_removed_key_is_ignored_with_a_warning) {
   parse(HEAD "pole_filter:\n  walls: {image_share: any}\n");
   TEST_ASSERT_EQUAL_STRING(
       "dir/x.yaml:4: pole_filter.walls.image_share: is not a parameter any more and is ignored: images are found by "
-      "their "
-      "number.\n",
+      "their number.\n",
       config.warnings);
 }
 
@@ -113,9 +112,9 @@ TEST(both_sections_together_are_refused) {
   refused(HEAD "motion:\n  states: {scale_sigma: 0.1}\npole_filter:\n  states: {scale_sigma: 0.3}\n",
           "dir/x.yaml:6: pole_filter.states.scale_sigma: 'motion.states.scale_sigma' is given on line 4, too; keep one "
           "of them");
-  refused(HEAD "pole_filter:\n  states: {scale_sigma: 0.3}\nmotion:\n  states: {scale_sigma: 0.1}\n",
-          "dir/x.yaml:6: motion.states.scale_sigma: 'motion.states.scale_sigma' is given on line 4, too; keep one of "
-          "them");
+  refused(
+      HEAD "pole_filter:\n  states: {scale_sigma: 0.3}\nmotion:\n  states: {scale_sigma: 0.1}\n",
+      "dir/x.yaml:6: motion.states.scale_sigma: 'motion.states.scale_sigma' is given on line 4, too; keep one of them");
 }
 
 TEST(a_shared_parameter_that_the_estimator_does_not_take_is_warned_of) {
@@ -299,12 +298,10 @@ TEST(misspelt) {
           "dir/x.yaml:3: motion.noise.sped_mps: unknown key; did you mean 'motion.noise.speed_mps'?");
   refused(HEAD "cloud_filter: {windows: 1}\n",
           "dir/x.yaml:3: cloud_filter.windows: unknown key; did you mean 'cloud_filter.window_s'?");
-  refused(
-      HEAD "something: 1\n",
-      "dir/x.yaml:3: something: unknown key; known here: format, estimator, sources, calibration, landmarks, dbc, "
-      "can_signals, devices, map, site, initial_pose, vision, start, black_box, publish, commands, merge, integrity, "
-      "realtime, motion, "
-      "sightings, pole_filter, cloud_filter");
+  refused(HEAD "something: 1\n",
+          "dir/x.yaml:3: something: unknown key; known here: format, estimator, sources, calibration, landmarks, dbc, "
+          "can_signals, devices, map, site, initial_pose, vision, start, black_box, publish, commands, merge, "
+          "integrity, realtime, motion, sightings, pole_filter, cloud_filter");
   refused(HEAD "pole_filter: {states: {other: 1}}\n",
           "dir/x.yaml:3: pole_filter.states.other: unknown key; known here: yaw_sigma_rad, slots, deep");
   refused("format: waymark-config/1\nestimator: pole_filtre\n",
@@ -353,16 +350,14 @@ TEST(wrong_sources) {
           "lateness_max_ms to at most 100, or horizon_ms to 150");
   refused(HEAD "sources:\n- {name: gnss}\n- {name: gnss}\n",
           "dir/x.yaml:5: sources[1].name: 'gnss' appears twice (first in line 4)");
-  refused(
-      HEAD "sources: [{name: gnss, sample_at: next_stamp}]\n",
-      "dir/x.yaml:3: sources[0].sample_at: only `motion` and `motion6` have rows whose values can get the next row's "
-      "stamp");
+  refused(HEAD "sources: [{name: gnss, sample_at: next_stamp}]\n",
+          "dir/x.yaml:3: sources[0].sample_at: only `motion` and `motion6` have rows whose values can get the next "
+          "row's stamp");
   refused(HEAD "sources: [{name: gnss, from_s: 5, until_s: 2}]\n",
           "dir/x.yaml:3: sources[0].until_s: 2 is not after from_s (5): nothing would be taken");
   refused(HEAD "sources: [{name: 'gnss:top'}]\n",
           "dir/x.yaml:3: sources[0].name: 'gnss:top' has a sensor's name; only sightings:SENSOR, markers:SENSOR and "
-          "can:INTERFACE are "
-          "possible");
+          "can:INTERFACE are possible");
   refused(HEAD "sources: [{nmae: gnss}]\n", "dir/x.yaml:3: sources[0].nmae: unknown key; did you mean 'name'?");
   refused(HEAD "sources: gnss\n", "dir/x.yaml:3: sources: a list of {name: NAME, ...} is needed");
 }

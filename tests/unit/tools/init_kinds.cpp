@@ -303,8 +303,7 @@ TEST(test_ids_that_differ_are_named) {
   const made::Folder folder;
   const Robot robot = proposed(
       "BO_ 256 DRIVE: 8 X\n SG_ VEHICLE_SPEED : 8|16@1+ (0.00390625,0) [0|250.996] \"km/h\" X\n"
-      "BO_ 2565868030 VDC2: 8 X\n SG_ YAW_RATE : 24|16@1+ (0.000122070313,-3.92) [-3.92|3.92] "
-      "\"rad/s\" X\n",
+      "BO_ 2565868030 VDC2: 8 X\n SG_ YAW_RATE : 24|16@1+ (0.000122070313,-3.92) [-3.92|3.92] \"rad/s\" X\n",
       log_of("00000100", "18F0090B", false), folder);
   TEST_ASSERT_FALSE(robot.binds(WM_Q_VEHICLE_SPEED));
   for (const Candidate &one : robot.candidates)

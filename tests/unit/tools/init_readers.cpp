@@ -196,8 +196,7 @@ const BadInput kTable[] = {
      "  distortion_model: radtan\n  distortion_coeffs: [0, 0, 0, 0]\n  intrinsics: [450, 450, 320, 240]\n"
      "  resolution: [640, 480]\n",
      "camchain.yaml:2: cam0.T_cam_imu: is not a rotation and translation: the rows of the left 3 x 3 must have length "
-     "1 "
-     "and right angles, the last row is 0 0 0 1"},
+     "1 and right angles, the last row is 0 0 0 1"},
     {"T_cam_imu of three rows", kCamchain,
      "cam0:\n  T_cam_imu: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]]\n  camera_model: pinhole\n"
      "  distortion_model: radtan\n  distortion_coeffs: [0, 0, 0, 0]\n  intrinsics: [450, 450, 320, 240]\n"
@@ -220,8 +219,7 @@ const BadInput kTable[] = {
      "layout.json: tags[0].pose.translation.x: '\"1\"' is not a number"},
     {"quaternion of no length", kLayout,
      "{\"tags\": [{\"ID\": 1, \"pose\": {\"translation\": {\"x\": 1, \"y\": 0, \"z\": 0}, \"rotation\": "
-     "{\"quaternion\": "
-     "{\"W\": 0, \"X\": 0, \"Y\": 0, \"Z\": 0}}}}]}",
+     "{\"quaternion\": {\"W\": 0, \"X\": 0, \"Y\": 0, \"Z\": 0}}}}]}",
      "layout.json: tags[0].pose.rotation.quaternion: its length is not 1"},
     {"no signal", kDbc, "VERSION \"\"\nBU_: ECU\n", "car.dbc: has no signals (SG_ lines)"},
     {"no signal that is motion", kDbc, "BO_ 288 DOORS: 1 ECU\n SG_ OPEN : 0|1@1+ (1,0) [0|1] \"\" X\n",

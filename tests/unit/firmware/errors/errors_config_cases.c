@@ -19,9 +19,7 @@ const error_case kErrorCases[] = {
     {CONFIG, "Unknown key", FILE_, "colour: red\n",
      "config/robot.yaml:3: colour: unknown key; known here: format, estimator, sources, calibration, landmarks, dbc, "
      "can_signals, devices, map, site, initial_pose, vision, start, black_box, publish, commands, merge, integrity, "
-     "realtime, motion, "
-     "sightings, positions, markers, localizer, landmark_ekf, edge_mcl, pf_edges, slam, "
-     "stereo_ekf"},
+     "realtime, motion, sightings, positions, markers, localizer, landmark_ekf, edge_mcl, pf_edges, slam, stereo_ekf"},
     {CONFIG, "CAN interface without its name", FILE_, "devices: {can: [{dbc: car.dbc, can_signals: s.yaml}]}\n",
      "config/robot.yaml:3: devices.can[0]: interface: is missing; `ip link` lists them"},
     {CONFIG, "CAN interface without its DBC", FILE_, "devices: {can: [{interface: can0}]}\n",
@@ -50,8 +48,7 @@ const error_case kErrorCases[] = {
      "landmark_ekf, edge_mcl, pf_edges, slam, stereo_ekf)"},
     {CONFIG, "No estimator", FILE_, "format: waymark-config/1\n",
      "config/robot.yaml:1: estimator: is missing; one of these is needed: odometry, landmark_ekf, edge_mcl, pf_edges, "
-     "slam, "
-     "stereo_ekf"},
+     "slam, stereo_ekf"},
     {CONFIG, "Another format", FILE_, "format: waymark-config/9\n",
      "config/robot.yaml:1: format: 'waymark-config/9' is not a format that this program reads; it reads "
      "waymark-config/1"},
@@ -91,8 +88,7 @@ const error_case kErrorCases[] = {
      "config/robot.yaml:3: landmarks: 'hall.csv' cannot be read (looked for config/hall.csv)"},
     {CONFIG, "Building that is not there", FILE_, "site: office/ground\n",
      "config/robot.yaml:3: site: config/office/ground: is no site: there is no site.yaml in it, no landmarks.csv and "
-     "no "
-     "map.yaml (docs/building.md)"},
+     "no map.yaml (docs/building.md)"},
     {CONFIG, "Start pose with an unknown key", FILE_, "initial_pose: {x_m: 1, y_m: 2, yaw_rad: 0}\n",
      "config/robot.yaml:3: initial_pose.yaw_rad: unknown key; known are: t_ns, x_m, y_m, z_m, heading_rad, "
      "heading_deg, qx, qy, qz, qw, sigma_xy_m, sigma_heading_rad, sigma_heading_deg"},
@@ -203,9 +199,9 @@ const error_case kErrorCases[] = {
     {REC, "Unknown quantity", "can-signals.yaml", "- {quantity: vehicle_sped, message: SPEED, signal: SPEED}\n",
      "rec/can-signals.yaml:1: [0].quantity: 'vehicle_sped' is unknown; did you mean 'vehicle_speed'? (one of: "
      "wheel_ticks_left, wheel_ticks_right, wheel_speed_front_left, wheel_speed_front_right, wheel_speed_rear_left, "
-     "wheel_speed_rear_right, vehicle_speed, yaw_rate, steering_wheel, road_wheel, steering_actuator, gear, "
-     "roll_rate, pitch_rate, acceleration_x, acceleration_y, acceleration_z, "
-     "gnss_latitude, gnss_longitude, gnss_altitude, gnss_sigma_xy, gnss_sigma_z, gnss_valid, gnss_altitude_valid)"},
+     "wheel_speed_rear_right, vehicle_speed, yaw_rate, steering_wheel, road_wheel, steering_actuator, gear, roll_rate, "
+     "pitch_rate, acceleration_x, acceleration_y, acceleration_z, gnss_latitude, gnss_longitude, gnss_altitude, "
+     "gnss_sigma_xy, gnss_sigma_z, gnss_valid, gnss_altitude_valid)"},
     {REC, "Binding without a signal", "can-signals.yaml", "- {quantity: vehicle_speed, message: SPEED}\n",
      "rec/can-signals.yaml:1: [0]: signal: is missing"},
     {REC, "Binding's key misspelt", "can-signals.yaml",
