@@ -46,7 +46,7 @@ _waymark() {
     "hil") words='--help --config --guest --host --local --out --faults --limits --from --until --can --ssh --record --program --package --mips --played --compare --json' ;;
     "import") words='--help --out --camera --stamps --begin-ns --quality' ;;
     "init") words='--help --motion --dbc --can-log --can --imu --gnss --sender-clock --wheel-radius --ticks --track --wheelbase --steering-ratio --tag-size --sees --camera --calibration --sensor --urdf --frame --mounting --tag-layout --tag-family --landmarks --map --stream --yes --force' ;;
-    "map") words='--help --out --site --surveyed --one-frame --by-place --author --note --json --list --use --keep --resolution --origin --inside --walls-below --negate --fine --speck --clearance --recording --draw --poses --id --picture --at --sigma --size --yaw --from --corners --calibration --camera --pose --sigma-deg --mounting-deg --family --ids --paper --rows --margin --size-min --stages --pictures --seed' ;;
+    "map") words='--help --out --site --surveyed --one-frame --by-place --author --note --json --list --use --keep --resolution --origin --inside --walls-below --negate --fine --speck --clearance --recording --draw --poses --id --picture --at --sigma --size --yaw --from --corners --calibration --camera --pose --sigma-deg --mounting-deg --family --ids --paper' ;;
     "mine") words='--help --out --within --all --jobs --json' ;;
     "play") words='--config --can --camera --lcm --channel-prefix --speed --loop --from --until --faults --start-at --json --print-faults --print-streams --print-kinds' ;;
     "reference") words='--help --map --range --particles --passes --seed' ;;
