@@ -23,8 +23,6 @@ static const wm_param kParams[] = {
     F64("noise.way", noise_way, 0.02, 0, 1, "Motion noise along the way, m per sqrt(m)."),
     F64("noise.side", noise_side, 0.01, 0, 1, "Motion noise across the way, m per sqrt(m)."),
     F64("noise.turn", noise_turn, 0.01, 0, 1, "Motion noise of the heading, rad per sqrt(m)."),
-    F64("noise.turn_rest", noise_turn_rest, 0.003, 0, 1, "Motion noise of the heading, rad per sqrt(s) of motion."),
-    F64("noise.turn_rel", noise_turn_rel, 0.02, 0, 1, "Motion noise of the heading, rad per sqrt(rad) of rotation."),
     F64("range_max_m", range_max_m, 6.0, 0.5, 50, "Points farther from base_link are not used, m."),
     F64("dead_reckoning_after_s", dead_reckoning_after_s, 1.0, 0.05, 3600,
         "The state is dead reckoning when no scan was fused for this time, s."),
@@ -32,6 +30,8 @@ static const wm_param kParams[] = {
 
 static const wm_param_old kOld[] = {
     {"resample_below", NULL, "a constant now: half of the particles"},
+    {"noise.turn_rest", NULL, "a constant now: 0.003 rad per sqrt(s)"},
+    {"noise.turn_rel", NULL, "a constant now: 0.02 rad per sqrt(rad)"},
     {NULL, NULL, NULL},
 };
 

@@ -15,7 +15,7 @@ enum pf_edges_weight { PF_EDGES_PRODUCT, PF_EDGES_SUM };
 typedef struct wm_pf_edges_params {
   int32_t particles, weight;
   double exponent, sigma_m, false_points;
-  double noise_way_rel, noise_way, noise_side, noise_turn, noise_turn_rest, noise_turn_rel;
+  double noise_way_rel, noise_way, noise_side, noise_turn;
   double range_max_m, dead_reckoning_after_s;
 } wm_pf_edges_params;
 

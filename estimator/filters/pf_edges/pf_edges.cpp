@@ -17,8 +17,10 @@ namespace {
 // Sigmas of a point for which the map has a baked layer; the last one serves larger sigmas, too.
 constexpr double kClassSigma_m[kSigmaClasses] = {0.01, 0.03, 0.06, 0.12};
 constexpr double kUnknownSigma_m = 0.03;  // of a point whose detector gives none: a pixel at 4 m
-constexpr double kResampleBelow = 0.5;    // effective particles, of all
-constexpr int kPointsMin = 5;             // of a scan: fewer leave a pose open
+// Noise of the heading beside that of the way: rad per sqrt(s) of motion, and per sqrt(rad) of rotation.
+constexpr double kTurnAtRest = 0.003, kTurnOfTurn = 0.02;
+constexpr double kResampleBelow = 0.5;  // effective particles, of all
+constexpr int kPointsMin = 5;           // of a scan: fewer leave a pose open
 // The published mean is that of particles about the heaviest one. Half a corridor's width, 20 degrees; not swept.
 constexpr double kCluster_m = 0.5, kCluster_rad = 0.35;
 // Share of a scan that the best particle leaves unexplained, from which on it contradicts all particles: more than half
@@ -150,8 +152,7 @@ void pf_edges::propagate() {
   step_noise noise;
   noise.along_m = std::sqrt(square(params_.noise_way) * way + square(params_.noise_way_rel * way));
   noise.across_m = params_.noise_side * std::sqrt(way);
-  noise.turn_rad = std::sqrt(square(params_.noise_turn) * way + square(params_.noise_turn_rest) * dt +
-                             square(params_.noise_turn_rel) * turn);
+  noise.turn_rad = std::sqrt(square(params_.noise_turn) * way + square(kTurnAtRest) * dt + square(kTurnOfTurn) * turn);
   particles_.propagate(increment, noise);
 }
 

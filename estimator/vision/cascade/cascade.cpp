@@ -17,11 +17,12 @@
 namespace wm {
 namespace {
 
-constexpr double kSigma_px = 0.3;      // of a detection's middle: the mean of its windows
-constexpr double kSigmaOfSize = 0.05;  // the same, in sizes: windows are coarse. From rendered streets; not swept
-constexpr double kSigmaOfRange = 0.2;  // of the distance, which follows from the window's height
-constexpr int kNeighboursMin = 3;      // overlapping windows of a detection (OpenCV's minNeighbors)
-constexpr size_t kCascadesMax = 8;     // each costs a pass over the panorama
+constexpr double kSigma_px = 0.3;        // of a detection's middle: the mean of its windows
+constexpr double kSigmaOfSize = 0.05;    // the same, in sizes: windows are coarse. From rendered streets; not swept
+constexpr double kTilt_rad = 3 * 0.007;  // of the mounting, each axis: extends the searched band
+constexpr double kSigmaOfRange = 0.2;    // of the distance, which follows from the window's height
+constexpr int kNeighboursMin = 3;        // overlapping windows of a detection (OpenCV's minNeighbors)
+constexpr size_t kCascadesMax = 8;       // each costs a pass over the panorama
 
 struct cascade_state {
   wm_cascade_params params;
@@ -37,8 +38,6 @@ struct cascade_state {
   wm_time_ns readout_ns;
   uint16_t *row;
 };
-
-double tilt_of(const wm_cascade_params &params) { return 3 * params.mounting_sigma_rad; }
 
 // Heights of the map's landmarks above the camera.
 bool heights_of(const wm_view &view, const mounted_camera &camera, double *low_m, double *high_m) {
@@ -80,7 +79,7 @@ size_t lay_out(cascade_state *state, const wm_cascade_params &params, const wm_v
     most_rows = larger(most_rows, c.height_px);
     if (state) state->bands[i] = band;
   }
-  around.plan(camera, tilt_of(params), params.size_min_px / most_rows);
+  around.plan(camera, kTilt_rad, params.size_min_px / most_rows);
   auto *cylinders = memory.take<uint8_t>(around.bytes());
   if (state) {
     pyramid_lay(&state->picture, width, height, levels);
@@ -126,7 +125,7 @@ void scan(cascade_state *self, size_t which, const cylinder &c) {
   const integral sums = {c.sums, c.squares, c.columns + 1};
   const int stages = static_cast<int>(cascade.stage_count);
   int first, last;
-  rows_of(cascade, self->bands[which], c, tilt_of(self->params), &first, &last);
+  rows_of(cascade, self->bands[which], c, kTilt_rad, &first, &last);
   for (int y = first; y <= last; y++)
     for (int x = 0; x + width <= c.columns; x++) {
       double surplus;

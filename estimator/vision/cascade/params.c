@@ -9,9 +9,6 @@
 static const wm_param kParams[] = {
     F64("size_min_px", size_min_px, 10, 4, 200,
         "px. Height of the smallest windows, in the middle of the picture; the largest ones are eight times as high."),
-    F64("mounting_sigma_rad", mounting_sigma_rad, 0.007, 0, 0.1,
-        "rad. Error of the camera's mounting: extends the searched band between the map's lowest and highest "
-        "landmark."),
 };
 
 static const wm_param_old kOld[] = {
@@ -19,6 +16,7 @@ static const wm_param_old kOld[] = {
     {"sigma_size", NULL, "a constant now: 0.05 of the window's size"},
     {"neighbours_min", NULL, "a constant now: 3 windows"},
     {"sigma_range", NULL, "a constant now: 0.2 of the distance"},
+    {"mounting_sigma_rad", NULL, "a constant now: 0.007 rad"},
     {NULL, NULL, NULL},
 };
 

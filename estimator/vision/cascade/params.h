@@ -11,7 +11,7 @@ extern "C" {
 #endif
 
 struct wm_cascade_params {
-  double size_min_px, mounting_sigma_rad;
+  double size_min_px;
 };
 
 extern const wm_param_table wm_cascade_params_table;

@@ -27,6 +27,7 @@ constexpr double kBlur_px = 1.0;         // added to the width of a line in the 
 constexpr int kBehindBand_px = 4;        // averaged behind a band, to compare with the floor before it
 constexpr double kFloorAgain = 1.5;      // off the middle, in changes, that is still the floor before (which is at 0.5)
 constexpr double kSlopeMin_grey_per_px = 0.2;  // below, an edge has no direction: noise
+constexpr double kNoise_grey = 2;              // of a pixel; divided by an edge's gradient it adds to sigma_px
 constexpr double kAveragedPixels = 9;          // of the 5 x 5 gradient, for its noise
 constexpr double kMargin_px = 2.5;             // from the edge of the picture: half of the gradient's mask
 constexpr double kStepOfRange = 1e-3;          // of the numerical derivative on the floor: below a pixel
@@ -198,7 +199,7 @@ found floor_point(const edges_state &state, const ray_edge &edge, const wm_frame
   const pixels_behind across = {frame, at.u, at.v, sign * gu / picture, sign * gv / picture};
   if (is_narrow(across, edge, board_px > line_px ? board_px : line_px, kBlur_px + kBand_m * floor / picture))
     return found::kLine;
-  const double noise = state.params.noise_grey / picture / std::sqrt(kAveragedPixels);
+  const double noise = kNoise_grey / picture / std::sqrt(kAveragedPixels);
   const double sigma_px = std::sqrt(square(state.params.sigma_px) + square(noise));
   const uint32_t i = out->count++;
   out->x_m[i] = static_cast<float>(x);

@@ -27,8 +27,6 @@ static const wm_param kParams[] = {
     F64("bird.side_m", hough.bird_side_m, 3.0, 0.2, 50,
         "m. Extent of the bird's-eye view to the left and to the right."),
     F64("sigma_px", sigma_px, 0.3, 0.01, 10, "px. Error of an edge across it, where contrast is good."),
-    F64("noise_grey", noise_grey, 2.0, 0.0, 100,
-        "Grey levels. Noise of a pixel; divided by an edge's gradient it adds to sigma_px."),
 };
 
 static const wm_param_old kOld[] = {
@@ -49,6 +47,7 @@ static const wm_param_old kOld[] = {
     {"windows.spacing_m", NULL, "a constant now: 0.1 m"},
     {"rays.line_rel", NULL, "a constant now: 0.05 of the range"},
     {"bird.px_per_m", NULL, "a constant now: the paper's 75 px/m"},
+    {"noise_grey", NULL, "a constant now: 2 grey levels"},
     {NULL, NULL, NULL},
 };
 

@@ -17,7 +17,7 @@ struct wm_edges_params {
   int32_t rays_sign;  // edges_sign
   double rays_contrast_grey;
   struct wm_edges_hough_params hough;
-  double sigma_px, noise_grey;
+  double sigma_px;
 };
 
 enum edges_mode { EDGES_BY_RAYS, EDGES_BY_WINDOWS };

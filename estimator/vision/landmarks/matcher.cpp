@@ -11,6 +11,7 @@ constexpr double kSmall_px2 = 30;   // a landmark of n px^2 needs a likeness of 
 constexpr double kApartMin = 0.06;  // likeness of the best place above the second one. Not swept
 constexpr double kSigmaFactor = 1.3;    // of the fit's sigma: errors of neighbouring pixels are correlated
 constexpr double kSigmaOfSize = 0.002;  // of the middle, in sizes: errors of the learnt picture, other light
+constexpr double kSizeMin_px = 7;       // shorter side of a landmark in the picture: smaller ones are ambiguous
 constexpr double kBlur_px = 0.6;        // sigma of the picture's blur: lens and compression
 constexpr double kMargin_px = 2;        // from the edge of the picture
 constexpr double kFits = 1.1;           // of the longer side, beside 4 px: room in the drawn view for a tilted landmark
@@ -50,7 +51,7 @@ wm_look expect_landmark(const matcher &self, const camera_guess &guess, const ap
   const double wide = 0.5 * (side(0, 1) + side(2, 3)), high = 0.5 * (side(1, 2) + side(3, 0));
   out->shorter_px = wide < high ? wide : high;
   out->area_px2 = wide * high;
-  if (!(out->shorter_px >= self.params.size_min_px)) return WM_LOOK_TOO_SMALL;
+  if (!(out->shorter_px >= kSizeMin_px)) return WM_LOOK_TOO_SMALL;
   out->level = 0;
   const double longer = wide < high ? high : wide;
   while (out->level + 1 < kLevels &&

@@ -8,8 +8,6 @@
 
 static const wm_param kParams[] = {
     F64("range_max_m", range_max_m, 40, 1, 1000, "m. Landmarks farther away are not searched."),
-    F64("size_min_px", size_min_px, 7, 4, 100,
-        "px. Smallest shorter side of a landmark in the picture: smaller ones are ambiguous."),
     F64("mounting_sigma_rad", mounting_sigma_rad, 0.007, 0, 0.1,
         "rad. Error of the camera's mounting, each axis; widens the search window."),
     F64("likeness_min", likeness_min, 0.7, 0.3, 1,
@@ -39,6 +37,7 @@ static const wm_param_old kOld[] = {
     {"contrast_grey", NULL, "a constant now: 4 grey levels"},
     {"search_after_s", NULL, "a constant now: 0.5 s"},
     {"blur_px", NULL, "a constant now: 0.6 px"},
+    {"size_min_px", NULL, "a constant now: 7 px"},
     {NULL, NULL, NULL},
 };
 

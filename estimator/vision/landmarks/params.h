@@ -11,7 +11,7 @@ extern "C" {
 #endif
 
 struct wm_landmarks_params {
-  double range_max_m, size_min_px;
+  double range_max_m;
   double mounting_sigma_rad;
   double likeness_min;
   double search_places, search_area_px2, likeness_alone, likeness_far;
