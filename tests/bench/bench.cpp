@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What has to be fast, as a table of works. Without a word: the median time of each, on this thread's own clock; with
+// What has to be fast, as a table of works, others' libraries among them. Without a word: the median time of each, on
+// this thread's own clock, and its share of the time of the row before that does the same (`of`); with
 // WM_BENCH_SHORT in the environment, as the tests run it, each a few times: does it still do what is meant to be
 // measured? wm_bench_works WORK [TIMES]: one of them, once warm, then counted. instructions.sh counts inside of
 // wm_counted; where no tool can (tests/boards/instructions.py), what more TIMES take is what one takes.
@@ -13,7 +14,9 @@
 #include <cstring>
 #include <ctime>
 #include <functional>
+#include <map>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "../unit/estimator/sea_floor.hpp"
@@ -26,6 +29,7 @@
 #include "drawn_window.h"
 #include "landmark_drive.h"
 #include "plain_ekf.h"
+#include "rivals.h"
 #include "slam_steps.h"
 #include "waymark/detectors.h"
 
@@ -40,21 +44,38 @@ namespace {
 // Set up, it gives what is done once; true: it did what is meant to be measured.
 using once = std::function<bool()>;
 
+// The drive's steps, made before they are measured, and where in them the work is.
+struct drive_steps {
+  std::vector<bench::landmark_drive::step> all;
+  size_t next = 0;
+};
+
+std::shared_ptr<drive_steps> steps_of(const bench::landmark_drive &drive) {
+  const auto out = std::make_shared<drive_steps>();
+  for (int i = 0; i < 2000; i++) out->all.push_back(drive.at(i));
+  return out;
+}
+
 // A prediction and a bearing of landmark_ekf. For 10 s a stated start is weighed (`start`); the rest of the drive is as
-// the steps after 12 s are.
+// the steps after 12 s are. At its end another drive begins.
 once landmark_steps(const std::vector<bench::setting> &settings, bool start) {
-  const auto drive = std::make_shared<bench::landmark_drive>(settings, false);
-  const auto steps = std::make_shared<std::vector<bench::landmark_drive::step>>();  // as many however often it is done
-  for (int i = 0; i < 1000; i++) steps->push_back(drive->at(i));
-  size_t i = 0;
-  while (!start && i < 600) {
-    drive->predict((*steps)[i]);
-    (void)drive->correct((*steps)[i++]);
-  }
+  using drive = bench::landmark_drive;
+  const auto begun = [=](drive_steps *steps) {
+    auto out = std::make_shared<drive>(settings, false);
+    for (steps->next = 0; !start && steps->next < 600; steps->next++) {
+      out->predict(steps->all[steps->next]);
+      (void)out->correct(steps->all[steps->next]);
+    }
+    return out;
+  };
+  const auto steps = steps_of(drive(settings, false));
+  std::shared_ptr<drive> now = begun(steps.get());
+  const size_t end = start ? 500 : steps->all.size();
   return [=]() mutable {
-    const auto &now = (*steps)[i++ % steps->size()];
-    drive->predict(now);
-    return drive->correct(now) || i > steps->size();  // then the drive begins anew, elsewhere
+    if (steps->next == end) now = begun(steps.get());
+    const auto &step = steps->all[steps->next++];
+    now->predict(step);
+    return now->correct(step);
   };
 }
 
@@ -62,15 +83,17 @@ once landmark_steps(const std::vector<bench::setting> &settings, bool start) {
 once plain_steps() {
   const auto drive = std::make_shared<bench::landmark_drive>(std::vector<bench::setting>{}, false);
   const auto filter = std::make_shared<bench::plain_ekf>(3, 0, 1.5707963, 0.05, 0.05);
-  const auto steps = std::make_shared<std::vector<bench::landmark_drive::step>>();
-  for (int i = 0; i < 1000; i++) steps->push_back(drive->at(i));
-  size_t i = 0;
-  return [=]() mutable {
-    const auto &now = (*steps)[i++ % steps->size()];
+  const auto steps = steps_of(*drive);
+  return [=] {
+    if (steps->next == steps->all.size()) {
+      steps->next = 0;
+      *filter = bench::plain_ekf(3, 0, 1.5707963, 0.05, 0.05);
+    }
+    const auto &now = steps->all[steps->next++];
     filter->predict(0.02, now.twist.as.twist2.v_mps, now.twist.as.twist2.w_radps, 1e-4, 1e-4);
     const wm_landmark &l = drive->landmark(now.seen.as.sighting.landmark_id);
     filter->bearing(l.p_m[0], l.p_m[1], now.seen.as.sighting.bearing_rad, 4e-4);
-    return true;
+    return std::fabs(std::hypot(filter->x_m(), filter->y_m()) - 3) < 0.05;  // on its circle
   };
 }
 
@@ -137,15 +160,11 @@ once marker(const wm_detector *detector, const char *family, const wm::views::In
   };
 }
 
-// By the AprilTag library's own picture of the tag.
-once tag() {
-  size_t count;
-  const wm_detector *const *library = wm_library_detectors(&count);
-  const wm_detector *detector = *std::find_if(
-      library, library + count, [](const wm_detector *d) { return std::strcmp(d->name, "apriltag") == 0; });
+// What is made of the AprilTag library's own picture of a tag.
+once of_tag(once (*make)(const wm::views::Ink &)) {
   apriltag_family_t *family = tag36h11_create();
   image_u8_t *image = apriltag_to_image(family, 7);
-  const once work = marker(detector, "tag36h11", [image](double x, double y) {
+  const once work = make([image](double x, double y) {
     const int i = static_cast<int>(std::floor((0.5 - x) * 8 + 1)), j = static_cast<int>(std::floor((0.5 - y) * 8 + 1));
     if (i < 0 || j < 0 || i >= image->width || j >= image->height) return -1;
     return image->buf[j * image->stride + i] ? 0 : 1;
@@ -154,6 +173,21 @@ once tag() {
   std::free(image);
   tag36h11_destroy(family);
   return work;
+}
+
+once tag(const wm::views::Ink &ink) {
+  size_t count;
+  const wm_detector *const *library = wm_library_detectors(&count);
+  return marker(*std::find_if(library, library + count,
+                              [](const wm_detector *d) { return std::strcmp(d->name, "apriltag") == 0; }),
+                "tag36h11", ink);
+}
+
+template <int kDecimate>
+once tag_by_library(const wm::views::Ink &ink) {
+  const wm::views::View view = wm::views::draw_view(0, 0.4);
+  return bench::library_search(take_picture(view, ink), static_cast<int>(view.camera.width_px),
+                               static_cast<int>(view.camera.height_px), kDecimate);
 }
 
 // A pair of 640x480 pictures to followed points, while a vehicle swims over a sea floor.
@@ -205,23 +239,33 @@ once slam(int known) {
 const struct {
   const char *name;
   once (*make)();
+  const char *of = nullptr;
 } kWorks[] = {
     {"plain_step", plain_steps},
-    {"landmark_pose", [] { return landmark_steps(bench::pose_alone(), false); }},
-    {"landmark_defaults", [] { return landmark_steps({}, false); }},
+    {"landmark_pose", [] { return landmark_steps(bench::pose_alone(), false); }, "plain_step"},
+    {"landmark_defaults", [] { return landmark_steps({}, false); }, "plain_step"},
+#ifdef WM_HAS_MRPT
+    {"mrpt_particles_200", [] { return bench::mrpt_weights(200); }},
+    {"mrpt_particles_2000", [] { return bench::mrpt_weights(2000); }},
+#endif
+#ifdef WM_HAS_OPENCV
+    {"opencv_window_50x50", bench::opencv_lines},
+#endif
+    {"library_tag", [] { return of_tag(tag_by_library<1>); }},
+    {"library_tag_half", [] { return of_tag(tag_by_library<2>); }},
     {"landmark_step", [] { return landmark_steps(bench::kCalibrationStates, false); }},
     {"landmark_start", [] { return landmark_steps(bench::kCalibrationStates, true); }},
     {"slam_step_30", [] { return slam(30); }},
     {"slam_step_250", [] { return slam(250); }},
-    {"particles_200", [] { return particles(200, false); }},
-    {"particles_2000", [] { return particles(2000, false); }},
+    {"particles_200", [] { return particles(200, false); }, "mrpt_particles_200"},
+    {"particles_2000", [] { return particles(2000, false); }, "mrpt_particles_2000"},
     {"particle_step_200", [] { return particles(200, true); }},
     {"particle_step_2000", [] { return particles(2000, true); }},
     {"edge_scans_tracking", [] { return edge_scans(true); }},
     {"edge_scans_searching", [] { return edge_scans(false); }},
     {"own_map_cycle", [] { return own_map(false); }},
     {"own_map_search", [] { return own_map(true); }},
-    {"window_50x50", window},
+    {"window_50x50", window, "opencv_window_50x50"},
     {"picture_rays", [] { return edges(0); }},
     {"picture_windows", [] { return edges(1); }},
     {"picture_lines", lines},
@@ -229,7 +273,7 @@ const struct {
     {"picture_landmarks_lost", [] { return landmarks(true); }},
     {"picture_points", points},
     {"picture_mr", [] { return marker(wm_detector_find("mr"), "mr", wm::views::mr_ink(7)); }},
-    {"picture_tag", tag},
+    {"picture_tag", [] { return of_tag(tag); }, "library_tag"},
 };
 
 double thread_us() {
@@ -238,43 +282,63 @@ double thread_us() {
   return static_cast<double>(now.tv_sec) * 1e6 + static_cast<double>(now.tv_nsec) * 1e-3;
 }
 
-// Prints the median of as many calls as fit into half a second, at least 11. False: of twenty calls more than one did
-// something else.
-bool measure(const char *name, const once &work) {
+// The median of as many samples as fit into half a second, at least 11, us. A sample is as many calls as take 30 us, so
+// that the clock's own time doesn't count. NaN: of twenty calls more than one did something else.
+double median_us(const char *name, const once &work) {
   constexpr size_t kLeast = 11;
+  constexpr double kSample_us = 30;
   const double most_us = std::getenv("WM_BENCH_SHORT") ? 0 : 5e5;
   std::vector<double> each;
-  size_t others = 0;
+  size_t calls = 0, others = 0, at_once = 1;
   double sum_us = 0;
   while (each.size() < kLeast || sum_us < most_us) {
     const double begin = thread_us();
-    others += !work();
-    each.push_back(thread_us() - begin);
-    sum_us += each.back();
+    for (size_t i = 0; i < at_once; i++) others += !work();
+    const double took_us = thread_us() - begin;
+    calls += at_once;
+    sum_us += took_us;
+    each.push_back(took_us / static_cast<double>(at_once));
+    if (took_us < kSample_us) {
+      at_once *= 2;
+      each.clear();
+    }
+  }
+  if (20 * others > calls) {
+    std::printf("%s: %zu of %zu did not do what is meant to be measured\n", name, others, calls);
+    return NAN;
   }
   std::nth_element(each.begin(), each.begin() + static_cast<std::ptrdiff_t>(each.size() / 2), each.end());
-  std::printf("%-24s %12.2f us\n", name, each[each.size() / 2]);
-  if (20 * others > each.size())
-    std::printf("%s: %zu of %zu did not do what is meant to be measured\n", name, others, each.size());
-  return 20 * others <= each.size();
+  return each[each.size() / 2];
+}
+
+// Prints the time of each, and its ratio to the row that does the same. False: one did something else.
+bool measure_all() {
+  bool works = true;
+  std::map<std::string, double> all_us;
+  for (const auto &[name, make, of] : kWorks) {
+    const double us = all_us[name] = median_us(name, make());
+    works = works && !std::isnan(us);
+    const auto other = of ? all_us.find(of) : all_us.end();
+    std::printf("%-24s %12.2f us", name, us);
+    if (other != all_us.end()) std::printf("  %.3g of %s", us / other->second, of);
+    std::printf("\n");
+  }
+  return works;
 }
 
 }  // namespace
 
 int main(int argc, char **argv) {
-  bool works = true, is_known = argc < 2;
-  for (const auto &[name, make] : kWorks) {
-    if (argc > 1 && std::strcmp(argv[1], name) != 0) continue;
-    is_known = true;
-    const once work = make();
-    if (argc < 2) {
-      works = measure(name, work) && works;
-      continue;
-    }
-    const std::function<void()> counted = [&] { (void)work(); };
-    counted();
-    for (int i = 0; i < (argc > 2 ? std::atoi(argv[2]) : 1); i++) wm_counted(&counted);
+  if (argc < 2) return !measure_all();
+  const auto *row = std::find_if(std::begin(kWorks), std::end(kWorks),
+                                 [&](const auto &one) { return std::strcmp(argv[1], one.name) == 0; });
+  if (row == std::end(kWorks)) {
+    std::fprintf(stderr, "wm_bench_works: there is no work '%s'\n", argv[1]);
+    return 2;
   }
-  if (!is_known) std::fprintf(stderr, "wm_bench_works: there is no work '%s'\n", argv[1]);
-  return !is_known ? 2 : !works;
+  const once work = row->make();
+  const std::function<void()> counted = [&] { (void)work(); };
+  counted();
+  for (int i = 0; i < (argc > 2 ? std::atoi(argv[2]) : 1); i++) wm_counted(&counted);
+  return 0;
 }
