@@ -6,6 +6,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "ignore.h"
 #include "picture.h"
 #include "waymark/yaml.h"
 
@@ -15,7 +16,7 @@ struct wm_map {
 };
 
 static const char *const kKeys[] = {"image",       "resolution", "origin", "negate", "occupied_thresh",
-                                    "free_thresh", "mode",       "layers", NULL};
+                                    "free_thresh", "mode",       "layers", "ignore", NULL};
 static const char *const kLayers[] = {"edges", "drivable", NULL};
 
 static wm_status check_keys(const wm_yaml_node *map, const char *const *known, wm_warn_fn warn, void *context,
@@ -181,7 +182,7 @@ static wm_status read_layers(const wm_yaml_node *root, wm_warn_fn warn, void *co
   self->raster.height_px = e->pixels ? e->height_px : d->height_px;
   self->raster.edges = e->pixels;
   self->raster.drivable = d->pixels;
-  return WM_OK;
+  return map_ignore(root, &self->raster, &self->edges, err);
 }
 
 wm_status wm_map_load(const char *path, wm_warn_fn warn, void *context, wm_map **out, wm_error *err) {

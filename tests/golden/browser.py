@@ -35,10 +35,19 @@ class Browser:
         os.close(from_browser)
         self.to, self.of, self.rest, self.number = mine_out, mine_in, b"", 0
         self.complaints, self.requests, self.session = [], [], None
-        target = self.call("Target.createTarget", url="about:blank")["targetId"]
-        self.session = self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
+        self.new_page()
+
+    def new_page(self):
+        self.session = None
+        self.target = self.call("Target.createTarget", url="about:blank")["targetId"]
+        self.session = self.call("Target.attachToTarget", targetId=self.target, flatten=True)["sessionId"]
         for domain in ("Page", "Runtime", "Log", "Network"):
             self.call(domain + ".enable")
+
+    def close_page(self):
+        """At once, whatever it is doing."""
+        self.session = None
+        self.call("Target.closeTarget", targetId=self.target)
 
     def hear(self, until):
         """The next message; None where none comes until then."""
@@ -93,6 +102,21 @@ class Browser:
             assert time.monotonic() < until, f"after {seconds} s there is no {expression}: {self.value('JSON.stringify(window.waymark && window.waymark.drawn)')}; {self.complaints}"
             self.hear(time.monotonic() + 0.2)
         return value
+
+    def mouse(self, *places, drags=False):
+        """Clicks at each place (px of the window), or drags from the first over the others."""
+        for i, (x, y) in enumerate(places):
+            self.call("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y, buttons=1 if drags and i else 0)
+            if not drags or i == 0:
+                self.call("Input.dispatchMouseEvent", type="mousePressed", x=x, y=y, button="left", buttons=1, clickCount=1)
+            if not drags or i == len(places) - 1:
+                self.call("Input.dispatchMouseEvent", type="mouseReleased", x=x, y=y, button="left", clickCount=1)
+
+    def press(self, key, ctrl=False, shift=False):
+        code = {"Delete": 46, "Enter": 13, "Escape": 27, "ArrowLeft": 37, "ArrowRight": 39}.get(key, ord(key[0].upper()))
+        same = {"key": key, "modifiers": 2 * ctrl + 8 * shift, "windowsVirtualKeyCode": code}
+        self.call("Input.dispatchKeyEvent", type="keyDown", **same, **({"text": key} if len(key) == 1 and not ctrl else {}))
+        self.call("Input.dispatchKeyEvent", type="keyUp", **same)
 
     def picture(self, path, whole_page=False):
         shot = self.call("Page.captureScreenshot", format="png", captureBeyondViewport=whole_page)

@@ -10,6 +10,8 @@ wm_script_test(run_service_net COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/servi
 wm_script_test(run_doctor COMMAND bash ${CMAKE_CURRENT_SOURCE_DIR}/doctor.sh $<TARGET_FILE:waymark> ${CMAKE_SOURCE_DIR}/config/etc)
 wm_script_test(run_command_line COMMAND bash ${CMAKE_CURRENT_SOURCE_DIR}/cli.sh)
 wm_script_test(web_page COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/web_page.py LABELS release-only COST 28)
+wm_script_test(web_editor COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/web_editor.py 12 LABELS release-only COST 40)
+wm_script_test(web_editor_page COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/editor_page.py LABELS release-only COST 40)
 wm_script_test(web_clients COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/web_clients.py LABELS release-only WAITS COST 23)
 wm_script_test(run_lcm_tools COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/lcm_tools.py LABELS release-only WAITS COST 18)
 wm_script_test(run_lcm_examples COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/lcm_examples.py LABELS release-only WAITS)

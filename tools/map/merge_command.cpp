@@ -164,14 +164,15 @@ void deliver(const MergeArguments &a, const MergeResult &result) {
   }
   if (a.site.empty()) return;
   const Target target = target_of(a.site);
-  write(target.landmarks, csv_of(result));
-  write(covariance_beside(target.landmarks), covariance_of(result));
+  const auto below = [&](const fs::path &file) { return fs::relative(file, target.site).string(); };
   const char *user = std::getenv("USER");
-  const MadeVersion made = make_version(target.site,
-                                        !a.author.empty() ? a.author
-                                        : user != nullptr ? user
-                                                          : "unknown",
-                                        !a.note.empty() ? a.note : text("merged of %zu drives", a.drives.size()));
+  VersionWish wish{!a.author.empty() ? a.author
+                   : user != nullptr ? user
+                                     : "unknown",
+                   !a.note.empty() ? a.note : text("merged of %zu drives", a.drives.size())};
+  wish.changes[below(target.landmarks)] = csv_of(result);
+  wish.changes[below(covariance_beside(target.landmarks))] = covariance_of(result);
+  const MadeVersion made = make_version(target.site, wish);
   std::printf("%s: version %s\n", target.site.c_str(), made.name.c_str());
 }
 

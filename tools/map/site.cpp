@@ -192,6 +192,7 @@ void check_reach(const wm_floors &site, SiteReport *report) {
 }  // namespace
 
 Floors read_floors(const fs::path &site) {
+  finish_version(site);
   wm_error error{};
   wm_floors *out = nullptr;
   need_ok(wm_floors_read(site.c_str(), &out, &error), error);

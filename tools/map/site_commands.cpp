@@ -80,7 +80,7 @@ int version_command(const VersionArguments &a) {
       std::printf("%s: version %s removed\n", a.site.c_str(), name.c_str());
     return kDone;
   }
-  const MadeVersion made = make_version(a.site, a.author.empty() ? user() : a.author, a.note);
+  const MadeVersion made = make_version(a.site, {a.author.empty() ? user() : a.author, a.note});
   if (made.is_new)
     std::printf("%s: version %s, %zu files (%zu as before)\n  robots take it at their next start or reload\n",
                 a.site.c_str(), made.name.c_str(), made.files, made.shared);

@@ -8,11 +8,13 @@
 #include <algorithm>
 #include <cerrno>
 #include <cinttypes>
+#include <cstdio>
 #include <cstring>
 #include <ctime>
+#include <fstream>
+#include <iterator>
 #include <set>
 
-#include "common/failure.h"
 #include "common/program.h"
 #include "common/text.h"
 #include "map/site.h"
@@ -24,6 +26,9 @@ namespace {
 
 namespace fs = std::filesystem;
 constexpr char kStaged[] = ".new", kGone[] = ".gone";  // folders in versions/ that a killed program may leave
+// A file there: the new version's name, and the changed files with their hashes before. It is there from before the
+// version is current until the site's own files have its changes.
+constexpr char kCarried[] = ".carried";
 
 struct Descriptor {
   int fd;
@@ -49,9 +54,18 @@ class Lock {
     if (folder_.fd < 0) throw Failure(site.string() + "/versions: can't be opened: " + std::strerror(errno));
     if (flock(folder_.fd, LOCK_EX | LOCK_NB) != 0)
       throw Failure(site.string() + ": another program changes its versions just now; try again when it is done");
+    carry(site);
+    clean(site);
+  }
+  Lock(const Lock &) = delete;
+  Lock &operator=(const Lock &) = delete;
+
+  // What was left over.
+  static void clean(const fs::path &site) {
     for (const auto &entry : fs::directory_iterator(site / "versions"))
       if (entry.path().filename().string().rfind('.', 0) == 0) fs::remove_all(entry.path());
   }
+  static void carry(const fs::path &site);
 
  private:
   static int made(const fs::path &site) {
@@ -81,6 +95,8 @@ uint64_t hash_of(const fs::path &file) {
   need_ok(wm_file_hash(file.c_str(), &out, &error), error);
   return out;
 }
+
+uint64_t hash_if_there(const fs::path &file) { return fs::exists(file) ? hash_of(file) : 0; }
 
 struct Draft {
   std::vector<wm_map_version_file> files;
@@ -118,7 +134,7 @@ std::string utc_now() {
 std::string quoted(const std::string &value) {
   std::string out = "\"";
   for (const char c : value) {
-    if (static_cast<unsigned char>(c) < ' ') continue;
+    if (static_cast<unsigned char>(c) < ' ' || c == '\x7f') continue;
     if (c == '"' || c == '\\') out += '\\';
     out += c;
   }
@@ -186,12 +202,62 @@ void need_sound(const fs::path &site, const std::string &name, Record *out) {
   need_ok(wm_map_version_read(site.c_str(), name.c_str(), out, &error), error);
 }
 
-void need_good(const fs::path &site) {
-  const SiteReport report = check_floors(site);
+// `staged` is what becomes a version; messages name the files of `site`.
+void need_good(const fs::path &site, const fs::path &staged) {
+  const SiteReport report = check_floors(staged);
   if (report.wrong.empty()) return;
   std::string lines = site.string() + ": no version is made, as robots could not use it:";
-  for (const std::string &line : report.wrong) lines += "\n  " + line;
+  for (std::string line : report.wrong) {
+    for (size_t at = 0; (at = line.find(staged.string(), at)) != std::string::npos; at += site.string().size())
+      line.replace(at, staged.string().size(), site.string());
+    lines += "\n  " + line;
+  }
   throw Failure(lines);
+}
+
+// All files of the site, with the changes; returns how many are shared with the base.
+size_t stage_all(const fs::path &site, const Draft &draft, const FileChanges &changes, const wm_map_version &base,
+                 const fs::path &staged) {
+  size_t shared = 0;
+  fs::create_directory(staged);
+  for (const wm_map_version_file &file : draft.files)
+    if (changes.count(file.path) == 0) shared += stage(site, file, base, staged) ? 1 : 0;
+  for (const auto &[path, bytes] : changes) {
+    if (!bytes) continue;
+    fs::create_directories((staged / path).parent_path());
+    write_through(staged / path, *bytes);
+  }
+  return shared;
+}
+
+std::string carried_text(const fs::path &site, const std::string &name, const FileChanges &changes) {
+  std::string out = name + "\n";
+  for (const auto &[path, bytes] : changes) out += text("%016" PRIx64 " ", hash_if_there(site / path)) + path + "\n";
+  return out;
+}
+
+// A person may have edited a file since: it stays then.
+void Lock::carry(const fs::path &site) {
+  const fs::path list = site / "versions" / kCarried;
+  std::ifstream file(list);
+  std::string name, line;
+  if (!std::getline(file, name) || name != current_of(site)) return;
+  while (std::getline(file, line)) {
+    uint64_t before = 0;
+    int path_at = 0;
+    if (std::sscanf(line.c_str(), "%16" SCNx64 " %n", &before, &path_at) != 1 || path_at != 17)
+      throw Failure(list.string() + ": is damaged; remove it, and compare the site's files with version " + name);
+    const fs::path to = site / line.substr(17), from = site / "versions" / name / line.substr(17);
+    if (hash_if_there(to) != before) continue;
+    if (!fs::exists(from)) {
+      fs::remove(to);
+      continue;
+    }
+    std::ifstream in(from, std::ios::binary);
+    const std::string bytes{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+    if (!in) throw Failure(from.string() + ": can't be read");
+    write_through(to, bytes);
+  }
 }
 
 }  // namespace
@@ -234,27 +300,53 @@ std::string draft_against_current(const fs::path &site) {
          site.string() + "` makes a version of them";
 }
 
-MadeVersion make_version(const fs::path &site, const std::string &author, const std::string &note) {
-  need_good(site);
-  const Draft draft = draft_of(site);
+std::string site_hash(const fs::path &site) { return draft_of(site).name; }
+
+OutdatedBase::OutdatedBase(const fs::path &site, const std::string &base)
+    : Failure(site.string() + ": is no longer as it was (" + base + "): another version was saved, or a file edited") {}
+
+void finish_version(const fs::path &site) {
+  if (!fs::exists(site / "versions" / kCarried)) return;
   const Lock lock(site);
+}
+
+MadeVersion make_version(const fs::path &site, const VersionWish &wish) {
+  if (wish.author.size() >= sizeof Record{}.author || wish.note.size() >= sizeof Record{}.note)
+    throw Failure(text("author and note of a version have at most %zu and %zu bytes", sizeof Record{}.author - 1,
+                       sizeof Record{}.note - 1),
+                  kUsage);
+  const Lock lock(site);
+  const Draft before = draft_of(site);
+  if (!wish.base.empty() && wish.base != before.name) throw OutdatedBase(site, wish.base);
   const fs::path versions = site / "versions", staged = versions / kStaged;
-  MadeVersion out{draft.name, !fs::exists(versions / draft.name), draft.files.size(), 0};
   Record base;
   if (const std::string current = current_of(site); !current.empty()) need_sound(site, current, &base);
-  if (out.is_new) {
-    fs::create_directory(staged);
-    for (const wm_map_version_file &file : draft.files) out.shared += stage(site, file, base, staged) ? 1 : 0;
-    write_through(staged / "version.yaml", record_text(draft, base.name, author, note));
-    sync_folders(staged);
-    if (const int failed = rename_through(staged.c_str(), (versions / draft.name).c_str()); failed != 0)
-      throw Failure((versions / draft.name).string() + ": can't be written: " + std::strerror(failed));
-    sync(site);
-  } else {
-    Record again;
-    need_sound(site, draft.name, &again);
+  MadeVersion out;
+  try {
+    out.shared = stage_all(site, before, wish.changes, base, staged);
+    need_good(site, staged);
+    const Draft draft = draft_of(staged);
+    out.name = draft.name;
+    out.files = draft.files.size();
+    out.is_new = !fs::exists(versions / draft.name);
+    if (out.is_new) {
+      write_through(staged / "version.yaml", record_text(draft, base.name, wish.author, wish.note));
+      sync_folders(staged);
+      if (const int problem = rename_through(staged.c_str(), (versions / draft.name).c_str()); problem != 0)
+        throw Failure((versions / draft.name).string() + ": can't be written: " + std::strerror(problem));
+      sync(site);
+    } else {
+      Record again;
+      need_sound(site, draft.name, &again);
+    }
+    if (!wish.changes.empty()) write_through(versions / kCarried, carried_text(site, out.name, wish.changes));
+    set_current(site, out.name);
+    Lock::carry(site);
+  } catch (...) {
+    if (out.name.empty() || current_of(site) != out.name) Lock::clean(site);  // else the next program carries the rest
+    throw;
   }
-  set_current(site, draft.name);
+  Lock::clean(site);
   return out;
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The page's files by their names: page.html, page.css, page.js (tools/web/page).
+// The pages' files by their names (tools/web/page).
 #pragma once
 
 #include <map>

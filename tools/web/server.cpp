@@ -126,22 +126,31 @@ bool is_own_host(const std::string &host) {
 
 struct WebServer::Glue {
   static MHD_Result answer(void *self_pointer, MHD_Connection *connection, const char *url, const char *method,
-                           const char *, const char *, size_t *upload_bytes, void **context) {
+                           const char *, const char *upload, size_t *upload_bytes, void **context) {
     auto *self = static_cast<WebServer *>(self_pointer);
-    static char began;
-    if (std::strcmp(method, "GET") != 0) return send(connection, refusal(405, "only GET is answered"));
-    if (*context == nullptr) {  // the head is there; what else the client sends is refused below
-      *context = &began;
+    const bool is_post = self->body_max_ > 0 && std::strcmp(method, MHD_HTTP_METHOD_POST) == 0;
+    if (!is_post && std::strcmp(method, MHD_HTTP_METHOD_GET) != 0)
+      return send(connection,
+                  refusal(405, self->body_max_ > 0 ? "only GET and POST are answered" : "only GET is answered"));
+    auto *request = static_cast<WebRequest *>(*context);
+    if (request == nullptr) {  // the head is there; a body comes in pieces, if one may come
+      *context = new WebRequest{url, {}, is_post, {}, {}};
       return MHD_YES;
     }
-    if (*upload_bytes > 0) return MHD_NO;
+    if (*upload_bytes > 0) {
+      if (!is_post || request->body.size() + *upload_bytes > self->body_max_) return MHD_NO;
+      request->body.append(upload, *upload_bytes);
+      *upload_bytes = 0;
+      return MHD_YES;
+    }
     const char *host = MHD_lookup_connection_value(connection, MHD_HEADER_KIND, MHD_HTTP_HEADER_HOST);
     if (self->is_local_ && (host == nullptr || !is_own_host(host)))
       return send(connection, refusal(403, "this page answers to its own computer's name alone"));
-    WebRequest request{url, {}};
-    MHD_get_connection_values(connection, MHD_GET_ARGUMENT_KIND, take_query, &request);
+    const char *token = MHD_lookup_connection_value(connection, MHD_HEADER_KIND, "X-Waymark-Token");
+    request->token = token != nullptr ? token : "";
+    MHD_get_connection_values(connection, MHD_GET_ARGUMENT_KIND, take_query, request);
     try {
-      return send(connection, self->handler_(request));
+      return send(connection, self->handler_(*request));
     } catch (const std::exception &) {
       return send(connection, refusal(500, "this can't be answered"));
     }
@@ -158,7 +167,9 @@ struct WebServer::Glue {
     if (info != nullptr) self->clients_[connection] = {info->connect_fd, std::chrono::steady_clock::now()};
   }
 
-  static void completed(void *self_pointer, MHD_Connection *connection, void **, MHD_RequestTerminationCode) {
+  static void completed(void *self_pointer, MHD_Connection *connection, void **context, MHD_RequestTerminationCode) {
+    delete static_cast<WebRequest *>(*context);
+    *context = nullptr;
     auto *self = static_cast<WebServer *>(self_pointer);
     const std::lock_guard<std::mutex> hold(self->lock_);
     const auto at = self->clients_.find(connection);
@@ -166,8 +177,8 @@ struct WebServer::Glue {
   }
 };
 
-WebServer::WebServer(const ListenAt &at, Handler handler, std::chrono::milliseconds patience)
-    : handler_(std::move(handler)), patience_(patience) {
+WebServer::WebServer(const ListenAt &at, Handler handler, std::chrono::milliseconds patience, size_t body_max)
+    : handler_(std::move(handler)), patience_(patience), body_max_(body_max) {
   AnyAddress address;
   if (!read_address(at.address, at.port, &address)) throw Failure("'" + at.address + "' is not an address", kUsage);
   is_local_ = is_loopback(address);

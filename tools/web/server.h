@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Answers to GET requests of browsers, by libmicrohttpd: one thread, no request waits for another. Who sends slowly or
-// does not read occupies one of kConnections, for kPatience at most; a request's head is limited to kHeadBytes.
+// Answers to requests of browsers, by libmicrohttpd: one thread, no request waits for another. Who sends slowly or does
+// not read occupies one of kConnections, for kPatience at most; a request's head is limited to kHeadBytes. GET alone is
+// answered, and POST where a body may have some bytes.
 #pragma once
 
 #include <chrono>
@@ -18,6 +19,8 @@ namespace wm::tools {
 struct WebRequest {
   std::string path;
   std::map<std::string, std::string> query;
+  bool is_post = false;
+  std::string body, token;  // of a POST; the head X-Waymark-Token
   // A whole number of the query; `absent` where it is missing, no number, or too large.
   [[nodiscard]] int64_t number(const std::string &key, int64_t absent) const;
 };
@@ -44,8 +47,9 @@ class WebServer {
   static constexpr std::chrono::seconds kPatience{20};  // for a request with its answer: a map over a slow radio link
 
   using Handler = std::function<WebAnswer(const WebRequest &)>;
-  // `handler` is called by the server's thread. Throws Failure where it cannot listen there.
-  WebServer(const ListenAt &at, Handler handler, std::chrono::milliseconds patience = kPatience);
+  // `handler` is called by the server's thread. `body_max`: bytes of a POST's body; 0: GET alone. Throws Failure where
+  // it cannot listen there.
+  WebServer(const ListenAt &at, Handler handler, std::chrono::milliseconds patience = kPatience, size_t body_max = 0);
   ~WebServer();
   WebServer(const WebServer &) = delete;
   WebServer &operator=(const WebServer &) = delete;
@@ -63,6 +67,7 @@ class WebServer {
 
   Handler handler_;
   std::chrono::milliseconds patience_;
+  size_t body_max_;
   bool is_local_ = false;  // listens on the loopback alone
   uint16_t port_ = 0;
   MHD_Daemon *daemon_ = nullptr;

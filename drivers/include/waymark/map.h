@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // A raster map in ROS map_server's YAML with layers (recording-format: map/map.yaml): `image`, `resolution`, `origin`
 // with its rotation, `mode` (trinary, scale, raw), `negate`, `occupied_thresh`, `free_thresh`, and `layers: {edges:
-// FILE, drivable: FILE}`. Pictures are PNG of any kind, or PGM (P2, P5, 8 or 16 bit). Start only; allocates.
+// FILE, drivable: FILE}`; `ignore: [[[x, y], ...], ...]`, polygons in the map's axes within which edges don't count.
+// Pictures are PNG of any kind, or PGM (P2, P5, 8 or 16 bit). Start only; allocates.
 #ifndef WAYMARK_MAP_H
 #define WAYMARK_MAP_H
 

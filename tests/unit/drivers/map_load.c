@@ -74,6 +74,45 @@ TEST(what_is_free_is_drivable_where_there_is_no_layer) {
   TEST_ASSERT_NULL(load()->edges);
 }
 
+// Pixels of 5 cm, the lower left one at the origin: edges in columns 1 (top row), 0 and 2 (bottom row).
+TEST(edges_within_an_ignored_area_do_not_count) {
+  folder_write("map.yaml",
+               "image: plan.pgm\nresolution: 0.05\norigin: [-1.5, 2.5, 0]\nlayers: {edges: edges.pgm}\n"
+               "ignore: [[[-1.46, 2.56], [-1.41, 2.56], [-1.41, 2.59], [-1.46, 2.59]], "
+               "[[-1.41, 2.4], [9, 2.4], [-1.41, 2.54]]]\n");
+  const uint8_t edges[6] = {0, 0, 0, 255, 0, 0};
+  TEST_ASSERT_EQUAL_UINT8_ARRAY(edges, load()->edges, 6);
+  TEST_ASSERT_EQUAL_STRING("", warnings);
+  // Turned by a right angle: x of the map is up in the picture, y to its left.
+  folder_write("map.yaml",
+               "resolution: 0.05\norigin: [1, 2, -1.57079632679]\nlayers: {edges: edges.pgm}\n"
+               "ignore: [[[0.96, 1.99], [1.01, 1.99], [1.01, 1.86], [0.96, 1.86]]]\n");
+  const uint8_t turned[6] = {0, 255, 0, 255, 0, 255};
+  TEST_ASSERT_EQUAL_UINT8_ARRAY(turned, load()->edges, 6);
+  folder_write("map.yaml",
+               "resolution: 0.05\norigin: [1, 2, -1.57079632679]\nlayers: {edges: edges.pgm}\n"
+               "ignore: [[[1.01, 1.99], [1.04, 1.99], [1.04, 1.86], [1.01, 1.86]]]\n");
+  const uint8_t lower[6] = {0, 255, 0, 0, 0, 0};
+  TEST_ASSERT_EQUAL_UINT8_ARRAY(lower, load()->edges, 6);
+}
+
+// Beyond the picture, over all of it, and with the same corner twice: no pixel outside is touched.
+TEST(ignored_areas_of_any_size) {
+  const uint8_t none[6] = {0};
+  folder_write("map.yaml",
+               YAML "ignore: [[[-1e8, -1e8], [1e8, -1e8], [1e8, 1e8], [-1e8, 1e8]], [[0, 0], [0, 0], [0, 0]]]\n");
+  TEST_ASSERT_EQUAL_UINT8_ARRAY(none, load()->edges, 6);
+  folder_write("map.yaml", YAML "ignore: [[[50, 50], [60, 50], [60, 60]]]\n");
+  const uint8_t all[6] = {0, 255, 0, 255, 0, 255};
+  TEST_ASSERT_EQUAL_UINT8_ARRAY(all, load()->edges, 6);
+  folder_write("map.yaml", YAML "ignore: []\n");
+  TEST_ASSERT_EQUAL_UINT8_ARRAY(all, load()->edges, 6);
+  refused(YAML "ignore: 3\n", "ignore", "a list of polygons");
+  refused(YAML "ignore: [[[1, 1], [2, 2]]]\n", "ignore[0]", "3 to 1000 corners");
+  refused(YAML "ignore: [[[1, 1], [2, 2], [3]]]\n", "ignore[0][2]", "2");
+  refused(YAML "ignore: [[[1, 1], [2, 2], [3, 1e9]]]\n", "ignore[0][2]", "metres up to 1e8");
+}
+
 TEST(the_hash_tells_maps_apart) {
   const uint64_t hash = load()->hash;
   TEST_ASSERT_TRUE(load()->hash == hash);
