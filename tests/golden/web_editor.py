@@ -124,6 +124,9 @@ def edits(server, site):
     with Server(one) as alone:
         floor = alone.site()["floors"][0]["name"]
         check(alone.save({"do": "delete", "floor": floor, "id": 2})[0] == 200 and current(one), "a folder with one map is edited, too")
+        (one / "landmarks.csv").write_text("id,x_m,y_m,cov_xx,cov_xy,cov_yy,yaw_rad,cov_tt\n1,1,2,0.04,0.01,0.04,1,0.02\n2,3,4,0.040,,0.04,1,0.02\n")
+        check(alone.save({"do": "set", "floor": floor, "id": 1, "y_m": 2.5, "sigma_m": 0.3})[0] == 200 and rows(one / "landmarks.csv") == {
+            "id": "x_m,y_m,cov_xx,cov_xy,cov_yy,yaw_rad,cov_tt,sigma_m", "1": "1,2.5,,,,1,0.02,0.3", "2": "3,4,0.040,,0.04,1,0.02,"}, "a place by hand has no measured covariance; its heading has")
         status, said = alone.save({"do": "origin", "floor": floor, "x_m": 0, "y_m": 0, "latitude_deg": 1, "longitude_deg": 2, "altitude_m": 3})
         check(status == 400 and "site.yaml" in said["errors"][0]["text"], "but has no place for an origin")
 
@@ -172,6 +175,19 @@ def refusals(server, site):
         named = said["errors"][0]["field"] if status == 400 else None
         check(named == field, f"{str(edit)[:70]}: {field!r} is named" + ("" if named == field else f": {status} {said}"))
     check(server.site() == before and not [p for p in (site / "versions").iterdir() if p.name.startswith(".")], "and nothing is left of them")
+
+
+def mutated(server, count):
+    """Bodies with bytes changed, left out and doubled: each is answered, and none is taken for a version of another base."""
+    whole = json.dumps({"base": "0" * 16, "author": "J", "note": "n", "edits": [{"do": "set", "floor": "ground", "id": 1, "x_m": 2.5, "yaw_rad": None}, {"do": "ignore", "floor": "ground", "areas": [[[1, 2], [3, 4], [5, 0]]]}]}).encode()
+    seen = set()
+    for _ in range(count):
+        body = bytearray(whole)
+        for _ in range(RANDOM.randint(1, 4)):
+            at = RANDOM.randrange(len(body))
+            body[at:at + RANDOM.randint(0, 2)] = RANDOM.choice((b"", bytes([RANDOM.randrange(256)]), b"[", b"{", b'"', b"1e99", b"null", bytes(body[at:at + 9])))
+        seen.add(server.ask("POST", "/version", bytes(body))[0])
+    check(seen <= {400, 409} and server.process.poll() is None, f"{count} mutated bodies are refused: {seen}")
 
 
 def two_at_once(site):
@@ -308,6 +324,7 @@ def main(count):
             who_is_answered(server)
             edits(server, site)
             refusals(server, site)
+            mutated(server, 500)
             broken_off(server, site)
             check(server.process.poll() is None, "the server still runs")
         two_at_once(site)

@@ -83,6 +83,13 @@ TEST(edges_within_an_ignored_area_do_not_count) {
   const uint8_t edges[6] = {0, 0, 0, 255, 0, 0};
   TEST_ASSERT_EQUAL_UINT8_ARRAY(edges, load()->edges, 6);
   TEST_ASSERT_EQUAL_STRING("", warnings);
+  // A trough about column 1: what lies between its sides counts.
+  folder_write("map.yaml",
+               "resolution: 0.05\norigin: [-1.5, 2.5, 0]\nlayers: {edges: edges.pgm}\n"
+               "ignore: [[[-1.6, 2.4], [-1.45, 2.4], [-1.45, 2.65], [-1.4, 2.65], [-1.4, 2.4], [-1.2, 2.4], "
+               "[-1.2, 2.7], [-1.6, 2.7]]]\n");
+  const uint8_t between[6] = {0, 255, 0, 0, 0, 0};
+  TEST_ASSERT_EQUAL_UINT8_ARRAY(between, load()->edges, 6);
   // Turned by a right angle: x of the map is up in the picture, y to its left.
   folder_write("map.yaml",
                "resolution: 0.05\norigin: [1, 2, -1.57079632679]\nlayers: {edges: edges.pgm}\n"
