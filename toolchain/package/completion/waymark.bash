@@ -52,7 +52,7 @@ _waymark() {
     "reference") words='--help --map --range --particles --passes --seed' ;;
     "report") words='--help --out --svg --style' ;;
     "simulate") words='--help --out --seed --landmarks --laps --duration --no-video --frame --png --camera --contact-sheet --perfect' ;;
-    "web") words='--help --recording --map --listen --url --prefix --pictures --duration' ;;
+    "web") words='--help --recording --map --listen --url --prefix --pictures --edit --drive --duration' ;;
   esac
   if [[ $word == -* ]]; then
     mapfile -t COMPREPLY < <(compgen -W "$words --help" -- "$word")
