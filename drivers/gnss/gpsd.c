@@ -1,26 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 // Positions and headings of a receiver by gpsd's socket.
-#include <errno.h>
 #include <math.h>
-#include <netdb.h>
-#include <poll.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/socket.h>
 #include <time.h>
-#include <unistd.h>
 
 #include "gpsd_report.h"
 #include "waymark/devices.h"
 #include "waymark/foreign_clock.h"
+#include "waymark/line_socket.h"
 #include "waymark/local_frame.h"
 
-#define TRY_AGAIN_NS (500 * WM_NS_PER_MS)
-// Without a byte for so long the connection is made anew: a computer that was switched off closes none.
-#define DEAD_NS (10 * WM_NS_PER_S)
-// gpsd's longest line is 10240 bytes (GPS_JSON_RESPONSE_MAX of gps_json.h).
-#define LINE_BYTES_MAX 16384
 // UTC of a receiver on a computer whose own clock is set by it, or by a time server: farther off, one of them is wrong.
 #define AHEAD_MAX_NS (10 * WM_NS_PER_MS)
 #define BEHIND_MAX_NS (10 * WM_NS_PER_S)
@@ -44,11 +35,8 @@ typedef struct gpsd {
   double ahead_m;                 // of the antenna in base_link; 0 where it is not given
   wm_time_ns course_ns;           // of the newest course; WM_TIME_NONE: none
   double course_rad, turn_radps;  // that course, and the mean turn rate by the courses
-  int fd, is_connected;
-  wm_time_ns next_try_ns, read_ns;  // the next connection; the last byte
-  char line[LINE_BYTES_MAX];
-  size_t used, taken;  // bytes in `line`, and those of them that are read
-  int skips;           // the rest of a line that is too long
+  line_socket lines;
+  char question[160];  // asks for reports, once connected
   foreign_clock receiver;
   int fix;                             // gpsd_fix; -1: none
   int is_stored;                       // what a receiver for time reports is a stored place
@@ -64,92 +52,12 @@ static wm_time_ns clock_ns(clockid_t clock) {
   return (wm_time_ns)now.tv_sec * WM_NS_PER_S + now.tv_nsec;
 }
 
-static void disconnect(gpsd *self) {
-  if (self->fd >= 0) (void)close(self->fd);
-  self->fd = -1;
-  self->is_connected = self->skips = 0;
-  self->used = self->taken = 0;
+// Of a connection that has ended.
+static void forget(gpsd *self) {
   self->fix = -1;
   self->is_stored = 0;
   self->deviations_ns = self->taken_ns = self->course_ns = WM_TIME_NONE;
   self->gone[0] = '\0';
-}
-
-// ── connection ──────────────────────────────────────────────────────────────────────────────────────────────────────
-
-static void begin(gpsd *self, wm_time_ns now_ns) {
-  char port[12];
-  struct addrinfo *found = NULL;
-  const struct addrinfo wanted = {.ai_family = AF_INET, .ai_socktype = SOCK_STREAM};
-  self->next_try_ns = now_ns + TRY_AGAIN_NS;
-  self->read_ns = now_ns;
-  (void)snprintf(port, sizeof port, "%d", (int)self->config.port);
-  if (getaddrinfo(self->config.host, port, &wanted, &found) != 0) return;
-  self->fd = socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
-  if (self->fd >= 0 && connect(self->fd, found->ai_addr, found->ai_addrlen) != 0 && errno != EINPROGRESS)
-    disconnect(self);
-  freeaddrinfo(found);
-}
-
-// Asks for reports, once connected.
-static void greet(gpsd *self) {
-  char text[160], device[80] = "";
-  int problem = 0;
-  socklen_t length = sizeof problem;
-  if (getsockopt(self->fd, SOL_SOCKET, SO_ERROR, &problem, &length) != 0 || problem != 0) {
-    disconnect(self);
-    return;
-  }
-  if (self->config.device[0]) (void)snprintf(device, sizeof device, ",\"device\":\"%s\"", self->config.device);
-  const int bytes = snprintf(text, sizeof text, "?WATCH={\"enable\":true,\"json\":true%s};\n", device);
-  if (send(self->fd, text, (size_t)bytes, MSG_NOSIGNAL) != bytes) {
-    disconnect(self);
-    return;
-  }
-  self->is_connected = 1;
-}
-
-static void read_more(gpsd *self, wm_time_ns now_ns) {
-  memmove(self->line, self->line + self->taken, self->used - self->taken);
-  self->used -= self->taken;
-  self->taken = 0;
-  if (self->used == sizeof self->line) {
-    self->skips = 1;
-    self->used = 0;
-  }
-  const ssize_t got = recv(self->fd, self->line + self->used, sizeof self->line - self->used, 0);
-  if (got > 0) {
-    self->used += (size_t)got;
-    self->read_ns = now_ns;
-  } else if (got == 0 || (errno != EAGAIN && errno != EINTR)) {
-    disconnect(self);
-  }
-}
-
-static void wait_for_bytes(gpsd *self) {
-  wm_time_ns now_ns = clock_ns(CLOCK_MONOTONIC);
-  if (self->fd >= 0 && now_ns - self->read_ns > DEAD_NS) disconnect(self);
-  if (self->fd < 0 && now_ns >= self->next_try_ns) begin(self, now_ns);
-  struct pollfd ready = {.fd = self->fd, .events = self->is_connected ? POLLIN : POLLOUT};
-  if (poll(&ready, 1, WM_DEVICE_WAIT_MS) <= 0 || self->fd < 0) return;  // without a socket it only waits
-  if (self->is_connected)
-    read_more(self, clock_ns(CLOCK_MONOTONIC));
-  else
-    greet(self);
-}
-
-// The next whole line; NULL: none yet.
-static const char *next_line(gpsd *self, size_t *length, wm_source_counts *counts) {
-  for (;;) {
-    const char *begin = self->line + self->taken;
-    const char *end = memchr(begin, '\n', self->used - self->taken);
-    if (!end) return NULL;
-    *length = (size_t)(end - begin);
-    self->taken += *length + 1;
-    if (!self->skips) return begin;
-    self->skips = 0;
-    wm_source_refuse(counts, self->base.where, "a line is longer than any of gpsd's");
-  }
 }
 
 // ── reports ─────────────────────────────────────────────────────────────────────────────────────────────────────────
@@ -263,7 +171,7 @@ static void take_deviations(gpsd *self, const gpsd_report *report) {
   if (!(sigma_m > 0.0)) return;
   self->deviation_m = sigma_m;
   self->deviation_up_m = report->alt_m;
-  self->deviations_ns = self->read_ns;
+  self->deviations_ns = self->lines.read_ns;
 }
 
 // 1: the row has its numbers.
@@ -311,23 +219,26 @@ static wm_status next_row(wm_row_device *base, wm_stream_row *out, wm_source_cou
   gpsd_report report;
   size_t length;
   wm_status status = WM_AGAIN;
-  const char *line = next_line(self, &length, counts);
+  const char *line = line_socket_next(&self->lines, &length);
   if (!line) {
-    wait_for_bytes(self);
-    line = next_line(self, &length, counts);
+    line_socket_wait(&self->lines);
+    line = line_socket_next(&self->lines, &length);
   }
+  if (!self->lines.is_connected) forget(self);
   while (line && status == WM_AGAIN) {
     const char *why = gpsd_report_read(line, length, &report);
-    out->arrival_ns = self->read_ns;
+    out->arrival_ns = self->lines.read_ns;
     if (!why && take(self, &report, out, counts)) {
       why = stamp(self, report.time_ns, out, counts);
       self->taken_ns = report.time_ns;
       if (!why) status = WM_OK;
     }
     if (why) wm_source_refuse(counts, base->where, why);
-    if (status == WM_AGAIN) line = next_line(self, &length, counts);
+    if (status == WM_AGAIN) line = line_socket_next(&self->lines, &length);
   }
-  counts->device = !self->is_connected ? WM_DEVICE_ABSENT : self->gone[0] ? WM_DEVICE_DOWN : WM_DEVICE_WORKS;
+  const char *fault = line_socket_fault(&self->lines);
+  if (fault) wm_source_refuse(counts, base->where, fault);
+  counts->device = !self->lines.is_connected ? WM_DEVICE_ABSENT : self->gone[0] ? WM_DEVICE_DOWN : WM_DEVICE_WORKS;
   return status;
 }
 
@@ -348,7 +259,7 @@ static unsigned note(const wm_row_device *base, unsigned state, int has_come, ch
 }
 
 static void close_gpsd(wm_row_device *base) {
-  disconnect((gpsd *)base);
+  line_socket_close(&((gpsd *)base)->lines);
   free(base);
 }
 
@@ -366,8 +277,10 @@ wm_status wm_gpsd_open(const wm_gpsd_device_config *config, const double origin[
   self->config = *config;
   memcpy(self->origin, origin, sizeof self->origin);
   self->ahead_m = isnan(ahead_m) ? 0.0 : ahead_m;
-  self->fd = self->fix = -1;
-  self->deviations_ns = self->taken_ns = self->course_ns = WM_TIME_NONE;
+  (void)snprintf(self->question, sizeof self->question, "?WATCH={\"enable\":true,\"json\":true%s%s%s};\n",
+                 config->device[0] ? ",\"device\":\"" : "", config->device, config->device[0] ? "\"" : "");
+  line_socket_init(&self->lines, config->host, config->port, self->question);
+  forget(self);
   self->base.ops = &kGpsd;
   (void)snprintf(self->base.stream, sizeof self->base.stream, "%s", wm_gpsd_stream(config));
   (void)snprintf(self->base.where, sizeof self->base.where, "%.50s:%d", config->host, (int)config->port);

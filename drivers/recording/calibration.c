@@ -259,11 +259,13 @@ static wm_status read_markers(const wm_yaml_node *markers, const warner *warn, w
   return number(markers, "size_m", DBL_MIN, 10, &rig->marker_size_m, err);
 }
 
-static wm_status read_motion6(const wm_yaml_node *motion6, const warner *warn, wm_rig *rig, wm_error *err) {
-  static const char *const kKeys[] = {"sigma_v_mps", "sigma_w_radps", NULL};
-  double *const outs[] = {rig->twist6_sigma_v_mps, rig->twist6_sigma_w_radps};
+static wm_status read_motion6(const wm_yaml_node *motion6, const warner *warn, calibration *out, wm_error *err) {
+  static const char *const kKeys[] = {"sigma_v_mps", "sigma_w_radps", "mounting", NULL};
+  double *const outs[] = {out->rig.twist6_sigma_v_mps, out->rig.twist6_sigma_w_radps};
+  const wm_mounting at_base_link = {0};
   TRY(calibration_keys(motion6, kKeys, warn, err));
-  for (int i = 0; kKeys[i]; i++) {
+  TRY(calibration_mounting(motion6, &at_base_link, warn, &out->mountings.motion6, err));
+  for (int i = 0; i < 2; i++) {
     wm_yaml_node sigma = wm_yaml_get(motion6, kKeys[i]);
     if (wm_yaml_there(&sigma)) TRY(list_in(&sigma, 3, 3, DBL_MIN, 1000, outs[i], NULL, err));
   }
@@ -304,7 +306,7 @@ wm_status calibration_read(const wm_yaml *doc, const warner *warn, calibration *
   if (wm_yaml_there(&stereo)) TRY(read_stereo(&stereo, warn, &out->rig, err));
   TRY(read_markers(&markers, warn, &out->rig, err));
   if (out->rig.marker_family[0]) add_marker_cameras(out);
-  TRY(read_motion6(&motion6, warn, &out->rig, err));
-  TRY(read_imu(&imu, warn, &out->imu, err));
+  TRY(read_motion6(&motion6, warn, out, err));
+  TRY(read_imu(&imu, warn, &out->mountings.imu, err));
   return read_gnss(&gnss, warn, out, err);
 }

@@ -21,7 +21,7 @@ typedef struct calibration {
   wm_sensor sensors[WM_SENSORS_MAX];
   size_t sensor_count;
   double gnss_origin[3];  // latitude and longitude in degrees, altitude in m; NaN: unknown
-  wm_mounting imu;
+  wm_row_mountings mountings;
 } calibration;
 
 // An empty calibration: no wheels, no sensors.

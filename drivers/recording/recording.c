@@ -181,7 +181,7 @@ static wm_status add_stream(wm_recording *self, const stream_kind *kind, wm_erro
   if (status != WM_OK || !there) return status;
   status = stream_open(path, kind, NULL, 0, NULL, 0, NULL, self->warn.fn, self->warn.context, &source, err);
   if (status != WM_OK) return status;
-  if (kind == &kStreamImu) stream_set_imu(source, wm_site_imu(self->site));
+  stream_mount(source, wm_site_row_mountings(self->site));
   self->quantities |= source->quantities;
   return add_source(self, source, err);
 }

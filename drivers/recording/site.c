@@ -208,7 +208,7 @@ wm_status wm_site_map(wm_site *self, const wm_raster **out, wm_error *err) {
 
 const wm_rig *wm_site_rig(const wm_site *self) { return &self->calibration.rig; }
 const double *wm_site_gnss_origin(const wm_site *self) { return self->calibration.gnss_origin; }
-const wm_mounting *wm_site_imu(const wm_site *self) { return &self->calibration.imu; }
+const wm_row_mountings *wm_site_row_mountings(const wm_site *self) { return &self->calibration.mountings; }
 const wm_start *wm_site_start(const wm_site *self) { return &self->start; }
 const char *wm_site_calibration_text(const wm_site *self, size_t *length) {
   *length = self->calibration_length;

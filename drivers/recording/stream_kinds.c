@@ -42,17 +42,13 @@ static const char *fill_motion(const fill_context *self, const csv_row *row, wm_
     return NULL;
   }
   out->kind = WM_EVENT_TWIST6;
-  out->as.twist6 = (wm_twist6){.v_mps = {v_mps, vy_mps, 0.0}, .w_radps = {0.0, 0.0, w_radps}};
+  out->as.twist6 = (wm_twist6){
+      .v_mps = {v_mps, vy_mps, 0.0}, .w_radps = {0.0, 0.0, w_radps}, .v_sigma_mps = (double)NAN, .arm_m = {0}};
   return NULL;
 }
 
-static const char *fill_motion6(const fill_context *self, const csv_row *row, wm_event *out) {
-  (void)self;
-  for (int i = 0; i < 3; i++) {
-    out->as.twist6.v_mps[i] = row->number[FIRST + i];
-    out->as.twist6.w_radps[i] = row->number[FIRST + 3 + i];
-  }
-  return NULL;
+static double on_axis(const double axis[3], const double v[3]) {
+  return axis[0] * v[0] + axis[1] * v[1] + axis[2] * v[2];
 }
 
 // Number of empty fields from `first` on.
@@ -60,6 +56,19 @@ static int count_empty(const csv_row *row, int first, int count) {
   int empty = 0;
   for (int i = 0; i < count; i++) empty += isnan(row->number[first + i]);
   return empty;
+}
+
+static const char *fill_motion6(const fill_context *self, const csv_row *row, wm_event *out) {
+  const double *v = &row->number[FIRST], *w = v + 3;
+  const int empty = count_empty(row, FIRST + 3, 3);
+  if (empty != 0 && empty != 3) return "a part of the turn rates is empty";
+  for (int i = 0; i < 3; i++) {
+    out->as.twist6.v_mps[i] = on_axis(self->motion6_axes[i], v);
+    out->as.twist6.w_radps[i] = on_axis(self->motion6_axes[i], w);
+    out->as.twist6.arm_m[i] = self->motion6_arm_m[i];
+  }
+  out->as.twist6.v_sigma_mps = w[3];
+  return NULL;
 }
 
 static const char *fill_increment(const fill_context *self, const csv_row *row, wm_event *out) {
@@ -239,9 +248,8 @@ static const char *fill_imu(const fill_context *self, const csv_row *row, wm_eve
   wm_quantities *q = &out->as.quantities;
   *q = (wm_quantities){.count = whole ? 6 : 3};
   for (uint8_t i = 0; i < q->count; i++) {
-    const double *axis = self->imu_axes[kAxis[i]], *of = i < 3 ? w : a;
     q->id[i] = kOrder[i];
-    q->value[i] = axis[0] * of[0] + axis[1] * of[1] + axis[2] * of[2];
+    q->value[i] = on_axis(self->imu_axes[kAxis[i]], i < 3 ? w : a);
   }
   return NULL;
 }
@@ -252,12 +260,13 @@ const stream_kind kStreamMotion = {
     .fill = fill_motion,   .also = WM_EVENT_TWIST6,
     .also_with = FIRST + 1};
 
-const stream_kind kStreamMotion6 = {"motion6.csv",
-                                    "motion6",
-                                    WM_EVENT_TWIST6,
-                                    {{STAMPS, NEEDED("vx_mps", SPEED), NEEDED("vy_mps", SPEED), NEEDED("vz_mps", SPEED),
-                                      NEEDED("wx_radps", RATE), NEEDED("wy_radps", RATE), NEEDED("wz_radps", RATE)}},
-                                    .fill = fill_motion6};
+const stream_kind kStreamMotion6 = {
+    "motion6.csv",
+    "motion6",
+    WM_EVENT_TWIST6,
+    {{STAMPS, NEEDED("vx_mps", SPEED), NEEDED("vy_mps", SPEED), NEEDED("vz_mps", SPEED), OPTIONAL("wx_radps", RATE),
+      OPTIONAL("wy_radps", RATE), OPTIONAL("wz_radps", RATE), OPTIONAL("sigma_v_mps", SIGMA)}},
+    .fill = fill_motion6};
 
 #define TICKS -1e15, 1e15     // doubles still count singly there
 #define ROAD_WHEEL -1.5, 1.5  // its tangent is finite; no wheel is turned across
@@ -395,14 +404,21 @@ const stream_kind kStreamGnss = {"gnss.csv",
                                    NEEDED("sigma_xy_m", SIGMA), OPTIONAL("sigma_z_m", SIGMA)}},
                                  .fill = fill_gnss};
 
-void fill_context_imu(fill_context *self, const wm_mounting *imu) {
-  const double *rpy = imu->rpy_rad;
+// base_link's x, y and z axis in the axes of what is mounted so.
+static void axes_of(const wm_mounting *mounting, double out[3][3]) {
+  const double *rpy = mounting->rpy_rad;
   const double sr = sin(rpy[0]), cr = cos(rpy[0]), sp = sin(rpy[1]), cp = cos(rpy[1]), sy = sin(rpy[2]),
                cy = cos(rpy[2]);
   const double axes[3][3] = {{cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr},
                              {sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr},
                              {-sp, cp * sr, cp * cr}};
-  memcpy(self->imu_axes, axes, sizeof axes);
+  memcpy(out, axes, sizeof axes);
+}
+
+void fill_context_mount(fill_context *self, const wm_row_mountings *mountings) {
+  axes_of(&mountings->imu, self->imu_axes);
+  axes_of(&mountings->motion6, self->motion6_axes);
+  memcpy(self->motion6_arm_m, mountings->motion6.xyz_m, sizeof self->motion6_arm_m);
 }
 
 // ── rows from elsewhere ─────────────────────────────────────────────────────────────────────────────────────────────
@@ -453,11 +469,11 @@ const char *wm_stream_number(const wm_stream *self, size_t index) {
   return column < CSV_COLUMNS_MAX ? self->format.columns[column].name : NULL;
 }
 
-wm_status wm_stream_event(const wm_stream *self, const wm_stream_row *row, const wm_mounting *imu, wm_event *out,
-                          wm_error *err) {
+wm_status wm_stream_event(const wm_stream *self, const wm_stream_row *row, const wm_row_mountings *mountings,
+                          wm_event *out, wm_error *err) {
   csv_row values;
   fill_context context = {0};
-  fill_context_imu(&context, imu);
+  fill_context_mount(&context, mountings);
   for (size_t i = 0; wm_stream_number(self, i); i++) {
     const csv_column *column = &self->format.columns[FIRST + i];
     const double value = values.number[FIRST + i] = row->number[i];

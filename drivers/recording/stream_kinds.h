@@ -16,10 +16,11 @@ enum { T, ARRIVAL, FIRST };
 typedef struct fill_context {
   uint16_t sensor_index;
   const wm_corner_reader *corners;  // of kStreamCorners
-  double imu_axes[3][3];            // base_link's x, y and z axis in the axes of the IMU
+  // base_link's x, y and z axis in the axes of the IMU, and of the log that gives motion6; the log's place in base_link
+  double imu_axes[3][3], motion6_axes[3][3], motion6_arm_m[3];
 } fill_context;
 
-void fill_context_imu(fill_context *self, const wm_mounting *imu);
+void fill_context_mount(fill_context *self, const wm_row_mountings *mountings);
 
 typedef struct stream_kind {
   const char *file;

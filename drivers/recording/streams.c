@@ -27,8 +27,8 @@ struct stream {
   int has_before;
 };
 
-void stream_set_imu(wm_source *source, const wm_mounting *imu) {
-  fill_context_imu(&((stream *)(void *)source)->context, imu);
+void stream_mount(wm_source *source, const wm_row_mountings *mountings) {
+  fill_context_mount(&((stream *)(void *)source)->context, mountings);
 }
 
 static int is_name(csv_field field, const char *name) {

@@ -22,7 +22,7 @@ wm_status stream_find_sensors(const char *path, const stream_kind *kind, sensor_
 wm_status stream_open(const char *path, const stream_kind *kind, const char *sensor, uint16_t sensor_index,
                       const sensor_names *others, int takes_broken, const wm_corner_reader *corners, wm_warn_fn warn,
                       void *context, wm_source **out, wm_error *err);
-// How the IMU of a source of kStreamImu is mounted.
-void stream_set_imu(wm_source *source, const wm_mounting *imu);
+// How the sensor of a source of kStreamImu or kStreamMotion6 is mounted.
+void stream_mount(wm_source *source, const wm_row_mountings *mountings);
 
 #endif

@@ -72,7 +72,8 @@ wm_status motion_front_end::check(const wm_event &event) const {
     case WM_EVENT_TWIST6:
       for (int i = 0; i < 3 && status == WM_OK; i++) {
         status = check_value(event.as.twist6.v_mps[i], kSpeedMost_mps);
-        if (status == WM_OK) status = check_value(event.as.twist6.w_radps[i], kRateMost_radps);
+        if (status == WM_OK && has_rates(event.as.twist6))
+          status = check_value(event.as.twist6.w_radps[i], kRateMost_radps);
       }
       break;
     case WM_EVENT_INCREMENT: status = check_increment(event); break;
@@ -99,10 +100,12 @@ void motion_front_end::feed(const wm_event &event) {
 
 void motion_front_end::take_twist(const wm_event &event) {
   const bool planar = event.kind == WM_EVENT_TWIST2;
-  const double v = planar ? event.as.twist2.v_mps : event.as.twist6.v_mps[0];
-  const double rate = planar ? event.as.twist2.w_radps : event.as.twist6.w_radps[2];
+  lacks_rate_ = !planar && !has_rates(event.as.twist6);
+  const double by_gyro = gyro_is_alive() ? value_[WM_Q_YAW_RATE] : 0.0;
+  const double rate = planar ? event.as.twist2.w_radps : lacks_rate_ ? by_gyro : event.as.twist6.w_radps[2];
+  const vec3 base = planar ? vec3{event.as.twist2.v_mps, 0, 0} : velocity_of_base(event.as.twist6, {0, 0, rate});
+  const double v = base.x, u = base.y;
   const double w = commands_ ? driven_rate(*params_, v, rate) : rate;
-  const double u = planar ? 0.0 : event.as.twist6.v_mps[1];
   if (!planar) watch_plane(event.t_ns, event.as.twist6);
   note_period(kTwistSpeed, event.t_ns, 1);
   stamp_ns_[kTwistSpeed] = twist_sample_ns_ = event.t_ns;
@@ -120,6 +123,7 @@ void motion_front_end::take_twist(const wm_event &event) {
   twists_in_space_ = !planar;
   if (twist_ns_ != WM_TIME_NONE && event.t_ns > twist_ns_ && !is_overdue(event.t_ns)) {
     const double dt = wm_seconds_between(twist_ns_, event.t_ns);
+    if (lacks_rate_) missed_turn_rad2_ += square(kUnknownRate_radps) * dt;
     twist_period_s_ += twist_period_s_ > 0.0 ? kPeriodGain * (dt - twist_period_s_) : dt;
   }
   twist_ns_ = event.t_ns;
@@ -130,8 +134,9 @@ void motion_front_end::take_twist(const wm_event &event) {
   note_plausibility(event.t_ns, quantity_bit(kTwistSpeed), v_plausible);
   if (!planar) note_plausibility(event.t_ns, quantity_bit(kTwistSide), u_plausible);
   note_plausibility(event.t_ns, quantity_bit(kTwistRate), w_plausible);
-  const bool still = watch_standstill(event.t_ns, plausible && speed_of({v, u, w}) < params_->standstill_speed_mps &&
-                                                      std::fabs(w) < params_->standstill_yaw_rate_radps);
+  const bool still =
+      watch_standstill(event.t_ns, plausible && !lacks_rate_ && speed_of({v, u, w}) < params_->standstill_speed_mps &&
+                                       std::fabs(w) < params_->standstill_yaw_rate_radps);
   if (still && !commands_ && rate != 0.0) {  // a measured rate; a rate of exactly 0 is one that was set to it
     value_[WM_Q_YAW_RATE] = rate;
     yaw_fresh_ = 1;
@@ -244,12 +249,14 @@ void motion_front_end::choose_model(uint32_t kinds) {
   const bool speed = read_speed(&ignored);
   const bool ticks = counts_ticks() && finite(wheels_.track_m);
   const bool steering = speed && finite(wheels_.wheelbase_m) && read_road_wheel(&ignored);
-  const bool has_other = ticks || speed_source_ == kOfTwist || (steering && !age_of_steering(now_ns_).is_overdue());
+  const bool twist_turns = !lacks_rate_ || !seen(WM_Q_YAW_RATE);  // beside a gyro a log without rates does not stand in
+  const bool has_other =
+      ticks || (speed_source_ == kOfTwist && twist_turns) || (steering && !age_of_steering(now_ns_).is_overdue());
   const bool possible[] = {false,
                            ticks,
                            speed && (gyro_is_alive() || wheels_stand_in(steering)),
                            steering,
-                           (kinds & WM_TWIST_EVENTS) != 0,
+                           (kinds & WM_TWIST_EVENTS) != 0 && twist_turns,
                            (kinds & WM_EVENT_BIT(WM_EVENT_INCREMENT)) != 0};
   const int wanted = params_->model;
   if (wanted == WM_MOTION_CONSTANT_VELOCITY) return;

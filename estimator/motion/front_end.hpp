@@ -257,6 +257,7 @@ class motion_front_end {
   uint8_t model_;
   uint8_t speed_source_;
   uint8_t speed_source_changed_;
+  uint8_t lacks_rate_;                 // the newest twist does not measure the turn
   uint8_t commands_;                   // twists are commands: why
   uint8_t twists_in_space_;            // the newest twist had six components
   uint8_t increments_are_calibrated_;  // the newest increment had a covariance

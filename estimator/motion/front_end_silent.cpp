@@ -81,7 +81,8 @@ void motion_front_end::note_silence(wm_time_ns t_ns) {
   if (model_ == WM_MOTION_INCREMENTS || model_ == WM_MOTION_CONSTANT_VELOCITY) return;
   if (parts && age_of_speed(t_ns).is_overdue()) health_ |= WM_MOTION_HEALTH_SPEED_SILENT;
   const bool gyro = takes_gyro && seen(WM_Q_YAW_RATE), steering = !gyro && model_ == WM_MOTION_ACKERMANN;
-  if ((gyro && age_of(WM_Q_YAW_RATE, WM_Q_YAW_RATE, t_ns).is_overdue()) ||
+  if ((!gyro && model_ == WM_MOTION_TWIST && lacks_rate_) ||
+      (gyro && age_of(WM_Q_YAW_RATE, WM_Q_YAW_RATE, t_ns).is_overdue()) ||
       (steering && age_of_steering(t_ns).is_overdue()))
     health_ |= WM_MOTION_HEALTH_TURN_SILENT;
 }

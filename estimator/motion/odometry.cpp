@@ -85,7 +85,6 @@ void feed_spatial(wm_odometry *self, const wm_event &event) {
   const bool quantities = event.kind == WM_EVENT_QUANTITIES;
   if (!quantities && event.kind != WM_EVENT_TWIST6) return;
   wm::spatial_twist twist = {};
-  if (!quantities) twist = {wm::vec_of(event.as.twist6.v_mps), wm::vec_of(event.as.twist6.w_radps)};
   const bool changes = self->source.take(event, &twist);
   // Of quantities, only an IMU's rates beside twists in space.
   if (!changes || (quantities && !(self->source.rates_are_fresh() && self->source.is_held()))) return;

@@ -18,6 +18,9 @@ constexpr double kSmoothing_s = 0.3;
 
 double variance_of(double sigma, double rel, double size) { return square(sigma) + square(rel * size); }
 
+// A sigma that the row states, in place of the usual one.
+double stated_or(double stated, double usual) { return stated > 0.0 ? stated : usual; }
+
 // Variance of a value that is held while the truth goes on to the next sample: a change c, evenly made, leaves c^2/3 on
 // average. Two samples' noise is taken off.
 double held_variance(double change, double sigma) {
@@ -119,12 +122,10 @@ void spatial_motion::init(const wm_motion_params *params, const wm_wheels *wheel
 
 void spatial_motion::feed(const wm_event &event) {
   spatial_twist now = {};
-  if (event.kind == WM_EVENT_TWIST6) {
-    now = {vec_of(event.as.twist6.v_mps), vec_of(event.as.twist6.w_radps)};
-  } else if (event.kind == WM_EVENT_TWIST2) {
+  if (event.kind == WM_EVENT_TWIST2) {
     now.v.x = event.as.twist2.v_mps;
     now.w.z = event.as.twist2.w_radps;
-  } else {
+  } else if (event.kind != WM_EVENT_TWIST6) {
     front_.feed(event);
     front_.advance(event.t_ns, kNeutralCalibration,
                    [](const motion_segment &, const motion_twist &, const motion_noise &) {});
@@ -148,6 +149,7 @@ uint32_t spatial_motion::health() const {
   static constexpr uint32_t kOfAxis[3] = {WM_MOTION_HEALTH_ROLL_RATE_STUCK, WM_MOTION_HEALTH_PITCH_RATE_STUCK,
                                           WM_MOTION_HEALTH_YAW_RATE_STUCK};
   uint32_t out = front_.health() | (history_.refused_lately() ? WM_MOTION_HEALTH_IMPLAUSIBLE : 0u);
+  if (source_.lacks_rates() && !source_.by_gyro()) out |= WM_MOTION_HEALTH_TURN_SILENT;
   for (int i = 0; i < 3; i++) out |= source_.stuck_rates() & (1u << i) ? kOfAxis[i] : 0u;
   return out | (source_.stuck_forces() ? WM_MOTION_HEALTH_ACCELEROMETER_STUCK : 0u);
 }
@@ -155,7 +157,7 @@ uint32_t spatial_motion::health() const {
 void spatial_motion::sample_noise(vec3 *v_var, vec3 *w_var) const {
   const double speed = length(v_mps()), rate = length(w_radps());
   for (int i = 0; i < 3; i++) {
-    (*v_var)[i] = variance_of(noise_.v_mps[i], noise_.v_rel, speed);
+    (*v_var)[i] = variance_of(stated_or(source_.v_sigma_mps(), noise_.v_mps[i]), noise_.v_rel, speed);
     (*w_var)[i] = variance_of(noise_.w_radps[i], noise_.w_rel, rate);
   }
 }
@@ -190,8 +192,8 @@ spatial_step spatial_motion::step_of(const spatial_piece &piece, wm_time_ns end_
   for (int i = 0; i < 3; i++) {
     const bool held = (by_twist & (1u << i)) != 0;
     if (held) changed.w[i] = source_.rate_change()[i];
-    const double v_var =
-        variance_of(noise_.v_mps[i], noise_.v_rel, speed) + held_variance(changed.v[i], noise_.v_mps[i]);
+    const double sigma_mps = stated_or(source_.v_sigma_held_mps(), noise_.v_mps[i]);
+    const double v_var = variance_of(sigma_mps, noise_.v_rel, speed) + held_variance(changed.v[i], sigma_mps);
     const double w_var =
         variance_of(noise_.w_radps[i], noise_.w_rel, rate) + held_variance(changed.w[i], noise_.w_radps[i]);
     s.place_m2[i] = v_var * v_held_s2 + square(kGapWalk_mps) * walk_s3 + square(p.limits_mps2) * piece.refused_s4 / 3.0;

@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "math/elementary.hpp"
+#include "motion/event_time.hpp"
 
 namespace wm {
 namespace {
@@ -120,6 +121,16 @@ void spatial_source::note_imu(const wm_event &event) {
   if ((came & 32u) && are_alive(3, event.t_ns) && stuck_forces() == 0) fresh_ |= kFreshForce;
 }
 
+// Of a log without rates the turn is the gyro's, or unknown.
+spatial_twist spatial_source::twist_of(const wm_event &event) const {
+  const wm_twist6 &twist = event.as.twist6;
+  const vec3 own = has_rates(twist) ? vec_of(twist.w_radps) : vec3{0, 0, 0};
+  vec3 w = own;
+  if (are_alive(0, event.t_ns))
+    for (int i = 0; i < 3; i++) w[i] = stuck_ & (1u << i) ? own[i] : imu_[i];
+  return {velocity_of_base(twist, w), own};
+}
+
 void spatial_source::note_twist(wm_time_ns t_ns, const spatial_twist &twist) {
   if (twist_ns_ != WM_TIME_NONE && t_ns > twist_ns_) {
     const double dt = wm_seconds_between(twist_ns_, t_ns);
@@ -131,6 +142,7 @@ void spatial_source::note_twist(wm_time_ns t_ns, const spatial_twist &twist) {
     if (follows) twist_period_s_ += twist_period_s_ > 0.0 ? kPeriodGain * (dt - twist_period_s_) : dt;
   }
   if (twist_ns_ == WM_TIME_NONE) mean_ = twist;
+  if (lacks_rates_) twist_has_rates_ = 0;
   twist_has_rates_ |= twist.w.x != 0.0 || twist.w.y != 0.0 || twist.w.z != 0.0;
   twist_ns_ = t_ns;
   twist_ = twist;
@@ -138,11 +150,16 @@ void spatial_source::note_twist(wm_time_ns t_ns, const spatial_twist &twist) {
 
 bool spatial_source::take(const wm_event &event, spatial_twist *now) {
   fresh_ = 0;
-  const bool quantities = event.kind == WM_EVENT_QUANTITIES;
-  if (quantities)
+  const bool quantities = event.kind == WM_EVENT_QUANTITIES, in_space = event.kind == WM_EVENT_TWIST6;
+  if (in_space) *now = twist_of(event);
+  if (quantities) {
     note_imu(event);
-  else if (event.kind != WM_EVENT_INCREMENT)
+  } else if (event.kind != WM_EVENT_INCREMENT) {
+    lacks_rates_ = in_space && !has_rates(event.as.twist6);
+    v_sigma_mps_[1] = v_sigma_mps_[0];
+    v_sigma_mps_[0] = in_space && event.as.twist6.v_sigma_mps > 0.0 ? event.as.twist6.v_sigma_mps : 0.0;
     note_twist(event.t_ns, *now);
+  }
   by_gyro_ = are_alive(0, event.t_ns);
   if (!by_gyro_) return true;
   had_gyro_ = 1;

@@ -30,8 +30,8 @@ class spatial_source {
   void init(double hold_max_s, const spatial_rest &rest);
   // By wheels or a vehicle's speed; a body whose twists come is judged by their mean.
   void note_standing(bool stands) { stands_ = stands; }
-  // Takes a motion event, with the twist that it gives on its own (of quantities: by the front end). *now becomes the
-  // twist that holds from here on. False: the event changes none.
+  // Takes a motion event, with the twist that it gives on its own (of quantities: by the front end; of a twist in space
+  // it is not read). *now becomes the twist that holds from here on. False: the event changes none.
   bool take(const wm_event &event, spatial_twist *now);
 
   // The newest event had the rates of an IMU, or a specific force on three axes.
@@ -43,13 +43,19 @@ class spatial_source {
   // The velocity is a twist's, beside an IMU: it has a period of its own.
   bool is_held() const { return by_gyro_ && twist_ns_ != WM_TIME_NONE; }
   double twist_period_s() const { return twist_period_s_; }
+  bool lacks_rates() const { return lacks_rates_ != 0; }  // the newest twist is a log's without rates
+  // Sigma that the newest twist states of its velocity, and the larger one of the newest two: a twist holds until the
+  // next one has come. 0: none.
+  double v_sigma_mps() const { return v_sigma_mps_[0]; }
+  double v_sigma_held_mps() const { return v_sigma_mps_[v_sigma_mps_[1] > v_sigma_mps_[0]]; }
   const vec3 &velocity_change() const { return velocity_change_; }  // between the last two twists
   const vec3 &rate_change() const { return rate_change_; }
   // Axes of the gyro, and of the accelerometer, that repeat one value and are not used.
   uint32_t stuck_rates() const { return stuck_ & kAxes; }
   uint32_t stuck_forces() const { return stuck_ >> 3; }
-  // Axes of which the gyro's rates are missing, after they were there: stuck or silent. The twist's are taken.
-  uint32_t lost_rates() const { return had_gyro_ ? (by_gyro_ ? stuck_rates() : kAxes) : 0u; }
+  // Axes of which the gyro's rates are missing, after they were there or beside a log that has none: stuck or silent.
+  // The twist's are taken.
+  uint32_t lost_rates() const { return had_gyro_ || lacks_rates_ ? (by_gyro_ ? stuck_rates() : kAxes) : 0u; }
   // Of these, the ones that no twist measures at a time.
   uint32_t unmeasured_rates(wm_time_ns t_ns) const {
     return twist_has_rates_ && velocity_is_known(t_ns) ? 0u : lost_rates();
@@ -70,6 +76,7 @@ class spatial_source {
     int64_t values, longest;     // different ones so far, and the most samples of one of them
   };
   void note_imu(const wm_event &event);
+  spatial_twist twist_of(const wm_event &event) const;
   void note_twist(wm_time_ns t_ns, const spatial_twist &twist);
   void watch_axis(int axis, wm_time_ns t_ns, double value);
   bool may_stand(int axis, double value) const;
@@ -87,8 +94,9 @@ class spatial_source {
   vec3 velocity_change_, rate_change_;
   double missed_rad2_[3], missed_since_s_;
   wm_time_ns twist_ns_;  // WM_TIME_NONE: none came
-  double twist_period_s_;
-  uint32_t fresh_, stuck_, by_gyro_, had_gyro_, twist_has_rates_, stands_;
+  double twist_period_s_, v_sigma_mps_[2];
+  uint32_t fresh_, stuck_, by_gyro_, had_gyro_, twist_has_rates_, lacks_rates_;
+  uint64_t stands_;  // of 64 bits: no padding, so that states compare by bytes
 };
 
 }  // namespace wm

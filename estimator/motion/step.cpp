@@ -10,9 +10,6 @@
 namespace wm {
 namespace {
 
-// Sigma of a turn rate of which nothing is known, rad/s per sqrt(s): a robot that may turn by 17 degrees in a second.
-// Not swept.
-constexpr double kUnknownRate_radps = 0.3;
 // The same where the steering is not trusted: a car on a road turns less. Not swept.
 constexpr double kUnknownSteeringRate_radps = 0.1;
 // Above this the speed is an artefact of two counts with nearly equal stamps; robots with counters are slower.

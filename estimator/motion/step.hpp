@@ -10,6 +10,10 @@
 
 namespace wm {
 
+// Sigma of a turn rate of which nothing is known, rad/s per sqrt(s): a robot that may turn by 17 degrees in a second.
+// Not swept.
+inline constexpr double kUnknownRate_radps = 0.3;
+
 // Terms of wm_motion_calibration.
 enum calibration_index {
   kSpeedScale = WM_SPEED_SCALE,

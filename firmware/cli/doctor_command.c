@@ -50,6 +50,7 @@ static int look(const wm_config *config, double seconds, int as_json) {
   doctor_cameras(config, &found);
   doctor_imu("", config, &found);
   doctor_gnss(config, RECEIVER_S, &found);
+  doctor_dvl(config, RECEIVER_S, &found);
   doctor_latency(seconds, priority, &wake_ns, &is_realtime);
   doctor_judge_latency(&wake_ns, is_realtime, &found);
   if (as_json) {

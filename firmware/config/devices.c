@@ -149,6 +149,7 @@ static wm_status stream_is_new(const wm_yaml_node *item, const wm_config *config
     if (strcmp(devices->lcm[i].stream, stream) == 0) line = devices->lcm[i].line;
   for (size_t i = 0; i < devices->gpsd_count; i++)
     if (strcmp(wm_gpsd_stream(&devices->gpsd[i]), stream) == 0) line = devices->gpsd[i].line;
+  if (devices->dvl.host[0] && strcmp("motion6", stream) == 0) line = devices->dvl.line;
   return line == 0 ? WM_OK : wm_yaml_fail(item, err, "the stream '%s' appears twice (first in line %d)", stream, line);
 }
 
@@ -217,6 +218,21 @@ static wm_status read_iio(const wm_yaml_node *item, wm_config *config, wm_error 
   return status == WM_OK ? stream_is_new(item, config, "imu", err) : status;
 }
 
+static wm_status read_dvl(const wm_yaml_node *item, wm_config *config, wm_error *err) {
+  wm_dvl_device_config *out = &config->devices.dvl;
+  if (!wm_yaml_there(item)) return WM_OK;
+  wm_dvl_device_config found = {.line = wm_yaml_line(item), .port = 16171};
+  if (!wm_yaml_is_map(item)) return wm_yaml_fail(item, err, "a map {host: ADDRESS, ...} is needed");
+  wm_status status = config_check_keys(item, kConfigDvlDeviceKeys, err);
+  if (status == WM_OK) status = text(item, "host", found.host, sizeof found.host, err);
+  if (status == WM_OK && !found.host[0])
+    return wm_yaml_fail(item, err, "host: is missing: the log's address, e.g. 192.168.194.95");
+  if (status == WM_OK) status = config_whole(item, kConfigDvlDeviceKeys, "port", &found.port, err);
+  if (status == WM_OK) status = stream_is_new(item, config, "motion6", err);
+  *out = found;
+  return status;
+}
+
 static wm_status read_list(const wm_yaml_node *list, size_t max, const char *what,
                            wm_status (*read)(const wm_yaml_node *, wm_config *, wm_error *), wm_config *config,
                            wm_error *err) {
@@ -234,7 +250,8 @@ static wm_status read_list(const wm_yaml_node *list, size_t max, const char *wha
 wm_status config_read_devices(const wm_yaml_node *root, wm_config *out, wm_error *err) {
   wm_yaml_node devices = wm_yaml_get(root, "devices"), can = wm_yaml_get(root, "devices.can"),
                cameras = wm_yaml_get(root, "devices.cameras"), lcm = wm_yaml_get(root, "devices.lcm"),
-               gpsd = wm_yaml_get(root, "devices.gpsd"), iio = wm_yaml_get(root, "devices.iio");
+               gpsd = wm_yaml_get(root, "devices.gpsd"), iio = wm_yaml_get(root, "devices.iio"),
+               dvl = wm_yaml_get(root, "devices.dvl");
   if (!wm_yaml_there(&devices)) return WM_OK;
   wm_status status = config_check_keys(&devices, kConfigDevicesKeys, err);
   if (status == WM_OK) status = read_list(&can, WM_CAN_DEVICES_MAX, "{interface: NAME, ...}", read_can, out, err);
@@ -243,6 +260,7 @@ wm_status config_read_devices(const wm_yaml_node *root, wm_config *out, wm_error
   if (status == WM_OK) status = read_list(&lcm, WM_LCM_DEVICES_MAX, "{stream: NAME, ...}", read_lcm, out, err);
   if (status == WM_OK) status = read_list(&gpsd, WM_GPSD_DEVICES_MAX, "{take: position, ...}", read_gpsd, out, err);
   if (status == WM_OK) status = read_iio(&iio, out, err);
+  if (status == WM_OK) status = read_dvl(&dvl, out, err);
   if (status == WM_OK)
     status = config_choice(&devices, kConfigDevicesKeys, "sightings", &out->devices.sightings_by_lcm, err);
   return status;

@@ -132,6 +132,9 @@ const config_key kConfigDevicesKeys[] = {
     {"gpsd", CONFIG_LIST, "none", .about = "GNSS receivers, by gpsd.", .of = kConfigGpsdDeviceKeys,
      .max = WM_GPSD_DEVICES_MAX},
     {"iio", CONFIG_MAP, "none", .about = "The IMU, by the kernel's IIO.", .of = kConfigIioDeviceKeys},
+    {"dvl", CONFIG_MAP, "none",
+     .about = "A Doppler velocity log of Water Linked's kind (A50, A125), over TCP: the stream motion6.",
+     .of = kConfigDvlDeviceKeys},
     {"sightings", CONFIG_CHOICE, "none", .about = "lcm: another program sends sightings of landmarks (docs/live.md).",
      .names = kSightings},
     {0},
@@ -198,6 +201,12 @@ const config_key kConfigIioDeviceKeys[] = {
      .about = "Name of the IMU, as `cat /sys/bus/iio/devices/*/name` prints it. It needn't be there yet."},
     {"trigger", CONFIG_TEXT, "its own", .about = "Name of the trigger that samples it, e.g. of an iio-trig-hrtimer."},
     {"rate_hz", CONFIG_NUMBER, "the driver's", .about = "Sampling rate, one that the driver has.", .max = 10000},
+    {0},
+};
+
+const config_key kConfigDvlDeviceKeys[] = {
+    {"host", CONFIG_TEXT, CONFIG_NEEDED, .about = "Its address, as its web page has it, e.g. `192.168.194.95`."},
+    {"port", CONFIG_WHOLE, "16171", .about = "Its port.", .min = 1, .max = 65535},
     {0},
 };
 

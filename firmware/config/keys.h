@@ -42,6 +42,7 @@ extern const config_key kConfigCanDeviceKeys[];
 extern const config_key kConfigLcmDeviceKeys[];
 extern const config_key kConfigGpsdDeviceKeys[];
 extern const config_key kConfigIioDeviceKeys[];
+extern const config_key kConfigDvlDeviceKeys[];
 extern const config_key kConfigCameraDeviceKeys[];
 
 // Reading by these tables. `map` has no other keys.

@@ -85,6 +85,7 @@ typedef enum wm_finding_id {
   WM_FOUND_CAMERA_DEVICE,
   WM_FOUND_IMU_DEVICE,
   WM_FOUND_GNSS_RECEIVER,
+  WM_FOUND_VELOCITY_LOG,
   WM_FOUND_LCM_ROUTE,
   WM_FOUND_COUNT
 } wm_finding_id;

@@ -137,5 +137,7 @@ const wm_finding_kind kFindingKinds[WM_FOUND_COUNT] = {
                              "docs/imu-gnss.md sets one up"},
     [WM_FOUND_GNSS_RECEIVER] = {"gnss-receiver", "gpsd does not run, or its receiver has no fix",
                                 "`gpspipe -w` shows its reports"},
+    [WM_FOUND_VELOCITY_LOG] = {"velocity-log", "the velocity log does not answer, or has no lock on the bottom",
+                               "its web page shows velocities"},
     [WM_FOUND_LCM_ROUTE] = {"lcm-route", "no interface has a route for multicast", "ip route add 224.0.0.0/4 dev lo"},
 };

@@ -195,7 +195,7 @@ wm_status wm_assemble(const wm_config *config, wm_recording *recording, uint64_t
   wm_setup *setup = &out->setup;
   wm_config_give_params(config, setup);
   setup->wheels = *wm_site_wheels(wm_recording_site(recording));
-  out->imu = wm_site_imu(wm_recording_site(recording));
+  out->imu = &wm_site_row_mountings(wm_recording_site(recording))->imu;
   setup->sensors = wm_site_sensors(wm_recording_site(recording), &setup->sensor_count);
   setup->landmarks = wm_site_landmarks(wm_recording_site(recording), &setup->landmark_count);
   setup->rig = wm_site_rig(wm_recording_site(recording));

@@ -193,7 +193,7 @@ wm_status session_push_row(session *self, uint32_t source, wm_time_ns t_ns, wm_t
     return wm_fail(err, WM_BAD_USAGE, "%s: %zu numbers; its table has %zu columns behind the stamps", to->base.name,
                    count, columns);
   for (size_t i = 0; i < WM_STREAM_NUMBERS_MAX; i++) row.number[i] = i < count ? numbers[i] : (double)NAN;
-  status = wm_stream_event(to->stream, &row, wm_site_imu(wm_recording_site(self->robot)), &to->event, err);
+  status = wm_stream_event(to->stream, &row, wm_site_row_mountings(wm_recording_site(self->robot)), &to->event, err);
   if (status == WM_OK) return deliver(self, to, arrival_ns, err);
   count_refused(to, status, err);
   return wm_fail_in(err, "%s", to->base.name);

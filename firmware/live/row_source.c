@@ -18,7 +18,7 @@ typedef struct row_source {
   wm_source base;
   wm_row_device *device;
   const wm_stream *stream;
-  wm_mounting imu;
+  wm_row_mountings mountings;
   wm_stream_row row;
   int has_come;         // a usable row since the start
   unsigned state;       // the device's own
@@ -44,7 +44,7 @@ static int take(row_source *self, wm_event *out) {
     *(self->row.t_ns < self->last_ns ? &counts->out_of_order : stuck ? &counts->frozen : &counts->ignored) += 1;
     return 0;
   }
-  const wm_status status = wm_stream_event(self->stream, &self->row, &self->imu, out, &err);
+  const wm_status status = wm_stream_event(self->stream, &self->row, &self->mountings, out, &err);
   if (status != WM_OK) {
     wm_source_refuse(counts, self->device->where, err.text);
     if (status != WM_BAD_DATA) counts->malformed--, counts->not_finite++;
@@ -96,7 +96,7 @@ static void close_source(wm_source *base) {
 
 static const wm_source_ops kRows = {next_event, close_source};
 
-wm_status row_source_open(wm_row_device *device, const wm_mounting *imu, wm_source **out, wm_error *err) {
+wm_status row_source_open(wm_row_device *device, const wm_row_mountings *mountings, wm_source **out, wm_error *err) {
   *out = NULL;
   row_source *self = aligned_alloc(WM_CACHE_LINE, (sizeof *self + WM_CACHE_LINE - 1) / WM_CACHE_LINE * WM_CACHE_LINE);
   if (!self) {
@@ -106,7 +106,7 @@ wm_status row_source_open(wm_row_device *device, const wm_mounting *imu, wm_sour
   memset(self, 0, sizeof *self);
   self->device = device;
   self->stream = wm_stream_find(device->stream);
-  self->imu = *imu;
+  self->mountings = *mountings;
   self->last_ns = WM_TIME_NONE;
   self->heard_ns = wm_monotonic_ns();
   self->state = WM_DEVICE_WORKS;
@@ -149,7 +149,9 @@ static wm_status open_device(const wm_config *config, const wm_site *site, size_
   index -= devices->lcm_count;
   if (index < devices->gpsd_count)
     return wm_gpsd_open(&devices->gpsd[index], wm_site_gnss_origin(site), wm_site_rig(site)->antenna_m[0], out, err);
-  return wm_iio_open(&devices->iio, "", out, err);
+  index -= devices->gpsd_count;
+  if (index == 0 && devices->iio.device[0]) return wm_iio_open(&devices->iio, "", out, err);
+  return wm_dvl_open(&devices->dvl, out, err);
 }
 
 wm_status row_sources_open(const wm_config *config, const wm_site *site, wm_source *out[WM_ROW_DEVICES_MAX],
@@ -159,7 +161,7 @@ wm_status row_sources_open(const wm_config *config, const wm_site *site, wm_sour
   for (*count = 0; status == WM_OK && *count < wanted;) {
     wm_row_device *device;
     status = open_device(config, site, *count, &device, err);
-    if (status == WM_OK) status = row_source_open(device, wm_site_imu(site), &out[*count], err);
+    if (status == WM_OK) status = row_source_open(device, wm_site_row_mountings(site), &out[*count], err);
     if (status == WM_OK) ++*count;
   }
   while (status != WM_OK && *count > 0) {

@@ -9,8 +9,8 @@
 #include "waymark/row_device.h"
 #include "waymark/streams.h"
 
-// Takes ownership of the device, also on failure. `imu`: mounting of the IMU. Allocates.
-wm_status row_source_open(wm_row_device *device, const wm_mounting *imu, wm_source **out, wm_error *err);
+// Takes ownership of the device, also on failure. Allocates.
+wm_status row_source_open(wm_row_device *device, const wm_row_mountings *mountings, wm_source **out, wm_error *err);
 // NULL where the source is none of these.
 const wm_stream *row_source_stream(const wm_source *source);
 // The row of the last event, for a recorder that owns the source.

@@ -5,6 +5,9 @@
 // Identities and stamps.
 #define WHOLE(body, member, kind) \
   { #member, (uint16_t)offsetof(wm_event, as.body.member), WM_FIELD_##kind, 1, 0, 0, 0, NO_LIMITS }
+// Numbers that came with a version of the codec.
+#define NUMBERS_SINCE(version, body, member, n, ...) \
+  { #member, (uint16_t)offsetof(wm_event, as.body.member), WM_FIELD_F64, n, version, 0, 0, __VA_ARGS__ }
 // Numbers: n elements, of which `needed` are never absent.
 #define NUMBERS_FROM(body, member, n, needed, zero_until, ...) \
   { #member, (uint16_t)offsetof(wm_event, as.body.member), WM_FIELD_F64, n, 0, zero_until, needed, __VA_ARGS__ }
@@ -14,8 +17,9 @@
 
 static const wm_event_field kTwist2[] = {NUMBERS(twist2, v_mps, 1, 1, WM_SPEED_LIMITS),
                                          NUMBERS(twist2, w_radps, 1, 1, WM_RATE_LIMITS)};
-static const wm_event_field kTwist6[] = {NUMBERS(twist6, v_mps, 3, 3, WM_SPEED_LIMITS),
-                                         NUMBERS(twist6, w_radps, 3, 3, WM_RATE_LIMITS)};
+static const wm_event_field kTwist6[] = {
+    NUMBERS(twist6, v_mps, 3, 3, WM_SPEED_LIMITS), NUMBERS(twist6, w_radps, 3, 0, WM_RATE_LIMITS),
+    NUMBERS_SINCE(7, twist6, v_sigma_mps, 1, WM_SIGMA_LIMITS), NUMBERS_SINCE(7, twist6, arm_m, 3, WM_PLACE_LIMITS)};
 static const wm_event_field kIncrement[] = {
     WHOLE(increment, from_ns, I64), NUMBERS(increment, dx_m, 1, 1, WM_PLACE_LIMITS),
     NUMBERS(increment, dy_m, 1, 1, WM_PLACE_LIMITS), NUMBERS(increment, dheading_rad, 1, 1, WM_ANGLE_LIMITS),

@@ -81,6 +81,7 @@ const char *wm_lcm_read_row(const char *stream, const void *message, size_t leng
   memset(out, 0, sizeof *out);
   memcpy(&out->t_ns, &m, sizeof(int64_t));
   memcpy(out->number, (const char *)&m + sizeof(int64_t), bytes);
+  for (size_t i = bytes / sizeof(double); i < WM_STREAM_NUMBERS_MAX; i++) out->number[i] = (double)NAN;
   for (size_t i = 0; i < bytes / sizeof(double); i++)
     if ((zero_is_absent(type) >> i & 1u) && out->number[i] == 0.0) out->number[i] = (double)NAN;
   return NULL;

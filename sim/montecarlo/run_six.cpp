@@ -68,6 +68,7 @@ std::vector<wm_event> events_of(const sim::Recording &recording) {
     wm_event &e = add(m, WM_EVENT_TWIST6, 0);
     std::copy(m.v_mps, m.v_mps + 3, e.as.twist6.v_mps);
     std::copy(m.w_radps, m.w_radps + 3, e.as.twist6.w_radps);
+    e.as.twist6.v_sigma_mps = NAN;
   }
   static constexpr uint8_t kImu[] = {WM_Q_ROLL_RATE,      WM_Q_PITCH_RATE,     WM_Q_YAW_RATE,
                                      WM_Q_ACCELERATION_X, WM_Q_ACCELERATION_Y, WM_Q_ACCELERATION_Z};

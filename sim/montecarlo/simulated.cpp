@@ -31,7 +31,7 @@ void add_measured(const sim::Recording &recording, std::vector<SmallEvent> &out)
       e.as.twist2 = {c.v_mps, c.w_radps};
     } else {
       e.kind = WM_EVENT_TWIST6;
-      e.as.twist6 = {{c.v_mps, c.side_mps, 0}, {0, 0, c.w_radps}};
+      e.as.twist6 = {{c.v_mps, c.side_mps, 0}, {0, 0, c.w_radps}, NAN, {}};
     }
     out.emplace_back(e);
   }

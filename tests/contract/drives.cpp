@@ -157,7 +157,7 @@ void scene::add_motion(motion by, double t_s, bool glitch) {
     return;
   }
   if (by == motion::sideways) {
-    add(WM_EVENT_TWIST6, t_s)->as.twist6 = {{v, 0.05 * std::sin(t_s), 0.0}, {0.0, 0.0, w}};
+    add(WM_EVENT_TWIST6, t_s)->as.twist6 = {{v, 0.05 * std::sin(t_s), 0.0}, {0.0, 0.0, w}, NAN, {}};
     return;
   }
   wm_quantities &q = add(WM_EVENT_QUANTITIES, t_s)->as.quantities;
@@ -410,7 +410,9 @@ dive::dive(unsigned happens, double seconds) {
           {(glitch ? 30 : 0.57) + 0.1 * std::sin(t) + 0.02 * normal(), 0.02 * normal(),
            0.04 * std::cos(0.4 * t) + 0.02 * normal()},
           {0.035 * std::cos(0.7 * t) + 0.004 + 0.003 * normal(), 0.02 * std::cos(0.5 * t) + 0.003 * normal(),
-           (glitch ? 20 : 0.14) + 0.003 * normal()}};
+           (glitch ? 20 : 0.14) + 0.003 * normal()},
+          NAN,
+          {}};
     const bool blind = (happens & kBlind) && t > 0.4 * seconds && t < 0.7 * seconds;
     if (i % 2 == 0 && !blind) add_picture(vehicle, t + 0.002, happens);
     if (i % 10 == 5) add_beacons(vehicle, t + 0.01, (happens & kMarked) != 0);

@@ -9,7 +9,7 @@
 #include "waymark/streams.h"
 
 static void read_row(const char *stream, const uint8_t *data, size_t size) {
-  const wm_mounting imu = {.rpy_rad = {0.1, 0.2, 0.3}};
+  const wm_row_mountings mountings = {.imu = {.rpy_rad = {0.1, 0.2, 0.3}}};
   wm_stream_row row;
   wm_event event;
   wm_error err;
@@ -17,7 +17,7 @@ static void read_row(const char *stream, const uint8_t *data, size_t size) {
   uint8_t again[512];
   check(wm_lcm_row(stream, &row, again, sizeof again) == size || size > sizeof again);
   const wm_stream *kind = wm_stream_find(stream);
-  if (wm_stream_event(kind, &row, &imu, &event, &err) != WM_OK) return;
+  if (wm_stream_event(kind, &row, &mountings, &event, &err) != WM_OK) return;
   check((wm_stream_kinds(kind) & WM_EVENT_BIT(event.kind)) != 0 && event.t_ns == row.t_ns);
   if (event.kind == WM_EVENT_TWIST6) check(fabs(event.as.twist6.v_mps[1]) <= 1000);
   if (event.kind == WM_EVENT_TWIST2) check(fabs(event.as.twist2.v_mps) <= 1000);

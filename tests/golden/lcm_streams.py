@@ -5,14 +5,17 @@ lcm_tools.py needs.
 
 The robot drives sideways on a circle. Its wheels' turn rate is wrong by a fifth, its gyro is right; the gyro's process has a
 clock of its own. Checked: the pose, health, the log's replay with the same bits, the recording's replay, and its live play.
-Then another one with counts of its wheels, a compass and positions, for landmark_ekf; and a vehicle in space with an IMU.
+Then another one with counts of its wheels, a compass and positions, for landmark_ekf; and a vehicle in space with an IMU, whose
+velocity comes over LCM, and by a Doppler log over TCP.
 """
 import json
 import math
 import re
 import signal
+import socket
 import subprocess
 import sys
+import threading
 import time
 
 import lcm_tools
@@ -153,6 +156,70 @@ def check_space(work):
     assert len(rows(work / "space-rec/imu.csv")) > SECONDS * 80
 
 
+SPEED = 0.4
+ARM = (0.5, 0.1, -0.2)  # of the log in base_link; it looks to the left
+LOG = (
+    "initial_pose: {x_m: 0, y_m: 0, z_m: -3, heading_rad: 0, sigma_heading_rad: 0.1}\ncalibration: calibration.yaml\n"
+    "devices: {dvl: {host: 127.0.0.1, port: %d}, lcm: [{stream: imu}, {stream: depth}]}\n")
+
+
+def speak_as_log(server, ended):
+    """The server of a log: ten reports a second, each twice, of the echo 0.1 s before, by a clock of its own. After 2 s it loses the
+    bottom for 0.3 s, and then the connection, within a line."""
+    w = (0, W * math.sin(ROLL), W * math.cos(ROLL))
+    at_log = [SPEED + w[1] * ARM[2] - w[2] * ARM[1], w[2] * ARM[0] - w[0] * ARM[2], w[0] * ARM[1] - w[1] * ARM[0]]
+    own = {"vx": at_log[1], "vy": at_log[0], "vz": -at_log[2]}  # turned by 90 degrees; y to the right, z down
+    client, _ = server.accept()
+    begin, k = time.monotonic(), 0
+    while not ended.is_set():
+        now_us = 1_000_000 * 86400 + int(1e6 * time.monotonic())
+        is_lost = 20 <= k < 23
+        report = {"time": 100.0, **(own if not is_lost else {"vx": 3.0, "vy": 0.0, "vz": 0.0}), "fom": 0.002 if not is_lost else 0.0002,
+                  "covariance": [[4e-6, 0, 0], [0, 4e-6, 0], [0, 0, 4e-6]], "altitude": 1.5, "transducers": [], "velocity_valid": not is_lost,
+                  "status": 0, "format": "json_v3.1", "type": "velocity", "time_of_validity": now_us - 100_000, "time_of_transmission": now_us}
+        place = {"ts": 1.0, "x": 0, "y": 0, "z": 0, "std": 0.1, "roll": 0, "pitch": 0, "yaw": 0, "type": "position_local", "status": 0}
+        try:
+            client.sendall("".join(json.dumps(line) + "\r\n" for line in (report, report, place)).encode())
+            if k == 25:
+                client.sendall(json.dumps(report)[:100].encode())
+                client.close()
+                client, _ = server.accept()
+        except OSError:  # the run has ended
+            break
+        k += 1
+        time.sleep(max(0, begin + k * 0.1 - time.monotonic()))
+    client.close()
+
+
+def check_log(work):
+    (work / "calibration.yaml").write_text(f"motion6: {{mounting: {{xyz_m: {list(ARM)}, rpy_deg: [0, 0, 90]}}}}\n")
+    ended = threading.Event()
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        lcm_tools.config(work / "log.yaml", "stereo_ekf", LOG % server.getsockname()[1])
+        voice = threading.Thread(target=speak_as_log, args=(server, ended), daemon=True)
+        voice.start()
+        run = start(work, "log")
+        subprocess.run([sys.executable, __file__, "publish_space"], env={"PYTHONPATH": str(work / "types")}, check=True)
+        _, err = stop(run, 0.1)
+        ended.set()
+        voice.join(5)
+    replay_both(work, "log")
+    source = json.loads((work / "log/health.json").read_text())["sources"]["motion6"]
+    print(source)
+    assert source["malformed"] == 1 and source["ignored"] >= 2 * source["received"] and source["rejected"] == {}, source
+    assert "no velocity log answers" in err and "without bottom lock" in err, err
+    for what in ("log", "log-replayed"):
+        trajectory = [(heading_of(row), float(row["x_m"]), float(row["y_m"])) for row in rows(work / what / "trajectory.csv")]
+        turned = trajectory[-1][0]
+        on_circle = [row for row in trajectory if 0.1 < row[0] < 0.9 * turned]  # before and behind, no IMU speaks
+        (h, *begin), (end_h, *end) = on_circle[0], on_circle[-1]
+        right = [begin[0] + SPEED / W * (math.sin(end_h) - math.sin(h)), begin[1] - SPEED / W * (math.cos(end_h) - math.cos(h))]
+        print(f"{what}: {turned:.3f} rad turned, {math.dist(end, right):.3f} m beside the circle")
+        assert turned > 0.5 * W * SECONDS and math.dist(end, right) < 0.08, (end, right)
+    recorded = rows(work / "log-rec/motion6.csv")
+    assert recorded[0]["wx_radps"] == "" and float(recorded[0]["sigma_v_mps"]) == 0.002, recorded[0]
+
+
 def start(work, name):
     """A run on the devices, which also records them, until stop()."""
     run = subprocess.Popen([lcm_tools.WAYMARK, "run", "--config", work / f"{name}.yaml", "--out", work / name, "--record",
@@ -225,6 +292,7 @@ def main():
         check_twist(work)
         check_wheels(work)
         check_space(work)
+        check_log(work)
 
 
 if __name__ == "__main__":

@@ -145,16 +145,23 @@ typedef struct wm_gpsd_device_config {
   int line;
 } wm_gpsd_device_config;
 
+// A Doppler velocity log of Water Linked's kind, over TCP.
+typedef struct wm_dvl_device_config {
+  char host[64];  // "": none
+  int32_t port;   // 16171
+  int line;
+} wm_dvl_device_config;
+
 // The stream that it gives: "gnss" or "heading".
 static inline const char *wm_gpsd_stream(const wm_gpsd_device_config *self) {
   return self->from == WM_GPSD_POSITION ? "gnss" : "heading";
 }
 
-#define WM_GPSD_DEVICES_MAX 2  // position and heading
-#define WM_ROW_DEVICES_MAX (WM_LCM_DEVICES_MAX + WM_GPSD_DEVICES_MAX + 1)
-#define WM_CAN_DEVICES_MAX 4     // buses of a robot
-#define WM_LCM_DEVICES_MAX 8     // streams over LCM
-#define WM_CAMERA_DEVICES_MAX 8  // cameras of a robot
+#define WM_GPSD_DEVICES_MAX 2                                              // position and heading
+#define WM_ROW_DEVICES_MAX (WM_LCM_DEVICES_MAX + WM_GPSD_DEVICES_MAX + 2)  // and an IMU and a velocity log
+#define WM_CAN_DEVICES_MAX 4                                               // buses of a robot
+#define WM_LCM_DEVICES_MAX 8                                               // streams over LCM
+#define WM_CAMERA_DEVICES_MAX 8                                            // cameras of a robot
 typedef struct wm_devices_config {
   wm_can_device_config can[WM_CAN_DEVICES_MAX];
   size_t can_count;
@@ -165,12 +172,13 @@ typedef struct wm_devices_config {
   wm_gpsd_device_config gpsd[WM_GPSD_DEVICES_MAX];
   size_t gpsd_count;
   wm_iio_device_config iio;
+  wm_dvl_device_config dvl;
   int32_t sightings_by_lcm;  // another program on the robot sends them
 } wm_devices_config;
 
 // Devices that give rows of a stream: at most WM_ROW_DEVICES_MAX.
 static inline size_t wm_devices_rows(const wm_devices_config *self) {
-  return self->lcm_count + self->gpsd_count + (self->iio.device[0] != '\0');
+  return self->lcm_count + self->gpsd_count + (self->iio.device[0] != '\0') + (self->dvl.host[0] != '\0');
 }
 // Devices that can be recorded or localized by.
 static inline size_t wm_devices_count(const wm_devices_config *self) {
@@ -197,6 +205,10 @@ const char *wm_iio_inspect(const wm_iio_device_config *config, const char *root,
 // above the ellipsoid), WM_BAD_CONFIG without one. `ahead_m`: the antenna's x in base_link; NaN: not given. Allocates.
 wm_status wm_gpsd_open(const wm_gpsd_device_config *config, const double origin[3], double ahead_m, wm_row_device **out,
                        wm_error *err);
+
+// A velocity log as rows of `motion6` without turn rates, in its own axes (x forwards, y to the left, z upwards).
+// Allocates.
+wm_status wm_dvl_open(const wm_dvl_device_config *config, wm_row_device **out, wm_error *err);
 
 #ifdef __cplusplus
 }

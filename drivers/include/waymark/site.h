@@ -61,8 +61,8 @@ wm_status wm_site_sensor(wm_site *self, const char *path, const char *name, uint
 wm_status wm_site_camera_sensor(wm_site *self, const char *camera, uint16_t *out, wm_error *err);
 // Latitude and longitude in degrees and altitude in m of the map's origin; NaN where calibration.yaml has none.
 const double *wm_site_gnss_origin(const wm_site *self);
-// Mounting of the IMU; that of base_link where calibration.yaml has none.
-const wm_mounting *wm_site_imu(const wm_site *self);
+// Mountings of the IMU and of a velocity log; that of base_link where calibration.yaml has none.
+const wm_row_mountings *wm_site_row_mountings(const wm_site *self);
 const wm_landmark *wm_site_landmarks(const wm_site *self, size_t *count);
 // Those of landmarks/appearance.csv beside the landmarks.csv in use, read at the first call and kept as long as the
 // site; none without such a file.

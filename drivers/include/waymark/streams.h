@@ -31,8 +31,8 @@ uint32_t wm_stream_quantities(const wm_stream *self);  // bit per wm_quantity th
 const char *wm_stream_number(const wm_stream *self, size_t index);
 // WM_NOT_FINITE, WM_OUT_OF_RANGE: a number that can't be; WM_BAD_DATA: numbers that contradict each other. `source` and
 // `seq` are 0.
-wm_status wm_stream_event(const wm_stream *self, const wm_stream_row *row, const wm_mounting *imu, wm_event *out,
-                          wm_error *err);
+wm_status wm_stream_event(const wm_stream *self, const wm_stream_row *row, const wm_row_mountings *mountings,
+                          wm_event *out, wm_error *err);
 
 #ifdef __cplusplus
 }

@@ -162,6 +162,9 @@ static void take_wheels(channels *all, const wm_event *event, int has_wheels, in
   if (has_steering) take_rate(all, CHANNEL_STEERING_TURN, event, sign * speed * steering, 0);
 }
 
+// Of a velocity log without rates 0.
+static double turn_of(const wm_twist6 *twist) { return isnan(twist->w_radps[2]) ? 0 : twist->w_radps[2]; }
+
 static void take_quantities(channels *all, const wm_event *event) {
   static const struct {
     wm_quantity quantity;
@@ -215,8 +218,8 @@ void channels_take(channels *self, const wm_event *event) {
       take_rate(self, CHANNEL_TWIST_WAY, event, event->as.twist2.v_mps, 1);
       break;
     case WM_EVENT_TWIST6:
-      wm_rows_note(&self->twists[event->source], event->as.twist6.v_mps[0], event->as.twist6.w_radps[2],
-                   event->as.twist6.v_mps[0] != 0 || event->as.twist6.w_radps[2] != 0);
+      wm_rows_note(&self->twists[event->source], event->as.twist6.v_mps[0], turn_of(&event->as.twist6),
+                   event->as.twist6.v_mps[0] != 0 || turn_of(&event->as.twist6) != 0);
       take_rate(self, CHANNEL_TWIST_TURN, event, event->as.twist6.w_radps[2], 1);
       take_rate(self, CHANNEL_TWIST_WAY, event, way_of(event->as.twist6.v_mps[0], event->as.twist6.v_mps[1]), 1);
       break;

@@ -57,7 +57,7 @@ static void take_motion(course_data *self, const wm_event *event) {
     self->turn_radps = event->as.twist2.w_radps;
   } else if (event->kind == WM_EVENT_TWIST6) {
     self->speed_mps = hypot(event->as.twist6.v_mps[0], event->as.twist6.v_mps[1]);
-    self->turn_radps = event->as.twist6.w_radps[2];
+    if (!isnan(event->as.twist6.w_radps[2])) self->turn_radps = event->as.twist6.w_radps[2];  // else the gyro's
   }
   for (uint8_t i = 0; event->kind == WM_EVENT_QUANTITIES && i < event->as.quantities.count; i++) {
     const double value = event->as.quantities.value[i];

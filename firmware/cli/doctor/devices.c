@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// LCM, CAN, cameras, IMU, GNSS.
+// LCM, CAN, cameras, IMU, GNSS, velocity log.
 #include <errno.h>
 #include <fcntl.h>
 #include <stdio.h>
@@ -147,28 +147,38 @@ void doctor_imu(const char *root, const wm_config *config, wm_findings *out) {
             "%s is present, but its buffer is not set up", device->device);
 }
 
-static void receiver(const wm_gpsd_device_config *config, double seconds, wm_findings *out) {
-  const double anywhere[3] = {0};
-  wm_row_device *device;
+// Listens to an opened device, and closes it.
+static void listen_to(wm_row_device *device, double seconds, wm_finding_id id, wm_findings *out) {
   wm_stream_row row;
   wm_source_counts counts = {0};
   char text[160];
-  wm_error err;
-  if (wm_gpsd_open(config, anywhere, (double)NAN, &device, &err) != WM_OK) {
-    wm_find_error(out, "gnss", &err);
-    return;
-  }
   int has_come = 0;
   const wm_time_ns until_ns = wm_monotonic_ns() + wm_ns_from_seconds(seconds);
   while (!has_come && wm_monotonic_ns() < until_ns) has_come = device->ops->next(device, &row, &counts) == WM_OK;
   unsigned state = counts.device;
   if (state == WM_DEVICE_WORKS && !has_come) state = WM_DEVICE_STALLED;
   (void)device->ops->note(device, state, has_come, text, sizeof text);
-  wm_find(out, WM_FOUND_GNSS_RECEIVER, has_come ? WM_SEVERITY_GOOD : WM_SEVERITY_BAD, wm_gpsd_stream(config),
-          has_come ? "" : NULL, "%s", text);
+  wm_find(out, id, has_come ? WM_SEVERITY_GOOD : WM_SEVERITY_BAD, device->stream, has_come ? "" : NULL, "%s", text);
   device->ops->close(device);
 }
 
 void doctor_gnss(const wm_config *config, double seconds, wm_findings *out) {
-  for (size_t i = 0; config && i < config->devices.gpsd_count; i++) receiver(&config->devices.gpsd[i], seconds, out);
+  const double anywhere[3] = {0};
+  wm_row_device *device;
+  wm_error err;
+  for (size_t i = 0; config && i < config->devices.gpsd_count; i++)
+    if (wm_gpsd_open(&config->devices.gpsd[i], anywhere, (double)NAN, &device, &err) == WM_OK)
+      listen_to(device, seconds, WM_FOUND_GNSS_RECEIVER, out);
+    else
+      wm_find_error(out, "gnss", &err);
+}
+
+void doctor_dvl(const wm_config *config, double seconds, wm_findings *out) {
+  wm_row_device *device;
+  wm_error err;
+  if (!config || !config->devices.dvl.host[0]) return;
+  if (wm_dvl_open(&config->devices.dvl, &device, &err) == WM_OK)
+    listen_to(device, seconds, WM_FOUND_VELOCITY_LOG, out);
+  else
+    wm_find_error(out, "motion6", &err);
 }

@@ -26,6 +26,7 @@ void doctor_cameras(const wm_config *config, wm_findings *out);
 void doctor_imu(const char *root, const wm_config *config, wm_findings *out);
 // Listens to gpsd for a report, for `seconds` at most.
 void doctor_gnss(const wm_config *config, double seconds, wm_findings *out);
+void doctor_dvl(const wm_config *config, double seconds, wm_findings *out);  // the same of the velocity log
 // Wakes 1000 times a second for `seconds` at the priority of a run. *is_realtime: it had that priority.
 void doctor_latency(double seconds, int priority, wm_histogram *wake_ns, int *is_realtime);
 void doctor_judge_latency(const wm_histogram *wake_ns, int is_realtime, wm_findings *out);

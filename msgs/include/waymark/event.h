@@ -86,7 +86,9 @@ typedef struct wm_twist2 {
 } wm_twist2;
 
 typedef struct wm_twist6 {
-  double v_mps[3], w_radps[3];
+  double v_mps[3], w_radps[3];  // rates all NaN: not measured (a velocity log); another sensor's are taken
+  double v_sigma_mps;           // of the velocity on each axis; NaN: the calibration's
+  double arm_m[3];              // point of the vehicle whose velocity it is, from base_link's origin; NaN: that origin
 } wm_twist6;
 
 // Pose of base_link at the event's time, seen from base_link at `from_ns`.

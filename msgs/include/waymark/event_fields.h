@@ -36,7 +36,7 @@ extern "C" {
 #define WM_PIXEL_LIMITS -1e5, 1e5
 #define WM_COVARIANCE_LIMITS -1e12, 1e12  // of any unit
 
-#define WM_EVENT_VERSION 6         // of the codec; the next one where a field comes
+#define WM_EVENT_VERSION 7         // of the codec; the next one where a field comes
 #define WM_EVENT_VERSION_OLDEST 3  // that is read
 
 // Numbers of a sighting.

@@ -26,6 +26,11 @@ typedef struct wm_wheels {
 
 #define WM_NAME_MAX 32
 
+// Where the sensors sit whose rows are in axes of their own: an IMU, and a velocity log (motion6).
+typedef struct wm_row_mountings {
+  wm_mounting imu, motion6;
+} wm_row_mountings;
+
 typedef struct wm_sensor {
   char name[WM_NAME_MAX];
   wm_mounting mounting;

@@ -37,7 +37,7 @@ inline wm_event twist(double t_s, double v, double w) {
 
 inline wm_event twist6(double t_s, double vx, double vy, double wz) {
   wm_event e = empty(t_s, WM_EVENT_TWIST6);
-  e.as.twist6 = {{vx, vy, 0.0}, {0.0, 0.0, wz}};
+  e.as.twist6 = {{vx, vy, 0.0}, {0.0, 0.0, wz}, NAN, {}};
   return e;
 }
 

@@ -9,7 +9,7 @@ namespace make {
 
 inline wm_event log6(double t_s, const wm::vec3 &v, const wm::vec3 &w = {0, 0, 0}) {
   wm_event e = empty(t_s, WM_EVENT_TWIST6);
-  e.as.twist6 = {{v.x, v.y, v.z}, {w.x, w.y, w.z}};
+  e.as.twist6 = {{v.x, v.y, v.z}, {w.x, w.y, w.z}, NAN, {}};
   return e;
 }
 

@@ -358,7 +358,7 @@ TEST(test_a_pose_in_space_is_carried_in_space) {
   start({NAN, NAN, NAN, NAN, NAN, NAN, 0, {}, {}});
   for (int i = 0; i <= 10; i++) {
     wm_event e = make::empty(0.1 * i, WM_EVENT_TWIST6);
-    e.as.twist6 = {{0, 0.2, 1}, {0.5, 0, 0}};
+    e.as.twist6 = {{0, 0.2, 1}, {0.5, 0, 0}, NAN, {}};
     feed(e);
   }
   wm_estimate fused{}, out{};
@@ -385,7 +385,7 @@ TEST(test_a_pose_in_space_is_carried_in_space) {
 
 void feed_six(double t_s, double v, double w) {
   wm_event e = make::empty(t_s, WM_EVENT_TWIST6);
-  e.as.twist6 = {{v, 0, 0}, {0, 0, w}};
+  e.as.twist6 = {{v, 0, 0}, {0, 0, w}, NAN, {}};
   feed(e);
 }
 

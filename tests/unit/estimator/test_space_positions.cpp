@@ -97,4 +97,25 @@ TEST(test_a_vehicle_without_a_receiver) {
   for (size_t i = 0; i < count; i++) TEST_ASSERT_NULL_MESSAGE(std::strstr(values[i].name, "gnss"), values[i].name);
 }
 
+// A visual odometry that measures 8 % too much, by positions for a while and then alone for 60 m. A prior of that size
+// holds; one of 1 % is wrong by many of its sigmas, and the pose with it.
+TEST(test_the_scale_of_a_visual_odometry) {
+  constexpr double kScale = 1 / 1.08;
+  for (const bool wide : {false, true}) {
+    boat b;
+    b.set("states.velocity_scale_sigma", wide ? 0.08 : 0.01);
+    b.log_scale = kScale;
+    free(b.state);
+    b.begin();
+    b.sail(20, 1.0, 0.3);
+    for (int i = 0; i < 2000; i++) b.swim(kStep_s, {1.5, 0, 0}, {0, 0, 0});
+    const wm_estimate e = b.estimate();
+    const wm_calibration_value found = b.calibrated("motion.velocity_scale");
+    const double scale_off = std::fabs(found.value - kScale) / found.sigma;
+    const double off = b.off() / std::sqrt(e.covariance[0] + e.covariance[7]);
+    TEST_ASSERT_EQUAL(wide, scale_off < 3);
+    TEST_ASSERT_EQUAL(wide, off < 2.5);
+  }
+}
+
 }  // namespace

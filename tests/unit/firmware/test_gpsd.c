@@ -73,7 +73,7 @@ static void welcome(void) {
 
 static void begin(void) {
   static const double kOrigin[3] = {ORIGIN_DEG, 500};
-  const wm_mounting none = {0};
+  const wm_row_mountings none = {0};
   wm_row_device *device;
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_gpsd_open(&config, kOrigin, ahead_m, &device, &err), err.text);
   TEST_ASSERT_EQUAL(WM_OK, row_source_open(device, &none, &source, &err));

@@ -94,7 +94,7 @@ static void open_writer(void) {
 static wm_iio_device_config config;
 
 static void begin(void) {
-  const wm_mounting level = {0};
+  const wm_row_mountings level = {0};
   wm_row_device *device;
   TEST_ASSERT_EQUAL(WM_OK, wm_iio_open(&config, root, &device, &err));
   TEST_ASSERT_EQUAL(WM_OK, row_source_open(device, &level, &source, &err));

@@ -22,7 +22,7 @@ void tearDown(void) {
 }
 
 static void begin(wm_lcm_device_config config) {
-  const wm_mounting upside_down = {.rpy_rad = {M_PI, 0, 0.5}};
+  const wm_row_mountings upside_down = {.imu = {.rpy_rad = {M_PI, 0, 0.5}}};
   if (config.rate_max_hz == 0) config.rate_max_hz = 1000;
   lcm = lcm_create("memq://");
   wm_row_device *device;
@@ -118,6 +118,12 @@ TEST(a_twist_in_six_degrees) {
   TEST_ASSERT_EQUAL(WM_EVENT_TWIST6, event.kind);
   TEST_ASSERT_EQUAL_DOUBLE(3, event.as.twist6.v_mps[2]);
   TEST_ASSERT_EQUAL_DOUBLE(6, event.as.twist6.w_radps[2]);
+  TEST_ASSERT_DOUBLE_IS_NAN(event.as.twist6.v_sigma_mps);  // no number of the message
+  tearDown();
+  const double none = (double)NAN;
+  begin_row("motion6", (const double[6]){1, 2, 3, none, none, none});
+  TEST_ASSERT_EQUAL_DOUBLE(3, event.as.twist6.v_mps[2]);
+  TEST_ASSERT_DOUBLE_IS_NAN(event.as.twist6.w_radps[2]);
 }
 
 TEST(wheels_and_steering_are_quantities) {

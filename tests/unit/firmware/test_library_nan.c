@@ -45,7 +45,7 @@ typedef struct given {
 static void motion(int step, double *n) { (void)step, n[0] = SPEED_MPS, n[1] = 0, n[2] = 0; }
 static void motion6(int step, double *n) {
   (void)step;
-  for (int i = 0; i < 6; i++) n[i] = i == 0 ? SPEED_MPS : 0;
+  for (int i = 0; i < 7; i++) n[i] = i == 0 ? SPEED_MPS : i == 6 ? 0.02 : 0;
 }
 static void ticks(int step, double *n) { n[0] = n[1] = round(step * 0.02 * SPEED_MPS / (2 * M_PI * 0.05) * 1000); }
 static void steering(int step, double *n) { (void)step, n[0] = SPEED_MPS, n[1] = 0; }
@@ -81,7 +81,7 @@ static void increment(int step, wm_event *out) {
 #define AT(part) offsetof(wm_event, as) + offsetof(__typeof__(((wm_event *)0)->as), part)
 static const given kGiven[] = {
     {"motion", 3, 1, motion, NULL, "rar", {0}},
-    {"motion6", 6, 1, motion6, NULL, "rrrrrr", {0}},
+    {"motion6", 7, 1, motion6, NULL, "rrrrrra", {0}},
     {"ticks", 2, 1, ticks, NULL, "rr", {0}},
     {"steering", 2, 1, steering, NULL, "rr", {0}},
     {"heading", 2, 0, heading, NULL, "rr", {0}},
@@ -260,7 +260,7 @@ static wm_status event_of(const wm_stream *stream, size_t column, double number,
   for (size_t i = 0; i < WM_STREAM_NUMBERS_MAX; i++) row.number[i] = usual(stream, i);
   row.number[column] = number;
   memset(out, 0, sizeof *out);
-  return wm_stream_event(stream, &row, &(wm_mounting){.xyz_m = {0}}, out, &err);
+  return wm_stream_event(stream, &row, &(wm_row_mountings){0}, out, &err);
 }
 
 // All streams with all their columns: a row without a number is refused, or its event has fewer numbers, or the number

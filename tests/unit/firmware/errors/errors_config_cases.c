@@ -77,6 +77,11 @@ const error_case kErrorCases[] = {
     {CONFIG, "IMU without its name", FILE_, "devices: {iio: {rate_hz: 200}}\n",
      "config/robot.yaml:3: devices.iio: device: is missing: a name as `cat /sys/bus/iio/devices/*/name` prints them, "
      "e.g. bmi160"},
+    {CONFIG, "Velocity log without its address", FILE_, "devices: {dvl: {port: 16171}}\n",
+     "config/robot.yaml:3: devices.dvl: host: is missing: the log's address, e.g. 192.168.194.95"},
+    {CONFIG, "Stream of a velocity log and of LCM", FILE_,
+     "devices:\n  lcm: [{stream: motion6}]\n  dvl: {host: 192.168.194.95}\n",
+     "config/robot.yaml:5: devices.dvl: the stream 'motion6' appears twice (first in line 4)"},
     {CONFIG, "Unknown source", FILE_, "sources: [{name: gpss}]\n",
      "config/robot.yaml:3: sources[0].name: 'gpss' is unknown; did you mean 'gnss'? (one of: can, motion, motion6, "
      "...)"},
