@@ -61,7 +61,7 @@ static int count_empty(const csv_row *row, int first, int count) {
 static const char *fill_motion6(const fill_context *self, const csv_row *row, wm_event *out) {
   const double *v = &row->number[FIRST], *w = v + 3;
   const int empty = count_empty(row, FIRST + 3, 3);
-  if (empty != 0 && empty != 3) return "a part of the turn rates is empty";
+  if (empty != 0 && empty != 3) return "wx_radps, wy_radps and wz_radps: all or none are empty";
   for (int i = 0; i < 3; i++) {
     out->as.twist6.v_mps[i] = on_axis(self->motion6_axes[i], v);
     out->as.twist6.w_radps[i] = on_axis(self->motion6_axes[i], w);

@@ -385,6 +385,38 @@ TEST(too_many_points) {
   TEST_ASSERT_EQUAL(5, event.as.points.dropped);
 }
 
+// The log looks to the left, 0.3 m behind base_link.
+TEST(a_velocity_log_has_no_rates) {
+  folder_write("calibration.yaml", "motion6: {mounting: {xyz_m: [-0.3, 0, 0.1], rpy_deg: [0, 0, 90]}}\n");
+  folder_write("motion6.csv",
+               "t_ns,vx_mps,vy_mps,vz_mps,wx_radps,wy_radps,wz_radps,sigma_v_mps\n1,1,2,3,,,,0.02\n2,1,2,3,4,5,6,\n"
+               "3,1,2,3,4,,6,0.02\n4,1,2,3,,,,0.02\n");
+  wm_source *log = source("motion6");
+  for (int i = 0; i < 3; i++) {
+    const wm_event event = next(log);
+    const wm_twist6 *twist = &event.as.twist6;
+    TEST_ASSERT_EQUAL(i == 2 ? 4 : i + 1, event.t_ns);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, -2, twist->v_mps[0]);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 1, twist->v_mps[1]);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 3, twist->v_mps[2]);
+    TEST_ASSERT_EQUAL_DOUBLE(-0.3, twist->arm_m[0]);
+    TEST_ASSERT_EQUAL_DOUBLE(0.1, twist->arm_m[2]);
+    if (i == 1) TEST_ASSERT_DOUBLE_WITHIN(1e-12, -5, twist->w_radps[0]);
+    for (int k = 0; k < 3; k++) TEST_ASSERT_EQUAL(i != 1, isnan(twist->w_radps[k]));
+    TEST_ASSERT_EQUAL(i == 1, isnan(twist->v_sigma_mps));
+  }
+  TEST_ASSERT_EQUAL_UINT64(1, log->counts.malformed);
+  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(log->counts.first_problem, "all or none are empty"), log->counts.first_problem);
+}
+
+TEST(columns_of_rates_may_be_absent) {
+  folder_write("motion6.csv", "t_ns,vx_mps,vy_mps,vz_mps\n1,1,2,3\n");
+  const wm_event event = next(source("motion6"));
+  TEST_ASSERT_EQUAL_DOUBLE(1, event.as.twist6.v_mps[0]);
+  TEST_ASSERT_DOUBLE_IS_NAN(event.as.twist6.w_radps[2]);
+  TEST_ASSERT_EQUAL_DOUBLE(0, event.as.twist6.arm_m[0]);
+}
+
 TEST(other_streams) {
   folder_write("motion6.csv", "t_ns,vx_mps,vy_mps,vz_mps,wx_radps,wy_radps,wz_radps\n1,1,2,3,4,5,6\n");
   folder_write("markers.csv", "t_ns,sensor,id,x_m,y_m,z_m,yaw_rad\n1,up,10,1,2,3,-3.2\n");

@@ -7,6 +7,8 @@
 
 namespace make {
 
+inline constexpr wm::vec3 kNoRates = {NAN, NAN, NAN};  // of a log that measures none
+
 inline wm_event log6(double t_s, const wm::vec3 &v, const wm::vec3 &w = {0, 0, 0}) {
   wm_event e = empty(t_s, WM_EVENT_TWIST6);
   e.as.twist6 = {{v.x, v.y, v.z}, {w.x, w.y, w.z}, NAN, {}};

@@ -505,4 +505,38 @@ TEST(test_which_values_are_fresh) {
     }
 }
 
+// A log without rates and without an IMU: each axis turns as it likes, and the health says so.
+TEST(test_a_log_without_rates_measures_no_turn) {
+  motion_by_default by({{0.01, 0.01, 0.01}, {0.004, 0.004, 0.004}, 0, 0});
+  by.motion.feed(twist6(0.0, {{1, 0, 0}, make::kNoRates}));
+  by.motion.feed(twist6(0.1, {{1, 0, 0}, make::kNoRates}));
+  by.motion.walk(make::at(0.0), make::at(0.1), [](const spatial_step &s) {
+    for (int i = 0; i < 3; i++) {
+      TEST_ASSERT_EQUAL_DOUBLE(0.0, s.w_radps[i]);
+      TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.01 * s.dt_s + square(0.004) * s.dt_s * 0.1, s.turn_rad2[i]);
+    }
+  });
+  TEST_ASSERT_EQUAL_HEX32(WM_MOTION_HEALTH_TURN_SILENT, by.motion.health());
+  by.motion.feed(twist6(0.2, {{1, 0, 0}, {0, 0, 0.1}}));
+  TEST_ASSERT_EQUAL_HEX32(0, by.motion.health());
+}
+
+// The sigma of a row takes the place of the usual one. A row holds until the next has come: the larger one of both.
+TEST(test_a_row_states_its_own_sigma) {
+  motion_by_default by({{0.01, 0.02, 0.03}, {0.004, 0.004, 0.004}, 0, 0});
+  const double stated[] = {NAN, 0.3, 0.001, 0.001, NAN}, newest[] = {0.02, 0.3, 0.001, 0.001, 0.02},
+               held[] = {0.02, 0.3, 0.3, 0.001, 0.001};
+  for (int k = 0; k < 5; k++) {
+    wm_event e = twist6(0.1 * k, {{1, 0, 0}, {0, 0, 0}});
+    e.as.twist6.v_sigma_mps = stated[k];
+    by.motion.feed(e);
+    vec3 v_var, w_var;
+    by.motion.sample_noise(&v_var, &w_var);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, square(newest[k]), v_var.y);
+    by.motion.walk(make::at(0.1 * k), make::at(0.1 * k + 0.1), [&](const spatial_step &s) {
+      TEST_ASSERT_DOUBLE_WITHIN(1e-12, square(held[k]) * s.dt_s * 0.1, s.place_m2[1]);
+    });
+  }
+}
+
 }  // namespace

@@ -159,4 +159,67 @@ TEST(test_commands_keep_their_own_turn_rate) {
   TEST_ASSERT_EQUAL(WM_MOTION_TWIST, front.model());
 }
 
+// Speeds of a log that measures no turn, at a place of its own.
+wm_event log_of(double t_s, double v, double u, double arm_x = 0, double arm_y = 0) {
+  wm_event e = make::twist6(t_s, v, u, kNone);
+  e.as.twist6.w_radps[0] = e.as.twist6.w_radps[1] = kNone;
+  e.as.twist6.arm_m[0] = arm_x, e.as.twist6.arm_m[1] = arm_y;
+  return e;
+}
+
+TEST(test_a_log_without_rates_beside_a_gyro) {
+  for (const double arm : {0.0, 0.4}) {
+    begin();
+    for (int i = 0; i < 200; i++) {
+      const double t = 0.01 * i, w = 0.25 + noise(i);
+      gyro(t, w);
+      if (i % 2 == 0) feed(log_of(t, 0.5 - w * arm, w * arm, arm, arm));  // v + w x arm
+    }
+    TEST_ASSERT_EQUAL(WM_MOTION_SPEED_YAW_RATE, front.model());
+    TEST_ASSERT_EQUAL_HEX32(0, front.health());
+    const double turned = 0.25 * 1.99;
+    TEST_ASSERT_DOUBLE_WITHIN(1e-4, turned, pose.heading_rad);
+    TEST_ASSERT_DOUBLE_WITHIN(2e-3, 2.0 * std::sin(turned), pose.x_m);
+    TEST_ASSERT_DOUBLE_WITHIN(2e-3, 2.0 * (1.0 - std::cos(turned)), pose.y_m);
+  }
+}
+
+// The gyro falls silent: its rate holds with growing noise, since the log has none that could stand in.
+TEST(test_a_log_without_rates_and_a_silent_gyro) {
+  begin();
+  const auto go = [](int from, int to, bool has_gyro) {
+    for (int i = from; i < to; i++) {
+      if (has_gyro) gyro(0.01 * i, 0.25 + noise(i));
+      if (i % 2 == 0) feed(log_of(0.01 * i, 0.5, 0));
+    }
+  };
+  go(0, 200, true);
+  const double before_rad2 = turn_var;
+  go(200, 700, false);
+  TEST_ASSERT_EQUAL(WM_MOTION_SPEED_YAW_RATE, front.model());
+  TEST_ASSERT_EQUAL_HEX32(WM_MOTION_HEALTH_TURN_SILENT, front.health());
+  TEST_ASSERT_GREATER_THAN_DOUBLE(0.25, turn_var - before_rad2);
+}
+
+// Without any gyro the way is measured and the turn is not: 0.3 rad per sqrt(s). Standing is no standstill either.
+TEST(test_a_log_without_rates_alone) {
+  for (const double v : {0.5, 0.0}) {
+    begin();
+    for (int i = 0; i <= 100; i++) feed(log_of(0.02 * i, v, 0));
+    TEST_ASSERT_EQUAL(WM_MOTION_TWIST, front.model());
+    TEST_ASSERT_EQUAL_HEX32(WM_MOTION_HEALTH_TURN_SILENT, front.health());
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 2 * v, pose.x_m);
+    TEST_ASSERT_GREATER_THAN_DOUBLE(0.99 * 0.09 * 2, turn_var);
+    TEST_ASSERT_FALSE(front.stands(wm_ns_from_seconds(2)));
+  }
+}
+
+TEST(test_a_part_of_the_rates_is_refused) {
+  begin();
+  wm_event e = make::twist6(0, 0.5, 0, 0.1);
+  e.as.twist6.w_radps[0] = kNone;
+  TEST_ASSERT_EQUAL(WM_NOT_FINITE, front.check(e));
+  TEST_ASSERT_EQUAL(WM_OK, front.check(log_of(0, 0.5, 0)));
+}
+
 }  // namespace

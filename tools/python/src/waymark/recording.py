@@ -30,7 +30,7 @@ _PLACED = ("x_m", "y_m", "z_m")
 _AXES = ("wx_radps", "wy_radps", "wz_radps", "ax_mps2", "ay_mps2", "az_mps2")
 COLUMNS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "motion.csv": (("v_mps", "w_radps"), ("vy_mps",)),
-    "motion6.csv": (("vx_mps", "vy_mps", "vz_mps", "wx_radps", "wy_radps", "wz_radps"), ()),
+    "motion6.csv": (("vx_mps", "vy_mps", "vz_mps"), ("wx_radps", "wy_radps", "wz_radps", "sigma_v_mps")),
     "increments.csv": (("from_ns", "dx_m", "dy_m", "dheading_rad"), _COVARIANCE),
     "ticks.csv": (("left", "right"), ()),
     "speeds.csv": (("left_mps", "right_mps"), ()),
