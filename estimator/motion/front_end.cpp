@@ -249,14 +249,14 @@ void motion_front_end::choose_model(uint32_t kinds) {
   const bool speed = read_speed(&ignored);
   const bool ticks = counts_ticks() && finite(wheels_.track_m);
   const bool steering = speed && finite(wheels_.wheelbase_m) && read_road_wheel(&ignored);
-  const bool twist_turns = !lacks_rate_ || !seen(WM_Q_YAW_RATE);  // beside a gyro a log without rates does not stand in
+  // A log without rates does not stand in for the gyro.
   const bool has_other =
-      ticks || (speed_source_ == kOfTwist && twist_turns) || (steering && !age_of_steering(now_ns_).is_overdue());
+      ticks || (speed_source_ == kOfTwist && !lacks_rate_) || (steering && !age_of_steering(now_ns_).is_overdue());
   const bool possible[] = {false,
                            ticks,
                            speed && (gyro_is_alive() || wheels_stand_in(steering)),
                            steering,
-                           (kinds & WM_TWIST_EVENTS) != 0 && twist_turns,
+                           (kinds & WM_TWIST_EVENTS) != 0,
                            (kinds & WM_EVENT_BIT(WM_EVENT_INCREMENT)) != 0};
   const int wanted = params_->model;
   if (wanted == WM_MOTION_CONSTANT_VELOCITY) return;
