@@ -20,11 +20,11 @@ typedef enum dvl_kind {
 typedef struct dvl_report {
   dvl_kind kind;
   // Of velocities alone. NaN: the report has none.
-  double v_mps[3];   // forwards, to the right, down, in the log's axes
-  double sigma_mps;  // figure of merit: the root of the covariance's largest eigenvalue
-  double since_ms;   // since the last report
-  int is_valid;      // it has a lock on the bottom; otherwise no number is a measurement
-  int is_hot;        // it will switch off soon
+  double v_mps[3];                       // forwards, to the right, down, in the log's axes
+  double sigma_mps;                      // figure of merit: the root of the covariance's largest eigenvalue
+  double since_ms;                       // since the last report
+  int is_valid;                          // it has a lock on the bottom; otherwise no number is a measurement
+  int is_hot;                            // it will switch off soon
   int64_t validity_us, transmission_us;  // of the log's clock: the echo, and the sending. DVL_NO_TIME: none
 } dvl_report;
 

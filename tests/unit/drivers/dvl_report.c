@@ -35,7 +35,8 @@ TEST(a_velocity_is_read) {
 }
 
 TEST(the_first_format_has_no_times) {
-  expect(DVL_VELOCITY, "{" SPEEDS "\"altitude\":1.5," BEAMS ",\"velocity_valid\":true,\"status\":0,"
+  expect(DVL_VELOCITY, "{" SPEEDS "\"altitude\":1.5," BEAMS
+                       ",\"velocity_valid\":true,\"status\":0,"
                        "\"format\":\"json_v1\"}");
   TEST_ASSERT_EQUAL(0, report.is_hot);
   TEST_ASSERT_EQUAL_INT64(DVL_NO_TIME, report.validity_us);
@@ -53,10 +54,12 @@ TEST(other_reports_are_named) {
   expect(DVL_WATER, "{" SPEEDS "\"velocity_valid\":true,\"type\":\"velocity_water\"}");
   expect(DVL_WATER, "{" SPEEDS "\"velocity_valid\":true,\"type\":\"velocity\",\"tracking_mode\":\"water\"}");
   expect(DVL_VELOCITY, "{" SPEEDS "\"velocity_valid\":true,\"type\":\"velocity\",\"tracking_mode\":\"bottom\"}");
-  expect(DVL_POSITION, "{\"ts\":49056.809,\"x\":12.4,\"y\":64.6,\"z\":1.8,\"std\":0.002,\"roll\":0.6,\"pitch\":0.6,"
-                       "\"yaw\":0.6,\"type\":\"position_local\",\"status\":0,\"format\":\"json_v3.1\"}");
-  expect(DVL_RESPONSE, "{\"response_to\":\"reset_dead_reckoning\",\"success\":true,\"error_message\":\"\","
-                       "\"result\":null,\"format\":\"json_v3.1\",\"type\":\"response\"}");
+  expect(DVL_POSITION,
+         "{\"ts\":49056.809,\"x\":12.4,\"y\":64.6,\"z\":1.8,\"std\":0.002,\"roll\":0.6,\"pitch\":0.6,"
+         "\"yaw\":0.6,\"type\":\"position_local\",\"status\":0,\"format\":\"json_v3.1\"}");
+  expect(DVL_RESPONSE,
+         "{\"response_to\":\"reset_dead_reckoning\",\"success\":true,\"error_message\":\"\","
+         "\"result\":null,\"format\":\"json_v3.1\",\"type\":\"response\"}");
   expect(DVL_OTHER, "{\"type\":\"something_new\"}");
   expect(DVL_OTHER, "{}");
 }

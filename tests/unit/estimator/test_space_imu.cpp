@@ -226,9 +226,7 @@ TEST(test_an_acceleration_that_the_log_measures_is_no_tilt) {
 
 // A velocity log that measures no rates: the turn is the gyro's.
 TEST(test_a_log_without_rates_beside_an_imu) {
-  const auto turning = [](int i) {
-    return vec3{jitter(i), jitter(i), 0.2};
-  };
+  const auto turning = [](int i) { return vec3{jitter(i), jitter(i), 0.2}; };
   vehicle with(0), without(0);
   with.go(2, {0.5, 0, 0}, {0, 0, 0.2}, turning, at_rest);
   without.go(2, {0.5, 0, 0}, kNoRates, turning, at_rest);

@@ -172,8 +172,9 @@ TEST(without_bottom_lock_nothing_is_measured) {
 }
 
 TEST(repeats_of_a_report_are_one) {
-  static const char *const kFirst = "{\"time\":120.7,\"vx\":0.1,\"vy\":0,\"vz\":0,\"fom\":0.001,\"altitude\":1.5,"
-                                    "\"velocity_valid\":true,\"status\":0,\"format\":\"json_v1\"}\n";
+  static const char *const kFirst =
+      "{\"time\":120.7,\"vx\":0.1,\"vy\":0,\"vz\":0,\"fom\":0.001,\"altitude\":1.5,"
+      "\"velocity_valid\":true,\"status\":0,\"format\":\"json_v1\"}\n";
   begin_connected();
   const int64_t echo_us = monotonic_us() - TRANSIT_US;
   for (int i = 0; i < 5; i++) {
@@ -194,7 +195,8 @@ TEST(repeats_of_a_report_are_one) {
 TEST(other_reports_are_counted_by_name) {
   begin_connected();
   say("{\"ts\":1.5,\"x\":1,\"y\":2,\"z\":3,\"std\":0.1,\"roll\":0,\"pitch\":0,\"yaw\":0,\"type\":\"position_local\","
-      "\"status\":0,\"format\":\"json_v3.1\"}\n{\"response_to\":\"get_config\",\"success\":true,\"type\":\"response\"}\n"
+      "\"status\":0,\"format\":\"json_v3.1\"}\n{\"response_to\":\"get_config\",\"success\":true,\"type\":\"response\"}"
+      "\n"
       "{\"vx\":9,\"vy\":9,\"vz\":9,\"fom\":0.1,\"velocity_valid\":true,\"type\":\"velocity_water\"}\n");
   expect(WM_AGAIN);
   report(1, SPEEDS);
@@ -247,7 +249,8 @@ TEST(times_that_contradict_each_other_are_refused) {
   for (int i = 0; i < 2; i++) {
     char text[300];
     (void)snprintf(text, sizeof text,
-                   "{" SPEEDS ",\"velocity_valid\":true,\"type\":\"velocity\",\"time_of_validity\":%d,"
+                   "{" SPEEDS
+                   ",\"velocity_valid\":true,\"type\":\"velocity\",\"time_of_validity\":%d,"
                    "\"time_of_transmission\":%d}\n",
                    5000000 + i, i ? 4999999 : 7000001);
     say(text);

@@ -154,7 +154,8 @@ static int drive(const given *of, int broken) {
   ok(waymark_health(session, &health, sizeof health, &err));
   ok(waymark_close(session, &err));
   const wm_source_health *counted = &health.sources[health.source_count - 1];
-  TEST_ASSERT_TRUE(said == WM_OK || said == WM_NOT_FINITE || said == WM_BAD_DATA);  // the last: of some that go together
+  TEST_ASSERT_TRUE(said == WM_OK || said == WM_NOT_FINITE ||
+                   said == WM_BAD_DATA);  // the last: of some that go together
   return said != WM_OK || counted->refused[WM_NOT_FINITE] > 0 || counted->rejected[WM_REJECTED_NOT_FINITE] > 0;
 }
 
