@@ -16,43 +16,21 @@ set(CPACK_STRIP_FILES ON)
 set(CPACK_INSTALL_DEFAULT_DIRECTORY_PERMISSIONS OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE WORLD_READ
   WORLD_EXECUTE)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+# Each system has packages of its own. A newer one's are newer, so that an upgrade of the system takes them; Debian 12's have the plain number.
+cmake_host_system_information(RESULT system QUERY DISTRIB_INFO)
 set(CPACK_DEBIAN_PACKAGE_RELEASE 1)
+if(NOT "${system_ID}${system_VERSION_ID}" STREQUAL debian12)
+  string(APPEND CPACK_DEBIAN_PACKAGE_RELEASE +${system_ID}${system_VERSION_ID})
+endif()
+set(version ${PROJECT_VERSION}-${CPACK_DEBIAN_PACKAGE_RELEASE})
 set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
 set(CPACK_DEBIAN_COMPRESSION_TYPE xz)
 set(CPACK_THREADS 1) # the bytes of xz depend on how many there are
 
-# What the programs need, written down: dpkg-shlibdeps looks into the database of this machine, which doesn't know another
-# architecture's libraries. tests/package/depends.py holds it against what is linked, and against dpkg-shlibdeps.
-set(base "libc6 (>= 2.36), libgcc-s1 (>= 12), libstdc++6 (>= 12)")
-set(pictures "libapriltag3 (>= 3.3.0), libpng16-16 (>= 1.6.39), libturbojpeg0 (>= 1:2.1.5), libyaml-0-2 (>= 0.2.5)")
-set(cameras "")
-if(WM_LIBCAMERA AND LIBCAMERA_FOUND)
-  set(cameras ", libcamera0.0.3 (>= 0.0.3)")
-endif()
-set(packed "zlib1g (>= 1:1.1.4)") # text files that are packed
-set(page "")
-if(TARGET waymark-web)
-  set(page ", libmicrohttpd12 (>= 0.9.75-2), ${packed}")
-endif()
-set(videos "")
-if(TARGET waymark-import)
-  set(videos ", libavcodec59 (>= 7:5.1), libavformat59 (>= 7:5.1), libavutil57 (>= 7:5.1), libswscale6 (>= 7:5.1)")
-endif()
-
-set(urdf "")
-if(TINYXML2_LIBRARY AND TINYXML2_HEADER)
-  set(urdf ", libtinyxml2-9 (>= 9.0.0+dfsg)")
-endif()
-
-set(pages "")
-if(HARU_LIBRARY AND HARU_HEADER)
-  set(pages ", libhpdf-2.3.0 (>= 2.3.0+dfsg)")
-endif()
-
+# Libraries that programs need are found in staged.cmake; here are the other packages.
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_NAME waymark)
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_SECTION misc)
-set(used "iproute2, procps") # by the service: `ip route`, `kill`
-set(CPACK_DEBIAN_RUNTIME_PACKAGE_DEPENDS "${base}, ${pictures}, ${packed}, liblcm1 (>= 1.3.1)${cameras}${page}, ${used}")
+set(CPACK_DEBIAN_RUNTIME_PACKAGE_DEPENDS "iproute2, procps") # of the service: `ip route`, `kill`
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_SUGGESTS "waymark-tools, can-utils, v4l-utils, liblcm-bin")
 set(CPACK_DEBIAN_RUNTIME_DESCRIPTION "localization of a robot on its own computer
 Estimates the pose of a robot from cameras, CAN and other sensors on its
@@ -72,7 +50,7 @@ if(TARGET waymark-gst)
   list(APPEND CPACK_COMPONENTS_ALL gst)
   set(CPACK_DEBIAN_GST_PACKAGE_NAME waymark-gst)
   set(CPACK_DEBIAN_GST_PACKAGE_SECTION misc)
-  set(CPACK_DEBIAN_GST_PACKAGE_DEPENDS "waymark (= ${PROJECT_VERSION}-1), libc6 (>= 2.36), libglib2.0-0 (>= 2.12.0), libgstreamer1.0-0 (>= 1.18.0), libgstreamer-plugins-base1.0-0 (>= 1.18.0)")
+  set(CPACK_DEBIAN_GST_PACKAGE_DEPENDS "waymark (= ${version})")
   set(CPACK_DEBIAN_GST_PACKAGE_RECOMMENDS "gstreamer1.0-plugins-base, gstreamer1.0-plugins-good")
   set(CPACK_DEBIAN_GST_DESCRIPTION "cameras of a robot by GStreamer
 Gives waymark the pictures of any GStreamer pipeline, as those of NVIDIA's
@@ -81,7 +59,7 @@ endif()
 
 set(CPACK_DEBIAN_TOOLS_PACKAGE_NAME waymark-tools)
 set(CPACK_DEBIAN_TOOLS_PACKAGE_SECTION misc)
-set(CPACK_DEBIAN_TOOLS_PACKAGE_DEPENDS "waymark (= ${PROJECT_VERSION}-1), ${base}, ${pictures}, ${packed}${videos}${urdf}${pages}")
+set(CPACK_DEBIAN_TOOLS_PACKAGE_DEPENDS "waymark (= ${version})")
 set(CPACK_DEBIAN_TOOLS_DESCRIPTION "desk tools for the localization of a robot
 Judges runs against truth, draws reports, makes maps, writes the
 configuration of a new robot: waymark eval, report, diff, map, init.")
@@ -92,20 +70,16 @@ if(TARGET waymark-simulate)
   string(APPEND CPACK_DEBIAN_TOOLS_PACKAGE_RECOMMENDS ", waymark-sim")
   set(CPACK_DEBIAN_SIM_PACKAGE_NAME waymark-sim)
   set(CPACK_DEBIAN_SIM_PACKAGE_SECTION misc)
-  set(CPACK_DEBIAN_SIM_PACKAGE_DEPENDS "waymark (= ${PROJECT_VERSION}-1), ${base}, ${pictures}, libembree3-3 (>= 3.13.5+dfsg)")
+  set(CPACK_DEBIAN_SIM_PACKAGE_DEPENDS "waymark (= ${version})")
   set(CPACK_DEBIAN_SIM_DESCRIPTION "simulated drives of a robot, with known truth
 Makes recordings of drives through corridors, offices, streets and over the
 sea floor: CAN, pictures, sightings and labels, with the errors and faults of
 sensors. The same seed gives the same bytes: waymark simulate.")
 endif()
 
-set(boards "")
-if(TARGET wm_calibrate)
-  set(boards ", libceres3 (>= 2.1.0+really2.1.0+dfsg), libgoogle-glog0v6 (>= 0.6.0), libopencv-calib3d406 (>= 4.6.0+dfsg), libopencv-contrib406 (>= 4.6.0+dfsg), libopencv-core406 (>= 4.6.0+dfsg), libopencv-imgproc406 (>= 4.6.0+dfsg)")
-endif()
 set(CPACK_DEBIAN_CALIBRATE_PACKAGE_NAME waymark-calibrate)
 set(CPACK_DEBIAN_CALIBRATE_PACKAGE_SECTION misc)
-set(CPACK_DEBIAN_CALIBRATE_PACKAGE_DEPENDS "waymark (= ${PROJECT_VERSION}-1), ${base}, ${pictures}, ${packed}${boards}")
+set(CPACK_DEBIAN_CALIBRATE_PACKAGE_DEPENDS "waymark (= ${version})")
 set(CPACK_DEBIAN_CALIBRATE_DESCRIPTION "calibration of a robot's cameras
 Finds the model of a camera, of a pair, and their mountings on the robot, from
 pictures of boards or from drives; reads calibrations of OpenCV, Kalibr, ROS
@@ -114,7 +88,7 @@ and OCamCalib: waymark calibrate.")
 set(CPACK_DEBIAN_FLEET_PACKAGE_NAME waymark-fleet)
 set(CPACK_DEBIAN_FLEET_PACKAGE_ARCHITECTURE all)
 set(CPACK_DEBIAN_FLEET_PACKAGE_SECTION misc)
-set(CPACK_DEBIAN_FLEET_PACKAGE_DEPENDS "waymark-tools (= ${PROJECT_VERSION}-1), python3 (>= 3.11), python3-yaml")
+set(CPACK_DEBIAN_FLEET_PACKAGE_DEPENDS "waymark-tools (= ${version}), python3 (>= 3.10), python3-yaml")
 set(CPACK_DEBIAN_FLEET_PACKAGE_SUGGESTS "snakemake, qemu-system-x86, qemu-system-arm, mmdebstrap, cpio, e2fsprogs, gcc-12, make, openssh-client")
 set(CPACK_DEBIAN_FLEET_DESCRIPTION "many drives of robots at once
 Replays and judges all recordings of a fleet on every core or on a cluster,
@@ -133,10 +107,9 @@ find_package(waymark) and pkg-config.")
 
 if(TARGET wm_shared)
   list(APPEND CPACK_COMPONENTS_ALL library)
-  string(APPEND CPACK_DEBIAN_DEV_PACKAGE_DEPENDS ", libwaymark0 (= ${PROJECT_VERSION}-1)")
+  string(APPEND CPACK_DEBIAN_DEV_PACKAGE_DEPENDS ", libwaymark0 (= ${version})")
   set(CPACK_DEBIAN_LIBRARY_PACKAGE_NAME libwaymark0)
   set(CPACK_DEBIAN_LIBRARY_PACKAGE_SECTION libs)
-  set(CPACK_DEBIAN_LIBRARY_PACKAGE_DEPENDS "${base}, ${pictures}, ${packed}")
   set(CPACK_DEBIAN_LIBRARY_DESCRIPTION "localization of a robot in a program of its own
 The runtime of waymark as a shared library with a stable C interface: a
 program pushes odometry, CAN frames, observations and pictures, and takes
@@ -148,7 +121,6 @@ endif()
 
 set(CPACK_DEBIAN_ROS2_PACKAGE_NAME waymark-ros2)
 set(CPACK_DEBIAN_ROS2_PACKAGE_SECTION misc)
-set(CPACK_DEBIAN_ROS2_PACKAGE_DEPENDS "${base}, liblcm1 (>= 1.3.1), libddsc0debian (>= 0.10.2)")
 set(CPACK_DEBIAN_ROS2_DESCRIPTION "poses of a robot for ROS 2
 A bridge between the messages of a waymark run and ROS 2, by Cyclone DDS: /tf,
 /waymark/pose, /waymark/odom and /diagnostics; /initialpose, /odom, /imu/data

@@ -23,6 +23,9 @@ set(CMAKE_C_FLAGS_INIT "${WM_CPU_FLAGS}")
 set(CMAKE_CXX_FLAGS_INIT "${WM_CPU_FLAGS} -Wno-psabi")
 set(CMAKE_CROSSCOMPILING_EMULATOR ${WM_QEMU} -L ${CMAKE_SYSROOT})
 set(CPACK_DEBIAN_PACKAGE_ARCHITECTURE ${WM_ARCH})
+# Whose libraries staged.cmake finds there.
+set(CPACK_WM_SYSROOT ${CMAKE_SYSROOT})
+set(CPACK_WM_TRIPLET ${WM_TRIPLET})
 
 # Libraries and headers are the sysroot's alone, programs the host's alone (lcm-gen, python3).
 set(CMAKE_FIND_ROOT_PATH ${CMAKE_SYSROOT})

@@ -28,13 +28,24 @@ fail() { echo "./dev sysroot $arch: $*" >&2; exit 1; }
 
 exec 9>"$root.lock"
 flock -n 9 || { say "another ./dev sysroot $arch is at work: waiting for it"; flock 9; }
-[ "$(cat "$stamp" 2>/dev/null)" = "${packages[*]}" ] && exit 0
+complete="${packages[*]} and their database"
+[ "$(cat "$stamp" 2>/dev/null)" = "$complete" ] && exit 0
 
 # ── an apt of its own ───────────────────────────────────────────────────────────────────────────────────────────────
 apt() { env APT_CONFIG="$work/apt.conf" apt-get -q "$@"; }
 say "sysroot $arch: package lists"
 bash toolchain/foreign-apt.sh "$arch" "$work" ||
   fail "the package lists of $arch could not be fetched (above). Is the mirror reachable? Run this again: it goes on where it stopped."
+
+enter() { # PACKAGE.deb : into the sysroot's own database of packages, by which dpkg-shlibdeps knows whose a library is
+  local info=$root.new/var/lib/dpkg/info/$(dpkg-deb -f "$1" Package) control
+  control=$(mktemp -d)
+  dpkg-deb -e "$1" "$control"
+  for file in shlibs symbols; do [ ! -e "$control/$file" ] || cp "$control/$file" "$info.$file"; done
+  rm -r "$control"
+  dpkg-deb --fsys-tarfile "$1" | tar -t | sed "s#^\./*#$root/#; s#/\$##" >"$info.list"
+  { dpkg-deb -f "$1"; printf 'Status: install ok installed\n\n'; } >>"$root.new/var/lib/dpkg/status"
+}
 
 # ── fetch, unpack ───────────────────────────────────────────────────────────────────────────────────────────────────
 # All of them: apt does not list packages that are in its archives, so it looks into an empty folder.
@@ -53,7 +64,8 @@ count=0
 for name in $(awk "/^'/{print \$2}" "$work/uris"); do
   count=$((count + 1))
   [ -t 1 ] && printf '\r%3d/%d %-60.60s' "$count" "$total" "$name"
-  dpkg-deb -x "$work/archives/$name" "$root.new" || fail "$name cannot be unpacked: remove $work/archives/$name and run this again"
+  dpkg-deb -x "$work/archives/$name" "$root.new" && enter "$work/archives/$name" ||
+    fail "$name cannot be unpacked: remove $work/archives/$name and run this again"
 done
 [ -t 1 ] && printf '\r%70s\r' ''
 # Links to absolute paths point into the host: make them relative.
@@ -61,7 +73,7 @@ find "$root.new" -type l -lname '/*' | while read -r link; do
   target=$root.new$(readlink "$link")
   [ -e "$target" ] && ln -sfr "$target" "$link"
 done || true
-echo "${packages[*]}" >"$root.new/.complete"
+echo "$complete" >"$root.new/.complete"
 rm -rf "$root"
 mv "$root.new" "$root"
 say "sysroot $arch: $(du -sh "$root" | cut -f1) in .cache/sysroot/$arch"

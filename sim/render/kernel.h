@@ -3,11 +3,10 @@
 // and for any. Both give the same bits. `C`: channels, 1 (grey: light and surfaces by their luminance) or 3.
 #pragma once
 
-#include <embree3/rtcore.h>
-
 #include <cstddef>
 #include <cstdint>
 
+#include "render/rays.h"
 #include "render/texture_view.h"
 
 namespace wm::render {

@@ -57,17 +57,14 @@ WM_LANES_INLINE Hits trace(const Frame<C> &frame, const Rays &rays, float time) 
   store(packet.hit.u, zero), store(packet.hit.v, zero), store(packet.hit.primID, splat(0));
   alignas(32) int valid[kLanes];
   store(valid, rays.alive);
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-  rtcIntersect8(valid, frame.still, &context, &packet);
+  first_hits(valid, frame.still, packet);
   int8 near = splat(0);
   for (int i = 0; i < frame.mover_count; i++)
     near |= pass_through(rays, frame.movers[i].centre, frame.movers[i].radius);
   near &= rays.alive;
   if (bits_of(near)) {
     store(valid, near);
-    rtcIntersect8(valid, frame.moving, &context, &packet);
+    first_hits(valid, frame.moving, packet);
   }
   Hits hits;
   hits.there = rays.alive & (load<int8>(packet.hit.geomID) != -1);

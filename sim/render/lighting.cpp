@@ -17,8 +17,6 @@ namespace {
 constexpr double kLift = 0.03;
 
 bool blocked(RTCScene still, const Vec3 &from, const Vec3 &step) {
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
   RTCRay ray{};
   ray.org_x = static_cast<float>(from.x());
   ray.org_y = static_cast<float>(from.y());
@@ -29,8 +27,7 @@ bool blocked(RTCScene still, const Vec3 &from, const Vec3 &step) {
   ray.tnear = 0;
   ray.tfar = 1;
   ray.mask = ~0u;
-  rtcOccluded1(still, &context, &ray);
-  return ray.tfar < 0;
+  return is_blocked(still, ray);
 }
 
 // Falls from 1 at half of the reach to 0 at the reach.

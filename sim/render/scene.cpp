@@ -99,13 +99,10 @@ bool occluded(RTCScene scene, const Vec3 &from, const Vec3 &target, double slack
   const Vec3 way = target - from;
   const double length = way.norm();
   if (length <= slack_m) return false;
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
   RTCRay ray;
   ray_of(from, way / length, ray);
   ray.tfar = static_cast<float>(length - slack_m);
-  rtcOccluded1(scene, &context, &ray);
-  return ray.tfar < 0;
+  return is_blocked(scene, ray);
 }
 
 }  // namespace
@@ -170,13 +167,11 @@ bool Scene::commit(std::string &error) {
 
 Hit Scene::cast(const Vec3 &from, const Vec3 &direction) const {
   const Vec3 unit = direction.normalized();
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
   RTCRayHit ray;
   ray_of(from, unit, ray.ray);
   ray.ray.tfar = INFINITY;
   ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-  rtcIntersect1(data_->still.scene, &context, &ray);
+  first_hit(data_->still.scene, ray);
   Hit out;
   if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return out;
   out.there = true;

@@ -2,10 +2,9 @@
 // A committed scene as the renderer's inner loops read it.
 #pragma once
 
-#include <embree3/rtcore.h>
-
 #include <vector>
 
+#include "render/rays.h"
 #include "render/scene.h"
 
 namespace wm::render {

@@ -34,14 +34,14 @@ def package(folder, name, version, architecture="all", text=""):
 class Apt:
     """apt with a root and a list of sources of its own."""
 
-    def __init__(self, folder, repository, keyring):
+    def __init__(self, folder, repository, keyring, suite="stable"):
         self.root = folder
         for name in ("etc/apt/sources.list.d", "etc/apt/preferences.d", "etc/apt/apt.conf.d", "etc/apt/trusted.gpg.d", "lists/partial",
                      "cache/archives/partial", "dpkg"):
             (folder / name).mkdir(parents=True)
         (folder / "dpkg/status").write_text("")
         (folder / "etc/apt/sources.list.d/waymark.sources").write_text(
-            f"Types: deb\nURIs: file:{repository}\nSuites: stable\nComponents: main\nSigned-By: {keyring}\n")
+            f"Types: deb\nURIs: file:{repository}\nSuites: {suite}\nComponents: main\nSigned-By: {keyring}\n")
         (folder / "apt.conf").write_text(
             f'Dir::Etc "{folder}/etc/apt";\nDir::State::Lists "{folder}/lists";\nDir::State::status "{folder}/dpkg/status";\n'
             f'Dir::Cache "{folder}/cache";\nAPT::Architecture "amd64";\nAPT::Architectures {{"amd64";}};\nAPT::Sandbox::User "root";\n'
@@ -56,6 +56,17 @@ def key_of(home, name):
     env = {**os.environ, "GNUPGHOME": str(home)}
     run("gpg", "--batch", "--passphrase", "", "--quick-generate-key", name, "ed25519", "sign", "never", env=env)
     return {**env, "WAYMARK_SIGNING_KEY": name, "SOURCE_DATE_EPOCH": "1700000000"}
+
+
+def check_suites(folder, repository, env):
+    """A newer system's packages are newer, and of another suite."""
+    run("python3", WRITER, repository, package(folder, "waymark", "1.1-1+debian13", "amd64"), env=env)
+    for suite, version in (("stable", "1.1-1"), ("debian13", "1.1-1+debian13")):
+        its = Apt(folder / suite, repository, repository / "waymark-archive-keyring.gpg", suite)
+        its("update")
+        its("download", "waymark")
+        assert [p.name for p in (folder / suite).glob("*.deb")] == [f"waymark_{version}_amd64.deb"], suite
+    assert "Suites: debian13\n" in (repository / "waymark-debian13.sources").read_text()
 
 
 def main():
@@ -85,6 +96,8 @@ def main():
         assert (folder / "right/waymark_1.1-1_amd64.deb").exists()
         other = package(folder / "other", "waymark", "1.1-1", "amd64", "Other content")
         assert "with other content" in run("python3", WRITER, repository, other, env=env, check=False).stderr
+
+        check_suites(folder, repository, env)
 
         # The same packages give the same files.
         again = folder / "again"
