@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include "cli/commands.h"
+#include "cli/journal.h"
 #include "findings/findings.h"
 #include "rt/clock.h"
 
@@ -18,13 +19,13 @@ int exit_code(wm_status status) {
 }
 
 int complain(const wm_error *err) {
-  (void)fprintf(stderr, "waymark: %s\n", err->text);
+  journal_line(JOURNAL_ERROR, "waymark", err->text);
   return exit_code(err->status);
 }
 
 void print_note(void *context, const char *text) {
   (void)context;
-  (void)fprintf(stderr, "note: %s\n", text);
+  journal_line(JOURNAL_NOTICE, "note", text);
 }
 
 void print_warning(void *context, wm_note note, const char *text) {
@@ -119,7 +120,7 @@ void print_report(const wm_run_report *r, const char *name, const char *out_dir,
     (void)printf("  %-32s %10.3g\n", "lost_probability", r->health.lost_probability);
   (void)printf("  %s at the end; written to %s\n", wm_state_name(r->health.state), out_dir);
   (void)fflush(stdout);
-  wm_findings_print(&r->findings, stderr);
+  journal_findings(&r->findings);
 }
 
 // ── progress ────────────────────────────────────────────────────────────────────────────────────────────────────────

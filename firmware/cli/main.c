@@ -21,7 +21,7 @@ static const char kHelp[] =
     "  check     find mistakes in a configuration and a recording before driving\n"
     "  doctor    find what is wrong with this computer, and how to mend it\n"
     "  stamps    switch the clocks of CAN adapters on, before a run\n"
-    "  config    print what a configuration may have, for editors (JSON schema)\n"
+    "  config    give a robot that runs another configuration, on trial; or print what one may have (JSON schema)\n"
     "  help      this text; `waymark COMMAND --help` has the options\n"
     "\n"
     "at the desk (programs named waymark-COMMAND, beside this one or in PATH):\n";

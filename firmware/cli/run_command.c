@@ -8,10 +8,10 @@
 #include <sys/statvfs.h>
 
 #include "cli/commands.h"
+#include "cli/opened.h"
 #include "cli/options.h"
-#include "fusion/choice.h"
+#include "cli/trial.h"
 #include "live/record.h"
-#include "live/robot.h"
 #include "live/run.h"
 #include "output/saved_pose.h"
 #include "rt/clock.h"
@@ -24,7 +24,7 @@ static const char kHelp[] =
     "with --out, into files and an event log. The sources are the configuration's devices or, with --recording, a\n"
     "recording's, played at real speed. Ends with the recording, after --duration, or by Ctrl-C (SIGTERM), and writes\n"
     "everything then. On devices SIGHUP reads the configuration again: a good one is taken, from the present pose and\n"
-    "into FOLDER.2 ...; a wrong one is reported, and the run continues.\n"
+    "into FOLDER.2 ...; a wrong one is reported, and the run continues. `waymark config set` tries one.\n"
     "\n"
     "  --config FILE          which estimator, and its parameters\n"
     "  --recording RECORDING  play this recording instead of devices\n"
@@ -49,15 +49,16 @@ static const char kHelp[] =
     "  waymark run --config config/robot.yaml --recording first-drive --out out/run --duration 60\n";
 
 typedef struct arguments {
-  const char *config, *recording, *record, *landmarks, *calibration, *map;
-  int resumes, force;
+  opened_choice opened;
+  const char *record;
+  int force;
   wm_run_options run;
 } arguments;
 
 #define RECORD_FREE_MB 500  // free space left on the disk, the default of `waymark record`
 #define BLIND_S 0.5         // from the end of one run to the first motion of the next, in one process
 
-static atomic_int stop, reload_asked;
+static atomic_int stop, reload_asked, is_on_trial;
 
 static void on_signal(int number) {
   (void)number;
@@ -88,57 +89,47 @@ static void print_times(const wm_live_report *r) {
                (double)r->loop_max_ns * 1e-6, (double)r->age_p99_ns * 1e-6);
 }
 
-// A configuration with its opened sources.
-typedef struct opened {
-  wm_config config;
-  wm_recording *recording;
-} opened;
-
-static void close_all(opened *self) {
-  wm_recording_close(self->recording);
-  wm_config_free(&self->config);
-  self->recording = NULL;
-}
-
-// A played recording replaces the robot's devices; the robot's saved state is not used, except with --resume.
-static void without_robot(wm_config *config, int resumes) {
-  if (!resumes) config->saved_pose[0] = config->saved_map[0] = config->black_box[0] = '\0';
-  config->devices.sightings_by_lcm = 0;
-}
-
-static wm_status open_all(const arguments *args, opened *out, wm_error *err) {
-  wm_config *config = &out->config;
-  memset(out, 0, sizeof *out);
-  wm_status status = wm_config_load_undecided(args->config, config, err);
-  if (status != WM_OK) return err->status = WM_BAD_CONFIG;  // also for a missing file
-  if (config->estimator) wm_config_each_warning(config, print_note, NULL);
-  if (args->recording) without_robot(config, args->resumes);
-  status = override_path(config->overrides.landmarks, args->landmarks, err);
-  if (status == WM_OK) status = override_path(config->overrides.calibration, args->calibration, err);
-  if (status == WM_OK) status = override_path(config->overrides.map, args->map, err);
-  if (status == WM_OK)
-    status = args->recording
-                 ? wm_recording_open(args->recording, &config->overrides, print_warning, NULL, &out->recording, err)
-                 : wm_robot_open(config, print_warning, NULL, &out->recording, err);
-  if (status == WM_OK) status = wm_choose_estimator(config, out->recording, print_note, NULL, err);
-  if (status != WM_OK) close_all(out);
-  return status;
-}
-
-// Another configuration, opened and checked while the present run continues.
+// The configuration that comes next, opened and checked while the present run continues.
 typedef struct reloading {
   const arguments *args;
+  trial trial;
+  const char *path;  // of the next one
   opened next;
+  // The pose before a trial, and when that was: what a wrong configuration made of it is not gone on with.
+  wm_estimate before;
+  int has_before, is_back;
+  wm_time_ns before_ns;
 } reloading;
+
+static int wants_reload(void *context) {
+  reloading *self = context;
+  char line[2 * TRIAL_PATH_MAX + 64];
+  const char *of_robot = self->args->opened.config;
+  self->path = of_robot;
+  self->is_back = self->trial.is_on;
+  if (atomic_exchange(&reload_asked, 0)) {
+    trial_end(&self->trial);
+    return 1;
+  }
+  const trial_news news = trial_look(&self->trial, wm_monotonic_ns());
+  if (news == TRIAL_NOTHING) return 0;
+  if (news == TRIAL_BEGINS) self->path = self->trial.path;
+  self->is_back = news == TRIAL_WITHDRAWN;
+  if (news == TRIAL_TAKEN) atomic_store(&is_on_trial, 0);
+  const char *is = news == TRIAL_BEGINS      ? "is on trial"
+                   : news == TRIAL_WITHDRAWN ? "was not good enough or was given up: back to the configuration before"
+                                             : "is the robot's now";
+  (void)snprintf(line, sizeof line, "configuration: %s %s", self->trial.path, is);
+  print_note(NULL, line);
+  return news != TRIAL_TAKEN;
+}
 
 static wm_status open_next(void *context, wm_error *err) {
   reloading *self = context;
-  static wm_assembly assembly;
-  wm_status status = open_all(self->args, &self->next, err);
-  if (status != WM_OK) return status;
-  status = wm_assemble(&self->next.config, self->next.recording, self->args->run.seed, &assembly, err);
-  wm_assembly_close(&assembly);
-  if (status != WM_OK) close_all(&self->next);
+  opened_choice choice = self->args->opened;
+  choice.config = self->path;
+  wm_status status = opened_open_to_run(&choice, self->args->run.seed, &self->next, err);
+  if (status != WM_OK) trial_end(&self->trial);  // the run goes on with the robot's own
   return status;
 }
 
@@ -254,43 +245,70 @@ static const char *folder_of(const arguments *args, int part, int puts_aside, ch
   return status == WM_OK ? out : NULL;
 }
 
+// A run that doesn't start with the configuration on trial: the robot's own is opened anew.
+static int goes_back(reloading *self, wm_status status, wm_error *err) {
+  if (status == WM_OK || !self->trial.is_on) return 0;
+  wm_error why = *err;
+  trial_end(&self->trial);
+  self->path = self->args->opened.config;
+  self->is_back = 1;
+  char line[sizeof why.text + TRIAL_PATH_MAX + 40];
+  (void)snprintf(line, sizeof line, "configuration: %s: %s. Back to the configuration before", self->trial.path,
+                 why.text);
+  print_note(NULL, line);
+  return open_next(self, err) == WM_OK;
+}
+
+// From the last pose; after a trial from the one before it, with the motion since then in its sigmas. 0: no pose is
+// worth it.
+static int start_of_next(reloading *self, const wm_live_report *report, const wm_motion_params *motion, wm_start *out) {
+  const wm_time_ns now_ns = wm_monotonic_ns();
+  if (!self->is_back) {
+    self->has_before = report->has_last && wm_saved_pose_is_worth_it(&report->last);
+    self->before = report->last;
+    self->before_ns = now_ns;
+  }
+  if (self->has_before)
+    wm_start_from_estimate(&self->before, motion, BLIND_S + wm_seconds_between(self->before_ns, now_ns), out);
+  return self->has_before;
+}
+
 static int run(const arguments *args) {
   static opened now;
   static reloading reload;
   static wm_live_report report;
   wm_error err = {0};
-  if (open_all(args, &now, &err) != WM_OK) return complain(&err);
+  if (opened_open(&args->opened, &now, &err) != WM_OK) return complain(&err);
   wm_run_options options = args->run;
   wm_start start;
   char out_dir[WM_PATH_MAX + 16], record_dir[WM_PATH_MAX + 16], last_floor[WM_NAME_MAX];
   reload.args = args;
   options.reload = open_next;
   options.reload_context = &reload;
-  options.reload_asked = args->recording ? NULL : &reload_asked;
+  options.on_trial = &is_on_trial;
+  options.wants_reload = args->opened.recording ? NULL : wants_reload;
+  trial_open(&reload.trial, args->opened.config);
   catch_signals();
   const int puts_aside = !args->force && args->run.out_max_mb <= 0 && args->run.out_dir;
   trouble so_far = {0};
   wm_status status = WM_OK;
   if (puts_aside)
-    status = put_run_aside(options.out_dir, args->recording ? wm_recording_name(now.recording) : NULL, &err);
+    status = put_run_aside(options.out_dir, args->opened.recording ? wm_recording_name(now.recording) : NULL, &err);
   if (status == WM_OK) status = run_once(&now, args->record, &options, &report, &err);
-  for (int part = 2; report.wants_restart; part++) {
-    remember(&so_far, status, &err);
-    close_all(&now);
+  for (int part = 2; report.wants_restart || goes_back(&reload, status, &err); part++) {
+    if (report.wants_restart) remember(&so_far, status, &err);
+    opened_close(&now);
     now = reload.next;
-    options.start = NULL;
+    options.start = start_of_next(&reload, &report, now.config.motion, &start) ? &start : NULL;
     options.start_floor = report.has_floors ? last_floor : NULL;
     (void)snprintf(last_floor, sizeof last_floor, "%s", report.last_floor);
-    if (report.has_last && wm_saved_pose_is_worth_it(&report.last)) {
-      wm_start_from_estimate(&report.last, now.config.motion, BLIND_S, &start);
-      options.start = &start;
-    }
     // A log and a recording hold one configuration each.
     options.out_dir = folder_of(args, part, puts_aside, out_dir, sizeof out_dir, &so_far);
     (void)snprintf(record_dir, sizeof record_dir, "%s.%d", args->record ? args->record : "", part);
+    atomic_store(&is_on_trial, reload.trial.is_on);
     status = run_once(&now, args->record ? record_dir : NULL, &options, &report, &err);
   }
-  close_all(&now);
+  opened_close(&now);
   if (status == WM_OK && so_far.status != WM_OK) return complain(&so_far.first);
   return status == WM_OK ? EXIT_DONE : complain(&err);
 }
@@ -306,19 +324,19 @@ static wm_status check_new_recording(const char *folder, const char *played, wm_
 int command_run(int argc, char *const *argv) {
   static arguments args = {.run = {.seed = 1, .speed = 1, .stop = &stop, .say = print_note}};
   int help = 0;
-  const option options[] = {{"--config", OPTION_TEXT, &args.config},
-                            {"--recording", OPTION_TEXT, &args.recording},
+  const option options[] = {{"--config", OPTION_TEXT, &args.opened.config},
+                            {"--recording", OPTION_TEXT, &args.opened.recording},
                             {"--out", OPTION_TEXT, &args.run.out_dir},
                             {"--record", OPTION_TEXT, &args.record},
                             {"--out-max-mb", OPTION_F64, &args.run.out_max_mb},
                             {"--duration", OPTION_F64, &args.run.duration_s},
                             {"--speed", OPTION_F64, &args.run.speed},
                             {"--seed", OPTION_U64, &args.run.seed},
-                            {"--resume", OPTION_FLAG, &args.resumes},
+                            {"--resume", OPTION_FLAG, &args.opened.resumes},
                             {"--force", OPTION_FLAG, &args.force},
-                            {"--landmarks", OPTION_TEXT, &args.landmarks},
-                            {"--calibration", OPTION_TEXT, &args.calibration},
-                            {"--map", OPTION_TEXT, &args.map},
+                            {"--landmarks", OPTION_TEXT, &args.opened.landmarks},
+                            {"--calibration", OPTION_TEXT, &args.opened.calibration},
+                            {"--map", OPTION_TEXT, &args.opened.map},
                             {"--help", OPTION_FLAG, &help},
                             {"-h", OPTION_FLAG, &help}};
   wm_error err = {0};
@@ -329,16 +347,17 @@ int command_run(int argc, char *const *argv) {
     (void)fputs(kHelp, stdout);
     return EXIT_DONE;
   }
-  if (!args.config) {
+  if (!args.opened.config) {
     (void)fprintf(stderr, "waymark: run needs --config FILE\n\n%s", kHelp);
     return EXIT_USAGE;
   }
-  if (!args.recording && args.run.speed != 1) {
+  if (!args.opened.recording && args.run.speed != 1) {
     (void)wm_fail(&err, WM_BAD_USAGE, "--speed: devices run at real speed; it is for a recording (--recording)");
     return complain(&err);
   }
-  if (args.record && check_new_recording(args.record, args.recording, &err) != WM_OK) return complain(&err);
-  if (args.run.out_dir && check_out_dir(args.run.out_dir, args.recording ? args.recording : "", &err) != WM_OK)
+  if (args.record && check_new_recording(args.record, args.opened.recording, &err) != WM_OK) return complain(&err);
+  if (args.run.out_dir &&
+      check_out_dir(args.run.out_dir, args.opened.recording ? args.opened.recording : "", &err) != WM_OK)
     return complain(&err);
   return run(&args);
 }

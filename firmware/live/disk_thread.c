@@ -75,6 +75,7 @@ static void flush(live *run) {
 
 void live_save_map(live *run, const void *image, size_t bytes) {
   live_disk *self = &run->disk;
+  if (live_is_on_trial(run)) return;
   const wm_config *config = run->config;
   wm_error err;
   const char *why =
@@ -110,7 +111,7 @@ double live_utc_s(void) {
 static void save_pose(live *run) {
   live_disk *self = &run->disk;
   wm_error err;
-  if (!self->has_last_pose) return;
+  if (!self->has_last_pose || live_is_on_trial(run)) return;
   self->has_last_pose = 0;
   const wm_building *building = run->assembly.building;
   const char *floor = building ? wm_building_floor_name(building, self->last_floor) : NULL;

@@ -161,6 +161,8 @@ uint64_t outputs_lost(const live_estimator *self);
 void live_publish_health(const live *run, wm_health *health);
 
 // Writes a map to the disk; errors are reported once. On the disk thread, and on the main thread after its end.
+// Then nothing changes of what the robot goes on with.
+int live_is_on_trial(const live *run);
 void live_save_map(live *self, const void *image, size_t bytes);
 // This computer's UTC in seconds.
 double live_utc_s(void);

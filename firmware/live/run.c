@@ -30,6 +30,11 @@ void live_say(live *self, const char *format, ...) {
   self->options->say(self->options->say_context, line);
 }
 
+int live_is_on_trial(const live *run) {
+  const atomic_int *on_trial = run->options->on_trial;
+  return on_trial && atomic_load(on_trial);
+}
+
 // ── memory ──────────────────────────────────────────────────────────────────────────────────────────────────────────
 
 #define NEEDS_MAX (WM_PIPELINE_NEEDS + 6 + VIEWS_NEEDS + WM_SOURCES_MAX + WM_VISION_NEEDS)
@@ -262,6 +267,7 @@ static wm_status prepare(live *self, wm_recording *recording, wm_error *err) {
                 &self->assembly, live_say_later, self, NULL);
   other_runs_open(&self->publish.others, params->publish_lcm, self->config->lcm_url, self->config->channel_prefix,
                   live_say_later, self);
+  self->publish.others.own_id = self->publish.others.own_id << 1 | (uint64_t)live_is_on_trial(self);
   lcm_group_open(&self->publish.group, self->config->lcm_url);
   black_box_open(&self->disk.box, self->config->black_box, params->black_box_keep_s, params->black_box_pictures_hz,
                  &self->assembly, self->options->say, self->options->say_context);
@@ -352,7 +358,7 @@ static int recording_is_over(live *self) {
 static void look_for_reload(live *self, wm_live_report *report) {
   const wm_run_options *options = self->options;
   wm_error why = {0};
-  if (!options->reload_asked || !atomic_exchange(options->reload_asked, 0)) return;
+  if (!options->wants_reload || !options->wants_reload(options->reload_context)) return;
   if (options->reload(options->reload_context, &why) != WM_OK) {
     live_say(self, "reload: %s. The run continues unchanged", why.text);
     return;

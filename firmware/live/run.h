@@ -22,11 +22,15 @@ typedef struct wm_run_options {
   double speed;       // 1: real speed; on devices it has to be 1
   // Set to 1 (by a signal handler or another thread) it ends the run. May be NULL.
   atomic_int *stop;
-  // Set to 1 it calls `reload`: WM_OK ends the run, and the caller starts the new one from report->last
-  // (report->wants_restart); an error is reported, and the run continues. On devices only. May be NULL.
-  atomic_int *reload_asked;
+  // Asked every 20 ms; where it returns 1 `reload` is called: WM_OK ends the run, and the caller starts the new one
+  // from report->last (report->wants_restart); an error is reported, and the run continues. On devices only. May be
+  // NULL.
+  int (*wants_reload)(void *reload_context);
   wm_status (*reload)(void *context, wm_error *err);
   void *reload_context;
+  // 1: the configuration is on trial. run_id of health is odd then from the start, and while it is 1 the files of saved
+  // pose and map stay as they are. May be NULL.
+  const atomic_int *on_trial;
   const wm_start *start;    // NULL: the saved pose, or the configuration's
   const char *start_floor;  // of `start`: its name, "" unknown; NULL: the configuration's
   // Receives notes for a person or a log, a line each; from any of the run's normal threads.

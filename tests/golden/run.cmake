@@ -16,6 +16,8 @@ wm_script_test(web_clients COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/web_clien
 wm_script_test(run_lcm_tools COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/lcm_tools.py LABELS release-only WAITS COST 18)
 wm_script_test(run_lcm_examples COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/lcm_examples.py LABELS release-only WAITS)
 wm_script_test(run_lcm_streams COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/lcm_streams.py LABELS release-only WAITS COST 22)
+wm_script_test(run_config_trial COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/config_trial.py LABELS release-only WAITS COST 60)
+wm_script_test(run_journal COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/journal.py LABELS release-only WAITS)
 wm_script_test(run_play COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/play.py LABELS release-only WAITS COST 13)
 # Real recordings played live and over LCM give the replay's poses: a quarter of an hour and more, where the recordings are.
 wm_script_test(run_played COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/played.py ${CMAKE_BINARY_DIR}/bin ${CMAKE_SOURCE_DIR}/../shared/data

@@ -206,6 +206,8 @@ TEST(a_run_begins_where_the_last_one_ended) {
   }
 }
 
+static int is_asked(void *context) { return atomic_exchange((atomic_int *)context, 0); }
+
 static int reloads;
 static wm_status refuse_then_take(void *context, wm_error *err) {
   atomic_int *asked = context;
@@ -234,7 +236,7 @@ TEST(another_configuration_is_taken_while_it_drives) {
   robot = robot_on(&can, &config);
   options = (wm_run_options){.seed = 1, .speed = 1, .duration_s = LONGEST_S, .say = hear, .start = &start};
   atomic_store(&asked, 1);
-  options.reload_asked = &asked;
+  options.wants_reload = is_asked;
   options.reload = refuse_then_take;
   options.reload_context = &asked;
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_run_live(&config, robot, &options, &live, &err), err.text);

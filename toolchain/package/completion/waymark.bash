@@ -32,7 +32,7 @@ _waymark() {
     "check") words='--landmarks --calibration --map --json --quick --apply' ;;
     "doctor") words='--json --seconds' ;;
     "stamps") words='' ;;
-    "config") words='--schema' ;;
+    "config") words='--schema --config --good-for --within --keep --untried' ;;
     "causes") words='--help --landmarks --calibration --map --clocks-apart --apply --json' ;;
     "mavlink") words='--help --link --as --frame --north --zero --origin --rate --take --system --component --url --prefix --duration' ;;
     "suggest") words='--help --out --against --only --from --to --minutes --json' ;;
