@@ -75,11 +75,11 @@ WM_KERNEL void add_block(const block_view &block, const field_poses &poses, int 
       const words tile = (row >> kTileShift) * tile_columns + (column >> kTileShift);
       words low, high;
       if constexpr (kLanes == 16) {
-        low = __builtin_shufflevector(inside, tile, 0, 16, 1, 17, 2, 18, 3, 19, 8, 24, 9, 25, 10, 26, 11, 27);
-        high = __builtin_shufflevector(inside, tile, 4, 20, 5, 21, 6, 22, 7, 23, 12, 28, 13, 29, 14, 30, 15, 31);
+        low = WM_SHUFFLE(inside, tile, 0, 16, 1, 17, 2, 18, 3, 19, 8, 24, 9, 25, 10, 26, 11, 27);
+        high = WM_SHUFFLE(inside, tile, 4, 20, 5, 21, 6, 22, 7, 23, 12, 28, 13, 29, 14, 30, 15, 31);
       } else {
-        low = __builtin_shufflevector(inside, tile, 0, 8, 1, 9, 2, 10, 3, 11);
-        high = __builtin_shufflevector(inside, tile, 4, 12, 5, 13, 6, 14, 7, 15);
+        low = WM_SHUFFLE(inside, tile, 0, 8, 1, 9, 2, 10, 3, 11);
+        high = WM_SHUFFLE(inside, tile, 4, 12, 5, 13, 6, 14, 7, 15);
       }
       std::memcpy(at + k * kLanes / 2, &low, sizeof low);
       std::memcpy(at + k * kLanes / 2 + kLanes / 4, &high, sizeof high);

@@ -17,6 +17,13 @@
 #define WM_HAS_WIDE 0
 #endif
 
+// Lanes of two vectors by their numbers. GCC 11 has it under another name, which takes the numbers as a vector.
+#if defined(__GNUC__) && !defined(__clang__) && __GNUC__ < 12
+#define WM_SHUFFLE(a, b, ...) __builtin_shuffle(a, b, (__typeof__((a) == (b))){__VA_ARGS__})
+#else
+#define WM_SHUFFLE(a, b, ...) __builtin_shufflevector(a, b, __VA_ARGS__)
+#endif
+
 #define WM_KERNEL [[gnu::always_inline]] inline
 
 #endif

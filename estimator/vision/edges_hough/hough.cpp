@@ -112,7 +112,7 @@ void load_row(const uint8_t *from, int side, int column, int16_t *out) {
     bytes v;
     std::memcpy(&v, from - x - 7, sizeof v);
     const half_lanes wide = __builtin_convertvector(v, half_lanes);
-    const half_lanes turned = __builtin_shufflevector(wide, wide, 7, 6, 5, 4, 3, 2, 1, 0);
+    const half_lanes turned = WM_SHUFFLE(wide, wide, 7, 6, 5, 4, 3, 2, 1, 0);
     std::memcpy(out + x, &turned, sizeof turned);
   }
   for (; x < side; x++) out[x] = from[x * column];
