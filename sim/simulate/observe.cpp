@@ -191,7 +191,9 @@ void find_position(const Scenario &sc, size_t number, Recording &r) {
             arrival_ns,
             static_cast<uint16_t>(64 + number),
             {0, 0, 0},
-            depth ? kNoIdea_m : s.sigma_xy_m,
+            depth               ? kNoIdea_m
+            : s.stated_xy_m > 0 ? s.stated_xy_m
+                                : s.sigma_xy_m,
             s.sigma_z_m,
             dice.outlier() < s.outlier_fraction};
     for (uint64_t i = 0; i < 3; i++) {

@@ -368,15 +368,37 @@ void read_errors(Reader &r, const wm_yaml_node &map, Errors &out) {
   r.number(map, "wheel_noise_mm_per_sqrt_m", 0, 1000, kMilli, out.wheel_noise_sqrtm);
 }
 
-// The map under `key`, with the stretch of time that it must give.
-wm_yaml_node read_span(Reader &r, const wm_yaml_node &map, const char *key, const char *const *known, Span &out) {
-  const wm_yaml_node node = r.child(map, key, false);
-  if (!r.ok() || !wm_yaml_there(&node)) return node;
+void read_span(Reader &r, const wm_yaml_node &node, const char *const *known, Span &out) {
   r.keys(node, known);
   r.number(node, "from_s", 0, 1e9, 1, out.from_s, true);
   r.number(node, "to_s", 0, 1e9, 1, out.to_s, true);
   if (r.ok() && out.to_s <= out.from_s) r.fail(node, "to_s must be after from_s");
+}
+
+// The map under `key`, with the stretch of time that it must give.
+wm_yaml_node read_span(Reader &r, const wm_yaml_node &map, const char *key, const char *const *known, Span &out) {
+  const wm_yaml_node node = r.child(map, key, false);
+  if (r.ok() && wm_yaml_there(&node)) read_span(r, node, known, out);
   return node;
+}
+
+// One map, or a list of them.
+void read_slips(Reader &r, const wm_yaml_node &map, std::vector<Slip> &out) {
+  static const char *const known[] = {"from_s", "to_s", "wheel", "percent", "added_mps", nullptr};
+  static const char *const wheels[] = {"left", "right", "both", nullptr};
+  const wm_yaml_node node = r.child(map, "wheel_slip", false);
+  if (!r.ok() || !wm_yaml_there(&node)) return;
+  const bool is_list = wm_yaml_is_list(&node) != 0;
+  for (size_t i = 0, n = is_list ? r.list(node) : 1; i < n && r.ok(); i++) {
+    const wm_yaml_node item = is_list ? wm_yaml_item(&node, i) : node;
+    Slip slip;
+    read_span(r, item, known, slip);
+    r.word(item, "wheel", wheels, slip.wheel, true);
+    r.number(item, "percent", -100, 1000, kPercent, slip.share);
+    r.number(item, "added_mps", -10, 10, 1, slip.added_mps);
+    if (r.ok() && slip.share == 0 && slip.added_mps == 0) r.fail(item, "give percent, added_mps or both");
+    out.push_back(slip);
+  }
 }
 
 void read_stuck(Reader &r, const wm_yaml_node &map, const char *key, Stuck &out) {
@@ -445,7 +467,6 @@ void read_faults(Reader &r, const wm_yaml_node &map, Faults &out) {
   r.number(map, "camera_clock_drift_ppm", -1e5, 1e5, 1e-6, out.camera_clock_drift);
   static const char *const known_span[] = {"from_s", "to_s", nullptr};
   static const char *const known_lights[] = {"from_s", "to_s", "left_percent", nullptr};
-  static const char *const known_slip[] = {"from_s", "to_s", "wheel", "percent", nullptr};
   static const char *const known_kidnap[] = {"at_s", "forward_s", nullptr};
   read_span(r, map, "camera_dropout", known_span, out.camera_dropout);
   read_span(r, map, "frozen_picture", known_span, out.frozen_picture);
@@ -453,11 +474,7 @@ void read_faults(Reader &r, const wm_yaml_node &map, Faults &out) {
   read_stuck(r, map, "accelerometer_stuck", out.accelerometer_stuck);
   const wm_yaml_node lights = read_span(r, map, "lights_off", known_lights, out.lights_off);
   if (r.ok() && wm_yaml_there(&lights)) r.number(lights, "left_percent", 0, 100, kPercent, out.lights_left);
-  const wm_yaml_node slip = read_span(r, map, "wheel_slip", known_slip, out.wheel_slip);
-  if (r.ok() && wm_yaml_there(&slip)) {
-    r.word(slip, "wheel", wheels, out.wheel_slip_wheel, true);
-    r.number(slip, "percent", -100, 1000, kPercent, out.wheel_slip_share, true);
-  }
+  read_slips(r, map, out.wheel_slip);
   const wm_yaml_node kidnap = r.child(map, "kidnap", false);
   if (r.ok() && wm_yaml_there(&kidnap)) {
     r.keys(kidnap, known_kidnap);

@@ -164,6 +164,7 @@ struct Sensor {
   double alike_fraction = 0;    // share of the points that look like one of sixteen others
   // gnss and depth
   double sigma_xy_m = 0, sigma_z_m = 0;
+  double stated_xy_m = 0;                  // gnss: what the receiver says of its error; 0: sigma_xy_m
   double wander_m = 0, wander_s = 30;  // gnss: each axis wanders so much, with this correlation time
 };
 
@@ -232,6 +233,13 @@ struct Span {
   bool holds(double t_s) const { return t_s >= from_s && t_s < to_s; }
 };
 
+// Wheels that turn otherwise than they roll: by a share of the way, and by a speed on top of it.
+struct Slip : Span {
+  int wheel = 0;       // 0 left, 1 right, 2 both
+  double share = 0;    // relative; -1: it stands
+  double added_mps = 0;
+};
+
 // A sensor that repeats its last value: all axes, or one.
 struct Stuck : Span {
   int axis = -1;  // 0 x, 1 y, 2 z; -1: all
@@ -259,9 +267,7 @@ struct Faults {
   Span frozen_picture;                                         // the last picture again and again
   Span lights_off;
   double lights_left = 0.02;                     // what is left of the light then
-  Span wheel_slip;                               // one wheel turns more (or less) than it rolls
-  int wheel_slip_wheel = 0;                      // 0 left, 1 right
-  double wheel_slip_share = 0;                   // relative
+  std::vector<Slip> wheel_slip;
   double kidnap_at_s = 0, kidnap_forward_s = 0;  // carried to where it would be so much later; 0: not
   Stuck gyro_stuck, accelerometer_stuck;         // imu.csv repeats the last rates, the last specific force
 };

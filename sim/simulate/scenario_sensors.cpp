@@ -80,6 +80,7 @@ void read_landmark_sensor(Reader &r, const wm_yaml_node &map, Sensor &out) {
 
 void read_position(Reader &r, const wm_yaml_node &map, Sensor &out) {
   r.number(map, "sigma_xy_m", 1e-6, 1e5, 1, out.sigma_xy_m, out.kind == Kind::gnss);
+  r.number(map, "stated_xy_m", 1e-6, 1e5, 1, out.stated_xy_m);
   r.number(map, "sigma_z_m", 1e-6, 1e5, 1, out.sigma_z_m, true);
   r.number(map, "outlier_m", 0, 1e5, 1, out.outlier_m);
   r.number(map, "wander_m", 0, 1e5, 1, out.wander_m);
@@ -115,6 +116,7 @@ void read_sensor(Reader &r, const wm_yaml_node &map, bool pictured, Sensor &out)
                                       "appearance_noise_percent",
                                       "alike_percent",
                                       "sigma_xy_m",
+                                      "stated_xy_m",
                                       "wander_m",
                                       "missed_percent",
                                       "sigma_z_m",
@@ -143,7 +145,7 @@ void read_sensor(Reader &r, const wm_yaml_node &map, bool pictured, Sensor &out)
   for (const char *key :
        {"focal_px", "centre_px", "baseline_m", "size", "one_side_percent", "appearance_noise_percent", "alike_percent"})
     only(r, map, key, stereo, "stereo");
-  for (const char *key : {"sigma_xy_m", "wander_m", "wander_s"}) only(r, map, key, out.kind == Kind::gnss, "gnss");
+  for (const char *key : {"sigma_xy_m", "stated_xy_m", "wander_m", "wander_s"}) only(r, map, key, out.kind == Kind::gnss, "gnss");
   only(r, map, "sigma_z_m", position, "gnss or depth");
   only(r, map, "bearing_sigma_deg", looks || out.kind == Kind::compass, "landmarks, markers or compass");
 
@@ -188,6 +190,10 @@ void read_sensors(Reader &r, const wm_yaml_node &list, Scenario &out) {
     if (r.ok() && !names.insert(sensor.name).second)
       r.fail(item, ("the name '" + sensor.name + "' is there already; give this sensor a `name` of its own").c_str());
     if (r.ok() && sensor.kind == Kind::stereo && ++pairs > 1) r.fail(item, "a recording has one stereo pair");
+    for (const Sensor &other : out.sensors)
+      if (r.ok() && sensor.kind == Kind::gnss && other.kind == Kind::gnss &&
+          !std::equal(sensor.xyz_m, sensor.xyz_m + 3, other.xyz_m))
+        r.fail(item, "sensors of kind gnss are one receiver in several modes, with one antenna: write the same xyz_m");
     if (r.ok() && sensor.kind == Kind::edges && out.world.kind != "corridor")
       r.fail(item, "only the world `corridor` has edges on the floor");
     if (r.ok() && sensor.kind == Kind::markers && (out.swims() || out.world.kind == "seabed"))

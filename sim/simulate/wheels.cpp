@@ -20,7 +20,7 @@ Wheels::Wheels(const Scenario &sc, const Random &random, const Drive &drive, con
   track_m_ = w.track_m * sc.motion.track_scale * (1 + drawn.track);
   heading0_rad_ = drive.at(0).heading_rad;
   for (int side = 0; side < 2; side++) radius_m_[side] = w.radius_m * (1 + drawn.wheel_radius[side]);
-  if (sc.errors.slip > 0 || sc.errors.wheel_noise_sqrtm > 0 || sc.faults.wheel_slip.to_s > sc.faults.wheel_slip.from_s)
+  if (sc.errors.slip > 0 || sc.errors.wheel_noise_sqrtm > 0 || !sc.faults.wheel_slip.empty())
     slip(sc, random);
 }
 
@@ -33,12 +33,15 @@ void Wheels::slip(const Scenario &sc, const Random &random) {
     for (uint64_t k = 0; k < steps; k++) {
       slipped_m_[side].push_back(sum);
       const double t_s = static_cast<double>(k) * kSlipStep_s;
-      double slip = sc.errors.slip * share;
-      if (sc.faults.wheel_slip.holds(t_s) && sc.faults.wheel_slip_wheel == static_cast<int>(side))
-        slip += sc.faults.wheel_slip_share;
+      double slip = sc.errors.slip * share, added_mps = 0;
+      for (const Slip &fault : sc.faults.wheel_slip) {
+        if (!fault.holds(t_s) || fault.wheel == 1 - static_cast<int>(side)) continue;
+        slip += fault.share;
+        added_mps += fault.added_mps;
+      }
       const State now = drive_.at(t_s);
       const double rim_mps = now.speed_mps + (side == 0 ? -0.5 : 0.5) * track_m_ * now.yaw_rate_radps;
-      sum += slip * rim_mps * kSlipStep_s;
+      sum += (slip * rim_mps + added_mps) * kSlipStep_s;
       if (sc.errors.wheel_noise_sqrtm > 0)
         sum += sc.errors.wheel_noise_sqrtm * std::sqrt(std::fabs(rim_mps) * kSlipStep_s) *
                random.normal(Stream::wheel_noise, k, side);

@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
+#include <utility>
 
 #include "simulate/angle.h"
 #include "simulate/bus.h"
@@ -180,8 +181,9 @@ wm_status write_calibration(const Scenario &sc, const Recording &r, const std::s
     if (s.range_sigma_m > 0) f.print("    range_sigma_m: %.6g\n", s.range_sigma_m);
     if (s.range_is_depth) f.text("    range_is: depth\n");
   }
+  bool has_antenna = false;
   for (const Sensor &s : sc.sensors)
-    if (s.kind == Sensor::Kind::gnss)
+    if (s.kind == Sensor::Kind::gnss && !std::exchange(has_antenna, true))
       f.print("gnss: {mounting: {xyz_m: [%.6g, %.6g, %.6g]}}\n", s.xyz_m[0], s.xyz_m[1], s.xyz_m[2]);
   if (!r.motion6.empty()) {
     const double v = sc.errors.speed_noise_mps, w = sc.errors.yaw_rate_noise_radps;

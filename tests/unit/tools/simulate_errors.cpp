@@ -288,9 +288,7 @@ TEST(test_a_slip_and_a_dead_encoder) {
   Scenario s = eight("hall-easy");
   make_perfect(s);
   const Recording plain = driven(s, 1);
-  s.faults.wheel_slip = {5, 5.5};
-  s.faults.wheel_slip_wheel = 0;
-  s.faults.wheel_slip_share = 0.2;
+  s.faults.wheel_slip = {{{5, 5.5}, 0, 0.2, 0}};
   s.faults.dead_encoder = 1;
   s.faults.dead_encoder_from_s = 12;
   const Recording r = driven(s, 1);
@@ -349,7 +347,7 @@ TEST(test_hard_doubles_easy) {
     TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.04, easy.pictures.latency_jitter_s);
     TEST_ASSERT_TRUE(hard.faults.frames_late > 0 && hard.faults.camera_clock_drift > 0);
     TEST_ASSERT_TRUE(!wheels ||
-                     (hard.faults.can_lost > 0 && hard.faults.can_late > 0 && hard.faults.wheel_slip_share > 0));
+                     (hard.faults.can_lost > 0 && hard.faults.can_late > 0 && hard.faults.wheel_slip.size() == 1));
   }
 }
 
