@@ -26,6 +26,17 @@ innovation prepare(planar_filter *filter, const residual *r, int count) {
   return filter->prepare(rows, innovations, noise, count);
 }
 
+// Observations of the pose itself and of landmarks; another localizer may be wrong as well as the wheels.
+bool wheels_lie(planar_filter *filter, const residual *r, const innovation &prepared) {
+  if (r->source.kind == noise_adaption::kNone || !(prepared.determinant > 0.0)) return false;
+  noise_adaption::row rows[planar_filter::kRows];
+  for (int k = 0; k < prepared.rows; k++) {
+    rows[k] = {{}, {}, prepared.value[k], prepared.s[k][k], r[k].noise, r[k].source.kind, k};
+    filter->put_adapted(r[k].row, rows[k].by);
+  }
+  return filter->weigh_wheels(rows, prepared.rows);
+}
+
 wm_verdict update(planar_filter *filter, innovation &&prepared, const residual *r, const gate_result &g,
                   const fuse_policy &policy) {
   const int count = prepared.rows;
@@ -50,6 +61,7 @@ wm_verdict update(planar_filter *filter, innovation &&prepared, const residual *
 fuse_result fuse(planar_filter *filter, residual *r, int count, double clutter_volume, const fuse_policy &policy,
                  record_list records) {
   innovation prepared = prepare(filter, r, count);
+  if (policy.usable && wheels_lie(filter, r, prepared)) prepared = prepare(filter, r, count);
   double variance[planar_filter::kRows];
   for (int i = 0; i < count; i++) variance[i] = prepared.s[i][i];
   const double log_bayes = landmark_evidence::log_bayes_factor(prepared.density(), clutter_volume);

@@ -43,6 +43,7 @@ void position_aid::carry_error(wm_time_ns t_ns, double position_sigma_m, planar_
   for (int k = 0; k < 2; k++) filter->fade(error_ + k, factor, added);
   noise.fade_correlated(factor, added);
   filter->turn_test().fade_correlated(factor);
+  filter->wheel_test().fade_correlated(factor);
 }
 
 void position_aid::release(planar_motion *filter) const {

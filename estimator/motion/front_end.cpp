@@ -483,7 +483,7 @@ void motion_front_end::note_holonomic(motion_input *input) {
 
 bool motion_front_end::standstill_yaw_rate(double *yaw_rate_radps) const {
   *yaw_rate_radps = value_[WM_Q_YAW_RATE];
-  return yaw_fresh_ != 0;
+  return yaw_fresh_ != 0 && !distrusted_;
 }
 
 bool motion_front_end::speed_source_changed() {

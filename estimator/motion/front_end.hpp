@@ -73,6 +73,7 @@ class motion_front_end {
                                     stated_noise_now(), noise_factors_);
       add_overdue_noise(segment, *params_, counts_give_way(segment), position_m2, &noise);
       add_refused_noise(segment, *params_, &noise);
+      if (distrusted_) add_distrusted_noise(segment, twist, &noise);
       if (segment.input.command) add_change_noise(segment, *params_, &noise);
       if (segment.held_s == 0.0) add_sampling_noise(segment.input, &noise);
       const bool is_twist = segment.input.model == WM_MOTION_TWIST || segment.input.model == WM_MOTION_SPEED_YAW_RATE;
@@ -100,6 +101,10 @@ class motion_front_end {
   // first call it grows without them.
   void set_position_variance(double variance_m2) { position_m2_ = variance_m2; }
   void set_noise_factors(const noise_factors &factors) { noise_factors_ = factors; }
+  // The wheels are found to lie, or are not: the speed is unknown meanwhile.
+  void distrust(bool lie) { distrusted_ = static_cast<uint8_t>(lie); }
+  // The speed is that of wheels that roll: measured, not commanded, and not another program's.
+  bool are_wheels() const { return !commands_ && model_ >= WM_MOTION_TICKS && model_ <= WM_MOTION_TWIST; }
   wm_time_ns now_ns() const { return now_ns_; }
   wm_time_ns newest_ns() const { return newest_ns_; }  // newest event that the model uses
   uint32_t health() const { return health_; }
@@ -135,7 +140,8 @@ class motion_front_end {
   bool speed_source_changed();
   // No speed since standstill.after_s.
   bool stands(wm_time_ns t_ns) const {
-    return still_since_ns_ != WM_TIME_NONE && wm_seconds_between(still_since_ns_, t_ns) >= params_->standstill_after_s;
+    return still_since_ns_ != WM_TIME_NONE && !distrusted_ &&
+           wm_seconds_between(still_since_ns_, t_ns) >= params_->standstill_after_s;
   }
   // The yaw rate of the last event at standstill, which is the gyro's bias. False: none.
   bool standstill_yaw_rate(double *yaw_rate_radps) const;
@@ -264,6 +270,7 @@ class motion_front_end {
   uint8_t yaw_fresh_;                  // the last event brought a yaw rate
   uint8_t observed_without_;  // per wheel: observations corrected the pose while counts were missing; no count since
   uint8_t speed_is_signed_;   // a negative speed came: the sign is the sensor's, not the gear's
+  uint8_t distrusted_;        // the wheels are found to lie
 };
 
 }  // namespace wm

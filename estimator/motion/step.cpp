@@ -12,6 +12,8 @@ namespace {
 
 // The same where the steering is not trusted: a car on a road turns less. Not swept.
 constexpr double kUnknownSteeringRate_radps = 0.1;
+// Speed of a robot that is pushed or carried, m/s: walking pace.
+constexpr double kPushed_mps = 0.5;
 // Above this the speed is an artefact of two counts with nearly equal stamps; robots with counters are slower.
 constexpr double kCatchUp_mps = 30.0;
 // Below this fraction of the middle's speed (a turn about the encoder's wheel) the encoder does not measure the speed.
@@ -346,6 +348,14 @@ void add_center_noise(const wm_motion_calibration &calibration, motion_noise *no
   noise->lateral_m2 += x * x * noise->rotation_rad2 - 2.0 * x * noise->lateral_rotation;
   noise->distance_lateral -= x * noise->distance_rotation;
   noise->lateral_rotation -= x * noise->rotation_rad2;
+}
+
+void add_distrusted_noise(const motion_segment &segment, const motion_twist &twist, motion_noise *noise) {
+  const double speed_mps = larger(speed_of(twist), kPushed_mps);
+  noise->distrusted_m2 = square(speed_mps) * segment.dt_s;
+  noise->distance_m2 += noise->distrusted_m2;
+  noise->lateral_m2 += noise->distrusted_m2;
+  if (segment.input.model == WM_MOTION_TICKS) noise->rotation_rad2 += square(kUnknownRate_radps) * segment.dt_s;
 }
 
 void add_refused_noise(const motion_segment &segment, const wm_motion_params &p, motion_noise *noise) {

@@ -84,6 +84,7 @@ struct motion_noise {
   double distance_m2, rotation_rad2, distance_rotation, lateral_m2, distance_lateral, lateral_rotation;
   // The parts of the distance, to the side and of the rotation that noise_factors scale.
   double adapted_distance_m2, adapted_lateral_m2, adapted_rotation_rad2;
+  double distrusted_m2;  // the part on each axis that wheels have which are found to lie
 };
 
 // Factors of the variances along and across the way, and of the rotation, that an estimator has found.
@@ -119,6 +120,9 @@ void add_overdue_noise(const motion_segment &segment, const wm_motion_params &pa
 
 // The noise of a turn about a centre that is ahead of base_link or behind: a part of the rotation's is sideways, too.
 void add_center_noise(const wm_motion_calibration &calibration, motion_noise *noise);
+
+// Noise of wheels that are found to lie: the robot may stand, or be pushed or carried to any side.
+void add_distrusted_noise(const motion_segment &segment, const motion_twist &twist, motion_noise *noise);
 
 // A sampled speed or turn rate holds until the next sample. A change by c between two samples, dt apart, happened at
 // any time between them: the distance or angle is evenly distributed over c dt, variance (c dt)^2 / 12. Its mean, c dt

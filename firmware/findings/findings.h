@@ -151,6 +151,8 @@ typedef void (*wm_line_fn)(void *context, const char *line);
 // devices, refused observations, maps.
 void wm_health_findings(const wm_health *health, wm_findings *out);
 
+// Of the first of these bits of motion_health; "" for none.
+const char *wm_motion_health_text(uint32_t bits);
 // What is wrong with the source behind a doubtful pose: "has biased innovations"; "" for none.
 const char *wm_cause_text(unsigned cause);
 // Of these, the ones about the map: landmarks that moved, identities that stand for two, capacity.

@@ -136,21 +136,36 @@ static void about_refused(const wm_source_health *s, wm_findings *out) {
         ->size = (double)unknown / (double)s->received;
 }
 
+static const char *const kMotionTexts[] = {
+    "the left encoder stood still while the robot moved (dead?)",
+    "the right encoder stood still while the robot moved (dead?)",
+    "a message's counter stood still: its sender is stuck; its values were not used",
+    "the yaw rate never changed (stuck sensor?)",
+    "samples of the last seconds exceeded the plausible acceleration and were refused (motion.limits)",
+    "the vehicle rose, rolled or pitched for seconds, which an estimator in the plane does not model",
+    "the gyro's roll rate never changed (stuck sensor?); it is not used",
+    "the gyro's pitch rate never changed (stuck sensor?); it is not used",
+    "the accelerometer gave one and the same value (stuck sensor?); it is not used",
+    "the speed is silent while other sensors of the motion go on; the last one holds for a while",
+    "the gyro, or the steering, is silent while the speed comes; the wheels or another sensor stand in",
+    "the wheels turn and the robot stands: a hole, a wall; its speed is unknown meanwhile",
+    "one wheel spins, by the gyro; the speed is unknown meanwhile",
+    "the robot moves and its wheels stand: it is pushed, or carried; its speed is unknown meanwhile",
+    "the robot moves otherwise than its wheels turn: lifted, or sliding; its speed is unknown meanwhile"};
+// From kWheelsFrom on the ground is to blame, and no sensor.
+enum { kMotionTextCount = sizeof kMotionTexts / sizeof kMotionTexts[0], kWheelsFrom = 11 };
+
+const char *wm_motion_health_text(uint32_t bits) {
+  for (unsigned i = 0; i < kMotionTextCount; i++)
+    if ((bits >> i) & 1u) return kMotionTexts[i];
+  return "";
+}
+
 static void about_motion(uint32_t bits, wm_findings *out) {
-  static const char *const kTexts[] = {
-      "the left encoder stood still while the robot moved (dead?)",
-      "the right encoder stood still while the robot moved (dead?)",
-      "a message's counter stood still: its sender is stuck; its values were not used",
-      "the yaw rate never changed (stuck sensor?)",
-      "samples of the last seconds exceeded the plausible acceleration and were refused (motion.limits)",
-      "the vehicle rose, rolled or pitched for seconds, which an estimator in the plane does not model",
-      "the gyro's roll rate never changed (stuck sensor?); it is not used",
-      "the gyro's pitch rate never changed (stuck sensor?); it is not used",
-      "the accelerometer gave one and the same value (stuck sensor?); it is not used",
-      "the speed is silent while other sensors of the motion go on; the last one holds for a while",
-      "the gyro, or the steering, is silent while the speed comes; the wheels or another sensor stand in"};
-  for (unsigned i = 0; i < sizeof kTexts / sizeof kTexts[0]; i++)
-    if ((bits >> i) & 1u) wm_find(out, WM_FOUND_MOTION_SENSOR, WM_SEVERITY_BAD, "motion", NULL, "%s", kTexts[i]);
+  for (unsigned i = 0; i < kMotionTextCount; i++)
+    if ((bits >> i) & 1u)
+      wm_find(out, WM_FOUND_MOTION_SENSOR, i < kWheelsFrom ? WM_SEVERITY_BAD : WM_SEVERITY_NOTE, "motion",
+              i < kWheelsFrom ? NULL : "", "%s", kMotionTexts[i]);
 }
 
 // Landmarks at other places than in the map, or without capacity in the map.

@@ -120,9 +120,11 @@ static void say_changes(live *run, const wm_health *health) {
     }
     live_say_later(run, line);
   }
-  if (health->motion_health != self->said_motion_health)
-    live_say_later(run, health->motion_health ? "motion: a sensor is dead, stuck or silent (see health)"
-                                              : "motion: the sensors work again");
+  if (health->motion_health != self->said_motion_health) {
+    const char *text = wm_motion_health_text(health->motion_health);
+    (void)snprintf(line, sizeof line, "motion: %s", text[0] ? text : "the sensors work again");
+    live_say_later(run, line);
+  }
   self->said_motion_health = health->motion_health;
 }
 

@@ -330,6 +330,22 @@ static void outliers(const wm_assembly *assembly, const wm_health *health, wm_fi
       ->size = share;
 }
 
+// For how long the wheels did not turn as the robot moved.
+static void wheels(const wm_health *health, wm_findings *out) {
+  static const struct {
+    const char *name, *text;
+  } kLies[] = {{"motion.wheels_spin_s", "the wheels turned and the robot stood for %.1f s: a hole, a wall"},
+               {"motion.one_wheel_spins_s", "one wheel span for %.1f s, by the gyro"},
+               {"motion.pushed_s", "the robot moved and its wheels stood for %.1f s: pushed, or carried"},
+               {"motion.lifted_s", "the robot moved otherwise than its wheels turned for %.1f s: lifted, or sliding"}};
+  for (uint32_t i = 0; i < wm_health_calibration_count(health); i++)
+    for (size_t k = 0; k < sizeof kLies / sizeof kLies[0]; k++)
+      if (strcmp(wm_health_calibration(health, i)->name, kLies[k].name) == 0)
+        wm_find(out, WM_FOUND_MOTION_SENSOR, WM_SEVERITY_NOTE, "wheels", "", kLies[k].text,
+                wm_health_calibration(health, i)->value)
+            ->size = wm_health_calibration(health, i)->value;
+}
+
 static void states(const drive_evidence *self, const wm_assembly *assembly, const wm_health *health, uint64_t total,
                    wm_findings *out) {
   if (self->published == 0 && self->poses > 0) return;  // a log: it holds no messages
@@ -548,6 +564,7 @@ void evidence_judge(const drive_evidence *self, const wm_assembly *assembly, con
   for (size_t i = 0; i < assembly->source_count; i++) refused(self, assembly, i, out);
   for (size_t i = 0; i < assembly->source_count; i++) weightless(self, assembly, i, out);
   outliers(assembly, health, out);
+  wheels(health, out);
   const int is_lost = evidence_share(self, WM_STATE_LOST, total) > BIASED_LOST_MAX;
   for (size_t i = 0; i < assembly->source_count; i++) biased(self, assembly, i, is_lost, out);
   states(self, assembly, health, total, out);

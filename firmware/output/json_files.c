@@ -128,9 +128,21 @@ static void put_names(FILE *f, const char *key, const char *const *names, const 
 }
 
 static void put_motion_health(FILE *f, uint32_t bits) {
-  static const char *const kNames[] = {
-      "encoder_left_dead", "encoder_right_dead", "counter_frozen",      "yaw_rate_stuck", "implausible", "not_planar",
-      "roll_rate_stuck",   "pitch_rate_stuck",   "accelerometer_stuck", "speed_silent",   "turn_silent"};
+  static const char *const kNames[] = {"encoder_left_dead",
+                                       "encoder_right_dead",
+                                       "counter_frozen",
+                                       "yaw_rate_stuck",
+                                       "implausible",
+                                       "not_planar",
+                                       "roll_rate_stuck",
+                                       "pitch_rate_stuck",
+                                       "accelerometer_stuck",
+                                       "speed_silent",
+                                       "turn_silent",
+                                       "wheels_spin",
+                                       "one_wheel_spins",
+                                       "pushed",
+                                       "lifted"};
   enum { kCount = sizeof kNames / sizeof kNames[0] };
   int wanted[kCount];
   for (unsigned i = 0; i < kCount; i++) wanted[i] = (bits >> i) & 1u;

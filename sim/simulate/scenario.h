@@ -164,7 +164,7 @@ struct Sensor {
   double alike_fraction = 0;    // share of the points that look like one of sixteen others
   // gnss and depth
   double sigma_xy_m = 0, sigma_z_m = 0;
-  double stated_xy_m = 0;                  // gnss: what the receiver says of its error; 0: sigma_xy_m
+  double stated_xy_m = 0;              // gnss: what the receiver says of its error; 0: sigma_xy_m
   double wander_m = 0, wander_s = 30;  // gnss: each axis wanders so much, with this correlation time
 };
 
@@ -235,8 +235,8 @@ struct Span {
 
 // Wheels that turn otherwise than they roll: by a share of the way, and by a speed on top of it.
 struct Slip : Span {
-  int wheel = 0;       // 0 left, 1 right, 2 both
-  double share = 0;    // relative; -1: it stands
+  int wheel = 0;     // 0 left, 1 right, 2 both
+  double share = 0;  // relative; -1: it stands
   double added_mps = 0;
 };
 
@@ -266,7 +266,7 @@ struct Faults {
   Span camera_dropout;                                         // no pictures
   Span frozen_picture;                                         // the last picture again and again
   Span lights_off;
-  double lights_left = 0.02;                     // what is left of the light then
+  double lights_left = 0.02;  // what is left of the light then
   std::vector<Slip> wheel_slip;
   double kidnap_at_s = 0, kidnap_forward_s = 0;  // carried to where it would be so much later; 0: not
   Stuck gyro_stuck, accelerometer_stuck;         // imu.csv repeats the last rates, the last specific force

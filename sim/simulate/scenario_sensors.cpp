@@ -145,7 +145,8 @@ void read_sensor(Reader &r, const wm_yaml_node &map, bool pictured, Sensor &out)
   for (const char *key :
        {"focal_px", "centre_px", "baseline_m", "size", "one_side_percent", "appearance_noise_percent", "alike_percent"})
     only(r, map, key, stereo, "stereo");
-  for (const char *key : {"sigma_xy_m", "stated_xy_m", "wander_m", "wander_s"}) only(r, map, key, out.kind == Kind::gnss, "gnss");
+  for (const char *key : {"sigma_xy_m", "stated_xy_m", "wander_m", "wander_s"})
+    only(r, map, key, out.kind == Kind::gnss, "gnss");
   only(r, map, "sigma_z_m", position, "gnss or depth");
   only(r, map, "bearing_sigma_deg", looks || out.kind == Kind::compass, "landmarks, markers or compass");
 

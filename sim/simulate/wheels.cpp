@@ -20,8 +20,7 @@ Wheels::Wheels(const Scenario &sc, const Random &random, const Drive &drive, con
   track_m_ = w.track_m * sc.motion.track_scale * (1 + drawn.track);
   heading0_rad_ = drive.at(0).heading_rad;
   for (int side = 0; side < 2; side++) radius_m_[side] = w.radius_m * (1 + drawn.wheel_radius[side]);
-  if (sc.errors.slip > 0 || sc.errors.wheel_noise_sqrtm > 0 || !sc.faults.wheel_slip.empty())
-    slip(sc, random);
+  if (sc.errors.slip > 0 || sc.errors.wheel_noise_sqrtm > 0 || !sc.faults.wheel_slip.empty()) slip(sc, random);
 }
 
 // First-order Gauss-Markov: stationary, of the deviation that the scenario says.

@@ -47,7 +47,7 @@ def tables():
     for path in sorted([*(ROOT / "config").glob("*.yaml"), *(ROOT / "config/datasets").glob("*.yaml")]):
         name = str(path.relative_to(ROOT / "config"))
         check(f"]({name})" in page, f"config/README.md names {name}")
-    tested = {kind for kind, *_ in KINDS} | {"robot", "hospital-robot"}  # the last: tests/contract/hospital.py drives it
+    tested = {kind for kind, *_ in KINDS} | {"robot", "hospital-robot", "robot-mower"}  # the last two: tests/contract/hospital.py, mower.py
     check({p.stem for p in (ROOT / "config").glob("*.yaml")} == tested, "each configuration by kind of robot has a drive here")
 
 

@@ -149,7 +149,7 @@ std::vector<CalibrationState> calibration_of(const Json &health) {
 
 // What the run had to complain of beside its counts.
 std::string complaints(const Json &health) {
-  static constexpr std::array<std::pair<const char *, const char *>, 11> kMotion{{
+  static constexpr std::array<std::pair<const char *, const char *>, 15> kMotion{{
       {"encoder_left_dead", "The left wheel’s encoder stood still while the robot drove: it is taken for dead."},
       {"encoder_right_dead", "The right wheel’s encoder stood still while the robot drove: it is taken for dead."},
       {"counter_frozen", "A motion message kept coming with a counter that stood still: its sender hung."},
@@ -161,6 +161,10 @@ std::string complaints(const Json &health) {
       {"accelerometer_stuck", "The accelerometer gave one and the same value: it is taken for stuck."},
       {"speed_silent", "The speed had fallen silent by the end, while other sensors of the motion went on."},
       {"turn_silent", "The gyro, or the steering, had fallen silent by the end, while the speed came."},
+      {"wheels_spin", "The wheels turned and the robot stood at the end: a hole, or a wall."},
+      {"one_wheel_spins", "One wheel was spinning at the end, by the gyro."},
+      {"pushed", "The robot moved and its wheels stood at the end: it was pushed, or carried."},
+      {"lifted", "The robot moved otherwise than its wheels turned at the end: lifted, or sliding."},
   }};
   std::string out;
   const auto each = [&health](const char *key, const auto &then) {

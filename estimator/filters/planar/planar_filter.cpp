@@ -11,6 +11,11 @@ namespace {
 
 // Share of a state's variance. A correction that changes less is left out: a thousand of them are 1e-4 of it.
 constexpr double kTurned = 1e-7;
+// Wheels against the gyro, over this time; a gap of the counts is longer.
+constexpr double kCompare_s = 0.5, kCompareMost_s = 1.0;
+// What both differ by while the wheels roll: a share of the turn (track, stamps that are some 50 ms apart), a slip of
+// this share of the way, and a cheap gyro's bias. A wheel that spins is faster by walking pace.
+constexpr double kTurnShare = 0.2, kSlipShare = 0.05, kGyroBias_radps = 0.02, kSpinning_mps = 0.5;
 
 }  // namespace
 
@@ -23,6 +28,8 @@ int planar_filter::count_motion_states(const wm_motion_states &states, int model
 void planar_filter::init(const wm_setup &setup, const wm_motion_states &motion, int states, double *arrays) {
   correlated_ = -1;
   unused_ = 0;
+  counted_ns_ = WM_TIME_NONE;
+  compared_rad_ = counted_m_[0] = counted_m_[1] = 0.0;
   state_.init({states, kRows, 1, states}, arrays);
   init_motion(setup);
   const double sigma_xy = given_or_default(setup.start.sigma_xy_m);
@@ -55,6 +62,7 @@ bool planar_filter::move(const wm_event &motion) {
         (void)update(row, innovation, variance);  // its variance is a parameter above 0
       });
   wheels_.update(*this, front_);
+  weigh_turn();
   return lag_begins;
 }
 
@@ -206,7 +214,43 @@ void planar_filter::adapt(const innovation &i, const sparse_row *rows, const upd
     }
     noise_.update(adapted);
     turn_test_.update(adapted);
+    if (front_.are_wheels()) wheel_test_.update(adapted);
   }
+}
+
+// The wheels' difference against the gyro. Skid steer turns by less, by an unknown share.
+void planar_filter::weigh_turn() {
+  constexpr uint32_t kOthers = WM_MOTION_HEALTH_ENCODER_LEFT_DEAD | WM_MOTION_HEALTH_ENCODER_RIGHT_DEAD |
+                               WM_MOTION_HEALTH_COUNTER_FROZEN | WM_MOTION_HEALTH_YAW_RATE_STUCK |
+                               WM_MOTION_HEALTH_TURN_SILENT;
+  const double track_m = front_.wheels().track_m * calibration().value[kTrackScale];
+  double counted_m[2];
+  if (front_.model() != WM_MOTION_SPEED_YAW_RATE || front_.params().states.drive == WM_DRIVE_SKID_STEER ||
+      !(track_m > 0.0) || !front_.wheel_distances(counted_m))
+    return;
+  const wm_time_ns from_ns = counted_ns_;
+  const double dt_s = from_ns == WM_TIME_NONE ? kCompareMost_s : wm_seconds_between(from_ns, now_ns());
+  if (dt_s < kCompare_s) return;
+  const double left = counted_m[0] - counted_m_[0], right = counted_m[1] - counted_m_[1];
+  const double gyro_rad = wrap(odom().heading_rad - compared_rad_), wheels_rad = (right - left) / track_m;
+  counted_ns_ = now_ns();
+  compared_rad_ = odom().heading_rad;
+  for (int side = 0; side < 2; side++) counted_m_[side] = counted_m[side];
+  // A wheel whose count stands while the other one's grows is a dead encoder, or the robot pivots about it.
+  if (!(dt_s < kCompareMost_s) || (front_.health() & kOthers) || front_.counts_wrapped() || left == 0.0 || right == 0.0)
+    return;
+  const double turn_rad = larger(std::fabs(gyro_rad), std::fabs(wheels_rad));
+  const double way_m = 0.5 * (std::fabs(left) + std::fabs(right));
+  const double variance_rad2 =
+      square(kTurnShare * turn_rad) + square(kSlipShare * way_m / track_m) + square(kGyroBias_radps * dt_s);
+  wheel_test_.weigh_turn(wheels_rad - gyro_rad, variance_rad2, kSpinning_mps * dt_s / track_m, dt_s);
+}
+
+bool planar_filter::weigh_wheels(const noise_adaption::row *rows, int count) {
+  if (!front_.are_wheels()) return false;
+  const double added_m2 = wheel_test_.weigh(rows, count, now_ns());
+  if (added_m2 > 0.0) inflate_pose(added_m2, 0.0);
+  return added_m2 > 0.0;
 }
 
 void planar_filter::carry_state(int state, const planar_row &by, double change, double added_variance) {
@@ -226,6 +270,7 @@ void planar_filter::set_pose(const wm_pose2 &pose, const double covariance[3][3]
   put_pose(pose, covariance);
   noise_.restart(false);
   turn_test_.restart();
+  wheel_test_.restart();
   wheels_.restart();
 }
 

@@ -51,6 +51,9 @@ class planar_filter : public planar_motion {
   };
   // False: the innovation is stale, or its covariance not positive definite and finite, and nothing changed.
   [[nodiscard]] bool update(innovation &&i, const sparse_row *rows, const update_options &options);
+  // Whether the wheels are found to lie by these rows of an observation, before they are fused: the pose is less sure
+  // then, and the rows are to be prepared again.
+  bool weigh_wheels(const noise_adaption::row *rows, int count);
   // By one row.
   [[nodiscard]] bool update(const sparse_row &row, double innovation, double noise, int kept_from = 0, int kept_to = 0);
   // A row's derivatives by the states that the noise's adaption follows.
@@ -77,6 +80,7 @@ class planar_filter : public planar_motion {
   void copy_state(int state, int from, double added_variance);
 
  private:
+  void weigh_turn();
   void adapt(const innovation &i, const sparse_row *rows, const update_options &options);
   // A position shows where the antenna was a delay ago. An update keeps the error of that past pose, on the robot's
   // axes [Barrau2017]. The error of the present pose follows from it by the way driven since then, which the update
@@ -97,6 +101,8 @@ class planar_filter : public planar_motion {
 
   int correlated_, unused_;  // no padding; -1: none
   wheel_heading wheels_;
+  wm_time_ns counted_ns_;               // of the last comparison of the wheels with the gyro
+  double compared_rad_, counted_m_[2];  // heading of odometry, and distances of the wheels, then
 };
 
 // A planar filter that brings its own memory, for at most so many states.

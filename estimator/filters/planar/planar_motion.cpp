@@ -36,6 +36,7 @@ void planar_motion::init_motion(const wm_setup &setup) {
   for (steady_rate &rate : steady_) rate.restart(0.0);
   noise_.init(0.0);
   turn_test_.init();
+  wheel_test_.init();
   heading_rad_ = twist_heading_rad_ = 0.0;
   sensor_states_ = 0;
 }
@@ -138,6 +139,7 @@ void planar_motion::take_step(const motion_segment &segment, const motion_twist 
                               const pose_step &step, double heading_end_rad) {
   noise_.move(step.x_m, step.y_m, noise.adapted_distance_m2, noise.adapted_lateral_m2, noise.adapted_rotation_rad2);
   if (!has_velocity()) turn_test_.move(step.x_m, step.y_m, is_turn(twist, noise, segment.dt_s) ? step.turn_rad : 0.0);
+  if (front_.are_wheels()) wheel_test_.move(step.heading, segment.dt_s, twist.v, noise.distrusted_m2);
   odom_ = compose(odom_, step.body);
   travelled_m_ += speed_of(twist) * segment.dt_s;
   turned_rad_ += std::fabs(step.turn_rad);
@@ -269,6 +271,7 @@ void planar_motion::list_states(calibration_list *out) const {
       out->add_length(length_square(front_.params().states, i, value(state), sigma));
       if (is_stated_wrongly(state)) out->alarm(WM_ALARM_STATED, value(state));
     }
+  wheel_test_.list(out);
 }
 
 void planar_motion::check_stated() {

@@ -10,6 +10,7 @@
 #include "filters/core/calibration_list.hpp"
 #include "filters/core/noise_adaption.hpp"
 #include "filters/core/turn_check.hpp"
+#include "filters/core/wheel_check.hpp"
 #include "filters/planar/pose_step.hpp"
 #include "math/elementary.hpp"
 #include "motion/event_time.hpp"
@@ -57,7 +58,7 @@ class planar_motion {
   planar_twist twist_now() const { return has_velocity() ? velocity_at(heading_rad_) : twist(); }  // as corrected
   double twist_heading_rad() const { return twist_heading_rad_; }  // of its end, before later corrections
   const wm_motion_calibration &calibration() const { return calibration_; }
-  uint32_t motion_health() const { return front_.health(); }
+  uint32_t motion_health() const { return front_.health() | wheel_test_.health(); }
   uint64_t motion_outliers() const { return front_.outliers(); }
   // A twist for the derivative of a time offset: where counts give the speed or the turn, low-passed, without their
   // steps.
@@ -81,6 +82,7 @@ class planar_motion {
   const noise_adaption &noise() const { return noise_; }
   turn_check &turn_test() { return turn_test_; }
   const turn_check &turn_test() const { return turn_test_; }
+  wheel_check &wheel_test() { return wheel_test_; }
   int motion_state(int calibration_index) const { return motion_state_[calibration_index]; }  // -1: off
 
   // ---- the state ----
@@ -199,6 +201,7 @@ class planar_motion {
   void predict_once(wm_time_ns t_ns, Walked walked) {
     const double dt = wm_seconds_between(now_ns(), t_ns);
     front_.set_noise_factors({noise_.scale(noise_adaption::kWay), noise_.scale(noise_adaption::kTurn)});
+    front_.distrust(wheel_test_.holds());
     front_.advance(t_ns, calibration_,
                    [this](const motion_segment &piece, const motion_twist &twist, const motion_noise &noise) {
                      propagate(piece, twist, noise);
@@ -265,6 +268,7 @@ class planar_motion {
   steady_rate steady_[2];     // of its v and w
   noise_adaption noise_;
   turn_check turn_test_;
+  wheel_check wheel_test_;
   double heading_rad_;  // only where has_velocity()
 };
 

@@ -82,6 +82,7 @@ pose_step make_pose_step(const motion_segment &segment, const motion_twist &twis
   out.y_m = dy;
   out.turn_rad = a.turn_rad;
   out.body = {a.x_m, a.y_m, a.turn_rad};
+  out.heading = h;
 
   out.column[0] = kHeading;
   out.by[0][0] = -dy;

@@ -4,6 +4,7 @@
 #ifndef WAYMARK_ESTIMATOR_PLANAR_POSE_STEP_HPP
 #define WAYMARK_ESTIMATOR_PLANAR_POSE_STEP_HPP
 
+#include "math/elementary.hpp"
 #include "motion/history.hpp"
 #include "motion/step.hpp"
 #include "waymark/frames.h"
@@ -17,6 +18,7 @@ struct pose_step {
   static constexpr int kMaxColumns = 15;  // the heading, and the calibration's fourteen terms; a model has fewer
   double x_m, y_m, turn_rad;              // motion of the pose, in map
   wm_pose2 body;                          // the same in base_link at the segment's beginning
+  sin_cos heading;                        // of the heading there
   // F is the identity but for the pose's rows, which have by[k][row] besides in column[k].
   int columns;
   int column[kMaxColumns];

@@ -61,6 +61,11 @@ void wm_motion_choose(wm_motion_params *params, uint32_t kinds);
 // Overdue while other sensors of the motion go on: another one stands in, or the last value holds with growing noise.
 #define WM_MOTION_HEALTH_SPEED_SILENT (1u << 9)
 #define WM_MOTION_HEALTH_TURN_SILENT (1u << 10)  // the gyro, or the steering of a robot without one
+// Wheels that do not turn as the robot moves: their speed is that of an unknown motion meanwhile.
+#define WM_MOTION_HEALTH_WHEELS_SPIN (1u << 11)      // they turn and the robot stands: a hole, a wall
+#define WM_MOTION_HEALTH_ONE_WHEEL_SPINS (1u << 12)  // by the gyro
+#define WM_MOTION_HEALTH_PUSHED (1u << 13)           // they stand and the robot moves
+#define WM_MOTION_HEALTH_LIFTED (1u << 14)           // it moves otherwise than they turn
 
 // Effective track over the distance of the wheels of skid steer, and the prior's sigma [Mandow2007]: above 1, as wheels
 // slip in turns. A prior for wheels and tracks on hard and soft floors. Not swept.

@@ -130,7 +130,8 @@ static void of_run(const wm_health *h, FILE *to) {
   gauge(to, "send_p99_seconds", "From a pose made to its message handed over, 99 of 100.",
         (double)h->send_p99_ns * 1e-9);
   gauge(to, "other_runs", "Runs on the same channels.", h->other_runs);
-  gauge(to, "motion_sensors_broken", "1 where an odometry sensor is dead, stuck or silent.", h->motion_health != 0);
+  gauge(to, "motion_sensors_broken", "1 where an odometry sensor is dead, stuck or silent, or wheels slip.",
+        h->motion_health != 0);
 }
 
 static void source_head(FILE *to, const char *name, const wm_source_health *s) {

@@ -116,7 +116,7 @@ static int list_troubles(const watch *self, char *why, size_t why_bytes) {
   if (h->cause) add_cause(h, why, why_bytes), faults++;
   if (self->has_pose && (self->pose.status_flags & WM_PUB_MOTION_STALE))
     add(why, why_bytes, "motion", "stale"), faults++;
-  if (h->motion_health) add(why, why_bytes, "motion sensor", "broken"), faults++;
+  if (h->motion_health) add(why, why_bytes, "motion", wm_motion_health_text(h->motion_health)), faults++;
   if (h->other_runs > 0) add(why, why_bytes, "another run", "on the same channels"), faults++;
   return faults;
 }
