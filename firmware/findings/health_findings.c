@@ -152,8 +152,8 @@ static const char *const kMotionTexts[] = {
     "one wheel spins, by the gyro; the speed is unknown meanwhile",
     "the robot moves and its wheels stand: it is pushed, or carried; its speed is unknown meanwhile",
     "the robot moves otherwise than its wheels turn: lifted, or sliding; its speed is unknown meanwhile"};
-// From kWheelsFrom on the ground is to blame, and no sensor.
-enum { kMotionTextCount = sizeof kMotionTexts / sizeof kMotionTexts[0], kWheelsFrom = 11 };
+#define FIRST_OF_WHEELS 11  // from here on the ground is to blame, and no sensor
+enum { kMotionTextCount = sizeof kMotionTexts / sizeof kMotionTexts[0] };
 
 const char *wm_motion_health_text(uint32_t bits) {
   for (unsigned i = 0; i < kMotionTextCount; i++)
@@ -164,8 +164,8 @@ const char *wm_motion_health_text(uint32_t bits) {
 static void about_motion(uint32_t bits, wm_findings *out) {
   for (unsigned i = 0; i < kMotionTextCount; i++)
     if ((bits >> i) & 1u)
-      wm_find(out, WM_FOUND_MOTION_SENSOR, i < kWheelsFrom ? WM_SEVERITY_BAD : WM_SEVERITY_NOTE, "motion",
-              i < kWheelsFrom ? NULL : "", "%s", kMotionTexts[i]);
+      wm_find(out, WM_FOUND_MOTION_SENSOR, i < FIRST_OF_WHEELS ? WM_SEVERITY_BAD : WM_SEVERITY_NOTE, "motion",
+              i < FIRST_OF_WHEELS ? NULL : "", "%s", kMotionTexts[i]);
 }
 
 // Landmarks at other places than in the map, or without capacity in the map.
