@@ -23,8 +23,8 @@
 
 namespace bench {
 
-// The search for tag36h11 in a grey picture, at full resolution (1) or at half of it (2, the library's default), without
-// poses. True: it found one.
+// The search for tag36h11 in a grey picture, at full resolution (1) or at half of it (2, the library's default),
+// without poses. True: it found one.
 inline std::function<bool()> library_search(std::vector<uint8_t> grey, int width, int height, int decimate) {
   const std::shared_ptr<apriltag_family_t> family(tag36h11_create(), tag36h11_destroy);
   const std::shared_ptr<apriltag_detector_t> detector(apriltag_detector_create(), apriltag_detector_destroy);
@@ -44,9 +44,9 @@ inline std::function<bool()> library_search(std::vector<uint8_t> grey, int width
 inline std::function<bool()> mrpt_weights(int particles) {
   using mrpt::maps::COccupancyGridMap2D;
   const auto edges = drawn_edges();
-  const auto grid = std::make_shared<COccupancyGridMap2D>(
-      0.0f, static_cast<float>(kMapWidth * kMapPixel_m), 0.0f, static_cast<float>(kMapHeight * kMapPixel_m),
-      static_cast<float>(kMapPixel_m));
+  const auto grid = std::make_shared<COccupancyGridMap2D>(0.0f, static_cast<float>(kMapWidth * kMapPixel_m), 0.0f,
+                                                          static_cast<float>(kMapHeight * kMapPixel_m),
+                                                          static_cast<float>(kMapPixel_m));
   grid->fill(0.9f);
   for (int y = 0; y < kMapHeight; y++)
     for (int x = 0; x < kMapWidth; x++)

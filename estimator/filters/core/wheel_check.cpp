@@ -14,11 +14,13 @@ constexpr double kWindow_s = 2.0, kLate_s = 1.0;
 // The scale of innovations follows what no error of the speed explains, over so many of them: a minute of positions. It
 // is known as by some more of them than a window has.
 constexpr double kScaleFrom = 300.0, kScaleCount = 30.0;
-constexpr double kMost = 5.0;  // sigmas: a larger innovation counts as this, an outlier is no evidence of a speed
+constexpr double kMost = 5.0;     // sigmas: a larger innovation counts as this, an outlier is no evidence of a speed
 constexpr double kApart_s = 0.2;  // observations nearer in time share their errors
-// Log odds that wheels have begun to lie in a window: one in 3000, once in an hour. They are taken to from an even chance
-// on; while they are, both are as probable until something speaks for one.
+// Log odds that wheels have begun to lie in a window: one in 3000, once in an hour. They are taken to from an even
+// chance on; while they are, both are as probable until something speaks for one.
 constexpr double kRate = -8.0, kBegins_nats = -kRate, kEnds_nats = 0.0;
+constexpr double kFitted_s =
+    5.0;  // so long observations have fitted before: a pose that is wrong from its start is no fault of the wheels
 constexpr double kForgotten_s = 10.0;  // without evidence for so long it holds no more
 // Of the faster one's speed: the robot, or the wheels, stand or nearly. That of the robot is the less sure one.
 constexpr double kRobotStands = 0.6, kWheelsStand = 0.4;
@@ -41,7 +43,7 @@ void wheel_check::restart() {
   std::memset(by_, 0, sizeof by_);
   added_m2_ = 0.0;
   window_ = late_ = {};
-  raw_[0] = raw_[1] = 0.0;
+  raw_[0] = raw_[1] = fitted_s_ = 0.0;
 }
 
 void wheel_check::sums::fade(double left) {
@@ -137,11 +139,12 @@ double wheel_check::weigh(const noise_adaption::row *rows, int count, wm_time_ns
   off_mps_[0] = (b * raw_[0] - cross * raw_[1]) / determinant;
   off_mps_[1] = (a * raw_[1] - cross * raw_[0]) / determinant;
   const double found = larger(window_.nats(scale2_), late_.nats(scale2_));
+  if (found < 0.0) fitted_s_ += dt_s < kWindow_s ? dt_s : kWindow_s;
   return decide(found);
 }
 
 double wheel_check::decide(double found) {
-  const bool begins = found > kBegins_nats, held = off_ != 0;
+  const bool begins = found > kBegins_nats && fitted_s_ > kFitted_s, held = off_ != 0;
   if (begins) unsupported_s_ = 0.0;
   off_ = 0;
   if (!begins && !(held && found > kEnds_nats)) return 0.0;

@@ -68,11 +68,12 @@ class wheel_check {
   sums window_, late_;     // of some seconds, of the last one
   double raw_[kAxes];      // as the products of the last one, with innovations as large as they are
   double off_mps_[kAxes];  // by which the speed is off, if it is
-  double scale2_;  // mean square of what no error of the speed explains of the innovations, at least 1
+  double scale2_;          // mean square of what no error of the speed explains of the innovations, at least 1
+  double fitted_s_;        // for how long wheels that roll explained the observations, since the pose began
   double unsupported_s_, uncompared_s_;  // since the evidence was enough for it to begin; since the gyro was compared
   wm_time_ns weighed_ns_;
   evidence spin_;
-  uint32_t off_;   // the bit of the alternative that holds against observations; 0: none
+  uint32_t off_;  // the bit of the alternative that holds against observations; 0: none
   uint32_t spins_;
 };
 

@@ -34,8 +34,13 @@ struct Drive {
     wm::noise_adaption::row rows[2];
     for (int k = 0; k < 2; k++) {
       const double seen = true_m[k] + larger * kReceiver_m * normal();
-      rows[k] = {{}, {}, seen - mean_m[k], variance_m2[k] + wm::square(kReceiver_m), wm::square(kReceiver_m),
-                 wm::noise_adaption::kPlace, k};
+      rows[k] = {{},
+                 {},
+                 seen - mean_m[k],
+                 variance_m2[k] + wm::square(kReceiver_m),
+                 wm::square(kReceiver_m),
+                 wm::noise_adaption::kPlace,
+                 k};
       rows[k].by[k] = 1.0;
     }
     const double added_m2 = check.weigh(rows, 2, static_cast<wm_time_ns>(++steps * kStep_s * 1e9));
@@ -82,8 +87,8 @@ TEST(test_each_lie_is_said_by_its_name_and_forgotten) {
     }
 }
 
-// Five hours of a receiver that is right, and as many of one whose error is three times what it states: at most a second
-// an hour.
+// Five hours of a receiver that is right, and as many of one whose error is three times what it states: at most a
+// second an hour.
 TEST(test_a_receiver_that_is_worse_than_stated_is_no_lie) {
   for (const double larger : {1.0, 3.0}) {
     int holds = 0;
