@@ -4,7 +4,7 @@ _waymark() {
   local word=${COMP_WORDS[COMP_CWORD]} command=${COMP_WORDS[1]:-} words= more=
   COMPREPLY=()
   if [ "$COMP_CWORD" -eq 1 ]; then
-    mapfile -t COMPREPLY < <(compgen -W 'run replay record watch check doctor stamps config causes mavlink suggest batch bench calibrate compare detect diff eval hil import init map mine play reference report simulate web --help --version' -- "$word")
+    mapfile -t COMPREPLY < <(compgen -W 'run replay record watch check doctor stamps config causes export mavlink suggest batch bench calibrate compare detect diff eval hil import init map mine play reference report simulate web --help --version' -- "$word")
     return
   fi
   case $command in
@@ -34,6 +34,7 @@ _waymark() {
     "stamps") words='' ;;
     "config") words='--schema --config --good-for --within --keep --untried' ;;
     "causes") words='--help --landmarks --calibration --map --clocks-apart --apply --json' ;;
+    "export") words='--help --mcap --recording --pictures --can --force' ;;
     "mavlink") words='--help --link --as --frame --north --zero --origin --rate --take --system --component --url --prefix --duration' ;;
     "suggest") words='--help --out --against --only --from --to --minutes --json' ;;
     "batch") words='--help --out --jobs --part --list' ;;

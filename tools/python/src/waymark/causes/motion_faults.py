@@ -183,11 +183,11 @@ def _can(robot: Robot, bound: dict[str, int]) -> Iterator[Fault]:
 
 
 def _twists(robot: Robot) -> Iterator[Fault]:
-    for file, speeds, turns in (("motion.csv", ("v_mps",), ("w_radps",)), ("motion6.csv", ("vx_mps", "vy_mps", "vz_mps"), ("wz_radps", "wx_radps", "wy_radps"))):
+    for file, speeds, rates in (("motion.csv", ("v_mps",), ("w_radps",)), ("motion6.csv", ("vx_mps", "vy_mps", "vz_mps"), ("wz_radps", "wx_radps", "wy_radps"))):
         table = robot.table(file)
         if not len(table.get("t_ns", ())):
             continue
-        turns = tuple(name for name in turns if name in table)  # a velocity log has none
+        turns = [name for name in rates if name in table]  # a velocity log has none
         # Another unit is that of all axes, another sign that of one.
         for f in TURNS[:4] if turns else ():
             yield discrete(f"turn rate times {f:.4g}", lambda _, f=f, file=file, names=turns: [column(file, n, f) for n in (names[:1] if f < 0 else names)],
