@@ -19,8 +19,8 @@ constexpr double kApart_s = 0.2;  // observations nearer in time share their err
 // Log odds that wheels have begun to lie in a window: one in 3000, once in an hour. They are taken to from an even
 // chance on; while they are, both are as probable until something speaks for one.
 constexpr double kRate = -8.0, kBegins_nats = -kRate, kEnds_nats = 0.0;
-constexpr double kFitted_s =
-    5.0;  // so long observations have fitted before: a pose that is wrong from its start is no fault of the wheels
+// So long no more than chance explains was there before: a pose that is wrong from its start is no fault of the wheels.
+constexpr double kFitted_s = 5.0, kChance_nats = 2.0;
 constexpr double kForgotten_s = 10.0;  // without evidence for so long it holds no more
 // Of the faster one's speed: the robot, or the wheels, stand or nearly. That of the robot is the less sure one.
 constexpr double kRobotStands = 0.6, kWheelsStand = 0.4;
@@ -62,6 +62,18 @@ void wheel_check::sums::add(double weight, double z, const double shift[kAxes]) 
   information[2] += weight * square(shift[1]);
 }
 
+double wheel_check::sums::explained(double prior) const {
+  const double a = information[0] + prior, cross = information[1], b = information[2] + prior;
+  return (b * square(products[0]) - 2.0 * cross * products[0] * products[1] + a * square(products[1])) /
+         (a * b - square(cross));
+}
+
+// By log(1 + x) <= x, and a determinant that is not below the prior's.
+double wheel_check::sums::nats_at_most(double scale2) const {
+  const double by = explained(scale2 / square(kOff_mps)), left = squares > by ? squares - by : 0.0;
+  return 0.5 * (count + kScaleCount) * by / (left + kScaleCount * scale2);
+}
+
 // Student's t, of innovations with a common scale.
 double wheel_check::sums::nats(double scale2) const {
   const double prior = scale2 / square(kOff_mps), stated = kScaleCount * scale2;
@@ -71,9 +83,8 @@ double wheel_check::sums::nats(double scale2) const {
   };
   const double a = information[0] + prior, cross = information[1], b = information[2] + prior;
   const double determinant = a * b - square(cross);
-  const double both = (b * square(products[0]) - 2.0 * cross * products[0] * products[1] + a * square(products[1]));
   const double forwards = factor(square(products[0]) / a, a / prior);
-  const double sideways = factor(both / determinant, determinant / square(prior));
+  const double sideways = factor(explained(prior), determinant / square(prior));
   return larger(forwards, sideways);
 }
 
@@ -138,9 +149,10 @@ double wheel_check::weigh(const noise_adaption::row *rows, int count, wm_time_ns
   const double b = late_.information[2] + prior, determinant = a * b - square(cross);
   off_mps_[0] = (b * raw_[0] - cross * raw_[1]) / determinant;
   off_mps_[1] = (a * raw_[1] - cross * raw_[0]) / determinant;
-  const double found = larger(window_.nats(scale2_), late_.nats(scale2_));
-  if (found < 0.0) fitted_s_ += dt_s < kWindow_s ? dt_s : kWindow_s;
-  return decide(found);
+  const double most = larger(window_.nats_at_most(scale2_), late_.nats_at_most(scale2_));
+  if (most < kChance_nats) fitted_s_ += dt_s < kWindow_s ? dt_s : kWindow_s;
+  if (off_ == 0 && most < kBegins_nats) return 0.0;
+  return decide(larger(window_.nats(scale2_), late_.nats(scale2_)));
 }
 
 double wheel_check::decide(double found) {

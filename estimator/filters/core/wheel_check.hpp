@@ -59,6 +59,8 @@ class wheel_check {
     void add(double weight, double z, const double shift[kAxes]);
     // Log Bayes factor of a speed that is off forwards, or on both axes; `scale2`: of the innovations until now.
     double nats(double scale2) const;
+    double nats_at_most(double scale2) const;  // a bound of it, without logarithms
+    double explained(double prior) const;      // of the squares, by a speed that is off on both axes
   };
 
   double by_[kAxes][kBlock];  // derivative of the mean by an error of the speed forwards, to the left
