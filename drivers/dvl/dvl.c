@@ -3,7 +3,6 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "dvl_report.h"
 #include "waymark/devices.h"
@@ -28,13 +27,18 @@ typedef struct dvl {
   uint64_t skipped[DVL_KINDS];  // reports that are no measurement, by kind; of velocities those without bottom lock
 } dvl;
 
+// Numbers that a report lacks are alike, too.
+static int is_alike(double a, double b) { return a == b || (isnan(a) && isnan(b)); }
+
 // A log that is polled, or two of its threads, send a report several times.
 static int is_repeat(const dvl *self, const dvl_report *report) {
   const dvl_report *last = &self->last;
   if (!self->has_last) return 0;
   if (report->validity_us != DVL_NO_TIME) return report->validity_us == last->validity_us;
-  return report->since_ms == last->since_ms && report->is_valid == last->is_valid &&
-         report->sigma_mps == last->sigma_mps && memcmp(report->v_mps, last->v_mps, sizeof report->v_mps) == 0;
+  int is_same = report->is_valid == last->is_valid && is_alike(report->since_ms, last->since_ms) &&
+                is_alike(report->sigma_mps, last->sigma_mps);
+  for (int i = 0; i < 3; i++) is_same = is_same && is_alike(report->v_mps[i], last->v_mps[i]);
+  return is_same;
 }
 
 // The row's stamp: that of the echo. Its clock is followed by the stamps of sending, which have the shortest delay.
