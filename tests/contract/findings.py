@@ -84,7 +84,7 @@ def covered_elsewhere(root):
     """Identifiers that other tests name, by their C constant or, in Python, as text."""
     kinds = dict(re.findall(r'\[WM_FOUND_([A-Z_]+)\]\s*=\s*\{\s*"([a-z-]+)"', (root / "firmware/findings/kinds.c").read_text()))
     named = set()
-    for test in ("findings", "doctor", "gpsd", "iio"):
+    for test in ("findings", "doctor", "gpsd", "iio", "dvl"):
         text = (root / f"tests/unit/firmware/test_{test}.c").read_text()
         named |= {kinds[name] for name in re.findall(r"WM_FOUND_([A-Z_]+)", text) if name in kinds}
     faults = "".join((root / f"tests/{t}.py").read_text() for t in ("golden/check_faults", "golden/check_sources", "contract/causes"))
