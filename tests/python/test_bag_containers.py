@@ -332,11 +332,16 @@ class Refused(BagTest):
         (self.folder / "holds one").mkdir()
         shutil.copy(self.folder / "drive.bin", self.folder / "holds one" / "a.mcap")
         (self.folder / "p.zstd").write_bytes(zstd((self.folder / "drive.bin").read_bytes()))
+        (self.folder / "alone").mkdir()
+        shutil.copy(BIN / "waymark-import", self.folder / "alone")
         for name in ("drive.bin", "holds one", "p.zstd"):
-            # Where the Python package's program isn't on the path, the command says that it would read the bag.
-            done = subprocess.run([BIN / "waymark-import", self.folder / name, "--out", self.folder / "o"], capture_output=True, text=True,
-                                  check=False, env={"PATH": "/nowhere"})
-            self.assertIn("bags are read by the Python package", done.stderr, name)
+            # The Python package's program is beside it; where it is not, and not on the path, the command says that it would read the bag.
+            for program, code, words in ((BIN, 0, ""), (self.folder / "alone", 1, "bags are read by the Python package")):
+                done = subprocess.run([program / "waymark-import", self.folder / name, "--out", self.folder / f"{name} of {code}"], capture_output=True, text=True,
+                                      check=False, env={"PATH": "/nowhere"})
+                self.assertEqual(done.returncode, code, done.stderr)
+                self.assertIn(words, done.stderr, name)
+            self.assertTrue((self.folder / f"{name} of 0/motion.csv").is_file(), name)
 
 
 class Messages(BagTest):
