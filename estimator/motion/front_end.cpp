@@ -98,13 +98,19 @@ void motion_front_end::feed(const wm_event &event) {
   note_silence(event.t_ns);
 }
 
+// Of a velocity log without rates the turn is the gyro's.
+planar_twist motion_front_end::measured_twist(const wm_event &event) const {
+  if (event.kind == WM_EVENT_TWIST2) return {event.as.twist2.v_mps, 0.0, event.as.twist2.w_radps};
+  const double by_gyro = gyro_is_alive() ? value_[WM_Q_YAW_RATE] : 0.0;
+  const double rate = has_rates(event.as.twist6) ? event.as.twist6.w_radps[2] : by_gyro;
+  const vec3 base = velocity_of_base(event.as.twist6, {0, 0, rate});
+  return {base.x, base.y, rate};
+}
+
 void motion_front_end::take_twist(const wm_event &event) {
   const bool planar = event.kind == WM_EVENT_TWIST2;
   lacks_rate_ = !planar && !has_rates(event.as.twist6);
-  const double by_gyro = gyro_is_alive() ? value_[WM_Q_YAW_RATE] : 0.0;
-  const double rate = planar ? event.as.twist2.w_radps : lacks_rate_ ? by_gyro : event.as.twist6.w_radps[2];
-  const vec3 base = planar ? vec3{event.as.twist2.v_mps, 0, 0} : velocity_of_base(event.as.twist6, {0, 0, rate});
-  const double v = base.x, u = base.y;
+  const auto [v, u, rate] = measured_twist(event);
   const double w = commands_ ? driven_rate(*params_, v, rate) : rate;
   if (!planar) watch_plane(event.t_ns, event.as.twist6);
   note_period(kTwistSpeed, event.t_ns, 1);

@@ -152,6 +152,7 @@ class motion_front_end {
   enum speed_source : uint8_t { kNone, kFrontWheels, kVehicleSpeed, kTicksMean, kRearWheels, kOfTwist };
 
   void take_quantities(const wm_event &event);
+  planar_twist measured_twist(const wm_event &event) const;
   void take_twist(const wm_event &event);
   void take_twist_beside_gyro(wm_time_ns t_ns, const planar_twist &sample);
   bool drives_sideways() const {
