@@ -164,7 +164,7 @@ struct Sensor {
   double alike_fraction = 0;    // share of the points that look like one of sixteen others
   // gnss and depth
   double sigma_xy_m = 0, sigma_z_m = 0;
-  double stated_xy_m = 0;              // gnss: what the receiver says of its error; 0: sigma_xy_m
+  double stated_xy_m = 0;              // gnss: the sigma that the receiver states; 0: sigma_xy_m
   double wander_m = 0, wander_s = 30;  // gnss: each axis wanders so much, with this correlation time
 };
 

@@ -6,7 +6,7 @@ Judged of each seed against the truth:
   float   truth inside the 95 % region for 85 % of the time under the trees;
   hole    wheels that turn while the robot stands are said within 3 s, are over soon after it, and the pose stays right;
   dock    the last pose is within 0.02 m and 0.5 degrees.
-Then on its first lane, each said by its name within 3 s: one wheel spins, the robot is pushed, it is lifted; and nothing in a drive
+Then on its first lane, each reported by its name within 3 s: one wheel spins, the robot is pushed, it is lifted; and nothing in a drive
 without a fault.
 
     mower.py SEEDS"""
@@ -29,7 +29,7 @@ HOLE_M = 0.10      # in the hole: what the wheels turn in half a second
 SETTLED_S = 5.0    # from the start, before which the pose is not judged
 EVERY = 5          # poses, of 50 Hz
 LIES = ("wheels_spin", "one_wheel_spins", "pushed", "lifted")
-# On the first lane, at 0.5 m/s: what the wheels do, and what is to be said.
+# On the first lane, at 0.5 m/s: what the wheels do, and the name that is to be reported.
 FAULTS = {"one_wheel_spins": "{from_s: 20, to_s: 26, wheel: left, added_mps: 0.4}",
           "pushed": "{from_s: 20, to_s: 26, wheel: both, percent: -100}",
           "lifted": "{from_s: 20, to_s: 26, wheel: both, percent: -100, added_mps: -0.3}"}

@@ -9,7 +9,7 @@ namespace {
 
 // Prior of the speed's error on each axis: of a robot at walking pace that stands, or is pushed, m/s.
 constexpr double kOff_mps = 0.5;
-// The sums' time constants: a hole is to be said within 3 s; the last second decides where positions come often.
+// Time constants of the sums: a hole is reported within 3 s. Where positions come often, the last second decides.
 constexpr double kWindow_s = 2.0, kLate_s = 1.0;
 // The scale of innovations follows what no error of the speed explains, over so many of them: a minute of positions. It
 // is known as by some more of them than a window has.
@@ -17,7 +17,7 @@ constexpr double kScaleFrom = 300.0, kScaleCount = 30.0;
 constexpr double kMost = 5.0;     // sigmas: a larger innovation counts as this, an outlier is no evidence of a speed
 constexpr double kApart_s = 0.2;  // observations nearer in time share their errors
 // Log odds that wheels have begun to lie in a window: one in 3000, once in an hour. They are taken to from an even
-// chance on; while they are, both are as probable until something speaks for one.
+// chance on; while they are, both are as probable until the evidence is for one of them.
 constexpr double kRate = -8.0, kBegins_nats = -kRate, kEnds_nats = 0.0;
 // So long no more than chance explains was there before: a pose that is wrong from its start is no fault of the wheels.
 constexpr double kFitted_s = 5.0, kChance_nats = 2.0;

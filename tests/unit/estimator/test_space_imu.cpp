@@ -236,7 +236,7 @@ TEST(test_a_log_without_rates_beside_an_imu) {
   TEST_ASSERT_DOUBLE_WITHIN(0.01, with.sigma_about({0, 0, 1}), without.sigma_about({0, 0, 1}));
 }
 
-// While its IMU is silent nothing measures the turn: the heading holds, and its sigma says so.
+// While its IMU is silent nothing measures the turn: the heading holds, and its sigma grows.
 TEST(test_a_log_without_rates_and_a_silent_imu) {
   vehicle v(0);
   v.go(

@@ -505,7 +505,7 @@ TEST(test_which_values_are_fresh) {
     }
 }
 
-// A log without rates and without an IMU: each axis turns as it likes, and the health says so.
+// A log without rates and without an IMU: the turn of each axis is unknown, and motion_health has the flag.
 TEST(test_a_log_without_rates_measures_no_turn) {
   motion_by_default by({{0.01, 0.01, 0.01}, {0.004, 0.004, 0.004}, 0, 0});
   by.motion.feed(twist6(0.0, {{1, 0, 0}, make::kNoRates}));
