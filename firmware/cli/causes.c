@@ -60,6 +60,13 @@ static uint64_t count_of(const wm_yaml_node *map, const char *key) {
   return wm_yaml_there(&node) && wm_yaml_i64(&node, 0, INT64_MAX, &count, NULL) == WM_OK ? (uint64_t)count : 0;
 }
 
+// Whether the answer's causes are such that the filter's states take up whole; the pose is right beside them.
+static int are_taken_up(const wm_yaml_node *root) {
+  const wm_yaml_node node = wm_yaml_get(root, "taken_up");
+  int is_true = 0;
+  return wm_yaml_there(&node) && wm_yaml_bool(&node, &is_true, NULL) == WM_OK && is_true;
+}
+
 // A finding for each item of a list.
 static int take_list(const wm_yaml_node *root, const char *key, wm_finding_id id, wm_severity severity,
                      wm_findings *found) {
@@ -72,7 +79,7 @@ static int take_list(const wm_yaml_node *root, const char *key, wm_finding_id id
     text_of(&item, "what", what, sizeof what);
     text_of(&item, "fix", fix, sizeof fix);
     wm_find(found, id, severity, "cause", fix, "%s%s", what,
-            severity == WM_SEVERITY_BAD ? told
+            id == WM_FOUND_LIKELY_CAUSE ? told
             : i + 1 < count             ? "; or:"
                                         : ": the drive fits with each of these, and cannot tell them apart");
   }
@@ -86,7 +93,9 @@ static void take(const char *json, wm_findings *found, causes_answer *out) {
   out->is_answered = 1;
   out->rows = count_of(&root, "rows");
   out->drives = count_of(&root, "drives");
-  out->is_found = take_list(&root, "causes", WM_FOUND_LIKELY_CAUSE, WM_SEVERITY_BAD, found);
+  const int is_note = are_taken_up(&root) && wm_findings_of(found, WM_SEVERITY_BAD) == 0;
+  out->is_found =
+      take_list(&root, "causes", WM_FOUND_LIKELY_CAUSE, is_note ? WM_SEVERITY_NOTE : WM_SEVERITY_BAD, found);
   out->is_undecided = take_list(&root, "undecided", WM_FOUND_CAUSE_UNDECIDED, WM_SEVERITY_NOTE, found);
   for (size_t i = 0; i < 2 && wm_yaml_is_list(&applied) && i < wm_yaml_count(&applied); i++) {
     const wm_yaml_node item = wm_yaml_item(&applied, i);

@@ -21,7 +21,8 @@ typedef struct causes_answer {
   char *json;            // the engine's whole answer, from malloc; NULL: none
 } causes_answer;
 
-// Adds its findings to `found`. The caller frees out->json.
+// Adds its findings to `found`: a cause that the filter's states take up is a note where nothing else is bad. The
+// caller frees out->json.
 void causes_ask(const causes_question *question, wm_findings *found, causes_answer *out);
 
 #endif

@@ -24,14 +24,11 @@ static const char kHelp[] =
     "Checks a configuration before driving: its keys and files; without a recording, the robot's devices. With a\n"
     "recording it drives the recording as a replay does and judges the fit: shares of updates that were refused and "
     "of\n"
-    "time lost, size of the innovations, calibration, time spans of the sources, units, landmarks. Where the "
-    "observations\n"
-    "contradict the poses `waymark causes` tries the usual mistakes (signs, units, axes, mountings, clocks, "
-    "identities,\n"
-    "wheels) and names the one that explains them. Prints the facts, then a line for each finding with its fix. Exit "
-    "code 2 "
-    "where\n"
-    "something has to be corrected first.\n"
+    "time lost, size of the innovations, calibration, time spans of the sources, units, landmarks. Where observations\n"
+    "contradict the poses or the calibration `waymark causes` tries the usual mistakes (signs, units, axes, "
+    "mountings,\n"
+    "clocks, identities, wheels) and names the one that explains them. Prints the facts, then a line for each finding\n"
+    "with its fix. Exit code 2 where something has to be corrected first.\n"
     "\n"
     "  --landmarks FILE    instead of the recording's map\n"
     "  --calibration FILE  instead of the recording's\n"
@@ -211,14 +208,16 @@ static void ask_for_causes(checked *self) {
   json_causes = answer.json;
 }
 
-// Whether a finding from this place on is one that a mistake of the setup may explain: not of a clock, of a counter, or
-// of data that are not used, which say themselves what is wrong.
+// Whether a finding from this place on is one that a mistake of the setup may explain: a state of calibration that
+// ended far off, a pose that is doubted, or what is bad. Not one of a clock, of a counter, or of data that are not
+// used, which name what is wrong themselves.
 static int may_have_a_cause(const wm_findings *found, size_t from) {
   for (size_t i = from; i < found->count; i++) {
     const wm_finding_id id = found->at[i].id;
     const int says_it = id == WM_FOUND_DATA_UNUSED || id == WM_FOUND_ROWS_UNUSED || id == WM_FOUND_CLOCK_JUMPED ||
                         id == WM_FOUND_CLOCK_COARSE || id == WM_FOUND_COUNTER_RESTARTS;
-    if (found->at[i].severity == WM_SEVERITY_BAD && !says_it) return 1;
+    const int is_bad = found->at[i].severity == WM_SEVERITY_BAD && !says_it;
+    if (is_bad || id == WM_FOUND_CALIBRATION_OFF || id == WM_FOUND_POSE_DOUBTFUL) return 1;
   }
   return 0;
 }

@@ -364,7 +364,7 @@ def judge(options, robot, mistake, seed, folder):
     row["right_m"], row["made_m"] = error_m(options, right, recording, recording), error_m(options, config, made, recording)
     limit_m = RIGHT_FACTOR * row["right_m"] + RIGHT_M
     row["is_harmless"] = name is not None and row["made_m"] <= limit_m
-    row["is_good"] = not row["is_harmless"] and name is not None and checked(options, config, made) == "good"
+    row["is_good"] = not row["is_harmless"] and name is not None and checked(options, config, made) == checked(options, config, made, with_causes=True) == "good"
     if done.returncode == 1:
         return row | {"named": done.stderr.strip(), "is_right": False, "is_wrong": False}
     found = json.loads(done.stdout)
@@ -413,6 +413,15 @@ def judge_answers(options):
             mine = [f for f in report["findings"] if f["about"] == "cause"]
             if [f["id"] for f in mine] != [identifier] * count or report["causes"] != (answer if isinstance(answer, dict) else None):
                 failures.append(f"{identifier}: {mine}, causes {report['causes']}")
+        # A drive that is good but for a state of calibration: of the same cause a note where the states take it up.
+        replays.copy_changed(here / "right", here / "scaled", {"sightings.csv": each(range_m=lambda r: 1.06 * r)})
+        for is_taken_up, verdict in ((True, 0), (False, 2)):
+            engine.write_text(f"#!/bin/sh\ncat <<'E'\n{json.dumps({**ANSWER, 'causes': [cause], 'undecided': [], 'told': ': so', 'taken_up': is_taken_up})}\nE\n")
+            engine.chmod(0o755)
+            done = subprocess.run([here / "waymark", "check", options.source_dir / "config/robot.yaml", here / "scaled"], capture_output=True, text=True,
+                                  env={"PATH": "/usr/bin:/bin"})
+            if done.returncode != verdict or "[likely-cause]" not in done.stdout:
+                failures.append(f"taken up: {is_taken_up}: {done.stdout}")
         # Where turns show that two clocks run apart the engine is asked whose it is.
         tables_robot(here / "tables", 1)
         replays.copy_changed(here / "tables", here / "apart", clock_of("imu", "gyro_clock")(random.Random(1))[0])
@@ -433,8 +442,8 @@ def found_by(options, config, recording):
     return [finding["id"] for finding in json.loads(done.stdout)["findings"]]
 
 
-def checked(options, config, recording):
-    done = subprocess.run([options.bin_dir / "waymark", "check", config, recording, "--quick"], capture_output=True, text=True)
+def checked(options, config, recording, with_causes=False):
+    done = subprocess.run([options.bin_dir / "waymark", "check", config, recording, *["--quick"] * (not with_causes)], capture_output=True, text=True)
     return "good" if done.returncode == 0 else "bad"
 
 

@@ -13,7 +13,7 @@ from ..native import WaymarkError
 from .changes import NAMED, Impossible
 from .features import with_points
 from .robot import Robot
-from .search import GAIN_MIN, NAMED_MOST, Search, Verdict
+from .search import APART_MIN, GAIN_MIN, NAMED_MOST, Search, Verdict
 from .trial import Change, Drive, Trials, edits_of, scratch_folder
 
 EPILOG = """A mistake is named where it predicts the drive better than every other one, and than none, with a probability of 99 %, on the half of the
@@ -58,7 +58,8 @@ def report(robot: Robot, verdict: Verdict) -> dict[str, Any]:
         out["before"] = _share(verdict.before)
     if verdict.after and verdict.before:
         after = verdict.after
-        out |= {"after": _share(after), "probability": round(min(verdict.probability, NAMED_MOST), 4), "gain_nats": round(verdict.gain, 3)}
+        out |= {"after": _share(after), "probability": round(min(verdict.probability, NAMED_MOST), 4), "gain_nats": round(verdict.gain, 3),
+                "taken_up": verdict.gain < APART_MIN and not any(fault.is_fact or fault.is_shown or fault.is_local for fault, _ in verdict.causes)}
         before, surely = verdict.before, f"probability {min(verdict.probability, NAMED_MOST):.4g}"
         if verdict.gain >= GAIN_MIN or any(fault.is_shown for fault, _ in verdict.causes):
             better = (f"and each is {math.exp(min(20, verdict.gain)):.1f} times as likely, on the half of the drive that this was not fitted to ({surely})")
