@@ -175,15 +175,13 @@ bool picture_motion::iterate(int count, const matrix<6> &prior, vector<6> *x) {
 }
 
 bool picture_motion::fit(const pair_view &pair, const pose3 &moved, const matrix<6> &prior, motion_error *out) {
-  const int count = make_rows(pair, moved);
+  const int count = rows_ = make_rows(pair, moved);
   vector<6> x;
   if (count < kLeast || !iterate(count, prior, &x)) return false;
   const double shown = median_misfit(count, x) / kMedianOfThree, noisy = shown > 1.0 ? shown : 1.0;
   const double cut = kCut * (noisy < kScaleMost ? noisy : kScaleMost);
   for (int i = 0; i < count; i++) {
-    if (misfit(row_[i], x) < cut) continue;
-    tracks()[row_[i].earlier].misses++;
-    row_[i].weight = 0.0;
+    if (!(misfit(row_[i], x) < cut)) row_[i].weight = 0.0;
   }
   matrix<6> information = kLeastInformation * matrix<6>::Identity(), covariance;
   vector<6> weighted = vector<6>::Zero();
@@ -192,6 +190,10 @@ bool picture_motion::fit(const pair_view &pair, const pose3 &moved, const matrix
   map(out->value) = covariance * weighted;
   map(out->covariance) = kAlike * noisy * covariance;
   return true;
+}
+
+void picture_motion::count_misses() {
+  for (int i = 0; i < rows_; i++) tracks()[row_[i].earlier].misses += row_[i].weight == 0.0;
 }
 
 // Disparities d' = f b / z' with variance P (d'/d)^4: the inverse of z' = z - a.

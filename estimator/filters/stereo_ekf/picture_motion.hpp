@@ -34,13 +34,15 @@ class picture_motion {
  public:
   static constexpr int kTracks = 256;
 
-  void clear() { tracks_ = seen_ = side_ = 0; }
+  void clear() { tracks_ = seen_ = rows_ = side_ = 0; }
   // A point of the present picture. False: its track was cut too often, or there is no room.
   bool add(int32_t id, double u, double disparity, double v);
 
   // Fits the motion since the earlier picture about `moved`, its prediction with the covariance `prior`. False: too few
-  // tracks. Counts for each track whether it fits.
+  // tracks.
   bool fit(const pair_view &pair, const pose3 &moved, const matrix<6> &prior, motion_error *out);
+  // Counts the tracks that the last fit cut.
+  void count_misses();
   // The present picture becomes the earlier one; `moved`, the motion since that one, carries the depths on.
   void close(const pair_view &pair, const pose3 &moved);
 
@@ -75,8 +77,7 @@ class picture_motion {
   view view_[kTracks];
   fit_row row_[kTracks];
   double sorted_[kTracks];
-  int32_t tracks_, seen_;
-  int64_t side_;  // of 64 bits: no padding
+  int32_t tracks_, seen_, rows_, side_;
 };
 
 }  // namespace wm

@@ -169,6 +169,7 @@ void stereo_ekf::init(const wm_stereo_ekf_params &params, const wm_setup &setup)
   map_.init(params_.frames_max, behind.frame, behind.map_point, behind.places);
   forget_map();
   now_ns_ = picture_ns_ = last_picture_ns_ = WM_TIME_NONE;
+  other_scene_ = 0;
   life_ = lifecycle();
   start_ns_ = setup.start.t_ns;
   odometry_ = {{{0, 0, 0}, kNoTurn}, 0.0, 0.0};

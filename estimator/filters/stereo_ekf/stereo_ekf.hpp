@@ -197,6 +197,8 @@ class stereo_ekf {
   pair_view pair() const;
   void add_track(const wm_stereo &seen, const wm_innovation &blank, record_list records);
   void view_increment(increment_view *out) const;
+  matrix<kError> predicted_variance(const increment_view &at) const;
+  bool shows_scene(const matrix<kError> &predicted, const motion_error &seen);
   bool increment_rows(const pair_view &view, row_block out[2]);
   void fuse_increment();
 
@@ -260,6 +262,7 @@ class stereo_ekf {
   double sigma_px_[4];
   wm_time_ns now_ns_, start_ns_;
   wm_time_ns last_picture_ns_;  // whose tracks `tracks_` has
+  int64_t other_scene_;         // how much speaks for tracks of another scene (increments.cpp), pictures
   wm_time_ns picture_ns_;       // the present picture; NONE between pictures
   picture_motion tracks_;
   travelled_pose odometry_;  // motion alone
