@@ -83,11 +83,7 @@ static wm_status next_row(wm_row_device *base, wm_stream_row *out, wm_source_cou
   dvl_report report;
   size_t length;
   wm_status status = WM_AGAIN;
-  const char *line = line_socket_next(&self->lines, &length);
-  if (!line) {
-    line_socket_wait(&self->lines);
-    line = line_socket_next(&self->lines, &length);
-  }
+  const char *line = line_socket_read(&self->lines, &length);
   while (line && status == WM_AGAIN) {
     const char *why = dvl_report_read(line, length, &report);
     out->arrival_ns = self->lines.read_ns;

@@ -219,11 +219,7 @@ static wm_status next_row(wm_row_device *base, wm_stream_row *out, wm_source_cou
   gpsd_report report;
   size_t length;
   wm_status status = WM_AGAIN;
-  const char *line = line_socket_next(&self->lines, &length);
-  if (!line) {
-    line_socket_wait(&self->lines);
-    line = line_socket_next(&self->lines, &length);
-  }
+  const char *line = line_socket_read(&self->lines, &length);
   if (!self->lines.is_connected) forget(self);
   while (line && status == WM_AGAIN) {
     const char *why = gpsd_report_read(line, length, &report);

@@ -81,7 +81,7 @@ static void read_more(line_socket *self, wm_time_ns now_ns) {
   }
 }
 
-void line_socket_wait(line_socket *self) {
+static void wait_for_more(line_socket *self) {
   const wm_time_ns now_ns = now();
   if (self->fd >= 0 && now_ns - self->read_ns > DEAD_NS) line_socket_close(self);
   if (self->fd < 0 && now_ns >= self->next_try_ns) begin(self, now_ns);
@@ -104,6 +104,13 @@ const char *line_socket_next(line_socket *self, size_t *length) {
     self->skips = 0;
     self->fault = "a line is longer than 16384 bytes";
   }
+}
+
+const char *line_socket_read(line_socket *self, size_t *length) {
+  const char *line = line_socket_next(self, length);
+  if (line) return line;
+  wait_for_more(self);
+  return line_socket_next(self, length);
 }
 
 const char *line_socket_fault(line_socket *self) {

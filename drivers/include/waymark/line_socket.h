@@ -26,10 +26,10 @@ typedef struct line_socket {
 
 void line_socket_init(line_socket *self, const char *host, int32_t port, const char *greeting);
 void line_socket_close(line_socket *self);
-// Waits for up to WM_DEVICE_WAIT_MS for bytes or a connection.
-void line_socket_wait(line_socket *self);
 // The next whole line, without its end; until the next call. NULL: none yet. Constant cost but for the bytes.
 const char *line_socket_next(line_socket *self, size_t *length);
+// The same; where none is there it waits once for bytes or a connection, for up to WM_DEVICE_WAIT_MS.
+const char *line_socket_read(line_socket *self, size_t *length);
 // What went wrong with a line since the last call; NULL: nothing.
 const char *line_socket_fault(line_socket *self);
 
