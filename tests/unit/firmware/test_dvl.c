@@ -1,83 +1,41 @@
 // SPDX-License-Identifier: Apache-2.0
 // A velocity log over TCP, of which the test is the server: velocities on the vehicle's axes, absent, silent, without
 // bottom lock, repeated, other reports, half a line, another clock, its end, back again.
-#include <arpa/inet.h>
-#include <sys/socket.h>
-#include <unistd.h>
-
 #include "cli/doctor/doctor.h"
-#include "common/suite.h"
-#include "live/row_source.h"
-#include "rt/clock.h"
+#include "live_source.h"
 
-#define MS WM_NS_PER_MS
 #define TRANSIT_US 189319  // of the manual's example
 
-static int server, client;
 static wm_dvl_device_config config;
 static wm_row_mountings mountings;
-static wm_source *source;
-static wm_event event;
-static wm_error err;
 static int64_t ahead_us;  // of the log's clock against the monotonic one
-
-static void listen_again(void) {
-  struct sockaddr_in at = {.sin_family = AF_INET, .sin_port = htons((uint16_t)config.port)};
-  at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  const int yes = 1;
-  socklen_t length = sizeof at;
-  server = socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK, 0);
-  TEST_ASSERT_EQUAL(0, setsockopt(server, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes));
-  TEST_ASSERT_EQUAL(0, bind(server, (struct sockaddr *)&at, sizeof at));
-  TEST_ASSERT_EQUAL(0, listen(server, 2));
-  TEST_ASSERT_EQUAL(0, getsockname(server, (struct sockaddr *)&at, &length));
-  config.port = ntohs(at.sin_port);
-}
-
-static void hang_up(void) {
-  if (client >= 0) (void)close(client);
-  if (server >= 0) (void)close(server);
-  server = client = -1;
-}
 
 void setUp(void) {
   config = (wm_dvl_device_config){.host = "127.0.0.1"};
   mountings = (wm_row_mountings){0};
   ahead_us = INT64_C(1638191471000000);  // a clock of its own
-  server = client = -1;
-  listen_again();
+  listen_at(&config.port);
 }
 
 void tearDown(void) {
-  if (source) source->ops->close(source);
-  source = NULL;
+  source_close();
   hang_up();
 }
 
-static wm_status next(void) { return source->ops->next(source, &event, &err); }
-
 static void welcome(void) {
-  const wm_time_ns until_ns = wm_monotonic_ns() + 10 * WM_NS_PER_S;
-  while ((client < 0 || source->counts.device != WM_DEVICE_WORKS) && wm_monotonic_ns() < until_ns) {
-    (void)next();
-    if (client < 0) client = accept(server, NULL, NULL);
-  }
-  TEST_ASSERT_EQUAL(WM_DEVICE_WORKS, source->counts.device);
+  accept_run();
+  wait_for(WM_DEVICE_WORKS, "");
 }
 
 static void begin(void) {
   wm_row_device *device;
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_dvl_open(&config, &device, &err), err.text);
-  TEST_ASSERT_EQUAL(WM_OK, row_source_open(device, &mountings, &source, &err));
+  source_open(device, &mountings);
 }
 
 static void begin_connected(void) {
   begin();
   welcome();
-}
-
-static void say(const char *text) {
-  TEST_ASSERT_EQUAL((int)strlen(text), send(client, text, strlen(text), MSG_NOSIGNAL));
 }
 
 static int64_t monotonic_us(void) { return wm_monotonic_ns() / 1000; }
@@ -96,33 +54,21 @@ static void report_of(int64_t echo_us, int is_valid, const char *speeds) {
 
 #define SPEEDS "\"vx\":0.5,\"vy\":0.2,\"vz\":-0.1,\"fom\":0.003"
 
-static void report(int is_valid, const char *speeds) {
+static void send_report(int is_valid, const char *speeds) {
   (void)usleep(2000);
   report_of(monotonic_us() - TRANSIT_US, is_valid, speeds);
 }
 
-static void expect(wm_status status) {
-  const wm_status got = next();
-  TEST_ASSERT_EQUAL_MESSAGE(status, got, source->counts.first_problem);
-}
-
-static void expect_note(unsigned state, const char *note) {
-  TEST_ASSERT_EQUAL_MESSAGE(state, source->counts.device, source->counts.device_note);
-  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(source->counts.device_note, note), source->counts.device_note);
-}
-
-static void wait_for(unsigned state) {
-  const wm_time_ns until_ns = wm_monotonic_ns() + 10 * WM_NS_PER_S;
-  while (source->counts.device != state && wm_monotonic_ns() < until_ns) (void)next();
-  TEST_ASSERT_EQUAL_MESSAGE(state, source->counts.device, source->counts.device_note);
+static void report(int is_valid, const char *speeds, wm_status status) {
+  send_report(is_valid, speeds);
+  expect(status);
 }
 
 // The A50's y points to the right and its z down. The stamp is that of the echo.
 TEST(a_velocity_is_on_the_vehicles_axes) {
   static const double kRight[] = {0.5, -0.2, 0.1};
   begin_connected();
-  report(1, SPEEDS);
-  expect(WM_OK);
+  report(1, SPEEDS, WM_OK);
   TEST_ASSERT_EQUAL(WM_EVENT_TWIST6, event.kind);
   for (int i = 0; i < 3; i++) {
     TEST_ASSERT_EQUAL_DOUBLE(kRight[i], event.as.twist6.v_mps[i]);
@@ -131,15 +77,14 @@ TEST(a_velocity_is_on_the_vehicles_axes) {
   }
   TEST_ASSERT_EQUAL_DOUBLE(0.003, event.as.twist6.v_sigma_mps);
   TEST_ASSERT_INT64_WITHIN(50 * MS, wm_monotonic_ns() - TRANSIT_US * 1000, event.t_ns);
-  expect_note(WM_DEVICE_WORKS, "0 without bottom lock");
+  expect_device(WM_DEVICE_WORKS, "0 without bottom lock");
 }
 
 // It looks to the left and backwards, half a metre behind base_link.
 TEST(its_mounting_is_calibration_yamls) {
   mountings.motion6 = (wm_mounting){.xyz_m = {-0.5, 0, -0.2}, .rpy_rad = {0, 0, M_PI_2}};
   begin_connected();
-  report(1, SPEEDS);
-  expect(WM_OK);
+  report(1, SPEEDS, WM_OK);
   TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0.2, event.as.twist6.v_mps[0]);
   TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0.5, event.as.twist6.v_mps[1]);
   TEST_ASSERT_EQUAL_DOUBLE(-0.5, event.as.twist6.arm_m[0]);
@@ -149,26 +94,24 @@ TEST(its_mounting_is_calibration_yamls) {
 // A small figure of merit is no precision where there is no lock.
 TEST(without_bottom_lock_nothing_is_measured) {
   begin_connected();
-  report(1, SPEEDS);
-  expect(WM_OK);
+  report(1, SPEEDS, WM_OK);
   for (int i = 0; i < 5; i++) {
-    report(0, "\"vx\":0.56,\"vy\":-0.02,\"vz\":0.003,\"fom\":0.0002");
-    expect(WM_AGAIN);
+    report(0, "\"vx\":0.56,\"vy\":-0.02,\"vz\":0.003,\"fom\":0.0002", WM_AGAIN);
   }
   TEST_ASSERT_EQUAL_UINT64(5, source->counts.ignored);
   TEST_ASSERT_EQUAL_UINT64(1, source->counts.received);
-  expect_note(WM_DEVICE_WORKS, "5 without bottom lock");
+  expect_device(WM_DEVICE_WORKS, "5 without bottom lock");
   const wm_time_ns until_ns = wm_monotonic_ns() + 5 * WM_NS_PER_S;
   while (source->counts.device == WM_DEVICE_WORKS && wm_monotonic_ns() < until_ns) {
-    report(0, "\"vx\":0,\"vy\":0,\"vz\":0,\"fom\":2.66");
+    send_report(0, "\"vx\":0,\"vy\":0,\"vz\":0,\"fom\":2.66");
     (void)next();
     (void)usleep(20000);
   }
-  expect_note(WM_DEVICE_DOWN, "has no lock on the bottom");
-  report(1, SPEEDS);
+  expect_device(WM_DEVICE_DOWN, "has no lock on the bottom");
+  send_report(1, SPEEDS);
   while (next() != WM_OK) {
   }
-  expect_note(WM_DEVICE_WORKS, "without bottom lock");
+  expect_device(WM_DEVICE_WORKS, "without bottom lock");
 }
 
 TEST(repeats_of_a_report_are_one) {
@@ -199,31 +142,23 @@ TEST(other_reports_are_counted_by_name) {
       "\n"
       "{\"vx\":9,\"vy\":9,\"vz\":9,\"fom\":0.1,\"velocity_valid\":true,\"type\":\"velocity_water\"}\n");
   expect(WM_AGAIN);
-  report(1, SPEEDS);
-  expect(WM_OK);
+  report(1, SPEEDS, WM_OK);
   TEST_ASSERT_EQUAL_DOUBLE(0.5, event.as.twist6.v_mps[0]);
   TEST_ASSERT_EQUAL_UINT64(3, source->counts.ignored);
   TEST_ASSERT_EQUAL_UINT64(0, source->counts.malformed);
-  expect_note(WM_DEVICE_WORKS, "1 velocity_water, 1 position_local");
+  expect_device(WM_DEVICE_WORKS, "1 velocity_water, 1 position_local");
 }
 
 TEST(rubbish_is_counted) {
-  char flood[1000];
   begin_connected();
-  memset(flood, 'x', sizeof flood - 1);
-  flood[sizeof flood - 1] = '\0';
   say("HTTP/1.1 400 Bad Request\r\n");
   expect(WM_AGAIN);
-  TEST_ASSERT_NOT_NULL(strstr(source->counts.first_problem, "is it a velocity log's port"));
+  expect_problem("is it a velocity log's port");
   say("ocity_valid\":true,\"status\":0}\n{\"vx\":0.1,\"velocity_valid\":true,\"type\":\"velocity\"}\n");
   expect(WM_AGAIN);
   TEST_ASSERT_EQUAL_UINT64(3, source->counts.malformed);
-  for (int i = 0; i < 40; i++) {
-    say(flood);
-    expect(WM_AGAIN);
-  }
-  say("\r\n");
-  report(1, SPEEDS);
+  flood();
+  send_report(1, SPEEDS);
   for (int i = 0; i < 10 && next() != WM_OK; i++) {
   }
   TEST_ASSERT_EQUAL_UINT64(1, source->counts.received);
@@ -232,14 +167,11 @@ TEST(rubbish_is_counted) {
 
 TEST(numbers_that_cannot_be_are_refused) {
   begin_connected();
-  report(1, "\"vx\":5000,\"vy\":0,\"vz\":0,\"fom\":0.001");
-  expect(WM_AGAIN);
-  report(1, "\"vx\":1e999,\"vy\":0,\"vz\":0,\"fom\":0.001");
-  expect(WM_AGAIN);
+  report(1, "\"vx\":5000,\"vy\":0,\"vz\":0,\"fom\":0.001", WM_AGAIN);
+  report(1, "\"vx\":1e999,\"vy\":0,\"vz\":0,\"fom\":0.001", WM_AGAIN);
   TEST_ASSERT_EQUAL_UINT64(1, source->counts.not_finite);
   TEST_ASSERT_EQUAL_UINT64(1, source->counts.malformed);
-  report(1, "\"vx\":0.1,\"vy\":0,\"vz\":0,\"fom\":0");
-  expect(WM_OK);
+  report(1, "\"vx\":0.1,\"vy\":0,\"vz\":0,\"fom\":0", WM_OK);
   TEST_ASSERT_EQUAL_DOUBLE(1e-4, event.as.twist6.v_sigma_mps);  // the log's resolution
 }
 
@@ -257,7 +189,7 @@ TEST(times_that_contradict_each_other_are_refused) {
     expect(WM_AGAIN);
   }
   TEST_ASSERT_EQUAL_UINT64(2, source->counts.malformed);
-  TEST_ASSERT_NOT_NULL(strstr(source->counts.first_problem, "was the log's clock set"));
+  expect_problem("was the log's clock set");
 }
 
 // Its clock is set by an hour in either direction: stamps go on as those of before after some reports.
@@ -268,7 +200,7 @@ TEST(a_clock_that_is_set_is_followed) {
     begin_connected();
     for (int i = 0; i < 40; i++) {
       if (i == 10) ahead_us += back ? -INT64_C(3600000000) : INT64_C(3600000000);
-      report(1, SPEEDS);
+      send_report(1, SPEEDS);
       const wm_status status = next();
       if (i >= 10 && i < 20) continue;
       TEST_ASSERT_EQUAL_MESSAGE(WM_OK, status, source->counts.first_problem);
@@ -280,31 +212,26 @@ TEST(a_clock_that_is_set_is_followed) {
 TEST(it_may_come_go_and_come_back) {
   hang_up();
   begin();
-  wait_for(WM_DEVICE_ABSENT);
-  expect_note(WM_DEVICE_ABSENT, "no velocity log answers at 127.0.0.1:");
-  listen_again();
+  wait_for(WM_DEVICE_ABSENT, "no velocity log answers at 127.0.0.1:");
+  listen_at(&config.port);
   welcome();
-  report(1, SPEEDS);
-  expect(WM_OK);
+  report(1, SPEEDS, WM_OK);
   say("{\"time\":120.7,\"vx\":0.1,\"vy\":0");  // the connection ends within a line
   expect(WM_AGAIN);
   hang_up();
-  wait_for(WM_DEVICE_ABSENT);
+  wait_for(WM_DEVICE_ABSENT, "");
   TEST_ASSERT_EQUAL_UINT64(1, source->counts.malformed);
-  TEST_ASSERT_NOT_NULL(strstr(source->counts.first_problem, "ended within a line"));
-  listen_again();
+  expect_problem("ended within a line");
+  listen_at(&config.port);
   welcome();
-  report(1, SPEEDS);
-  expect(WM_OK);
+  report(1, SPEEDS, WM_OK);
   TEST_ASSERT_EQUAL_UINT64(2, source->counts.received);
 }
 
 TEST(silence_is_reported) {
   begin_connected();
-  report(1, SPEEDS);
-  expect(WM_OK);
-  wait_for(WM_DEVICE_STALLED);
-  expect_note(WM_DEVICE_STALLED, "sends no velocity over ground");
+  report(1, SPEEDS, WM_OK);
+  wait_for(WM_DEVICE_STALLED, "sends no velocity over ground");
 }
 
 TEST(doctor_judges_it) {

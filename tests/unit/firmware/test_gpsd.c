@@ -1,71 +1,32 @@
 // SPDX-License-Identifier: Apache-2.0
 // A receiver by gpsd, of which the test is the server: positions and headings, absent, silent, without a fix, another
 // fix, doubled, late, NaN, another clock, unplugged, back again.
-#include <arpa/inet.h>
-#include <fcntl.h>
-#include <sys/socket.h>
 #include <time.h>
-#include <unistd.h>
 
 #include "cli/doctor/doctor.h"
-#include "common/suite.h"
-#include "live/row_source.h"
-#include "rt/clock.h"
+#include "live_source.h"
 
-#define MS WM_NS_PER_MS
 #define ORIGIN_DEG 48.0, 11.0
 
-static int server, client;
 static wm_gpsd_device_config config;
 static double ahead_m;
-static wm_source *source;
-static wm_event event;
-static wm_error err;
-
-static void listen_again(void) {
-  struct sockaddr_in at = {.sin_family = AF_INET, .sin_port = htons((uint16_t)config.port)};
-  at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  const int yes = 1;
-  socklen_t length = sizeof at;
-  server = socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK, 0);
-  TEST_ASSERT_EQUAL(0, setsockopt(server, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes));
-  TEST_ASSERT_EQUAL(0, bind(server, (struct sockaddr *)&at, sizeof at));
-  TEST_ASSERT_EQUAL(0, listen(server, 2));
-  TEST_ASSERT_EQUAL(0, getsockname(server, (struct sockaddr *)&at, &length));
-  config.port = ntohs(at.sin_port);
-}
-
-static void hang_up(void) {
-  if (client >= 0) (void)close(client);
-  if (server >= 0) (void)close(server);
-  server = client = -1;
-}
 
 void setUp(void) {
   config = (wm_gpsd_device_config){
       .host = "127.0.0.1", .accuracy_scale = 1, .course_min_mps = 1, .sigma_deg = 1, .device = "/dev/ttyACM0"};
-  server = client = -1;
   ahead_m = (double)NAN;
-  listen_again();
+  listen_at(&config.port);
 }
 
 void tearDown(void) {
-  if (source) source->ops->close(source);
-  source = NULL;
+  source_close();
   hang_up();
 }
 
-static wm_status next(void) { return source->ops->next(source, &event, &err); }
-
 // Until the run has connected and asked.
 static void welcome(void) {
-  const wm_time_ns until_ns = wm_monotonic_ns() + 10 * WM_NS_PER_S;
   char asked[200] = "";
-  while (client < 0 && wm_monotonic_ns() < until_ns) {
-    (void)next();
-    client = accept(server, NULL, NULL);
-  }
-  TEST_ASSERT_GREATER_OR_EQUAL(0, client);
+  accept_run();
   TEST_ASSERT_EQUAL(WM_AGAIN, next());
   TEST_ASSERT_GREATER_THAN(0, recv(client, asked, sizeof asked - 1, 0));
   TEST_ASSERT_EQUAL_STRING("?WATCH={\"enable\":true,\"json\":true,\"device\":\"/dev/ttyACM0\"};\n", asked);
@@ -76,16 +37,12 @@ static void begin(void) {
   const wm_row_mountings none = {0};
   wm_row_device *device;
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_gpsd_open(&config, kOrigin, ahead_m, &device, &err), err.text);
-  TEST_ASSERT_EQUAL(WM_OK, row_source_open(device, &none, &source, &err));
+  source_open(device, &none);
 }
 
 static void begin_connected(void) {
   begin();
   welcome();
-}
-
-static void say(const char *text) {
-  TEST_ASSERT_EQUAL((int)strlen(text), send(client, text, strlen(text), MSG_NOSIGNAL));
 }
 
 static wm_time_ns utc_ns(void) {
@@ -95,7 +52,7 @@ static wm_time_ns utc_ns(void) {
 }
 
 // A report of position at that time, with further members.
-static void report(wm_time_ns t_ns, const char *members) {
+static void send_report(wm_time_ns t_ns, const char *members) {
   (void)usleep(2000);  // gpsd writes milliseconds: the next report has another stamp
   char text[600], stamp[40];
   const time_t seconds = (time_t)(t_ns / WM_NS_PER_S);
@@ -109,26 +66,12 @@ static void report(wm_time_ns t_ns, const char *members) {
 #define PLACE "\"lat\":48.0001,\"lon\":11.0,\"altHAE\":501.5,\"epx\":0.3,\"epy\":0.4,\"epv\":0.7"
 #define FIX "\"mode\":3,\"status\":1," PLACE
 
-static void expect(wm_status status) {
-  const wm_status got = next();
-  TEST_ASSERT_EQUAL_MESSAGE(status, got, source->counts.first_problem);
-}
-
-static void now(const char *members, wm_status status) {
-  report(utc_ns(), members);
+static void report(wm_time_ns t_ns, const char *members, wm_status status) {
+  send_report(t_ns, members);
   expect(status);
 }
 
-static void expect_state(unsigned state, const char *note) {
-  TEST_ASSERT_EQUAL_MESSAGE(state, source->counts.device, source->counts.device_note);
-  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(source->counts.device_note, note), source->counts.device_note);
-}
-
-static void wait_for(unsigned state) {
-  const wm_time_ns until_ns = wm_monotonic_ns() + 10 * WM_NS_PER_S;
-  while (source->counts.device != state && wm_monotonic_ns() < until_ns) (void)next();
-  TEST_ASSERT_EQUAL_MESSAGE(state, source->counts.device, source->counts.device_note);
-}
+static void now(const char *members, wm_status status) { report(utc_ns(), members, status); }
 
 TEST(a_position_is_in_the_map) {
   begin_connected();
@@ -142,7 +85,7 @@ TEST(a_position_is_in_the_map) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.5 / sqrt(2), event.as.position.sigma_xy_m);
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.7, event.as.position.sigma_z_m);
   TEST_ASSERT_INT64_WITHIN(100 * MS, wm_monotonic_ns(), event.t_ns);
-  expect_state(WM_DEVICE_WORKS, "fix without corrections");
+  expect_device(WM_DEVICE_WORKS, "fix without corrections");
 }
 
 TEST(sigmas_follow_the_fix) {
@@ -167,7 +110,7 @@ TEST(sigmas_follow_the_fix) {
     TEST_ASSERT_DOUBLE_IS_NAN(event.as.position.sigma_z_m);
   }
   TEST_ASSERT_EQUAL_UINT32(5, source->counts.news);  // each change of the type
-  expect_state(WM_DEVICE_WORKS, "fix without corrections");
+  expect_device(WM_DEVICE_WORKS, "fix without corrections");
 }
 
 static void deviations(const char *lat_m) {
@@ -203,14 +146,13 @@ TEST(deviations_before_the_first_fix_are_of_it) {
 TEST(a_course_is_a_heading) {
   config.from = WM_GPSD_COURSE;
   begin_connected();
-  report(utc_ns(), FIX ",\"speed\":0.5,\"track\":90");  // too slow
+  send_report(utc_ns(), FIX ",\"speed\":0.5,\"track\":90");  // too slow
   expect(WM_AGAIN);
   now(FIX ",\"speed\":2,\"track\":90", WM_OK);
   TEST_ASSERT_EQUAL(WM_EVENT_HEADING, event.kind);
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0, event.as.heading.heading_rad);
   TEST_ASSERT_DOUBLE_WITHIN(1e-3, 0.05, event.as.heading.sigma_rad);
-  report(utc_ns() + MS, FIX ",\"speed\":2,\"track\":350,\"epd\":5");
-  expect(WM_OK);
+  report(utc_ns() + MS, FIX ",\"speed\":2,\"track\":350,\"epd\":5", WM_OK);
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 100 * M_PI / 180, event.as.heading.heading_rad);
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 5 * M_PI / 180, event.as.heading.sigma_rad);
 }
@@ -227,8 +169,7 @@ TEST(the_course_is_the_antennas) {
     const double heading = 0.1 * k * turn_radps, course = heading + atan2(turn_radps * ahead_m, speed_mps);
     (void)snprintf(members, sizeof members, FIX ",\"speed\":%.4f,\"track\":%.4f",
                    hypot(speed_mps, turn_radps * ahead_m), fmod(810 - course * 180 / M_PI, 360));
-    report(begin_ns + k * 100 * MS, members);
-    expect(WM_OK);
+    report(begin_ns + k * 100 * MS, members, WM_OK);
     if (k >= 40) TEST_ASSERT_DOUBLE_WITHIN(0.004, 0, remainder(event.as.heading.heading_rad - heading, 2 * M_PI));
   }
   TEST_ASSERT_DOUBLE_WITHIN(1e-3, 0.02, event.as.heading.sigma_rad);
@@ -255,7 +196,7 @@ TEST(without_a_fix_nothing_is_fused) {
   for (size_t i = 0; i < sizeof kNone / sizeof kNone[0]; i++) {
     now(FIX, WM_OK);
     now(kNone[i], WM_AGAIN);
-    expect_state(WM_DEVICE_DOWN, "no fix");
+    expect_device(WM_DEVICE_DOWN, "no fix");
   }
   TEST_ASSERT_EQUAL_UINT64(6, source->counts.ignored);
 }
@@ -264,7 +205,7 @@ TEST(without_a_fix_nothing_is_fused) {
 TEST(a_stored_place_is_no_fix) {
   begin_connected();
   now("\"mode\":3,\"status\":7," PLACE, WM_AGAIN);
-  expect_state(WM_DEVICE_DOWN, "a stored place");
+  expect_device(WM_DEVICE_DOWN, "a stored place");
   now("\"mode\":3," PLACE, WM_AGAIN);
   now(FIX, WM_OK);
 }
@@ -272,10 +213,8 @@ TEST(a_stored_place_is_no_fix) {
 TEST(reports_of_one_epoch_are_one_row) {
   begin_connected();
   const wm_time_ns t_ns = utc_ns();
-  report(t_ns, FIX);
-  expect(WM_OK);
-  report(t_ns, FIX ",\"speed\":1");
-  expect(WM_AGAIN);
+  report(t_ns, FIX, WM_OK);
+  report(t_ns, FIX ",\"speed\":1", WM_AGAIN);
   TEST_ASSERT_EQUAL_UINT64(1, source->counts.ignored);
   now(FIX, WM_OK);
 }
@@ -283,20 +222,13 @@ TEST(reports_of_one_epoch_are_one_row) {
 TEST(rubbish_is_counted) {
   begin_connected();
   say("$GPGGA,1,2,3\r\n{\"class\":\"TPV\",\r\n");
-  char flood[1000];
-  memset(flood, 'x', sizeof flood - 1);
-  flood[sizeof flood - 1] = '\0';
-  for (int i = 0; i < 40; i++) {
-    say(flood);
-    expect(WM_AGAIN);
-  }
-  say("\r\n");
-  report(utc_ns(), FIX);
+  flood();
+  send_report(utc_ns(), FIX);
   for (int i = 0; i < 10 && next() != WM_OK; i++) {
   }
   TEST_ASSERT_EQUAL_UINT64(1, source->counts.received);
   TEST_ASSERT_EQUAL_UINT64(3, source->counts.malformed);
-  TEST_ASSERT_NOT_NULL(strstr(source->counts.first_problem, "is not a JSON object"));
+  expect_problem("is not a JSON object");
 }
 
 TEST(an_accuracy_that_cannot_be_is_refused) {
@@ -309,9 +241,8 @@ TEST(an_accuracy_that_cannot_be_is_refused) {
 TEST(doubled_and_older_reports_are_counted) {
   begin_connected();
   const wm_time_ns t_ns = utc_ns();
-  for (int i = 0; i < 3; i++) report(t_ns, FIX);
-  report(t_ns - 150 * MS, FIX);
-  expect(WM_OK);
+  for (int i = 0; i < 3; i++) send_report(t_ns, FIX);
+  report(t_ns - 150 * MS, FIX, WM_OK);
   for (int i = 0; i < 3; i++) expect(WM_AGAIN);
   TEST_ASSERT_EQUAL_UINT64(2, source->counts.ignored);
   TEST_ASSERT_EQUAL_UINT64(0, source->counts.frozen);
@@ -324,7 +255,7 @@ TEST(a_receivers_clock_is_followed) {
   begin_connected();
   const wm_time_ns off_ns = -INT64_C(1024) * 7 * 86400 * WM_NS_PER_S;
   for (int i = 0; i < 20; i++) {
-    report(utc_ns() + off_ns + (i < 10 ? 0 : -30 * WM_NS_PER_S), FIX);
+    send_report(utc_ns() + off_ns + (i < 10 ? 0 : -30 * WM_NS_PER_S), FIX);
     const wm_status status = next();
     if (i < 10) TEST_ASSERT_EQUAL(WM_OK, status);
     if (status == WM_OK) TEST_ASSERT_INT64_WITHIN(70 * MS, wm_monotonic_ns() - 80 * MS, event.t_ns);
@@ -336,15 +267,13 @@ TEST(a_receivers_clock_is_followed) {
 TEST(by_utc_the_clocks_must_agree) {
   config.clock = WM_GPSD_CLOCK_UTC;
   begin_connected();
-  report(utc_ns() - 300 * MS, FIX);  // late, and fused at its stamp
+  send_report(utc_ns() - 300 * MS, FIX);  // late, and fused at its stamp
   expect(WM_OK);
   TEST_ASSERT_INT64_WITHIN(100 * MS, wm_monotonic_ns() - 300 * MS, event.t_ns);
-  report(utc_ns() + 2000 * MS, FIX);
-  expect(WM_AGAIN);
-  report(utc_ns() - 20000 * MS, FIX);
-  expect(WM_AGAIN);
+  report(utc_ns() + 2000 * MS, FIX, WM_AGAIN);
+  report(utc_ns() - 20000 * MS, FIX, WM_AGAIN);
   TEST_ASSERT_EQUAL_UINT64(2, source->counts.malformed);
-  TEST_ASSERT_NOT_NULL(strstr(source->counts.first_problem, "this computer's clock are apart"));
+  expect_problem("this computer's clock are apart");
 }
 
 TEST(absent_and_back) {
@@ -352,31 +281,30 @@ TEST(absent_and_back) {
   begin();
   expect(WM_AGAIN);
   expect(WM_AGAIN);
-  expect_state(WM_DEVICE_ABSENT, "no gpsd answers at 127.0.0.1:");
-  listen_again();
+  expect_device(WM_DEVICE_ABSENT, "no gpsd answers at 127.0.0.1:");
+  listen_at(&config.port);
   welcome();
   now(FIX, WM_OK);
   hang_up();
-  wait_for(WM_DEVICE_ABSENT);
-  listen_again();
+  wait_for(WM_DEVICE_ABSENT, "");
+  listen_at(&config.port);
   welcome();
   now(FIX, WM_OK);
-  expect_state(WM_DEVICE_WORKS, "fix");
+  expect_device(WM_DEVICE_WORKS, "fix");
 }
 
 TEST(unplugged_silent_and_back) {
   begin_connected();
   now(FIX, WM_OK);
-  wait_for(WM_DEVICE_STALLED);
-  expect_state(WM_DEVICE_STALLED, "is its receiver plugged in?");
+  wait_for(WM_DEVICE_STALLED, "is its receiver plugged in?");
   say("{\"class\":\"DEVICE\",\"path\":\"/dev/ttyACM0\",\"activated\":0}\r\n");
   expect(WM_AGAIN);
-  expect_state(WM_DEVICE_DOWN, "its receiver was unplugged");
+  expect_device(WM_DEVICE_DOWN, "its receiver was unplugged");
   now(FIX, WM_OK);
-  expect_state(WM_DEVICE_WORKS, "fix");
+  expect_device(WM_DEVICE_WORKS, "fix");
   say("{\"class\":\"ERROR\",\"message\":\"no such device\"}\r\n");
   expect(WM_AGAIN);
-  expect_state(WM_DEVICE_DOWN, "no such device");
+  expect_device(WM_DEVICE_DOWN, "no such device");
 }
 
 TEST(the_maps_origin_is_needed) {
