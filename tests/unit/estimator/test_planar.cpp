@@ -1,40 +1,32 @@
 // SPDX-License-Identifier: Apache-2.0
 // The planar filter's algebra: kernels and their scalar twins, prediction's derivatives against finite differences,
 // Joseph's form against the plain one, one number after the other against all at once.
-#include "common/suite.h"
-#include "events.hpp"
-#include "filters/planar/planar_filter.hpp"
 #include "math/arc.hpp"
 #include "math/elementary.hpp"
+#include "planar_fixture.hpp"
 #include "waymark/random.h"
 
 namespace {
 
-constexpr int kMax = 16;
-wm_motion_params params;
-wm_motion_states states;
-wm_setup setup;
-wm::planar_filter_of<64> *filter;
+using namespace planar;
 
-void make_setup(const wm_wheels &wheels) {
-  make::exact_motion(&params);
-  setup = {};
-  setup.motion = &params;
-  setup.wheels = wheels;
-  setup.start = {WM_TIME_NONE, {1, 2, 0}, {0, 0, 0, 1}, 0.4, 0.1, 0.1};
-  states = {};
+constexpr int kMax = 16;
+const wm_pose2 kStart = {1, 2, 0.4};
+
+wm_wheels wheels_of_track() {
+  wm_wheels wheels = make::no_wheels();
+  wheels.track_m = 0.5;
+  return wheels;
 }
 
 // A filter with everything on that twists can teach, driven for a while so that all is correlated.
 // No lag: it is held at 0 and above, which is not linear.
 void make_busy_filter(int more = 0) {
-  wm_wheels wheels = make::no_wheels();
-  wheels.track_m = 0.5;
-  make_setup(wheels);
+  all_exact();
   const double sigma[9] = {0.1, 0.1, 0.02, 0.05, 0.05, 0.05, 0, 0, 0.05};
   std::memcpy(states.sigma, sigma, sizeof sigma);
-  filter->init(setup, states, wm::kPoseStates + wm::planar_filter::count_motion_states(states) + more);
-  for (int i = 0; i <= 20; i++) filter->move(make::twist(0.1 * i, 1.0 + 0.3 * sin(i), 0.5 * cos(0.7 * i)));
+  begin(wheels_of_track(), kStart, 0.1, more);
+  drive_swinging();
 }
 
 void copy_covariance(double out[kMax][kMax]) {
@@ -49,7 +41,7 @@ wm_pose2 drive(const double x0[3], const wm_motion_calibration &c, const wm_whee
   front.take_commands(true);
   wm_pose2 pose = {x0[0], x0[1], x0[2]};
   for (int i = 0; i <= 20; i++) {
-    const wm_event e = make::twist(0.1 * i, 1.0 + 0.3 * sin(i), 0.5 * cos(0.7 * i));
+    const wm_event e = swinging(i);
     front.feed(e);
     front.advance(e.t_ns, c, [&](const wm::motion_segment &s, const wm::motion_twist &t, const wm::motion_noise &) {
       const wm::arc a = wm::make_arc(t.v * s.dt_s, t.u * s.dt_s, t.w * s.dt_s);
@@ -62,15 +54,13 @@ wm_pose2 drive(const double x0[3], const wm_motion_calibration &c, const wm_whee
 // With a diagonal start and no noise, the covariance of (pose, state) after the drive is derivative times variance:
 // every calibration column, the lag's too, against differences.
 TEST(test_prediction_carries_the_right_derivatives) {
-  wm_wheels wheels = make::no_wheels();
-  wheels.track_m = 0.5;
-  make_setup(wheels);
+  const wm_wheels wheels = wheels_of_track();
   params.noise_speed_mps = params.noise_speed_rel = params.noise_yaw_rate_radps = params.noise_yaw_rate_rel = 0;
   params.noise_side_rel = 0;
   const double sigma[] = {0.1, 0.1, 0.02, 0.05, 0.05, 0.05, 0, 0.1, 0.05, 0.1, 0.05, 0.3, 0, 0.1};
   std::memcpy(states.sigma, sigma, sizeof sigma);
-  filter->init(setup, states, wm::kPoseStates + wm::planar_filter::count_motion_states(states));
-  for (int i = 0; i <= 20; i++) filter->move(make::twist(0.1 * i, 1.0 + 0.3 * sin(i), 0.5 * cos(0.7 * i)));
+  begin(wheels, kStart, 0.1);
+  drive_swinging();
   int state = 3, checked = 0;
   for (int k = 0; k < wm::kCalibrationCount; k++) {
     if (sigma[k] == 0) continue;
@@ -167,9 +157,8 @@ TEST(test_an_update_is_josephs_form) {
 
 // GIVEN a car that stands WHEN its gyro says 0.015 rad/s THEN that is its bias.
 TEST(test_standing_still_teaches_the_gyros_bias) {
-  make_setup(make::car());
   states.sigma[2] = 0.02;
-  filter->init(setup, states, wm::kPoseStates + wm::planar_filter::count_motion_states(states));
+  begin(make::car(), kStart, 0.1);
   for (int i = 0; i < 300; i++)
     filter->move(make::quantities(0.1 * i, {{WM_Q_VEHICLE_SPEED, 0.0}, {WM_Q_YAW_RATE, 0.015 + 0.002 * (i % 2)}}));
   TEST_ASSERT_DOUBLE_WITHIN(0.001, 0.016, filter->calibration().value[wm::kYawRateBias]);
@@ -234,8 +223,7 @@ TEST(test_a_yaw_that_is_stated_wrongly_is_found) {
 }
 
 TEST(test_the_estimate_of_a_drive_has_its_twist) {
-  make_setup(make::no_wheels());
-  filter->init(setup, states, wm::kPoseStates + wm::planar_filter::count_motion_states(states));
+  begin(make::no_wheels(), kStart, 0.1);
   for (int i = 0; i <= 10; i++) filter->move(make::twist(0.1 * i, 1.5, i < 5 ? 0.0 : 0.2));
   filter->move_to(make::at(1.1));
   wm_estimate out;
@@ -262,8 +250,4 @@ TEST(test_an_update_of_a_vast_variance_leaves_some) {
 
 }  // namespace
 
-void setUp(void) {
-  filter =
-      static_cast<wm::planar_filter_of<64> *>(aligned_alloc(16, (sizeof(wm::planar_filter_of<64>) + 15) / 16 * 16));
-}
-void tearDown(void) { free(filter); }
+void setUp(void) { all_exact(); }

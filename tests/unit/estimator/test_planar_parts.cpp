@@ -1,34 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
 // Parts of the planar filter one by one: poses given from outside, covariances that are inflated and mixed, limits of
 // states, rates without the steps of counts, states that come and go with the motion's kind, updates that are refused.
-#include <memory>
-
-#include "common/suite.h"
-#include "events.hpp"
 #include "filters/planar/past_pose.hpp"
-#include "filters/planar/planar_filter.hpp"
 #include "filters/planar/set_pose.hpp"
 #include "math/se3.hpp"
-#include "motion/motion_params.h"
+#include "planar_fixture.hpp"
 #include "waymark/random.h"
 
 namespace {
 
+using namespace planar;
+
 constexpr int kMost = 24;
-wm_motion_params params;
-wm_motion_states states;
-wm_setup setup;
-std::unique_ptr<wm::planar_filter_of<64>> filter;
 
 void begin(const wm_wheels &wheels, int model = WM_MOTION_AUTO) {
   params.model = model;
-  setup = {};
-  setup.motion = &params;
-  setup.wheels = wheels;
-  setup.start = {WM_TIME_NONE, {1, 2, 0}, {0, 0, 0, 1}, 0.4, 0.1, 0.1};
   params.states = states;
-  filter = std::make_unique<wm::planar_filter_of<64>>();
-  filter->init(setup, states, wm::kPoseStates + wm::planar_filter::count_motion_states(states, model));
+  planar::begin(wheels, {1, 2, 0.4}, 0.1);
 }
 
 // Driven for a while so that all is correlated.
@@ -38,7 +26,7 @@ void begin_busy() {
   for (const int term : {WM_SPEED_SCALE, WM_YAW_RATE_SCALE, WM_YAW_RATE_BIAS, WM_TRACK_SCALE})
     states.sigma[term] = 0.05;
   begin(wheels);
-  for (int i = 0; i <= 20; i++) filter->move(make::twist(0.1 * i, 1.0 + 0.3 * sin(i), 0.5 * cos(0.7 * i)));
+  drive_swinging();
 }
 
 struct kept {
@@ -125,10 +113,10 @@ TEST(test_the_start_of_the_filter) {
   begin(make::no_wheels());
   expect_pose(1.0, 2.0, 0.4, 0.1, 0.1);
   setup.start = {WM_TIME_NONE, {NAN, NAN, 0}, {0, 0, 0, 1}, NAN, NAN, NAN};
-  filter->init(setup, states, wm::kPoseStates + wm::planar_filter::count_motion_states(states));
+  begin_again();
   expect_pose(0.0, 0.0, 0.0, 0.05, 0.05);
   setup.start.heading_rad = 4.0;
-  filter->init(setup, states, wm::kPoseStates + wm::planar_filter::count_motion_states(states));
+  begin_again();
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 4.0 - 2.0 * M_PI, filter->value(2));
 }
 
@@ -258,7 +246,7 @@ TEST(test_the_turn_is_tested_by_what_is_seen) {
       if (list.count() > 0) listed = value.value;
     }
     TEST_ASSERT_EQUAL_DOUBLE(how == 0 ? -1.0 : 0.0, listed);
-    filter->init(setup, states, wm::kPoseStates + wm::planar_filter::count_motion_states(states, models[how]));
+    begin_again();
     wm_calibration_value value{};
     wm::calibration_list list(&value, 1);
     filter->turn_test().list(&list);  // begun again, nothing is known of it
@@ -487,8 +475,8 @@ TEST(test_a_filter_that_is_begun_again_is_the_same) {
   const kept first;
   const double travelled = filter->travelled_m(), turned = filter->turned_rad();
   const wm_pose2 odom = filter->odom();
-  filter->init(setup, states, wm::kPoseStates + wm::planar_filter::count_motion_states(states));
-  for (int i = 0; i <= 20; i++) filter->move(make::twist(0.1 * i, 1.0 + 0.3 * sin(i), 0.5 * cos(0.7 * i)));
+  begin_again();
+  drive_swinging();
   for (int i = 0; i < filter->states(); i++) {
     TEST_ASSERT_EQUAL_DOUBLE(first.x[i], filter->value(i));
     for (int j = 0; j < filter->states(); j++) TEST_ASSERT_EQUAL_DOUBLE(first.p[i][j], filter->covariance(i, j));
@@ -521,8 +509,4 @@ TEST(test_a_past_path_is_that_between_the_poses) {
 
 }  // namespace
 
-void setUp(void) {
-  make::exact_motion(&params);
-  states = {};
-}
-void tearDown(void) { filter.reset(); }
+void setUp(void) { all_exact(); }

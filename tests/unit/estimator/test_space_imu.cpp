@@ -12,6 +12,11 @@ using make::imu;
 using make::kNoRates;
 
 double jitter(int i) { return i % 2 ? 1e-6 : -1e-6; }
+// Rates of a turn about the body's z axis, of an IMU that is alive; and of one that is silent.
+auto turning(double w_radps) {
+  return [w_radps](int i) { return vec3{jitter(i), jitter(i), w_radps}; };
+}
+vec3 silent(int) { return {NAN, 0, 0}; }
 
 // stereo_ekf without pictures, from level, for `seconds`: the log ten times a second, the IMU a hundred times.
 struct vehicle : scene {
@@ -32,11 +37,9 @@ struct vehicle : scene {
     }
   }
   // Roll and pitch: of the body's axes, how far they leave the level.
-  void tilt(double *roll, double *pitch) const {
-    const wm_estimate e = estimate();
-    const mat3 R = matrix_of(quat_of(e.pose_map_base.q_xyzw));
-    *roll = R.m[2][1];
-    *pitch = -R.m[2][0];
+  std::pair<double, double> tilt() const {
+    const mat3 R = matrix_of(quat_of(estimate().pose_map_base.q_xyzw));
+    return {R.m[2][1], -R.m[2][0]};
   }
   // Of a rotation about an axis of the map.
   double sigma_about(const vec3 &axis) const {
@@ -54,12 +57,7 @@ vec3 at_rest(int) { return {0, 0, kG}; }
 
 TEST(test_the_rates_are_the_imus_and_the_velocity_the_logs) {
   vehicle v(0);
-  v.go(
-      2, {0.5, 0, 0}, {0, 0, 0},
-      [](int i) {
-        return vec3{jitter(i), jitter(i), 0.2};
-      },
-      at_rest);
+  v.go(2, {0.5, 0, 0}, {0, 0, 0}, turning(0.2), at_rest);
   const wm_estimate e = v.estimate();
   TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.2 * 1.99, e.heading_rad);
   TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.5 / 0.2 * std::sin(0.398), e.pose_map_base.p_m[0]);
@@ -68,23 +66,12 @@ TEST(test_the_rates_are_the_imus_and_the_velocity_the_logs) {
 
 TEST(test_a_silent_imu_yields_to_the_logs_rates) {
   vehicle v(0);
-  v.go(
-      1, {0, 0, 0}, {0, 0, 0.1},
-      [](int i) {
-        return vec3{jitter(i), jitter(i), 0.3};
-      },
-      at_rest);
+  v.go(1, {0, 0, 0}, {0, 0, 0.1}, turning(0.3), at_rest);
   const double before = v.estimate().heading_rad;
-  v.go(
-      3, {0, 0, 0}, {0, 0, 0.1},
-      [](int) {
-        return vec3{NAN, 0, 0};
-      },
-      at_rest);
+  v.go(3, {0, 0, 0}, {0, 0, 0.1}, silent, at_rest);
   TEST_ASSERT_DOUBLE_WITHIN(0.07, before + 0.3, v.estimate().heading_rad);  // a quarter of a second until it is noticed
 }
 
-// A velocity that holds while the gyro goes on is not certain for ever.
 // Beside an IMU the log's velocity holds for hold_max_s, and no longer.
 TEST(test_a_velocity_holds_for_its_time_and_no_longer) {
   spatial_source source;
@@ -126,10 +113,10 @@ TEST(test_an_axis_that_repeats_for_a_moment_is_not_stuck) {
 
 TEST(test_a_silent_log_beside_an_imu_makes_the_place_uncertain) {
   vehicle v(0);
-  const auto turning = [](int i) { return vec3{jitter(i), jitter(i), 0.1}; };
-  v.go(2, {0.5, 0, 0}, {0, 0, 0}, turning, at_rest);
+  const auto turns = turning(0.1);
+  v.go(2, {0.5, 0, 0}, {0, 0, 0}, turns, at_rest);
   const double before_m = std::sqrt(v.estimate().covariance[0]);
-  for (int i = 0; i < 1000; i++, v.step_++) v.tell(imu(0.01 * v.step_, turning(v.step_), {0, 0, kG}));
+  for (int i = 0; i < 1000; i++, v.step_++) v.tell(imu(0.01 * v.step_, turns(v.step_), {0, 0, kG}));
   TEST_ASSERT_LESS_THAN_DOUBLE(0.1, before_m);
   TEST_ASSERT_GREATER_THAN_DOUBLE(1.0, std::sqrt(v.estimate().covariance[0]));
 }
@@ -158,12 +145,8 @@ TEST(test_a_stuck_axis_is_found) {
 
 TEST(test_the_filter_reports_a_stuck_axis) {
   vehicle v(0);
-  v.go(
-      12, {0, 0, 0}, {0, 0, 0},
-      [](int i) {
-        return vec3{0.05, jitter(i), jitter(i)};
-      },
-      at_rest);
+  const auto stuck = [](int i) { return vec3{0.05, jitter(i), jitter(i)}; };
+  v.go(12, {0, 0, 0}, {0, 0, 0}, stuck, at_rest);
   TEST_ASSERT_EQUAL(WM_MOTION_HEALTH_ROLL_RATE_STUCK, v.ekf->motion_health(v.state));
 }
 
@@ -176,8 +159,7 @@ vec3 still(int i) { return {jitter(i), jitter(i), jitter(i)}; }
 TEST(test_gravity_levels) {
   vehicle v(0.01);
   v.go(20, {0, 0, 0}, {0, 0, 0}, still, tilted);
-  double roll, pitch;
-  v.tilt(&roll, &pitch);
+  const auto [roll, pitch] = v.tilt();
   TEST_ASSERT_DOUBLE_WITHIN(0.003, 0.05, roll);
   TEST_ASSERT_DOUBLE_WITHIN(0.003, -0.08, pitch);
   TEST_ASSERT_LESS_THAN_DOUBLE(0.005, v.sigma_about({1, 0, 0}));
@@ -188,8 +170,7 @@ TEST(test_gravity_levels) {
 TEST(test_without_the_state_gravity_is_not_used) {
   vehicle v(0);
   v.go(5, {0, 0, 0}, {0, 0, 0}, still, tilted);
-  double roll, pitch;
-  v.tilt(&roll, &pitch);
+  const auto [roll, pitch] = v.tilt();
   TEST_ASSERT_DOUBLE_WITHIN(1e-4, 0, roll);
   TEST_ASSERT_DOUBLE_WITHIN(1e-4, 0, pitch);
 }
@@ -201,8 +182,7 @@ TEST(test_vibration_and_bumps_tilt_nothing) {
     const double shaken = 3 * std::sin(2 * M_PI * 23 * 0.01 * i), bump = i % 200 < 5 ? 30.0 : 0.0;
     return vec3{shaken + 0.3 * bump, shaken, kG + shaken + bump};
   });
-  double roll, pitch;
-  v.tilt(&roll, &pitch);
+  const auto [roll, pitch] = v.tilt();
   const double sigma = std::sqrt(v.estimate().covariance[wm_cov_index(4, 4)]);
   TEST_ASSERT_DOUBLE_WITHIN(2 * sigma, 0, pitch);
   TEST_ASSERT_DOUBLE_WITHIN(0.03, 0, roll);
@@ -219,17 +199,16 @@ TEST(test_an_acceleration_that_the_log_measures_is_no_tilt) {
     v.tell(imu(t, still(v.step_), {1, 0, kG}));
   }
   v.go(1, {2, 0, 0}, {0, 0, 0}, still, at_rest);
-  double roll, pitch;
-  v.tilt(&roll, &pitch);
+  const auto [roll, pitch] = v.tilt();
   TEST_ASSERT_DOUBLE_WITHIN(0.01, 0, pitch);
 }
 
 // A velocity log that measures no rates: the turn is the gyro's.
 TEST(test_a_log_without_rates_beside_an_imu) {
-  const auto turning = [](int i) { return vec3{jitter(i), jitter(i), 0.2}; };
+  const auto turns = turning(0.2);
   vehicle with(0), without(0);
-  with.go(2, {0.5, 0, 0}, {0, 0, 0.2}, turning, at_rest);
-  without.go(2, {0.5, 0, 0}, kNoRates, turning, at_rest);
+  with.go(2, {0.5, 0, 0}, {0, 0, 0.2}, turns, at_rest);
+  without.go(2, {0.5, 0, 0}, kNoRates, turns, at_rest);
   for (int i = 0; i < 3; i++)
     TEST_ASSERT_DOUBLE_WITHIN(1e-3, with.estimate().pose_map_base.p_m[i], without.estimate().pose_map_base.p_m[i]);
   TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.2 * 1.99, without.estimate().heading_rad);
@@ -239,19 +218,9 @@ TEST(test_a_log_without_rates_beside_an_imu) {
 // While its IMU is silent nothing measures the turn: the heading holds, and its sigma grows.
 TEST(test_a_log_without_rates_and_a_silent_imu) {
   vehicle v(0);
-  v.go(
-      1, {0.5, 0, 0}, kNoRates,
-      [](int i) {
-        return vec3{jitter(i), jitter(i), 0.1};
-      },
-      at_rest);
+  v.go(1, {0.5, 0, 0}, kNoRates, turning(0.1), at_rest);
   const double before = v.sigma_about({0, 0, 1});
-  v.go(
-      3, {0.5, 0, 0}, kNoRates,
-      [](int) {
-        return vec3{NAN, 0, 0};
-      },
-      at_rest);
+  v.go(3, {0.5, 0, 0}, kNoRates, silent, at_rest);
   TEST_ASSERT_DOUBLE_WITHIN(0.05, 0.1 * 1.2, v.estimate().heading_rad);
   // A gyro is silent after 0.25 s; from then on 0.1 rad per sqrt(s).
   TEST_ASSERT_DOUBLE_WITHIN(0.01, std::sqrt(square(before) + 0.01 * 2.75), v.sigma_about({0, 0, 1}));
