@@ -482,21 +482,6 @@ TEST(test_how_far_off_the_plane_is_off) {
         }
 }
 
-// GIVEN samples of a holonomic drive with a noise of their own WHEN they change by less than it THEN no change is noise
-// between samples.
-TEST(test_the_sampling_noise_of_a_holonomic_drive_is_never_below_zero) {
-  start(make::no_wheels(), WM_MOTION_TWIST);
-  params.twist = WM_TWIST_MEASURED;
-  params.states.drive = WM_DRIVE_HOLONOMIC;
-  params.noise_speed_mps = params.noise_sideways_mps = params.noise_yaw_rate_radps = 0.5;
-  params.noise_speed_rel = params.noise_sideways_rel = params.noise_side_rel = params.noise_yaw_rate_rel = 0.0;
-  front.init(&params, &wheels);
-  for (int i = 0; i <= 50; i++) feed(make::twist6(0.1 * i, 1.0 + 0.01 * (i % 2), 0.3 - 0.01 * (i % 2), 0.2));
-  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 5.0 * 0.25, way_var);
-  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 5.0 * 0.25, side_var);
-  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 5.0 * 0.25, turn_var);
-}
-
 // GIVEN samples of one axis that change by 0.4 to and fro WHEN their own noise explains a part of it THEN the rest is
 // noise between samples of that axis: (change^2 - 2 own / dt) dt^2 / 12.
 TEST(test_the_sampling_noise_is_what_the_own_noise_does_not_explain) {

@@ -161,29 +161,6 @@ TEST(test_rear_wheels_are_preferred_and_a_silent_source_yields) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1.0, speed_at(10.0));
 }
 
-// A speed that is overdue holds, and its way's variance is that of a robot that may have braked, however often it is
-// asked. A source that is slow by habit is not overdue.
-TEST(test_a_held_speed_is_doubted_more_and_more) {
-  double grown[2];
-  for (int steps : {1, 7}) {
-    start(make::car());
-    without_noise_of_rates();
-    for (int i = 0; i <= 10; i++) speed_and_gyro(0.1 * i, 1.0, 0.0);
-    advance(1.29);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0, way_var);
-    for (int i = 1; i <= steps; i++) advance(1.29 + (2.3 - 1.29) * i / steps);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 2.3, pose.x_m);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.25, way_var);  // a second after 0.3 s: half a metre
-    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.0625, turn_var);
-    grown[steps > 1] = way_var;
-  }
-  TEST_ASSERT_DOUBLE_WITHIN(1e-12, grown[0], grown[1]);
-  start(make::car());
-  params.noise_speed_mps = params.noise_speed_rel = 0;
-  for (int i = 0; i <= 10; i++) speed_and_gyro(i, 1.0, 0.0);
-  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0, way_var - 0.25 * 0.75 * 0.75 * 0.75 * 0.75);  // the first one's habit isn't known
-}
-
 // A sampled speed changed at any time since the sample before it; counts are of the whole time, a command is obeyed
 // from its stamp on.
 TEST(test_a_change_between_samples_is_noise_of_its_moment) {
@@ -275,34 +252,6 @@ TEST(test_counts_that_may_have_wrapped) {
     }
 }
 
-// Of a bus that is silent for a minute: a correction ends what may have been driven until then.
-TEST(test_an_unknown_motion_begins_at_the_last_correction) {
-  start(make::car());
-  params.noise_speed_mps = params.noise_speed_rel = 0;
-  for (int i = 0; i <= 10; i++) speed_and_gyro(0.1 * i, 1.5, 0.0);
-  advance(3.0);
-  for (int i = 1; i <= 60; i++) {  // as a filter that is not corrected
-    front.set_position_variance(way_var + side_var);
-    advance(3.0 + i);
-  }
-  TEST_ASSERT_DOUBLE_WITHIN(20.0, 90.0 * 90.0, way_var);
-  front.set_position_variance(0.01 * 0.01);
-  const double before_m2 = way_var;
-  advance(63.25);
-  TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.375 * 0.375, way_var - before_m2);
-}
-
-TEST(test_ackermann_by_table_ratio_and_road_wheel) {
-  start(make::car());
-  feed(make::quantities(0, {{WM_Q_VEHICLE_SPEED, 2.0}, {WM_Q_STEERING_WHEEL, 3.0}}));
-  TEST_ASSERT_EQUAL(WM_MOTION_ACKERMANN, front.model());
-  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 2.0 * tan(0.2) / 2.5, front.twist_at(0, calibration).w);
-  feed(make::quantities(0, {{WM_Q_STEERING_ACTUATOR, 0.075}}));
-  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 2.0 * tan(0.26) / 2.5, front.twist_at(0, calibration).w);
-  feed(make::quantities(0, {{WM_Q_ROAD_WHEEL, -0.1}}));
-  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 2.0 * tan(-0.1) / 2.5, front.twist_at(0, calibration).w);
-}
-
 TEST(test_standing_still_shows_the_gyros_bias_and_holds_the_heading) {
   start(make::car());
   double rate;
@@ -316,21 +265,6 @@ TEST(test_standing_still_shows_the_gyros_bias_and_holds_the_heading) {
   TEST_ASSERT_EQUAL_DOUBLE(heading, pose.heading_rad);
   speed_and_gyro(2.1, 0.5, 0.01);
   TEST_ASSERT_FALSE(front.standstill_yaw_rate(&rate));
-}
-
-// GIVEN a lag WHEN a command comes THEN the robot obeys it that much later, between events, too.
-TEST(test_commands_are_obeyed_late) {
-  start(make::no_wheels());
-  calibration.value[wm::kLag] = 0.25;
-  feed(make::twist(0, 0, 0));
-  feed(make::twist(1, 1, 0));
-  advance(1.25);
-  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.0, pose.x_m);
-  advance(1.75);
-  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.5, pose.x_m);
-  feed(make::twist(2, 0, 0));
-  feed(make::twist(3, 0, 0));
-  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1.0, pose.x_m);
 }
 
 // A velocity that is the estimator's state holds without an end; each second has the noise of its walk alone.

@@ -204,23 +204,6 @@ TEST(test_noise_of_a_counted_way) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-4, 0.0385, sigma_m(1e6, 1.0, true));
 }
 
-// An increment's own covariance, as a rate, is that of the segment's time; without one, or in doubt, it is the model's.
-TEST(test_increments_have_their_own_covariance) {
-  wm::motion_input input = input_of(WM_MOTION_INCREMENTS, 1.0, 0.3, 0.5, kNone);
-  for (int i = 0; i < 6; i++) input.increment_noise[i] = 0.125f * static_cast<float>(i + 1);
-  const wm_motion_params p = only(nullptr, 0.0);
-  const wm::motion_twist t = wm::twist_of(input, wm::kNeutralCalibration, make::car(), {});
-  const auto noise = [&] {
-    return wm::noise_of(input, t, kDt_s, p, make::car(), wm::kNeutralCalibration, kNotStated, {1, 1});
-  };
-  const wm::motion_noise n = noise();
-  const double in_order[6] = {n.distance_m2,       n.distance_lateral, n.lateral_m2,
-                              n.distance_rotation, n.lateral_rotation, n.rotation_rad2};
-  for (int i = 0; i < 6; i++) TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0.125 * (i + 1) * kDt_s, in_order[i]);
-  input.doubtful = 1;
-  TEST_ASSERT_DOUBLE_WITHIN(1e-12, (1.0 + 0.09) * kDt_s, noise().distance_m2);
-}
-
 // A speed that is the artefact of two stamps: sideways it counts by its distance, as 30 m/s.
 TEST(test_sideways_noise_of_an_impossible_speed_is_by_distance) {
   const wm_motion_params p = only(&kTerms[5], 0.05);

@@ -35,21 +35,6 @@ void assert_pose(double x, double y, double heading, wm_pose2 p) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-6, heading, p.heading_rad);
 }
 
-TEST(test_half_a_circle_by_twists) {
-  for (int i = 0; i <= 100; i++) feed(make::twist(0.01 * i, 1.0, M_PI));
-  assert_pose(0.0, 2.0 / M_PI, M_PI, pose_at(1.0));
-  assert_pose(1.0 / M_PI, 1.0 / M_PI, M_PI / 2, pose_at(0.5));  // looked up
-  assert_pose(sin(M_PI * 0.333) / M_PI, (1 - cos(M_PI * 0.333)) / M_PI, M_PI * 0.333,
-              pose_at(0.333));  // between points
-}
-
-TEST(test_extrapolates_with_the_held_twist_but_not_for_ever) {
-  feed(make::twist(0, 1.0, 0.0));
-  feed(make::twist(1, 1.0, 0.0));
-  assert_pose(1.5, 0, 0, pose_at(1.5));
-  assert_pose(1.0 + params.hold_max_s, 0, 0, pose_at(60));
-}
-
 // The mean of the two wheels stands. A slow turn is one of ticks that add up.
 TEST(test_a_robot_that_turns_on_the_spot_does_not_stand) {
   for (const double rate : {0.05, 1.0}) {
@@ -418,24 +403,6 @@ TEST(test_a_twist_in_space_does_not_hold_for_ever) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.5 + params.hold_max_s, out.pose_map_base.p_m[0]);
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.0, out.v_mps[0]);
   TEST_ASSERT_GREATER_THAN_DOUBLE(1.0, out.covariance[wm_cov_index(1, 1)]);
-}
-
-// GIVEN twists in space that are silent WHEN an observation corrects the pose meanwhile THEN what is added to it until
-// the next one depends on the time since it, not on that since the begin of the silence.
-TEST(test_in_space_a_silence_adds_by_the_time_since_the_correction) {
-  for (int i = 0; i <= 10; i++) feed_six(0.1 * i, 1.0, 0.0);
-  const double after_s[] = {4.0, 10.0, 61.0, 601.0};
-  double grown_m2[4];
-  for (int i = 0; i < 4; i++)
-    grown_m2[i] = carried_in_space(after_s[i], after_s[i] + 0.25).covariance[wm_cov_index(0, 0)];
-  for (int i = 1; i < 4; i++) TEST_ASSERT_DOUBLE_WITHIN(1e-6, grown_m2[0], grown_m2[i]);
-  TEST_ASSERT_DOUBLE_WITHIN(0.1, 1.0, std::sqrt(grown_m2[0]));
-}
-
-// GIVEN 1 m/s in space WHEN 138 m/s come for 0.2 s THEN the speed holds.
-TEST(test_a_twist_in_space_that_nothing_reaches_is_refused) {
-  for (int i = 0; i <= 100; i++) feed_six(0.02 * i, i > 50 && i <= 60 ? 138.0 : 1.0, 0.0);
-  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1.5, carried_in_space(0.5, 2.0).pose_map_base.p_m[0]);
 }
 
 TEST(test_derivatives_of_compositions) {

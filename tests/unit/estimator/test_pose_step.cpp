@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // One step of the prediction against numeric derivatives: the columns of F by the heading, by calibration states and by
-// the lag, and each term of the noise, with all covariances of a segment.
+// the lag, and of a velocity that is a state.
 #include "common/suite.h"
 #include "filters/planar/pose_step.hpp"
 
@@ -118,44 +118,6 @@ TEST(test_column_by_the_lag) {
   at_work inner(1, 0, 0.5);  // neither end: its length does not depend on the lag
   inner.motion_state[wm::kLag] = 4;
   TEST_ASSERT_EQUAL(1, inner.make().columns);
-}
-
-// Of a command the drive is elsewhere at the end of the segment than on the mean.
-TEST(test_lag_of_a_command_takes_the_twist_at_the_end) {
-  at_work work(1.0, 0, 0.5);
-  work.motion_state[wm::kLag] = 4;
-  work.segment.last = true;
-  work.segment.input.command = 1;
-  work.segment.end = {1.4, 0, 0.9};
-  const wm::pose_step step = work.make();
-  const vec3 by_end = work.derivative(0, -1.4 / work.dt_s, 0, -0.9 / work.dt_s);
-  check_column(by_end, step, 1);
-}
-
-TEST(test_noise_is_that_of_distance_side_and_rotation) {
-  // Covariance of distance, side and rotation: each entry another number.
-  const double q[3][3] = {{4e-4, 1e-4, -0.7e-4}, {1e-4, 3e-4, 0.5e-4}, {-0.7e-4, 0.5e-4, 2e-4}};
-  wm::motion_noise noise{};
-  noise.distance_m2 = q[0][0];
-  noise.lateral_m2 = q[1][1];
-  noise.rotation_rad2 = q[2][2];
-  noise.distance_lateral = q[0][1];
-  noise.distance_rotation = q[0][2];
-  noise.lateral_rotation = q[1][2];
-  for (const auto &t : kTwists) {
-    at_work work(t[0], t[1], t[2]);
-    const double inverse = 1 / work.dt_s;  // of a twist per metre and rad of the segment
-    const vec3 by[3] = {work.derivative(0, inverse, 0, 0), work.derivative(0, 0, inverse, 0),
-                        work.derivative(0, 0, 0, inverse)};
-    const wm::pose_step step = work.make(noise);
-    for (int i = 0; i < 3; i++)
-      for (int j = i; j < 3; j++) {
-        double expected = 0;
-        for (int k = 0; k < 3; k++)
-          for (int l = 0; l < 3; l++) expected += by[k].at[i] * q[k][l] * by[l].at[j];
-        TEST_ASSERT_DOUBLE_WITHIN(1e-10, expected, step.noise[i][j]);
-      }
-  }
 }
 
 TEST(test_velocity_as_states) {

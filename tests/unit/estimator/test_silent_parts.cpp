@@ -78,37 +78,6 @@ TEST(test_the_rear_wheels_stand_in_backwards) {
   TEST_ASSERT_DOUBLE_WITHIN(0.02, -0.5, pose.heading_rad - before);
 }
 
-// GIVEN no other measure of the turn WHEN the gyro falls silent THEN the last rate holds with growing noise, and no
-// longer than hold_max.
-TEST(test_a_turn_that_nothing_measures_is_doubted) {
-  begin({true, false, true, false});
-  drive(2, 3, 0.2, {true, false, true, false});
-  const double before = pose.heading_rad, way = way_var;
-  drive(3, 4.26, 0, {true, false, false, false});
-  TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.2 * 1.25, pose.heading_rad - before);
-  TEST_ASSERT_DOUBLE_WITHIN(0.06 * 0.06, 0.0625, turn_var);  // (0.5 rad/s2 x 1 s^2 / 2)^2
-  TEST_ASSERT_DOUBLE_WITHIN(1e-6, way, way_var);             // the speed comes
-  drive(4.26, 9, 0, {true, false, false, false});
-  TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.2 * 2.0, pose.heading_rad - before);
-  TEST_ASSERT_GREATER_THAN_DOUBLE(1.0, turn_var);
-  TEST_ASSERT_TRUE(has_health(WM_MOTION_HEALTH_TURN_SILENT));
-}
-
-// GIVEN a speed and a gyro WHEN the speed falls silent THEN its way is doubted as after a silence of both.
-TEST(test_a_speed_that_falls_silent_is_doubted) {
-  begin({true, false, true, false});
-  const double x = pose.x_m;
-  drive(2, 3.24, 0, {false, false, true, false});
-  TEST_ASSERT_DOUBLE_WITHIN(0.03, 1.24, pose.x_m - x);
-  TEST_ASSERT_DOUBLE_WITHIN(0.06, 0.25, way_var);  // (1 m/s2 x 1 s^2 / 2)^2
-  TEST_ASSERT_TRUE(has_health(WM_MOTION_HEALTH_SPEED_SILENT));
-  drive(3.24, 6, 0, {false, false, true, false});
-  TEST_ASSERT_DOUBLE_WITHIN(0.03, 2.0, pose.x_m - x);  // hold_max
-  TEST_ASSERT_GREATER_THAN_DOUBLE(1.0, way_var);
-  drive(6, 6.1, 0, {true, false, true, false});
-  TEST_ASSERT_EQUAL_HEX32(0, front.health());
-}
-
 // GIVEN a robot that stands WHEN its speed falls silent THEN the gyro's rate is no measure of its bias.
 TEST(test_a_silent_speed_shows_no_standstill) {
   start(make::car());

@@ -90,27 +90,6 @@ TEST(test_a_velocity_holds_for_its_time_and_no_longer) {
   TEST_ASSERT_EQUAL_DOUBLE(0.01, now.w.z);
 }
 
-// A value that repeats for 0.2 s is chance or a coarse step; one of a moving body that repeats for longer is stuck.
-TEST(test_an_axis_that_repeats_for_a_moment_is_not_stuck) {
-  spatial_source source;
-  source.init(2.0, {0.05, 0.02});
-  const auto go = [&](int from, int to, bool repeats) {
-    for (int i = from; i < to; i++) {
-      spatial_twist now = {{0.5, 0.0, 0.0}, {0.0, 0.0, 0.0}};
-      if (i % 10 == 0) source.take(make::log6(0.01 * i, now.v), &now);
-      const double w = 0.01 * std::sin(i);
-      source.take(imu(0.01 * i, {w, w, repeats ? 0.3 : w}, {w, w, kG + w}), &now);
-    }
-  };
-  go(0, 400, false);
-  go(400, 420, true);
-  TEST_ASSERT_EQUAL_HEX32(0, source.stuck_rates());
-  go(420, 440, true);
-  TEST_ASSERT_EQUAL_HEX32(4, source.stuck_rates());
-  go(440, 441, false);
-  TEST_ASSERT_EQUAL_HEX32(0, source.stuck_rates());
-}
-
 TEST(test_a_silent_log_beside_an_imu_makes_the_place_uncertain) {
   vehicle v(0);
   const auto turns = turning(0.1);

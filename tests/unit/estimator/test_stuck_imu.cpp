@@ -59,26 +59,6 @@ TEST(test_all_axes_that_stick_are_found_within_half_a_second) {
   TEST_ASSERT_EQUAL(0, s.source.lost_rates());
 }
 
-TEST(test_one_axis_is_found_and_named) {
-  for (int axis = 0; axis < 6; axis++) {
-    sensors s;
-    s.go(10, {0.3, 0, 0}, moving);
-    const imu_row last = moving(s.i - 1);
-    const auto stuck = [&](int i) {
-      imu_row r = moving(i);
-      (axis < 3 ? r.w : r.f)[axis % 3] = (axis < 3 ? last.w : last.f)[axis % 3];
-      return r;
-    };
-    s.go(0.5, {0.3, 0, 0}, stuck);
-    TEST_ASSERT_EQUAL(axis < 3 ? 1u << axis : 0u, s.source.stuck_rates());
-    TEST_ASSERT_EQUAL(axis < 3 ? 0u : 1u << (axis - 3), s.source.stuck_forces());
-    TEST_ASSERT_EQUAL(axis < 3, s.source.force_is_fresh());
-    s.go(0.05, {0.3, 0, 0}, moving);
-    TEST_ASSERT_EQUAL(0, s.source.stuck_rates() | s.source.stuck_forces());
-    TEST_ASSERT_TRUE(s.source.force_is_fresh());
-  }
-}
-
 double coarse(double value, double step) { return step * std::round(value / step); }
 
 // Steps as large as the noise, and a body that stands for a minute with the same value: alive.
