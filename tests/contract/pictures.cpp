@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "common/fisheye_rig.hpp"
 #include "waymark/mr_code.h"
 
 namespace pictures {
@@ -160,6 +161,14 @@ double print_grey(const vec &eye, const vec &ray, int /*picture*/) {
 constexpr int kSide = 48;  // of a sign, px
 constexpr double kSign_m = 0.6;
 
+// By these cameras, number 0 first.
+std::unique_ptr<film> film_of(std::initializer_list<wm_camera> cameras) {
+  auto out = std::make_unique<film>();
+  out->rig = wm::drawn::rig_of(cameras);
+  for (int32_t i = 0; i < static_cast<int32_t>(cameras.size()); i++) out->cameras.push_back(i);
+  return out;
+}
+
 }  // namespace
 
 wm_view film::view() const {
@@ -174,58 +183,39 @@ wm_view film::view() const {
 }
 
 std::unique_ptr<film> floor_film() {
-  auto out = std::make_unique<film>();
-  wm_rig_init(&out->rig);
-  out->rig.camera_count = 1;
-  out->rig.cameras[0] = camera_of(WM_CAMERA_EQUIDISTANT, 640, 360, 260, {{0.3, 0, 0.4}, {0, 22 * M_PI / 180, 0}});
-  out->cameras = {0};
+  auto out = film_of({camera_of(WM_CAMERA_EQUIDISTANT, 640, 360, 260, {{0.3, 0, 0.4}, {0, 22 * M_PI / 180, 0}})});
   for (int i = 0; i < 2; i++) shoot(*out, {{0.2 * i, 0.1 * i, 0}, {0, 0, 0.1 * i}}, room_grey, 1.5);
   return out;
 }
 
 std::unique_ptr<film> upright_film() {
-  auto out = std::make_unique<film>();
-  wm_rig_init(&out->rig);
-  out->rig.camera_count = 1;
-  out->rig.cameras[0] = camera_of(WM_CAMERA_EQUIDISTANT, 400, 400, 115, {{0, 0, 0.8}, {0, -M_PI / 2, 0}});
-  out->cameras = {0};
+  auto out = film_of({camera_of(WM_CAMERA_EQUIDISTANT, 400, 400, 115, {{0, 0, 0.8}, {0, -M_PI / 2, 0}})});
   for (int i = 0; i < 14; i++)
     shoot(*out, {{0, 0, 0}, {0.008, -0.006, 0.06 * i + (i == 10 ? 0.25 : 0)}}, upright_grey, 1.5);
   return out;
 }
 
 std::unique_ptr<film> stereo_film() {
-  auto out = std::make_unique<film>();
-  wm_rig_init(&out->rig);
-  out->rig.camera_count = 2;
-  for (int i = 0; i < 2; i++)
-    out->rig.cameras[i] =
-        camera_of(WM_CAMERA_PINHOLE_RADTAN, 400, 300, 260, {{0.4, 0.15 - 0.3 * i, -0.1}, {0, 48 * M_PI / 180, 0}});
+  const auto side = [](double y_m) {
+    return camera_of(WM_CAMERA_PINHOLE_RADTAN, 400, 300, 260, {{0.4, y_m, -0.1}, {0, 48 * M_PI / 180, 0}});
+  };
+  auto out = film_of({side(0.15), side(-0.15)});
   out->rig.stereo = {0, 1, 0.3, {260, 260, 199.5, 149.5}, {0.5, 0.5, 0.5, 0.5}};
-  out->cameras = {0, 1};
   for (int i = 0; i < 6; i++) shoot(*out, {{0.05 * i, 0.01 * i, 2.2}, {0.01 * i, 0.005 * i, 0.015 * i}}, sea_grey, 1.5);
   return out;
 }
 
 std::unique_ptr<film> marker_film() {
-  auto out = std::make_unique<film>();
-  wm_rig_init(&out->rig);
-  out->rig.camera_count = 1;
-  out->rig.cameras[0] = camera_of(WM_CAMERA_EQUIDISTANT, 640, 360, 330, {{0, 0, 1}, {0, 0, 0}});
+  auto out = film_of({camera_of(WM_CAMERA_EQUIDISTANT, 640, 360, 330, {{0, 0, 1}, {0, 0, 0}})});
   std::strcpy(out->rig.marker_family, "mr");
   out->rig.marker_size_m = 0.25;
-  out->cameras = {0};
   for (int i = 0; i < 2; i++) shoot(*out, {{0.05 * i, 0.02, 0}, {0, 0, 0.02}}, print_grey, 1);
   return out;
 }
 
 // Signs at different distances and angles on both sides of a street. A square of white is what the cascade finds.
 std::unique_ptr<film> street_film(bool lost, int signs) {
-  auto out = std::make_unique<film>();
-  wm_rig_init(&out->rig);
-  out->rig.camera_count = 1;
-  out->rig.cameras[0] = camera_of(WM_CAMERA_EQUIDISTANT, 640, 400, 300, {{0, 0, 1.4}, {0, 0, 0}});
-  out->cameras = {0};
+  auto out = film_of({camera_of(WM_CAMERA_EQUIDISTANT, 640, 400, 300, {{0, 0, 1.4}, {0, 0, 0}})});
   out->signs.resize(static_cast<size_t>(signs));
   for (int i = 0; i < signs; i++) {
     std::vector<uint8_t> &sign = out->signs[static_cast<size_t>(i)];

@@ -34,33 +34,6 @@ void see(const wm_pose2 &truth, uint64_t number) {
 
 double sigma_of(int state) { return std::sqrt(filter->variance(state)); }
 
-// GIVEN a base that drives sideways WHEN its noise is asked for THEN it is that of the sideways speed, and forwards it
-// is as exact as a robot at rest but for its slip.
-TEST(test_sideways_has_noise_of_its_own) {
-  begin(WM_DRIVE_HOLONOMIC, make::no_wheels(), false);
-  params.noise_yaw_rate_radps = params.noise_yaw_rate_rel = 0.0;
-  params.noise_sideways_mps = 0.04;
-  params.noise_sideways_rel = 0.2;
-  const double before_m2 = filter->covariance(1, 1);
-  for (int i = 0; i <= 20; i++) filter->move(make::twist6(0.1 * i, 0.0, 0.7, 0.0));
-  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 2.0 * (0.04 * 0.04 + 0.14 * 0.14), filter->covariance(1, 1) - before_m2);
-  const double slip_mps = params.noise_side_rel * 0.7, speed_mps = params.noise_speed_mps;
-  TEST_ASSERT_DOUBLE_WITHIN(1e-6, 2.0 * (speed_mps * speed_mps + slip_mps * slip_mps), filter->covariance(0, 0));
-}
-
-// GIVEN a base that could drive sideways WHEN it stands THEN its noise has the factor of a robot at rest, sideways as
-// well as forwards.
-TEST(test_at_rest_the_noise_sideways_falls_as_well) {
-  begin(WM_DRIVE_HOLONOMIC, make::no_wheels(), false);
-  params.noise_speed_mps = params.noise_sideways_mps = 0.04;
-  params.noise_rest_factor = 0.1;
-  double before_m2[2];
-  for (int k = 0; k < 2; k++) before_m2[k] = filter->covariance(k, k);
-  for (int i = 0; i <= 20; i++) filter->move(make::twist6(0.1 * i, 0.0, 0.0, 0.0));
-  for (int k = 0; k < 2; k++)
-    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 2.0 * 0.004 * 0.004, filter->covariance(k, k) - before_m2[k]);
-}
-
 // GIVEN wheels that roll WHEN a twist has a sideways speed THEN it is used, without a state of its own: the odometry of
 // a rolling base by pictures, or of a base_link that is not on the axle, has it, too.
 TEST(test_a_rolling_base_uses_a_sideways_speed_without_a_scale) {

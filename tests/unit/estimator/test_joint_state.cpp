@@ -309,24 +309,6 @@ TEST(test_a_row_with_missing_entries_is_refused) {
   TEST_ASSERT_EQUAL_DOUBLE(before, a.state->value(0));
 }
 
-// In doubt a correction moves the pose; calibration and map stay, and the half matrix stays symmetric.
-TEST(test_the_pose_alone_is_corrected) {
-  made a(true);
-  a.state->move(make::twist(0.0, 0.0, 0.0));
-  const int s = a.state->landmark_state(a.add(1.6, 2.1));
-  joint_row row;
-  row.add(0, 1.0), row.add(2, 0.5), row.add(3, 0.3);
-  const double innovation = 0.1, noise = 0.01, none = 0.0, place = a.state->value(s), scale = a.state->value(3);
-  wm::innovation block = a.state->prepare(&row, &innovation, &noise, 1);
-  const double x = a.state->value(0), variance = a.state->variance(0), of_place = a.state->variance(s);
-  TEST_ASSERT_TRUE(a.state->fuse(std::move(block), &none, wm::joint_state::scope::pose));
-  TEST_ASSERT_TRUE(a.state->value(0) != x && a.state->variance(0) < variance);
-  TEST_ASSERT_EQUAL_DOUBLE(place, a.state->value(s));
-  TEST_ASSERT_EQUAL_DOUBLE(scale, a.state->value(3));
-  TEST_ASSERT_EQUAL_DOUBLE(of_place, a.state->variance(s));
-  TEST_ASSERT_EQUAL_DOUBLE(a.state->covariance_row(2)[3], a.state->covariance_row(3)[2]);
-}
-
 // One row of a landmark seen from the robot.
 static wm::innovation see_landmark(made *m, int first, double innovation, double noise, joint_row *row) {
   row->add(wm::kX, -0.6);

@@ -85,18 +85,6 @@ TEST(test_prediction_carries_the_right_derivatives) {
   TEST_ASSERT_EQUAL(12, checked);
 }
 
-// What the noise's adaption takes of a row: its derivatives by the pose, and by a position's lasting error where that
-// is a state.
-TEST(test_a_row_s_part_of_the_pose) {
-  make_busy_filter();
-  wm::planar_row row;
-  row.add(0, 0.3), row.add(2, -1.1), row.add(3, 0.7), row.add(4, 0.2);
-  double by[wm::noise_adaption::kBlock];
-  filter->put_adapted(row, by);
-  const double expected[wm::noise_adaption::kBlock] = {0.3, 0.0, -1.1, 0.0, 0.0};
-  for (int i = 0; i < wm::noise_adaption::kBlock; i++) TEST_ASSERT_EQUAL_DOUBLE(expected[i], by[i]);
-}
-
 // One number or two at once, by the whole matrices: Joseph's form for the best gain without the rows of states that are
 // considered. What such a state contributes to the innovation counts in its covariance; it stays, and so does its own
 // covariance with others that stay. Premise, asserted: the prior couples the two rows.

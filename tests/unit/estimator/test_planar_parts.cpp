@@ -120,16 +120,6 @@ TEST(test_the_start_of_the_filter) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 4.0 - 2.0 * M_PI, filter->value(2));
 }
 
-// A covariance that is set may be given by its upper half alone.
-TEST(test_a_given_covariance_is_its_upper_half) {
-  begin_busy();
-  const double upper[3][3] = {{0.04, 0.01, -0.005}, {9, 0.03, 0.004}, {9, 9, 0.01}};
-  filter->set_pose({1.0, 2.0, 7.0}, upper);
-  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 7.0 - 2.0 * M_PI, filter->value(2));
-  for (int i = 0; i < 3; i++)
-    for (int j = 0; j < 3; j++) TEST_ASSERT_EQUAL_DOUBLE(i <= j ? upper[i][j] : upper[j][i], filter->covariance(i, j));
-}
-
 // ── covariances ─────────────────────────────────────────────────────────────────────────────────────────────────────
 
 TEST(test_inflated_mixed_and_scaled_covariances) {
@@ -155,30 +145,6 @@ TEST(test_inflated_mixed_and_scaled_covariances) {
       TEST_ASSERT_DOUBLE_WITHIN(1e-12, c.p[i][j] * (i < 3 ? 3.0 : 1.0) * (j < 3 ? 3.0 : 1.0), filter->covariance(i, j));
 }
 
-// Each state in turn: its row and column by the whole matrix, P' = F P F' + Q, and nothing else.
-TEST(test_fading_and_forgetting_touch_one_row_and_column) {
-  begin_busy();
-  const int n = filter->states();
-  for (int state = 0; state < n; state++)
-    for (const bool forgets : {false, true}) {
-      begin_busy();
-      const kept a;
-      if (forgets)
-        filter->forget(state, 0.9, 0.03);
-      else
-        filter->fade(state, 0.6, 0.03);
-      const double by = forgets ? 0.0 : 0.6;
-      for (int i = 0; i < n; i++) {
-        TEST_ASSERT_EQUAL_DOUBLE(i != state ? a.x[i] : forgets ? 0.9 : 0.6 * a.x[i], filter->value(i));
-        for (int j = 0; j < n; j++) {
-          const double factor = (i == state ? by : 1.0) * (j == state ? by : 1.0);
-          const double expected = factor * a.p[i][j] + (i == state && j == state ? 0.03 : 0.0);
-          TEST_ASSERT_DOUBLE_WITHIN(1e-15, expected, filter->covariance(i, j));
-        }
-      }
-    }
-}
-
 // A row without states has no effect. An innovation without a positive variance, or that is not finite, is refused.
 TEST(test_updates_that_are_refused) {
   begin_busy();
@@ -192,22 +158,6 @@ TEST(test_updates_that_are_refused) {
   for (int i = 0; i < filter->states(); i++) TEST_ASSERT_EQUAL_DOUBLE(before.x[i], filter->value(i));
   TEST_ASSERT_TRUE(filter->update(nothing, 0.1, 0.1));  // of no effect
   for (int i = 0; i < filter->states(); i++) TEST_ASSERT_EQUAL_DOUBLE(before.x[i], filter->value(i));
-}
-
-// H P H' of two rows, by all states.
-TEST(test_the_covariance_of_two_rows) {
-  begin_busy();
-  wm::planar_row a, b;
-  a.add(0, 0.4), a.add(3, -1.2), a.add(5, 0.3);
-  b.add(1, 2.0), b.add(2, 0.7), b.add(4, -0.9);
-  double expected = 0.0, own = 0.0;
-  for (int i = 0; i < 3; i++)
-    for (int j = 0; j < 3; j++) {
-      expected += a.by[i] * b.by[j] * filter->covariance(a.index[i], b.index[j]);
-      own += b.by[i] * b.by[j] * filter->covariance(b.index[i], b.index[j]);
-    }
-  TEST_ASSERT_DOUBLE_WITHIN(1e-14, expected, filter->covariance_of(a, b));
-  TEST_ASSERT_DOUBLE_WITHIN(1e-14, own, filter->variance_of(b));
 }
 
 // What the noise's adaption takes of a row beside the pose: its derivatives by a position's lasting error, each axis.
@@ -272,23 +222,6 @@ TEST(test_a_state_beyond_its_limit_takes_the_others_along) {
     const double by = filter->covariance(scale, i) / filter->variance(scale);
     const double expected = before.x[i] + before.p[i][scale] / s * innovation - by * beyond;
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, i == 2 ? wm::wrap(expected) : expected, filter->value(i));
-  }
-}
-
-// Errors of sensors are cut at their own limits, and walk.
-TEST(test_states_of_sensors_have_limits_and_walk) {
-  begin(make::no_wheels());
-  const int error = filter->add_sensor_state(0.1, 0.5, 0.2, -0.3, 0.4),
-            still = filter->add_sensor_state(0.0, 0.5, 0.0, -1, 1);
-  filter->move(make::twist(0.0, 1.0, 0.0));
-  filter->move(make::twist(2.5, 1.0, 0.0));
-  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.25 + 0.04 * 2.5, filter->variance(error));
-  TEST_ASSERT_EQUAL_DOUBLE(0.25, filter->variance(still));
-  for (const double sign : {-1.0, 1.0}) {
-    wm::planar_row row;
-    row.add(error, 1.0);
-    TEST_ASSERT_TRUE(filter->update(row, sign * 5.0, 1e-3));
-    TEST_ASSERT_EQUAL_DOUBLE(sign < 0.0 ? -0.3 : 0.4, filter->value(error));
   }
 }
 

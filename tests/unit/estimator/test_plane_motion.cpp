@@ -30,34 +30,6 @@ void begin_by_its_velocity(double heading_rad) {
   planar::begin(make::no_wheels(), {0, 0, heading_rad}, 0.1);
 }
 
-// Heading to the centre: a circle sideways of 2 m radius, a radian of it.
-TEST(test_a_circle_sideways) {
-  begin();
-  for (int i = 0; i <= 40; i++) filter->move(make::twist6(0.1 * i, 0.0, 0.5, 0.25));
-  TEST_ASSERT_DOUBLE_WITHIN(1e-12, -2.0 * (1.0 - cos(1.0)), filter->pose().x_m);
-  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 2.0 * sin(1.0), filter->pose().y_m);
-  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 1.0, filter->pose().heading_rad);
-  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 2.0, filter->travelled_m());
-  wm_estimate e;
-  filter->estimate(&e);
-  TEST_ASSERT_EQUAL_DOUBLE(0.5, e.v_mps[1]);
-}
-
-// Variance is added along the way, wherever the robot's front is: sideways is no more exact than forwards.
-TEST(test_sideways_is_as_uncertain_as_forwards) {
-  double along[2], across[2];
-  for (int sideways : {0, 1}) {
-    begin();
-    params.noise_yaw_rate_radps = params.noise_yaw_rate_rel = 0;
-    for (int i = 0; i <= 20; i++) filter->move(make::twist6(0.1 * i, sideways ? 0.0 : 0.7, sideways ? 0.7 : 0.0, 0.0));
-    along[sideways] = filter->covariance(sideways, sideways);
-    across[sideways] = filter->covariance(1 - sideways, 1 - sideways);
-  }
-  TEST_ASSERT_DOUBLE_WITHIN(1e-12, along[0], along[1]);
-  TEST_ASSERT_DOUBLE_WITHIN(1e-12, across[0], across[1]);
-  TEST_ASSERT_TRUE(along[0] > 2 * across[0]);
-}
-
 void drive_askew(int from) {
   for (int i = from; i <= 20; i++) filter->move(make::twist6(0.1 * i, 0.4, -0.6 + 0.02 * i, 0.5));
 }

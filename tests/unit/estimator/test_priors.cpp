@@ -31,17 +31,6 @@ TEST(test_commands_are_told_by_rows_that_repeat) {
   }
 }
 
-// Wheels that stand measure the same speed, too, if not quite zero.
-TEST(test_a_measurement_that_stands_is_no_command) {
-  begin();
-  for (int i = 0; i < 1000; i++) {
-    wm_event e = driven(i, false);
-    if (i < 500) e.as.twist2 = {-0.022, 0.0006};
-    feed(e);
-  }
-  TEST_ASSERT_DOUBLE_IS_NAN(sigma_of("motion.lag_s"));
-}
-
 TEST(test_a_stated_kind_decides) {
   for (const bool commands : {false, true}) {
     motion.twist = commands ? WM_TWIST_COMMANDS : WM_TWIST_MEASURED;
@@ -49,19 +38,6 @@ TEST(test_a_stated_kind_decides) {
     for (int i = 0; i < 200; i++) feed(driven(i, !commands));
     TEST_ASSERT_EQUAL(commands, !std::isnan(sigma_of("motion.lag_s")));
   }
-}
-
-// Until the kind is known, the larger noise holds.
-TEST(test_the_kind_gives_the_noise) {
-  double variance[2];
-  for (const bool commands : {false, true}) {
-    motion.twist = commands ? WM_TWIST_COMMANDS : WM_TWIST_MEASURED;
-    for (double &sigma : motion.states.sigma) sigma = 0.0;
-    begin();
-    for (int i = 0; i < 200; i++) feed(driven(i, commands));
-    variance[commands] = estimate().covariance[wm_cov_index(5, 5)];
-  }
-  TEST_ASSERT_GREATER_THAN_DOUBLE(3.0 * variance[0], variance[1]);
 }
 
 TEST(test_a_prior_is_a_multiple_of_the_sensors_own_sigma) {

@@ -68,16 +68,6 @@ TEST(test_the_rear_wheels_stand_in_for_a_silent_gyro) {
   TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.5, pose.heading_rad);
 }
 
-// In reverse the wheels' speeds may have no sign: the gear turns their difference, too.
-TEST(test_the_rear_wheels_stand_in_backwards) {
-  begin({false, true, true, false});
-  feed(make::quantities(2, {{WM_Q_GEAR, -1}}));
-  drive(2.02, 2.3, 0, {false, true, false, false});
-  const double before = pose.heading_rad;
-  drive(2.3, 3.3, 0.5, {false, true, false, false});
-  TEST_ASSERT_DOUBLE_WITHIN(0.02, -0.5, pose.heading_rad - before);
-}
-
 // GIVEN a robot that stands WHEN its speed falls silent THEN the gyro's rate is no measure of its bias.
 TEST(test_a_silent_speed_shows_no_standstill) {
   start(make::car());

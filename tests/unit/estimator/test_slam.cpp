@@ -348,35 +348,6 @@ TEST(test_a_full_map_goes_on_with_what_it_has) {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.2, off());
 }
 
-// Lines from a row of poses to one place: found, with the true derivative by each pose.
-TEST(test_a_line_is_found_and_keeps_its_ties_to_every_pose) {
-  const double want[2] = {4.0, 3.0};
-  for (bool unscented : {false, true}) {
-    wm::line_bundle b{};
-    b.count = 5;
-    for (int i = 0; i < b.count; i++) {
-      b.pose[i] = {1 + 0.3 * i, 2.0 - 0.2 * i, 0.1 * i};
-      b.azimuth_rad[i] = wm::wrap(wm::atan2(want[1] - b.pose[i].y_m, want[0] - b.pose[i].x_m) - b.pose[i].heading_rad);
-      b.sigma_rad[i] = 0.002;
-      for (int k = 0; k < 3; k++) b.pose_covariance[3 * i + k][3 * i + k] = 1e-6;
-    }
-    const wm::line_landmark l = wm::find_line(b, unscented);
-    TEST_ASSERT_TRUE(l.solved);
-    for (int k = 0; k < 2; k++) TEST_ASSERT_DOUBLE_WITHIN(0.01, want[k], l.place_m[k]);
-    // All poses moved alike move the place alike; turned about the first, they turn it.
-    for (int k = 0; k < 2; k++)
-      for (int c = 0; c < 2; c++) {
-        double sum = 0.0;
-        for (int i = 0; i < b.count; i++) sum += l.by_pose[k][3 * i + c];
-        TEST_ASSERT_DOUBLE_WITHIN(1e-6, k == c ? 1.0 : 0.0, sum);
-      }
-    TEST_ASSERT_GREATER_THAN_DOUBLE(0.0, l.noise[0][0]);
-    TEST_ASSERT_GREATER_THAN_DOUBLE(0.0, l.noise[1][1]);
-    b.azimuth_rad[2] += 3.0;  // behind the pose
-    TEST_ASSERT_FALSE(wm::find_line(b, unscented).solved);
-  }
-}
-
 }  // namespace
 
 void setUp(void) { make_room(); }

@@ -182,29 +182,6 @@ TEST(test_an_acceleration_that_the_log_measures_is_no_tilt) {
   TEST_ASSERT_DOUBLE_WITHIN(0.01, 0, pitch);
 }
 
-// A velocity log that measures no rates: the turn is the gyro's.
-TEST(test_a_log_without_rates_beside_an_imu) {
-  const auto turns = turning(0.2);
-  vehicle with(0), without(0);
-  with.go(2, {0.5, 0, 0}, {0, 0, 0.2}, turns, at_rest);
-  without.go(2, {0.5, 0, 0}, kNoRates, turns, at_rest);
-  for (int i = 0; i < 3; i++)
-    TEST_ASSERT_DOUBLE_WITHIN(1e-3, with.estimate().pose_map_base.p_m[i], without.estimate().pose_map_base.p_m[i]);
-  TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.2 * 1.99, without.estimate().heading_rad);
-  TEST_ASSERT_DOUBLE_WITHIN(0.01, with.sigma_about({0, 0, 1}), without.sigma_about({0, 0, 1}));
-}
-
-// While its IMU is silent nothing measures the turn: the heading holds, and its sigma grows.
-TEST(test_a_log_without_rates_and_a_silent_imu) {
-  vehicle v(0);
-  v.go(1, {0.5, 0, 0}, kNoRates, turning(0.1), at_rest);
-  const double before = v.sigma_about({0, 0, 1});
-  v.go(3, {0.5, 0, 0}, kNoRates, silent, at_rest);
-  TEST_ASSERT_DOUBLE_WITHIN(0.05, 0.1 * 1.2, v.estimate().heading_rad);
-  // A gyro is silent after 0.25 s; from then on 0.1 rad per sqrt(s).
-  TEST_ASSERT_DOUBLE_WITHIN(0.01, std::sqrt(square(before) + 0.01 * 2.75), v.sigma_about({0, 0, 1}));
-}
-
 // The log sits at the bow and to the side: while the vehicle turns on the spot it moves, and the vehicle does not.
 TEST(test_a_log_that_is_mounted_away_from_base_link) {
   const vec3 arm = {0.4, -0.3, 0.2}, w = {0.02, -0.03, 0.2};

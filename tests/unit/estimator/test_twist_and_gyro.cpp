@@ -53,17 +53,6 @@ TEST(test_a_speed_that_no_robot_reaches_is_refused_beside_a_gyro) {
   TEST_ASSERT_EQUAL_HEX32(0, front.health());
 }
 
-// A gyro of 5 Hz is overdue after three of its periods, not after the 0.25 s of quick ones.
-TEST(test_a_slow_gyro_is_overdue_by_its_own_period) {
-  begin();
-  const auto slow = [](int i) { return i % 20 == 0 ? 0.25 + noise(i / 20) : kNone; };
-  drive(0, 2, 0.5, 0.0, 0.1, slow);
-  drive(2.0, 2.35, 0.5, 0.0, 0.1, [](int) { return kNone; });  // the newest is of 1.8 s
-  TEST_ASSERT_EQUAL(WM_MOTION_SPEED_YAW_RATE, front.model());
-  drive(2.35, 2.5, 0.5, 0.0, 0.1, [](int) { return kNone; });
-  TEST_ASSERT_EQUAL(WM_MOTION_TWIST, front.model());
-}
-
 // The learnt bias is the gyro's: the twist's turn rate has none.
 TEST(test_a_silent_gyro_is_replaced_and_taken_up_again) {
   begin();
@@ -102,17 +91,6 @@ TEST(test_a_stuck_gyro_is_replaced) {
   drive(5, 5.1, 0.3, 0.0, 0.2, [](int i) { return 0.2 + noise(i); });
   TEST_ASSERT_FALSE(has_health(WM_MOTION_HEALTH_YAW_RATE_STUCK));
   TEST_ASSERT_EQUAL(WM_MOTION_SPEED_YAW_RATE, front.model());
-}
-
-// The same bits after a stop are still those of a stuck gyro.
-TEST(test_a_stop_does_not_mend_a_stuck_gyro) {
-  begin();
-  drive(0, 1, 0.3, 0.0, 0.0, [](int i) { return noise(i); });
-  drive(1, 5, 0.3, 0.0, 0.2, [](int) { return 0.01; });
-  drive(5, 8, 0.0, 0.0, 0.0, [](int) { return 0.01; });
-  drive(8, 8.5, 0.3, 0.0, 0.2, [](int) { return 0.01; });
-  TEST_ASSERT_TRUE(has_health(WM_MOTION_HEALTH_YAW_RATE_STUCK));
-  TEST_ASSERT_EQUAL(WM_MOTION_TWIST, front.model());
 }
 
 // The twist turned by 0.3 rad more than the gyro until that was found.
@@ -165,23 +143,6 @@ wm_event log_of(double t_s, double v, double u, double arm_x = 0, double arm_y =
   e.as.twist6.w_radps[0] = e.as.twist6.w_radps[1] = kNone;
   e.as.twist6.arm_m[0] = arm_x, e.as.twist6.arm_m[1] = arm_y;
   return e;
-}
-
-TEST(test_a_log_without_rates_beside_a_gyro) {
-  for (const double arm : {0.0, 0.4}) {
-    begin();
-    for (int i = 0; i < 200; i++) {
-      const double t = 0.01 * i, w = 0.25 + noise(i);
-      gyro(t, w);
-      if (i % 2 == 0) feed(log_of(t, 0.5 - w * arm, w * arm, arm, arm));  // v + w x arm
-    }
-    TEST_ASSERT_EQUAL(WM_MOTION_SPEED_YAW_RATE, front.model());
-    TEST_ASSERT_EQUAL_HEX32(0, front.health());
-    const double turned = 0.25 * 1.99;
-    TEST_ASSERT_DOUBLE_WITHIN(1e-4, turned, pose.heading_rad);
-    TEST_ASSERT_DOUBLE_WITHIN(2e-3, 2.0 * std::sin(turned), pose.x_m);
-    TEST_ASSERT_DOUBLE_WITHIN(2e-3, 2.0 * (1.0 - std::cos(turned)), pose.y_m);
-  }
 }
 
 // The gyro falls silent: its rate holds with growing noise, since the log has none that could stand in.

@@ -29,65 +29,54 @@ void tearDown(void) {
   folder_remove();
 }
 
-static void chooses(const char *name, wm_choice_facts facts) {
-  const char *why = NULL;
-  const wm_estimator *chosen = wm_choose(&facts, &why);
-  TEST_ASSERT_NOT_NULL(why);
-  TEST_ASSERT_NOT_NULL_MESSAGE(chosen, why);
-  TEST_ASSERT_EQUAL_STRING(name, chosen->name);
-}
-
-static void leaves_open(const char *word, wm_choice_facts facts) {
-  const char *why = NULL;
-  TEST_ASSERT_NULL(wm_choose(&facts, &why));
-  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(why, word), why);
-}
-
 #define WHEELS BIT(QUANTITIES)
 
-TEST(edge_points_with_a_map) {
-  chooses("edge_mcl", (wm_choice_facts){.kinds = WHEELS | BIT(POINTS), .has_map = 1});
-  // The hospital robot: whatever else is there.
-  chooses("edge_mcl",
-          (wm_choice_facts){.kinds = WHEELS | BIT(POINTS) | BIT(MARKER) | BIT(SIGHTING) | BIT(POSITION) | BIT(HEADING),
-                            .has_map = 1,
-                            .has_landmarks = 1});
+// What a robot has, and the estimator that is chosen; "": none, for the reason that has these words.
+static const struct {
+  const char *robot, *chosen, *words;
+  wm_choice_facts has;
+} kRobots[] = {
+    {"edge points and a map", "edge_mcl", "", {.kinds = WHEELS | BIT(POINTS), .has_map = 1}},
+    {"edge points, a map and all else",
+     "edge_mcl",
+     "",
+     {.kinds = WHEELS | BIT(POINTS) | BIT(MARKER) | BIT(SIGHTING) | BIT(POSITION) | BIT(HEADING),
+      .has_map = 1,
+      .has_landmarks = 1}},
+    {"edge points without a map", "", "map: FILE", {.kinds = WHEELS | BIT(POINTS) | BIT(MARKER), .has_landmarks = 1}},
+    {"a map, but no edge points",
+     "landmark_ekf",
+     "",
+     {.kinds = WHEELS | BIT(MARKER), .has_map = 1, .has_landmarks = 1}},
+    {"a stereo pair", "stereo_ekf", "", {.kinds = BIT(TWIST6) | BIT(STEREO)}},
+    {"a stereo pair on wheels", "stereo_ekf", "", {.kinds = WHEELS | BIT(STEREO) | BIT(POSITION), .has_landmarks = 1}},
+    {"a velocity log and positions", "stereo_ekf", "", {.kinds = BIT(TWIST6) | BIT(POSITION)}},
+    {"a velocity log and sightings", "stereo_ekf", "", {.kinds = BIT(TWIST6) | BIT(SIGHTING), .has_landmarks = 1}},
+    {"positions with a depth", "stereo_ekf", "", {.kinds = WHEELS | BIT(POSITION), .measures_depth = 1}},
+    {"visual odometry beside wheels", "landmark_ekf", "", {.kinds = WHEELS | BIT(TWIST6) | BIT(POSITION)}},
+    {"upright lines", "slam", "", {.kinds = WHEELS | BIT(SIGHTING), .has_landmarks = 1, .tracks_unknown = 1}},
+    {"known landmarks", "landmark_ekf", "", {.kinds = WHEELS | BIT(SIGHTING), .has_landmarks = 1}},
+    {"known markers and positions",
+     "landmark_ekf",
+     "",
+     {.kinds = BIT(TWIST2) | BIT(MARKER) | BIT(POSITION), .has_landmarks = 1}},
+    {"unknown landmarks", "slam", "", {.kinds = WHEELS | BIT(SIGHTING)}},
+    {"unknown markers", "slam", "", {.kinds = BIT(INCREMENT) | BIT(MARKER)}},
+    {"positions", "landmark_ekf", "", {.kinds = WHEELS | BIT(POSITION)}},
+    {"headings", "landmark_ekf", "", {.kinds = BIT(TWIST2) | BIT(HEADING)}},
+    {"positions without motion", "landmark_ekf", "", {.kinds = BIT(POSITION)}},
+    {"motion alone", "odometry", "", {.kinds = WHEELS, .has_landmarks = 1}},
+    {"nothing", "", "devices", {.has_map = 1, .has_landmarks = 1}}};
+
+TEST(each_robot_gets_its_estimator) {
+  for (size_t i = 0; i < sizeof kRobots / sizeof kRobots[0]; i++) {
+    const char *why = NULL;
+    const wm_estimator *chosen = wm_choose(&kRobots[i].has, &why);
+    TEST_ASSERT_NOT_NULL_MESSAGE(why, kRobots[i].robot);
+    TEST_ASSERT_EQUAL_STRING_MESSAGE(kRobots[i].chosen, chosen ? chosen->name : "", kRobots[i].robot);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(why, kRobots[i].words), why);
+  }
 }
-TEST(edge_points_without_a_map) {
-  leaves_open("map: FILE", (wm_choice_facts){.kinds = WHEELS | BIT(POINTS) | BIT(MARKER), .has_landmarks = 1});
-}
-TEST(a_map_alone_decides_nothing) {
-  chooses("landmark_ekf", (wm_choice_facts){.kinds = WHEELS | BIT(MARKER), .has_map = 1, .has_landmarks = 1});
-}
-TEST(a_stereo_pair) {
-  chooses("stereo_ekf", (wm_choice_facts){.kinds = BIT(TWIST6) | BIT(STEREO)});
-  chooses("stereo_ekf", (wm_choice_facts){.kinds = WHEELS | BIT(STEREO) | BIT(POSITION), .has_landmarks = 1});
-}
-TEST(in_space) {
-  chooses("stereo_ekf", (wm_choice_facts){.kinds = BIT(TWIST6) | BIT(POSITION)});
-  chooses("stereo_ekf", (wm_choice_facts){.kinds = BIT(TWIST6) | BIT(SIGHTING), .has_landmarks = 1});
-  chooses("stereo_ekf", (wm_choice_facts){.kinds = WHEELS | BIT(POSITION), .measures_depth = 1});
-  // On wheels a visual odometry beside them changes nothing.
-  chooses("landmark_ekf", (wm_choice_facts){.kinds = WHEELS | BIT(TWIST6) | BIT(POSITION)});
-}
-TEST(upright_lines) {
-  chooses("slam", (wm_choice_facts){.kinds = WHEELS | BIT(SIGHTING), .has_landmarks = 1, .tracks_unknown = 1});
-}
-TEST(known_landmarks) {
-  chooses("landmark_ekf", (wm_choice_facts){.kinds = WHEELS | BIT(SIGHTING), .has_landmarks = 1});
-  chooses("landmark_ekf", (wm_choice_facts){.kinds = BIT(TWIST2) | BIT(MARKER) | BIT(POSITION), .has_landmarks = 1});
-}
-TEST(unknown_landmarks) {
-  chooses("slam", (wm_choice_facts){.kinds = WHEELS | BIT(SIGHTING)});
-  chooses("slam", (wm_choice_facts){.kinds = BIT(INCREMENT) | BIT(MARKER)});
-}
-TEST(positions_alone) {
-  chooses("landmark_ekf", (wm_choice_facts){.kinds = WHEELS | BIT(POSITION)});
-  chooses("landmark_ekf", (wm_choice_facts){.kinds = BIT(TWIST2) | BIT(HEADING)});
-  chooses("landmark_ekf", (wm_choice_facts){.kinds = BIT(POSITION)});
-}
-TEST(motion_alone) { chooses("odometry", (wm_choice_facts){.kinds = WHEELS, .has_landmarks = 1}); }
-TEST(nothing) { leaves_open("devices", (wm_choice_facts){.has_map = 1, .has_landmarks = 1}); }
 
 // ── of a configuration and a recording ──────────────────────────────────────────────────────────────────────────────
 
