@@ -63,27 +63,6 @@ TEST(every_spelling_of_a_unit_has_its_size) {
                                         rows[r].spelled[i]);
 }
 
-TEST(unit_scale_and_offset_of_the_binding) {
-  wm_can_binding b = binding(WM_Q_YAW_RATE, "M", "S");
-  (void)snprintf(b.unit, sizeof b.unit, "deg/s");
-  b.scale = -1.0;
-  b.offset = 0.25;
-  open_one(&f, "BO_ 291 M: 2 X\n SG_ S : 7|16@0- (0.1,0) [0|0] \"\" X\n", b);
-  TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0.25 - 90.0 * PI / 180, value_of(&f, "can0 123#0384"));
-  TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0.25 + 90.0 * PI / 180, value_of(&f, "can0 123#FC7C"));
-}
-
-TEST(sum_of_signals) {
-  wm_can_binding b = binding(WM_Q_STEERING_WHEEL, "M", "COARSE");
-  (void)snprintf(b.signal[1], sizeof b.signal[1], "FINE");
-  b.signal_count = 2;
-  open_one(&f,
-           "BO_ 37 M: 8 X\n SG_ COARSE : 3|12@0- (1.5,0) [0|0] \"deg\" X\n"
-           " SG_ FINE : 39|4@0- (0.1,0) [0|0] \"deg\" X\n",
-           b);
-  TEST_ASSERT_DOUBLE_WITHIN(1e-12, (3.0 - 0.7) * PI / 180, value_of(&f, "can0 025#0002000090000000"));
-}
-
 TEST(floats) {
   const char *dbc =
       "BO_ 291 M: 8 X\n SG_ S : 0|32@1- (1,0) [0|0] \"m/s\" X\n SG_ D : 7|64@0- (1,0) [0|0] \"m/s\" X\n"
@@ -347,17 +326,6 @@ TEST(a_bound_signal_is_no_counter) {
              b);
     for (unsigned i = 0; i < 60; i++) (void)count((i < 40 ? i : 40 + 7 * i) & 0xFF);
     TEST_ASSERT_EQUAL_UINT64(0, f.counts.lost + f.counts.frozen);
-  }
-}
-
-// A decoder gives the quantities that are bound, and no others.
-TEST(one_quantity_alone) {
-  for (int quantity = 0; quantity < WM_Q_COUNT; quantity++) {
-    wm_can_binding b = binding(quantity, "W", "V");
-    if (open_with(&f, "BO_ 257 W: 3 X\n SG_ V : 0|16@1+ (1,0) [0|0] \"\" X\nVAL_ 257 V 0 \"P\" 1 \"R\" 2 \"D\";\n", &b,
-                  1) != WM_OK)
-      continue;
-    TEST_ASSERT_EQUAL_HEX32(UINT32_C(1) << quantity, wm_can_decoder_quantities(f.decoder));
   }
 }
 

@@ -47,29 +47,6 @@ TEST(lengths_of_a_degree) {
   TEST_ASSERT_DOUBLE_WITHIN(0.05, 0.02 * 55800.0, at.p_m[0]);
 }
 
-// East, north and up by PROJ 9.1, +proj=topocentric +ellps=WGS84, kilometres away: what gpsd's positions get, too.
-TEST(far_places_are_in_the_tangent_plane) {
-  static const struct {
-    double place[3], at_m[3];
-  } kPlaces[] = {{{48.11, 11.51, 510}, {744.72519, 1112.06103, 9.85956}},
-                 {{48.0, 11.4, 450}, {-7463.05710, -11115.06175, -64.05335}},
-                 {{49.1, 12.5, 500}, {73027.19970, 111679.40707, -1396.10890}}};
-  begin(48.1, 11.5, 500);
-  for (size_t i = 0; i < sizeof kPlaces / sizeof kPlaces[0]; i++) {
-    (void)value(WM_CAN_ALTITUDE, kPlaces[i].place[2]);
-    TEST_ASSERT_EQUAL(1, fix(kPlaces[i].place[0], kPlaces[i].place[1]));
-    for (int k = 0; k < 3; k++) TEST_ASSERT_DOUBLE_WITHIN(1e-3, kPlaces[i].at_m[k], at.p_m[k]);
-  }
-}
-
-// A pole has every longitude: 0.001 degrees from it are 111.69 m.
-TEST(near_the_pole) {
-  begin(89.999, 0, 0);
-  TEST_ASSERT_EQUAL(1, fix(89.999, 180));
-  TEST_ASSERT_DOUBLE_WITHIN(0.01, 0, at.p_m[0]);
-  TEST_ASSERT_DOUBLE_WITHIN(0.01, 2 * 111.694, at.p_m[1]);
-}
-
 // On a plateau a degree is longer by altitude over radius.
 TEST(altitude_of_the_map) {
   begin(45, 10, 4000);

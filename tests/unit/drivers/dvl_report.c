@@ -63,32 +63,3 @@ TEST(other_reports_are_named) {
   expect(DVL_OTHER, "{\"type\":\"something_new\"}");
   expect(DVL_OTHER, "{}");
 }
-
-TEST(what_is_no_report_is_refused) {
-  static const char *const kNone[][2] = {
-      {"", "no line of JSON"},
-      {"hello", "no line of JSON"},
-      {"HTTP/1.1 400 Bad Request\r", "no line of JSON"},
-      {"ocity_valid\":true,\"status\":0}", "no line of JSON"},
-      {"{" SPEEDS "\"velocity_valid\":tr", "no line of JSON"},
-      {"{" SPEEDS "\"type\":\"velocity\"}", "without velocity_valid"},
-      {"{" SPEEDS "\"velocity_valid\":3,\"type\":\"velocity\"}", "without velocity_valid"},
-      {"{\"vx\":0.1,\"vy\":0.1,\"fom\":0.1,\"velocity_valid\":true}", "lacks one of vx, vy, vz and fom"},
-      {"{\"vx\":0.1,\"vy\":0.1,\"vz\":null,\"fom\":0.1,\"velocity_valid\":true}", "lacks one of vx, vy, vz and fom"},
-      {"{\"vx\":0.1,\"vy\":0.1,\"vz\":0.1,\"velocity_valid\":true}", "lacks one of vx, vy, vz and fom"}};
-  for (size_t i = 0; i < sizeof kNone / sizeof kNone[0]; i++) {
-    const char *why = dvl_report_read(kNone[i][0], strlen(kNone[i][0]), &report);
-    TEST_ASSERT_NOT_NULL_MESSAGE(why, kNone[i][0]);
-    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(why, kNone[i][1]), why);
-  }
-}
-
-TEST(impossible_times_are_none) {
-  static const char *const kTimes[] = {"-5", "1e3", "9000000000000001", "\"now\"", "1638191471563017.5"};
-  char line[200];
-  for (size_t i = 0; i < sizeof kTimes / sizeof kTimes[0]; i++) {
-    (void)snprintf(line, sizeof line, "{" SPEEDS "\"velocity_valid\":true,\"time_of_validity\":%s}", kTimes[i]);
-    expect(DVL_VELOCITY, line);
-    TEST_ASSERT_EQUAL_INT64_MESSAGE(DVL_NO_TIME, report.validity_us, kTimes[i]);
-  }
-}
