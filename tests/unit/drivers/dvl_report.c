@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reports of a velocity log: of json_v3.1 and of json_v1, as the manual and an A50 have them, and what is none.
+// Reports of a velocity log: of json_v3.1 and of json_v1, as the manual and an A50 have them, and other reports.
 #include "dvl_report.h"
 
 #include "common/suite.h"
