@@ -6,10 +6,13 @@
 
 import unittest
 
+import bag_files
 import numpy as np
 from bag_drives import SPEED, BagTest, ns, place, times, turn_rate
 from bag_files import image
 from rosbags.rosbag2 import StoragePlugin
+
+import waymark
 
 S = 1_000_000_000
 
@@ -102,6 +105,33 @@ class OfTheRecorder(BagTest):
         for begin, end in ((0, 4), (8, 12), (4, 8), (12, 15.1)):
             bag.drive(when=lambda t, begin=begin, end=end: begin <= t < end)
         self.assert_taken(bag, never=("clock",))
+
+
+class Recorded(BagTest):
+    """Bags that were not recorded on the robot while it drove."""
+
+    def test_a_log_at_another_pace_than_all_stamps_is_no_clock(self):
+        paces = {"played twice as fast": (lambda t: ns(0) + 3600 * S + int(t * S / 2), "0.5 times"), "at half the pace": (
+            lambda t: ns(0) + 5 * S + int(2 * t * S), "2 times"), "converted, 20 s later": (lambda t: ns(0) + 20 * S + int(0.02 * t * S), "0.02 times"),
+            "one time of the log": (lambda t: ns(15), "at once"), "no time of the log": (lambda t: 0, "at once")}
+        for name, (log, words) in paces.items():
+            with self.subTest(name):
+                bag = self.bag().drive(log=log).turns(log=log)
+                for t in times():
+                    bag.put("/cmd_vel", "Twist", log(t), bag.twist((1, 0, 0), (0, 0, 0)))
+                recording, _ = self.assert_taken(bag, words, never=("finding", "/odom: ", "/imu/data: "), delta=0.02)
+                np.testing.assert_array_equal(recording.table("imu.csv")["t_ns"], [ns(t) for t in times(50)])
+                self.assertNotIn("arrival_ns", recording.table("motion.csv"))
+
+    def test_a_file_out_of_order_is_no_clock_that_was_set(self):
+        for step_s, chunking in ((0.5, False), (3, False), (3, True)):
+            with self.subTest(step_s=step_s, chunking=chunking):
+                bag, chance = self.bag().drive().turns(), np.random.default_rng(1)
+                bag.items.sort(key=lambda item: item[0] + step_s * S * chance.uniform())
+                path = bag.mcap(self.folder / "order.mcap", chunking=chunking)
+                said, out = bag_files.BagTest.take(self, path, out=f"order-{step_s}-{chunking}")
+                self.assertNotIn("clock", said)
+                self.assert_end(waymark.Recording(out), said, 0.02)
 
 
 class OwnClocks(BagTest):

@@ -4,6 +4,7 @@
 
     test_bag_gnss.py BIN_DIR"""
 
+import copy
 import unittest
 
 import numpy as np
@@ -84,6 +85,26 @@ class Fixes(BagTest):
             _, said = self.take(self.resized(size, size))
             with self.subTest(size=size):
                 self.assertEqual(f"finding: /fix: its way is {1 / size:.3g} times as long as that of /odom" in said, size != 1.2, said)
+
+    def test_a_receiver_that_stands_while_the_robot_drives_is_a_base_station_s(self):
+        bag = self.drive()
+        for t in range(16):
+            self.fix(bag, t, ORIGIN[:2], variance=1e-8, topic="/base/fix")
+        self.assert_driven(bag, "not taken: /base/fix: it stands still while the robot drives")
+        bag = self.bag().drive()
+        for t in range(16):
+            self.fix(bag, t, ORIGIN[:2])
+        self.assertIn("is it the receiver of a base station", self.take(bag)[1])
+
+    def test_fixes_that_are_sent_again_count_once(self):
+        bag = self.drive()
+        for log_ns, topic, kind, message in [item for item in bag.items if item[1] == "/fix"]:
+            for k in range(1, 10):
+                again = copy.deepcopy(message)
+                again.header = bag.m.header(message.header.stamp.sec * 10**9 + message.header.stamp.nanosec + k * 100_000_000, message.header.frame_id)
+                bag.items.append((log_ns + k * 100_000_000, topic, kind, again))
+        recording = self.assert_driven(bag, "91 % of its fixes repeat the one before", options=("--origin", *map(str, ORIGIN)))
+        self.assertEqual(len(recording.table("gnss.csv")["t_ns"]), 16)
 
     def test_a_latitude_without_its_sign_is_named(self):
         recording, said = self.take(self.drive(lambda i, w, a: ((-w[0], w[1]), a, 0)))

@@ -203,6 +203,18 @@ class Comparison(ImuTest):
         recording, _ = self.assert_imu(self.with_imu(counts), "its accelerometer shows 1.638e+04 at rest", "is 940 times the turn rate")
         np.testing.assert_allclose(recording.table("imu.csv")["az_mps2"], 9.80665, atol=1e-3)
 
+    def test_accelerations_of_another_vertical_than_the_turns_are_left_out(self):
+        for name, change in (("its gyro on another axis", lambda t, w, a: (w[[2, 0, 1]], a)), ("its accelerometer on another axis", lambda t, w, a: (w, a[[2, 0, 1]]))):
+            with self.subTest(name):
+                recording, _ = self.assert_imu(self.with_imu(change), "its accelerations are left out")
+                self.assertNotIn("az_mps2", recording.table("imu.csv"))
+
+    def test_all_of_it_with_z_down_is_said_to_be_possible(self):
+        bag = self.bag().drive(pose=lambda t: place(t) * np.array([1, -1, -1]), twist=lambda t: ((1, 0, 0), (0, 0, -turn_rate(t))))
+        for t in times(50):
+            bag.imu(ns(t), ns(t), (0, 0, -turn_rate(t)), -STILL)
+        self.assertIn("the drive is its mirror image", self.take(bag)[1])
+
     def test_nothing_in_common(self):
         chance = np.random.default_rng(7)
         self.assert_taken(self.with_imu(lambda t, w, a: (chance.normal(size=3), a)), "nothing in common")

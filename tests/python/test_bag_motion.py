@@ -267,6 +267,31 @@ class WhichTopic(BagTest):
         recording, said = self.take(bag, "--motion", "/vo/pose")
         self.assert_end(recording, said)
 
+    def test_a_speed_whose_direction_turns_as_it_does_is_of_axes_that_stay(self):
+        def along(t, first=0.0):
+            heading = place(t)[2] + first
+            return (SPEED * np.cos(heading), SPEED * np.sin(heading), 0), (0, 0, turn_rate(t))
+        for frame, first in (("base_link", 0.0), ("odom", 2.0)):
+            with self.subTest(frame):
+                bag = self.bag()
+                for t in times():
+                    twist = bag.twist(*along(t, first))
+                    bag.put("/vel", "TwistStamped", ns(t), bag.m.make("TwistStamped", header=bag.m.header(ns(t), frame), twist=twist))
+                self.assert_taken(bag, "on axes that stay")
+        self.assert_taken(self.bag().drive(pose=lambda t: (0, 0, 0), twist=along), "on axes that stay")
+        crab = self.bag()  # sideways in the turn, and about an axle that lies behind
+        for t in times():
+            v = (SPEED * np.cos(0.4 * turn_rate(t)), SPEED * np.sin(0.4 * turn_rate(t)) + 0.5 * turn_rate(t), 0)
+            crab.put("/vel", "TwistStamped", ns(t), crab.m.make("TwistStamped", header=crab.m.header(ns(t), "base_link"), twist=crab.twist(v, (0, 0, turn_rate(t)))))
+        self.assertNotIn("finding", self.take(crab)[1])
+
+    def test_motion_that_tf_alone_has_is_named(self):
+        bag = self.bag()
+        for t in times():
+            bag.tf("odom", "base_link", in_plane(place(t)), topic="/tf", stamp=ns(t), log=ns(t))
+            bag.imu(ns(t), ns(t), (0, 0, turn_rate(t)))
+        self.assertIn("finding: tf: 'base_link' moves in 'odom', and no topic has that motion", self.take(bag)[1])
+
     def test_twists_in_a_frame_of_the_world_are_named(self):
         _, said = self.take(self.command(self.bag(), "/local/velocity", "TwistStamped", 20, factor=1.0, frame="map"))
         self.assertIn("finding: /local/velocity", said)

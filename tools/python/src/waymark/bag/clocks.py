@@ -27,6 +27,8 @@ _BURST = 0.1  # messages nearer to each other than this share of their usual dis
 _LAG_NS, _LAG_SHARE = 100_000_000, 1e-3  # a delay that grows by more is named: crystals differ by 1e-4 at most
 _QUEUE_MAX = 0.5  # growth of a delay, ns a ns, that a queue has: of a stream that is read at half its rate
 _RATE_MAX = 0.05  # no oscillator is off by more: stamps in another unit, or of no clock
+_PACE_PARTS = 4  # of a drive, in each of which the pace is the same
+_PACE_SPAN_NS = 2_000_000_000  # of stamps, from which on they show the pace of the log
 
 Say = Callable[[str, str], None]
 
@@ -50,6 +52,7 @@ class Clock:
     has_arrival: bool = True
     spread: bool = False  # messages of one stamp are spread evenly up to the next stamp
     cuts: list[tuple[int, int]] = field(default_factory=list)  # times from which on all is earlier, and by how much
+    log: "Pace | None" = None  # how times of the log become those at the pace of the stamps
 
     def mended(self, stamp_ns: Array, log_ns: Array) -> Array:
         """Stamps without the steps of their clock."""
@@ -59,6 +62,8 @@ class Clock:
     def __call__(self, stamp_ns: Array, log_ns: Array) -> tuple[Array, Array]:
         """Times and arrivals of messages by their stamps (0: none) and times of the log."""
         stamp_ns, log_ns = np.asarray(stamp_ns, dtype=np.int64), np.asarray(log_ns, dtype=np.int64)
+        if self.log:
+            log_ns = self.log(log_ns)
         t = self.mended(stamp_ns, log_ns) + np.rint(self.drift * (log_ns - self.start_ns)).astype(np.int64)
         t = np.where((stamp_ns == 0) | self.by_log, log_ns - self.delay_ns, t)
         if self.spread:
@@ -69,6 +74,31 @@ class Clock:
             shift_t += np.where(t >= at_ns, by_ns, 0)
             shift_a += np.where(arrival >= at_ns, by_ns, 0)
         return t - shift_t, np.maximum(arrival - shift_a, t - shift_t)
+
+
+@dataclass
+class Pace:
+    """A log at another pace than all stamps, as of a bag that was played and recorded anew, or converted: as times of the stamps' clock."""
+
+    rate: float  # of the stamps, ns per ns of the log
+    log_ns: int
+    stamp_ns: int  # of `log_ns`, so that no message is logged before its stamp
+
+    def __call__(self, log_ns: Array) -> Array:
+        return np.asarray(self.stamp_ns + np.rint(self.rate * (log_ns - self.log_ns)).astype(np.int64))
+
+
+def _pace(pairs: list[Array]) -> Pace | None:
+    """By the (stamp, log) pairs (n, 2) of all topics; None where one of them goes at the pace of the log, or they differ."""
+    known = [rows for rows in (each[each[:, 0] != 0] for each in pairs) if len(rows) >= _PACE_PARTS and np.ptp(rows[:, 0]) > _PACE_SPAN_NS]
+    at = [np.linspace(0, len(rows) - 1, _PACE_PARTS + 1).astype(int) for rows in known]
+    spans = np.vstack([np.zeros((0, 2)), *(np.diff(rows[k], axis=0) for rows, k in zip(known, at))])
+    rates = spans[:, 0] / np.maximum(spans[:, 1], 1)  # of each part: a clock that is set is off in one of them
+    if len(known) < (2 if spans[:, 1].any() else 1) or rates.max() > (1 + 2 * _RATE_MAX) * rates.min() or np.abs(rates - 1).min() <= _RATE_MAX:
+        return None
+    rate, first_ns = float(np.median(rates)), min(int(rows[0, 1]) for rows in known)
+    ahead = max(int((rows[:, 0] - np.rint(rate * (rows[:, 1] - first_ns)).astype(np.int64)).max()) for rows in known)
+    return Pace(rate, first_ns, ahead)
 
 
 _LOST_NS = 3600 * 10**9  # farther apart than the bag is long and an hour, stamps and log have nothing in common
@@ -296,6 +326,11 @@ def once(times: Array, values: Array) -> Array:
 
 def settle(stamps: dict[str, Array], note: Say) -> dict[str, Clock]:
     """The clock of each topic by its (stamp, log) pairs (n, 2), in the order of the log. What was found is said."""
+    pace = _pace(list(stamps.values()))
+    if pace:
+        how = f"at {1 / pace.rate:.3g} times the pace of the stamps of all topics" if pace.rate < 1e6 else "at once, by the times of its log"
+        note("clock", f"the bag was logged {how}, as one that was played and recorded anew, or converted: the stamps are kept, and no arrivals")
+        stamps = {name: np.column_stack([times[:, 0], pace(times[:, 1])]) for name, times in stamps.items()}
     topics = [_look(name, times) for name, times in sorted(stamps.items()) if len(times)]
     stamped = [topic for topic in topics if topic.known.any()]
     for topic in topics:
@@ -310,6 +345,9 @@ def settle(stamps: dict[str, Array], note: Say) -> dict[str, Clock]:
             note(topic.name, "its stamps are of another clock than the bag's (simulated time?): no arrivals")
         for clock in clocks.values():
             clock.has_arrival = False
+    if pace:
+        for clock in clocks.values():
+            clock.log, clock.has_arrival = pace, False
     return clocks
 
 

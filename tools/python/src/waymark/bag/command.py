@@ -42,7 +42,10 @@ def _write_moving(into: Collection, given: argparse.Namespace) -> str:
     for (parent, child), why in sorted(into.frames.broken.items()):
         into.note("tf", f"'{child}' in '{parent}' comes with {why}: {'such messages are' if into.frames.has(parent, child) else 'it is'} left out")
     for parent, child in sorted(into.frames.moving):
-        if not is_world(parent):
+        if is_world(parent) and not {"odometry", "twists"} & into.samples.keys():
+            into.find("tf", f"'{child}' moves in '{parent}', and no topic has that motion: transforms are not taken as one. Record the odometry's own topic "
+                            "(nav_msgs/Odometry), or make one of them")
+        elif not is_world(parent):
             into.note("tf", f"'{child}' moves in '{parent}': what is mounted on it has no place that stands still")
     if not into.samples and not into.sight.topics and not into.sight.tags:
         for topic in into.frames.topics:

@@ -155,7 +155,8 @@ class Bag:
     def all_notes(self) -> list[str]:
         """What was wrong with the files, each once."""
         first_ns = min((first for first, _ in self._logs.values()), default=0)
-        said = self.notes + [absent.text(first_ns) for absent in self.absent()] + [f"{file.path.name}: {note}" for file in self.files for note in file.notes]
+        said = self.notes + [absent.text(first_ns) for absent in self.absent()]
+        said += [f"{file.path.name}: {note}" if len(self.files) > 1 else note for file in self.files for note in file.notes]
         return list(dict.fromkeys(said))
 
     def __enter__(self) -> "Bag":

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether the headings of poses turn as the way does that they go. A base on wheels or tracks goes along its heading, ahead or back."""
+"""Whether headings turn as the way does that they go. A base on wheels or tracks goes along its heading, ahead or back."""
 
 import numpy as np
 
@@ -9,10 +9,30 @@ from . import compare
 _STEP_M = 0.05  # of a window; below it a direction is the places' noise
 _SHARPEST_RAD = 1.0  # from a window to the next; what turns more does so on the spot
 _ALIKE_R = 0.7
+_SAME_R, _SAME_FACTOR = 0.95, 1.1  # of the turns of a speed's direction and of the turn rate: no base that goes sideways keeps them alike
 
 
 def _wrapped(angle: Array, period: float = 2 * np.pi) -> Array:
     return np.asarray(np.remainder(angle + period / 2, period) - period / 2)
+
+
+def off_world(t_ns: Array, twist: Array) -> Array | None:
+    """Twists (n, 6) whose speed turns by as much as they turn themselves are on axes that stay: on the robot's, which goes ahead in the mean. None: they are
+    there already, or the drive doesn't show it."""
+    borders = compare.grid(t_ns)
+    windows = compare.held(t_ns, twist, borders)
+    moves = np.linalg.norm(windows[:, :2], axis=1) > _STEP_M
+    direction, turn = np.arctan2(windows[:, 1], windows[:, 0]), windows[:, 5]
+    ok = moves[:-1] & moves[1:]
+    course, by_rate = _wrapped(np.diff(direction))[ok], ((turn[:-1] + turn[1:]) / 2)[ok]
+    alike = compare.likeness(course, by_rate)
+    if not compare.turns(course) or not compare.turns(by_rate) or alike.r < _SAME_R or alike.differs(_SAME_FACTOR):
+        return None
+    rate, step = np.nan_to_num(twist[:, 5]), np.append(np.diff(t_ns) / 1e9, 0.0)
+    heading = np.concatenate([[0.0], np.cumsum(rate * step)])[:-1]
+    first = np.angle(np.nansum((twist[:, 0] + 1j * twist[:, 1]) * np.exp(-1j * heading)))
+    c, s = np.cos(heading + first), np.sin(heading + first)
+    return np.column_stack([c * twist[:, 0] + s * twist[:, 1], c * twist[:, 1] - s * twist[:, 0], twist[:, 2:]])
 
 
 def contradiction(t_ns: Array, places: Array, heading: Array) -> str:

@@ -26,6 +26,8 @@ _SPREAD_SIGMAS = 3.0  # the way under the fixes in sigmas of a fix, from which o
 _SPEED_MAX_MPS = 100.0  # of a robot whose motion is not known
 _ALTITUDE_M = (-5_000.0, 10_000.0)  # of a robot's place, the deepest mines included; of others, and of no number, nothing is known
 _CLIMB_MAX_M = 1_000.0  # from the median of a drive; farther off is a receiver's word for "none" (-1000, -9999)
+_STANDS = 0.1  # of the motion's way, in which the fixes of a receiver that stands stay
+_REPEATS, _REGULAR = 0.5, 0.8  # share of fixes that repeat the one before, and of their runs that are alike, from which on they are sent again
 _LEAP_SIGMAS, _LEAPS_MAX = 10.0, 0.1  # of a leap; share of leaps among the steps of a drive
 _FUSED = re.compile(r"filtered|fused|ekf|ukf", re.I)
 
@@ -58,8 +60,20 @@ def _sigmas(values: Array, has_altitude: Array) -> tuple[Array, Array]:
     return xy, np.where(has_altitude, z, np.nan)
 
 
-def _choose(into: Collection, given: argparse.Namespace) -> str | None:
-    """The receiver with the smallest stated errors; a filter's answer only where there is no receiver."""
+def _stands(into: Collection, topic: str, motion: Motion | None) -> bool:
+    """Whether a receiver stays at its place while the robot drives, as that of a base station."""
+    if motion is None or motion.is_command:
+        return False
+    t_ns, _, values = into.timed(topic, into.samples["fixes"][topic])
+    ok = (values[:, 7] != _NO_FIX) & np.isfinite(values[:, :2]).all(axis=1) & (values[:, :2] != 0).any(axis=1)
+    way = _way(motion, t_ns[ok], np.zeros(2))
+    if not ok.any() or not _shows(way, float(np.median(_sigmas(values[ok], np.isfinite(values[ok, 2]))[0]))):
+        return False
+    return _is_still(way, _plane(values[ok])[:, :2])
+
+
+def _choose(into: Collection, given: argparse.Namespace, motion: Motion | None) -> str | None:
+    """Of the receivers that move with the robot that of the smallest stated errors; a filter's answer only where there is no receiver."""
     topics: dict[str, Samples] = into.samples.get("fixes", {})
     if given.gnss:
         if given.gnss not in topics:
@@ -70,10 +84,27 @@ def _choose(into: Collection, given: argparse.Namespace) -> str | None:
         values = topics[topic].values
         ok = (values[:, 7] != _NO_FIX) & np.isfinite(values[:, 0]) & (values[:, :2] != 0).any(axis=1)
         if not ok.any():
-            return 1.0, 0.0, 0.0
-        return 0.0, float(bool(_FUSED.search(topic))), float(np.median(_sigmas(values[ok], ok[ok])[0]))
+            return 1.0, 0.0, 0.0, 0.0
+        return 0.0, float(_stands(into, topic, motion)), float(bool(_FUSED.search(topic))), float(np.median(_sigmas(values[ok], ok[ok])[0]))
 
     return min(sorted(topics), key=rank) if topics else None
+
+
+def _once_each(into: Collection, topic: str, values: Array) -> Array:
+    """Which fixes are new. A driver that sends the last one again, with a new stamp, has runs of about one length; a robot that stands has not."""
+    keep: Array = np.ones(len(values), dtype=bool)
+    if len(values) < 4:
+        return keep
+    same = (np.diff(values[:, :2], axis=0) == 0).all(axis=1)
+    begins = np.concatenate([[0], 1 + np.flatnonzero(~same)])
+    lengths = np.diff(np.append(begins, len(values)))
+    inner = lengths[1:-1]
+    usual = int(np.median(inner)) if len(inner) > 1 else 1
+    if same.mean() <= _REPEATS or usual < 2 or float((np.abs(inner - usual) <= 1).mean()) < _REGULAR:
+        return keep
+    keep = (np.arange(len(values)) - np.repeat(begins, lengths)) % (usual + 1) == 0
+    into.note(topic, f"{100 * same.mean():.0f} % of its fixes repeat the one before with a new stamp: the first of each is taken")
+    return keep
 
 
 def _altitude(into: Collection, topic: str, altitude: Array) -> Array:
@@ -127,6 +158,11 @@ def _way(motion: Motion, t_ns: Array, antenna: Array) -> Array:
                                             np.sin(turned) * antenna[0] + np.cos(turned) * antenna[1]]))
 
 
+def _spread(places: Array) -> float:
+    """The largest distance from the middle, m."""
+    return float(np.linalg.norm(places - places.mean(axis=0), axis=1).max(initial=0))
+
+
 def _laid(way: Array, places: Array) -> tuple[Array, float]:
     """Where the way's start lies among the places, the way being turned and moved onto them (Umeyama 1991, without a scale), and what is left (rms)."""
     a, b = way - way.mean(axis=0), places - places.mean(axis=0)
@@ -136,14 +172,26 @@ def _laid(way: Array, places: Array) -> tuple[Array, float]:
     return np.asarray(places.mean(axis=0) - rotation @ way.mean(axis=0)), float(np.sqrt(np.mean((b - a @ rotation.T) ** 2)))
 
 
+def _size(way: Array, places: Array) -> float:
+    """The places' extent in that of the way."""
+    a, b = (np.sqrt(np.mean((points - points.mean(axis=0)) ** 2)) for points in (way, places))
+    return float(b / a) if a > 0 else 1.0
+
+
+def _is_still(way: Array, places: Array) -> bool:
+    """Whether places stay together while the way leads on, and are no small picture of it."""
+    extent = float(np.sqrt(np.mean((places - places.mean(axis=0)) ** 2)))
+    return _spread(places) < _STANDS * _spread(way) and _laid(_size(way, places) * way, places)[1] >= extent / 2
+
+
 def _fits_within(way: Array, sigma_m: float) -> float:
     """What may be left where the way and the places are of one drive (rms, m): the fixes' noise and 2 % of the way."""
-    return 3 * sigma_m + 0.02 * float(np.linalg.norm(way - way.mean(axis=0), axis=1).max())
+    return 3 * sigma_m + 0.02 * _spread(way)
 
 
 def _shows(way: Array, sigma_m: float) -> bool:
     """Whether a way is long enough to compare places with it."""
-    return len(way) >= 5 and float(np.linalg.norm(way - way.mean(axis=0), axis=1).max()) >= max(_SPREAD_SIGMAS * sigma_m, 1.0)
+    return len(way) >= 5 and _spread(way) >= max(_SPREAD_SIGMAS * sigma_m, 1.0)
 
 
 def _start(motion: Motion | None, t_ns: Array, places: Array, sigma_m: float, antenna: Array) -> Array | None:
@@ -205,9 +253,12 @@ def _read(into: Collection, topic: str, motion: Motion | None, t_ns: Array, valu
 
 
 def _find_size(into: Collection, topic: str, motion: str, way: Array, places: Array, sigma_m: float) -> None:
-    """Names a way of the fixes that is the motion's in another size: a speed in another unit."""
-    a, b = (np.sqrt(np.mean((points - points.mean(axis=0)) ** 2)) for points in (way, places))
-    size = float(b / a) if a > 0 else 1.0
+    """Names a way of the fixes that is the motion's in another size: a speed in another unit, or a receiver that stands."""
+    if _is_still(way, places):
+        into.find(topic, f"its fixes stay within {_spread(places):.2g} m while {motion} drives {2 * _spread(way):.3g} m far: is it the receiver of a base station, or "
+                         "does its driver send the last fix on? It is kept")
+        return
+    size = _size(way, places)
     if max(size, 1 / max(size, 1e-9)) > compare.SAME and _laid(size * way, places)[1] <= _fits_within(size * way, sigma_m):
         into.find(topic, f"its way is {size:.3g} times as long as that of {motion}: is the speed there in another unit (km/h are 3.6 times m/s)? Both are kept")
 
@@ -233,12 +284,13 @@ def _origin(into: Collection, topic: str, motion: Motion | None, t_ns: Array, va
 
 def write(into: Collection, given: argparse.Namespace, base: str, motion: Motion | None) -> None:
     """gnss.csv, the map's origin, and the antenna's place."""
-    topic = _choose(into, given)
+    topic = _choose(into, given, motion)
     if topic is None:
         return
     for other in into.samples["fixes"]:
         if other != topic:
-            into.refuse(other, f"positions come from {topic}; --gnss {other} takes this one")
+            why = "it stands still while the robot drives, as that of a base station; " if _stands(into, other, motion) else ""
+            into.refuse(other, f"{why}positions come from {topic}; --gnss {other} takes this one")
     samples = into.samples["fixes"][topic]
     t, arrival, values = into.timed(topic, samples)
     place = _antenna(into, topic, samples.frame, base)
@@ -249,6 +301,8 @@ def write(into: Collection, given: argparse.Namespace, base: str, motion: Motion
         into.refuse(topic, "it never has a fix")
         return
     t, arrival, values = t[ok], arrival[ok], values[ok]
+    new = _once_each(into, topic, values)
+    t, arrival, values = t[new], arrival[new], values[new]
     stale = _stale(into, topic, motion, t, values)
     t, arrival, values = t[stale:], arrival[stale:], values[stale:]
     altitude = _altitude(into, topic, values[:, 2])

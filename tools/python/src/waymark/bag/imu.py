@@ -313,6 +313,12 @@ def _scale(imu: Imu, size: float, r: float, words: str) -> None:
         imu.say(f"{text}, or the turns of the motion are (skid steer): it is kept as it is")
 
 
+def _leave_out_accelerations(imu: Imu, gravity: Array, up: Array) -> None:
+    """Of an accelerometer whose vertical is not that of the gyro's turns."""
+    imu.accelerometer[:] = np.nan
+    imu.say(f"its accelerometer has gravity along {_axis(gravity)}, while its gyro turns about {_axis(up)}: its accelerations are left out; --as-is takes them")
+
+
 def _orient(imu: Imu, fit: _Fit, gravity: Array | None, motion: Motion, words: str) -> None:
     """Sign and axis by the turns and by gravity."""
     expected = _UP if imu.rotation is None else imu.rotation[2]
@@ -323,9 +329,10 @@ def _orient(imu: Imu, fit: _Fit, gravity: Array | None, motion: Motion, words: s
     if along > _SAME:
         if gravity is not None and gravity @ expected < -_NEAR:
             imu.accelerometer *= -1
-            imu.say("its accelerometer shows gravity downwards, not the force against it (REP 145: +9.81 upwards): turned round")
+            imu.say("its accelerometer shows gravity downwards, not the force against it (REP 145: +9.81 upwards): turned round. If z is down in all of them "
+                    f"(north-east-down), {words} and the gyro turn to the other side, and the drive is its mirror image: mend the node")
         elif gravity is not None and gravity @ expected < _NEAR:
-            imu.say(f"its accelerometer has gravity along {_axis(gravity)}, while its gyro turns about {_axis(up)}: its accelerations are not to be used")
+            _leave_out_accelerations(imu, gravity, up)
         return
     if along < -_SAME and (by_gravity is None or by_gravity < -_SAME):
         imu.gyro *= -1
@@ -337,6 +344,8 @@ def _orient(imu: Imu, fit: _Fit, gravity: Array | None, motion: Motion, words: s
         imu.accelerometer *= -1
         imu.say("its accelerometer shows gravity downwards, not the force against it (REP 145: +9.81 upwards): turned round")
     also = "its gyro and its accelerometer show" if by_gravity is not None and abs(by_gravity) > _SAME else "its gyro shows"
+    if gravity is not None and by_gravity is not None and abs(by_gravity) < _NEAR:
+        _leave_out_accelerations(imu, gravity, up)
     known = _set_up(imu, up, motion)
     imu.say(f"{also} its {_axis(up)} axis upwards (r {fit.r:.2f} with {words}), but {stated}: {_line(imu)}; {known}")
 

@@ -35,6 +35,8 @@ _LATE_MAX_NS = 100_000_000  # differences are known at their end: as twists only
 _POSE_UNITS = {1000.0: "mm", 100.0: "cm", 39.37: "inches"}
 _FLAT = 1e-3  # m/s, rad/s: a part of the twist that stays below is none: the floats' own, or that of poses as text
 _LEVER_R, _LEVER_M = 0.95, 0.05  # skid steer and legs slide, too, and their sideways speed follows nothing so closely
+_OFF_WORLD = ("the direction of its speed turns by as much as it turns itself: its speeds are on axes that stay, as of 'odom', and not on the robot's: they are turned "
+              "into these, as if it went ahead")
 _UPRIGHT = np.cos(np.radians(30))  # of the robot's z axis, in the mean of a drive: no slope is steeper
 _NAMES = ("x", "y", "z")
 
@@ -109,6 +111,9 @@ class _Odometry:
             if compare.moves(by_twist[:, :3]) or compare.turns(by_twist[:, 5]):
                 self.say("its poses stand still while its twist moves: the twist is used" if poses_ok else
                          "its poses have no orientation (a quaternion of zeros): nothing compares its twist, which is used")
+            if (turned_back := course.off_world(self.t, self.twist)) is not None:
+                self.say(_OFF_WORLD, finding=True)
+                return turned_back
             return self.twist
         larger = compare.likeness(np.linalg.norm(by_pose[:, :3], axis=1), np.linalg.norm(by_twist[:, :3], axis=1)).factor
         unit = next((name for size, name in _POSE_UNITS.items() if abs(larger / size - 1) < compare.KNOWN_SHARE), None)
@@ -273,7 +278,10 @@ def _plain(into: Collection, topic: str, samples: Samples, base: str) -> Motion:
     """A topic of twists alone."""
     t, arrival, values = into.timed(topic, samples)
     out = Motion(topic, t, arrival, values, is_command=bool(_COMMAND.search(topic)))
-    if is_world(samples.frame):
+    if (turned_back := course.off_world(t, values)) is not None:
+        out.twist = turned_back
+        out.said.append((True, _OFF_WORLD))
+    elif is_world(samples.frame):
         out.said.append((True, f"its twists are said to be on the axes of '{samples.frame}', and no pose comes with them: taken as the robot's"))
     elif samples.frame:
         matrix, text = _place(into, topic, samples.frame, base)

@@ -2,7 +2,9 @@
 """Messages of a bag in the order of its log, also of chunks that overlap in time."""
 
 import heapq
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator
+from itertools import chain, islice
 from operator import itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -10,6 +12,8 @@ from typing import Any, NamedTuple
 from .decoding import Topic
 
 _BACK_NS = 1_000_000_000  # a topic whose log goes back by more, over times that it had, was logged by a clock that was set
+_AFTER = 10  # messages of the topic that rise behind a step back: they do where the clock was set, and not where the file is out of order
+_AHEAD, _AHEAD_MAX_BYTES = 200, 8 << 20  # messages that are looked at for that
 _PENDING_MAX_BYTES = 48 << 20  # of chunks that overlap; beyond it the earliest go on, so that memory has a bound
 _by_time = itemgetter(0)
 
@@ -40,12 +44,26 @@ class Seams:
         runs = self._runs.get(topic)
         return runs is not None and log_ns < runs[-1][1] - _BACK_NS and (log_ns < self._first - _BACK_NS or any(a <= log_ns <= b for a, b in runs))
 
-    def mend(self, batch: Batch) -> Batch:
-        """A batch, in the file's order, with the log's times that go on."""
+    def over(self, batches: Iterable[Batch]) -> Iterator[Batch]:
+        """All batches, in the file's order, with the log's times that go on."""
+        ahead: deque[Batch] = deque()
+        count = size = 0
+        for batch in batches:
+            ahead.append(batch)
+            count, size = count + len(batch.messages), size + sum(len(data) for *_, data in batch.messages)
+            while len(ahead) > 1 and (count - len(ahead[0].messages) > _AHEAD or size > _AHEAD_MAX_BYTES):
+                first = ahead.popleft()
+                count, size = count - len(first.messages), size - sum(len(data) for *_, data in first.messages)
+                yield self._mended(first, ahead)
+        while ahead:
+            first = ahead.popleft()
+            yield self._mended(first, ahead)
+
+    def _mended(self, batch: Batch, ahead: Iterable[Batch]) -> Batch:
         out = []
-        for log_ns, topic, data in batch.messages:
+        for i, (log_ns, topic, data) in enumerate(batch.messages):
             t_ns = log_ns + self.offset_ns
-            if self._is_back(topic, t_ns):
+            if self._is_back(topic, t_ns) and _rises(topic, chain(batch.messages[i:], *(later.messages for later in ahead))):
                 self.found.append((self._latest - t_ns, self._latest - self._first))
                 self.offset_ns += self._latest - t_ns
                 t_ns = self._latest
@@ -60,12 +78,18 @@ class Seams:
         return Batch(min((message[0] for message in out), default=batch.start_ns + self.offset_ns), out)
 
 
+def _rises(topic: Topic, messages: Iterable[tuple[int, Topic, Any]]) -> bool:
+    """Whether the log of a topic's next messages rises."""
+    own = list(islice((log_ns for log_ns, other, _ in messages if other is topic), _AFTER))
+    return own == sorted(own)
+
+
 def in_order(batches: Iterable[Batch], seams: Seams | None = None) -> Iterator[tuple[Topic, int, Any]]:
     """Messages of all batches by log time, as far as those that overlap fit into memory."""
     seams = seams or Seams()
     pending: list[tuple[int, Topic, Any]] = []
     held = 0
-    for batch in map(seams.mend, batches):
+    for batch in seams.over(batches):
         until = 0
         if pending and held <= _PENDING_MAX_BYTES:
             while until < len(pending) and pending[until][0] < batch.start_ns:

@@ -33,7 +33,7 @@ def settle(into: Collection) -> None:
         for other_kind, other in sorted(others, key=lambda item: grown[item[1]]):
             before = into.clocks[topic]
             moved = clocks.onto(into.samples[kind][topic].times, into.samples[other_kind][other].times)
-            if moved is None or before.by_log or into.clocks[other].by_log:
+            if moved is None or before.by_log or before.log or into.clocks[other].by_log:
                 continue
             theirs = _rates(into, other_kind, other)
             as_it_is = _likeness(_rates(into, kind, topic), theirs)
