@@ -164,6 +164,12 @@ def ticks(track_m=0.5, radius_m=0.1, per_turn=2000, swap=False, raw_bits=None, w
     return table("t_ns,left,right", rows)
 
 
+def speeds(factor):
+    """speeds.csv of a track of 0.5 m, times a factor."""
+    n = noise(7)
+    return table("t_ns,left_mps,right_mps", [[ns(t), *(f"{factor * (speed(t) + side * turn(t) / 4) + n(0.005):.5f}" for side in (-1, 1))] for t in times(50)])
+
+
 WHEELS = "wheels: {radius_m: 0.1, track_m: 0.5, ticks_per_turn: 2000}\n"
 
 
@@ -362,6 +368,9 @@ FAULTS = [
     ("gyro of the time since boot", both(imu_csv=imu(stamp=lambda t: round((t + 85) * 1e9))), ("bad", "clocks-apart", "imu"), "don't overlap", "one clock"),
     *[(f"positions {abs(by)} s too {word}", {"motion.csv": motion(), "gnss.csv": shifted(gnss(sigma=1, stated=1), by), **EKF}, ("bad", "clocks-apart", "gnss"), f"it begins {abs(by):.2f} s", "one clock") for by, word in ((2.5, "late"), (-4.0, "early"))],
     ("stamps of whole seconds", both(motion_csv=motion(stamp=grid(1.0))), ("bad", "clock-coarse", "motion"), "have the stamp of the one before", "grid of about 1 s"),
+    ("stamps of whole seconds, equal rows", both(motion_csv=motion(stamp=grid(1.0), exact=True, v=0, w=0)), ("bad", "clock-coarse", "motion"), "have the stamp of the one before", "grid of about 1 s"),
+    ("stamps in microseconds at 20 Hz", {"motion.csv": motion(20, stamp=lambda t: ns(t) // 1000)}, ("bad", "rate-implausible", "motion"), "data a second: are its stamps in us", "nanoseconds"),
+    *[(f"wheels' speeds, {k:.3g} times", {"speeds.csv": speeds(k), "imu.csv": imu(), "calibration.yaml": WHEELS}, ("bad", DISAGREE, "*"), "times", f"speeds in {unit}, or m/s that are read as that? Their `unit:`, or columns, times {by}") for k, unit, by in ((3.6, "km/h", 0.27), (1 / 3.6, "km/h", 3.6), (2.237, "mph", 0.44))],
     ("stamps of 16 ms at 200 Hz", both(imu_csv=imu(200, stamp=grid(0.016))), ("bad", "clock-coarse", "imu"), "have the stamp", "0.016 s"),
     ("stamps of 10 ms at 200 Hz", both(imu_csv=imu(200, stamp=grid(0.01))), ("note", "clock-coarse", "imu"), "have the stamp", "0.01 s"),
     ("rows of one post after the other", sighted() | {"sightings.csv": by_post(sighted()["sightings.csv"], 4)}, ("bad", "rows-disordered", "sightings:eye"), "are older", "sort the rows by t_ns"),

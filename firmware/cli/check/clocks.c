@@ -16,6 +16,7 @@
 #define EVENTS_MIN 20
 #define SAME_STAMP_NOTE 0.2  // share of the rows that have the stamp of the one before
 #define SAME_STAMP_BAD 0.5
+#define MANY 4  // rows of one stamp, in the mean
 #define TWICE_NOTE 0.01
 #define UNUSED_BAD 0.02            // share of a source that a run drops or ignores
 #define LATE_OBSERVATIONS_BAD 0.1  // of observations that a slow transport brings too late: the rest is right
@@ -236,10 +237,10 @@ static void judge_grid(const clock_facts *f, uint64_t twice, const char *name, w
   if (f->measured < EVENTS_MIN || f->stamps == 0) return;
   const double span_s = wm_seconds_between(f->first_ns, f->newest_ns);
   char fix[WM_FINDING_FIX_MAX];
+  const int are_many = f->stamps * MANY < f->measured;  // more than of two programs that send the same
   // Differences are a period each: their span is the jitter of the period.
-  const int are_differences =
-      f->stamps * 4 < f->measured && span_s < 0.001 * (double)f->measured && f->first_ns < DIFFERENCE_MAX_NS;
-  const uint64_t same = are_differences || f->same_stamp < twice ? f->same_stamp : f->same_stamp - twice;
+  const int are_differences = are_many && span_s < 0.001 * (double)f->measured && f->first_ns < DIFFERENCE_MAX_NS;
+  const uint64_t same = are_many || f->same_stamp < twice ? f->same_stamp : f->same_stamp - twice;
   const double share = (double)same / (double)f->measured;
   if (share < SAME_STAMP_NOTE) return;
   (void)snprintf(

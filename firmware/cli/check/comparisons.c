@@ -25,6 +25,7 @@
 #define APART_SHARE 0.005    // of the time's sum, that the way leaves: a speed that varies by 7 %, or stops
 #define DEGREES (180 / M_PI)
 #define KMH 3.6
+#define MPH 2.237
 
 typedef struct fit {
   double aa, bb, ab;  // sums over the windows
@@ -244,7 +245,7 @@ static const char *unit_of(double factor, int is_way) {
     double factor;
     int is_way;
     const char *what;
-  } kKnown[] = {{DEGREES, 0, "deg/s"}, {KMH, 1, "km/h"}, {2.237, 1, "mph"}, {1000, 1, "mm/s"}, {100, 1, "cm/s"}};
+  } kKnown[] = {{DEGREES, 0, "deg/s"}, {KMH, 1, "km/h"}, {MPH, 1, "mph"}, {1000, 1, "mm/s"}, {100, 1, "cm/s"}};
   for (size_t i = 0; i < sizeof kKnown / sizeof kKnown[0]; i++)
     if (kKnown[i].is_way == is_way && fabs(factor / kKnown[i].factor - 1) < NEAR) return kKnown[i].what;
   return NULL;
@@ -253,12 +254,25 @@ static const char *unit_of(double factor, int is_way) {
 // The difference of two wheels, whose turn is that over the track.
 static int is_of_track(const channel *c) { return c->kind == CHANNEL_TICKS_TURN || c->kind == CHANNEL_WHEELS_TURN; }
 
+// The unit that two wheels' speeds may have where their turn is off by its factor, to either side; NULL: none.
+static const char *wheels_unit(const channel *c, const channel *other, double factor) {
+  if (c->kind != CHANNEL_WHEELS_TURN && other->kind != CHANNEL_WHEELS_TURN) return NULL;
+  const double size = fmax(factor, 1 / factor);
+  return fabs(size / KMH - 1) < NEAR ? "km/h" : fabs(size / MPH - 1) < NEAR ? "mph" : NULL;
+}
+
 static void factor_line(const scene *s, const channel *c, const channel *other, double measured, char *fix,
                         size_t capacity) {
   const double factor = usual_factor(measured);
   const char *unit = unit_of(factor, channel_is_way(c->kind)), *source = source_of(c, s->assembly);
   const wm_wheels *w = s->all->wheels;
-  if (is_of_track(c))
+  const char *of_speeds = wheels_unit(c, other, factor);
+  if (of_speeds)
+    (void)snprintf(fix, capacity,
+                   "are the wheels' speeds in %s, or m/s that are read as that? Their `unit:`, or columns, times %.4g "
+                   "would agree; else measure the track again",
+                   of_speeds, is_of_track(c) ? 1 / factor : factor);
+  else if (is_of_track(c))
     (void)snprintf(fix, capacity,
                    "measure the track again (`wheels: {track_m: %.3g}` would agree), or look at the gyro's unit",
                    w->track_m * factor);

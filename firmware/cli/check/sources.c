@@ -99,6 +99,16 @@ static void counted(const wm_assembled_source *s, const source_facts *facts, wm_
 #define EVENTS_MIN 20
 // Of distinct stamps. The fastest sensor of a robot, a gyro, gives 8000 samples a second.
 #define RATE_MAX_HZ 20000.0
+// Of what is no IMU's and no bus's, where its stamps would be of 2001 to 2096 as microseconds. As nanoseconds they are
+// of a computer that runs for 11 to 46 days.
+#define SLOW_MAX_HZ 500.0
+#define MICROS_FIRST_NS INT64_C(1000000000000000)
+#define MICROS_LAST_NS INT64_C(4000000000000000)
+
+static double most_hz(const wm_assembled_source *s, const source_facts *facts) {
+  const int may_be_us = facts->first_ns >= MICROS_FIRST_NS && facts->first_ns <= MICROS_LAST_NS;
+  return may_be_us && !(s->kinds & WM_EVENT_BIT(WM_EVENT_QUANTITIES)) ? SLOW_MAX_HZ : RATE_MAX_HZ;
+}
 
 static void rate(const wm_assembled_source *s, const source_facts *facts, wm_findings *out) {
   const double seconds = wm_seconds_between(facts->first_ns, facts->last_ns);
@@ -109,7 +119,7 @@ static void rate(const wm_assembled_source *s, const source_facts *facts, wm_fin
     return;
   }
   const double hz = (double)(facts->stamps - 1) / seconds;
-  if (hz > RATE_MAX_HZ)
+  if (hz > most_hz(s, facts))
     wm_find(out, WM_FOUND_RATE_IMPLAUSIBLE, WM_SEVERITY_BAD, s->name, NULL,
             "%.0f data a second: are its stamps in us, ms or s? t_ns is in nanoseconds", hz)
         ->size = hz;

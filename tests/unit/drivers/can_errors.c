@@ -42,6 +42,19 @@ static const bad_input kTable[] = {
      "(python-can)"},
     {"a table of another program", CANDUMP, "Time Stamp,ID,Extended,Dir,Bus,LEN,D1",
      "this is no log of candump, but a table of SavvyCAN: save it there as candump's log"},
+    {"a log without its date", CANDUMP, "base hex  timestamps absolute",
+     "this is no log of candump, but a log of Vector (ASC); `python -m can.logconvert LOG can.log` makes one of it "
+     "(python-can)"},
+    {"an old trace of PEAK", CANDUMP, ";   PCAN-View",
+     "this is no log of candump, but a trace of PEAK (TRC) or another program's; `python -m can.logconvert LOG "
+     "can.log` "
+     "makes one of it (python-can)"},
+    {"a log of BUSMASTER", CANDUMP, "***BUSMASTER Ver 3.2.2***",
+     "this is no log of candump, but a log of BUSMASTER: save it there as ASC, and `python -m can.logconvert LOG "
+     "can.log` makes one of it (python-can)"},
+    {"a pointer of Git LFS", CANDUMP, "version https://git-lfs.github.com/spec/v1",
+     "this is no log of candump, but a pointer of Git LFS: `git lfs pull` fetches the file that it stands for"},
+    {"a web page", CANDUMP, "<html>", "this is no log of candump, but a web page or XML: did the download go wrong?"},
     {"screen output of candump", CANDUMP, "  can0  123   [2]  11 22",
      "this is what candump shows on the screen (no time, ID [LENGTH] BYTES), not a log; record with `candump -l any`, "
      "or `candump -L any > can.log`, which give (SECONDS.MICROS) IFACE ID#DATA"},
