@@ -58,6 +58,7 @@ class Columns(Folder):
                               (["2023-11-14T00:00:00", "2023-11-14T00:00:01"], "t_ns holds text .'2023-11-14T00:00:00'.; whole nanoseconds"),
                               (np.array([2**63, 2**63 + 1], dtype=np.uint64), "has 9223372036854775808 in row 0; whole numbers up to"),
                               (np.ma.array([1, 2], mask=[0, 1]), "has no value .masked. in row 1"),
+                              (np.array([True, False]), "holds bool; whole nanoseconds"),
                               (np.array([1j, 2j]), "holds complex128")):
             with self.assertRaisesRegex(ValueError, words):
                 self.written(stamps)
@@ -86,6 +87,37 @@ class Columns(Folder):
         waymark.write_table(self.folder / "a.csv", {"id": np.array([7.0, -1.0]), "sensor": np.array([b"a", b"b"])})
         self.assertEqual(waymark.read_table(self.folder / "a.csv")["id"].tolist(), [7, -1])
 
+    def test_names_that_no_program_reads_are_refused(self):
+        for name, table, words in (("motion", {"t_ns": STAMPS}, "a table's file is called NAME.csv"), ("../a.csv", {"t_ns": STAMPS}, "outside of the recording"),
+                                   ("motion.csv", {"t_ns": STAMPS, 3: STAMPS}, "the column 3 has no name")):
+            with self.assertRaisesRegex(ValueError, words), waymark.RecordingWriter(self.folder / "n") as writer:
+                writer.table(name, table)
+
+    def test_files_that_are_no_tables_are_named(self):
+        head = "t_ns,v_mps,w_radps\n"
+        for text, words in (("1,2,3\n", "a.csv:1: there is no header line"), ("", "a.csv:1: there is no header line"),
+                            ("t_ns,v_mps,v_mps\n1,2,3\n", "a.csv:1: the column v_mps appears twice"), (head + "1.5,2,3\n", "a.csv:2: '1.5' is not a whole number"),
+                            (head + f"{10**19},2,3\n", "a.csv:2: '1000.*' does not fit into 64 bits"), ((head + "1,2,3\n").encode("utf-16"), "no text in UTF-8")):
+            (self.folder / "a.csv").write_bytes(text if isinstance(text, bytes) else text.encode())
+            with self.subTest(text), self.assertRaisesRegex(ValueError, words):
+                waymark.read_table(self.folder / "a.csv")
+        (self.folder / "a.csv").write_text("t_ns, v_mps\n1, 2\n")
+        self.assertEqual(list(waymark.read_table(self.folder / "a.csv")), ["t_ns", "v_mps"])
+
+    def test_yaml_that_is_none_is_named_with_its_line(self):
+        for text, words in ((b"name: a\nstreams: [\n", "recording.yaml:3: this is no valid YAML$"), (b"\xff\xfea\0", "no text in UTF-8"), (b"- 1\n", "not a mapping of keys"),
+                            (b"name: a\nname: b\n", "recording.yaml:2: the key name appears twice")):
+            (self.folder / "recording.yaml").write_bytes(text)
+            with self.subTest(text), self.assertRaisesRegex(ValueError, words):
+                waymark.Recording(self.folder)
+
+    def test_the_runtime_names_utf16(self):
+        (self.folder / "robot.yaml").write_text(CONFIG)
+        (self.folder / "recording.yaml").write_text("format: waymark-recording/1\nname: a\nstreams: [motion.csv]\n")
+        (self.folder / "motion.csv").write_bytes("t_ns,v_mps,w_radps\n1,2,3\n".encode("utf-16"))
+        done = subprocess.run([BIN / "waymark", "check", self.folder / "robot.yaml", self.folder, "--quick"], capture_output=True, text=True, check=False)
+        self.assertIn("the file is in UTF-16: save it in UTF-8", done.stdout + done.stderr)
+
     def test_the_runtime_knows_every_column(self):
         self.assertEqual(set(STREAMS) - set(COLUMNS), set())
         (self.folder / "robot.yaml").write_text(CONFIG)
@@ -105,7 +137,7 @@ class Columns(Folder):
         for field in ("1_0", "\u0661"):
             for name in ("t_ns", "x_m"):
                 (self.folder / "a.csv").write_text(f"{name}\n1\n{field}\n", encoding="utf-8")
-                with self.subTest(field, name=name), self.assertRaisesRegex(ValueError, f"a.csv:3: '{field}' is not a number"):
+                with self.subTest(field, name=name), self.assertRaisesRegex(ValueError, f"a.csv:3: '{field}' is not a (whole )?number"):
                     waymark.read_table(self.folder / "a.csv")
 
     def test_a_byte_order_mark_is_no_part_of_a_name(self):
@@ -193,6 +225,15 @@ class Maps(Folder):
                             ("image: b.png\nmode: raw\nnegate: 1\n", "negate: the map servers")):
             (self.folder / "map.yaml").write_text(f"resolution: 0.05\norigin: [0, 0, 0]\n{keys}")
             with self.assertRaisesRegex(ValueError, words):
+                waymark.read_floor_plan(self.folder / "map.yaml")
+        for keys, words in (("resolution: 0,05\norigin: [0, 0]\n", "map.yaml: resolution: '0,05' is not a number"), ("origin: [0, 0]\n", "resolution is missing"),
+                            ("resolution: 1\norigin: {x: 0}\n", "origin is .x, y, yaw."), ("resolution: 1\norigin: [0, 0, 0, 0]\n", "origin is .x, y, yaw."),
+                            ("resolution: 1\norigin: [0, a]\n", "origin: 'a' is not a number"), ("- 1\n", "not a mapping"), ("a: [\n", "map.yaml:2: this is no valid YAML"),
+                            ("resolution: 1\nresolution: 2\norigin: [0, 0]\n", "map.yaml:2: the key resolution appears twice"),
+                            ("resolution: 1\norigin: [0, 0]\nnegate: yes\n", "negate: 'yes' is not a number"),
+                            ("resolution: 1\norigin: [0, 0]\noccupied_thresh: 0.1\n", "free_thresh is 0.196, above occupied_thresh")):
+            (self.folder / "map.yaml").write_text(keys + "image: b.png\n" * (keys[0] != "-" and keys[-2] != "["))
+            with self.subTest(keys), self.assertRaisesRegex(ValueError, words):
                 waymark.read_floor_plan(self.folder / "map.yaml")
 
 

@@ -15,7 +15,7 @@ import numpy as np
 import yaml
 from PIL import Image
 
-from .documents import read_yaml
+from .documents import read_mapping
 from .tables import Array, Table, as_column, read_table, write_table
 
 FREE, OCCUPIED, UNKNOWN = 0, 100, -1
@@ -119,23 +119,35 @@ def _cells(mode: str, shares: dict[str, float], path: Path, file: Path) -> Array
     return cells
 
 
+def _number(value: Any, key: str, file: Path) -> float:
+    if not isinstance(value, (int, float)):
+        raise ValueError(f"{file}: {key}: {value!r} is not a number")
+    return float(value)
+
+
 def read_floor_plan(path: str | Path) -> FloorPlan:
     """A map.yaml (of ROS's map_server, with `layers` of ours) and its pictures. `path` may be a recording's folder.
 
     ValueError or FileNotFoundError name the file and what is wrong with it.
     """
     file = Path(path) / "map/map.yaml" if Path(path).is_dir() else Path(path)
-    try:
-        about = read_yaml(file.read_text(encoding="utf-8"))
-        resolution_m, given = float(about["resolution"]), [float(value) for value in about["origin"]]
-        layers = {str(name): str(picture) for name, picture in (about.get("layers") or {}).items()}
-        shares = {key: float(about.get(key, default)) for key, default in _SHARES.items()}
-        x_m, y_m, yaw = (*given, 0.0)[:3]
-    except (yaml.YAMLError, TypeError, KeyError, ValueError, AttributeError) as error:
-        raise ValueError(f"{file}: this is not a map with image, resolution and origin: {type(error).__name__}: {error}") from None
+    about = read_mapping(file)
+    for key in ("resolution", "origin"):
+        if key not in about:
+            raise ValueError(f"{file}: {key} is missing; a map has image, resolution and origin")
+    origin, layers = about["origin"], about.get("layers") or {}
+    if not isinstance(origin, list) or not 2 <= len(origin) <= 3:
+        raise ValueError(f"{file}: origin is [x, y, yaw], and not {origin!r}")
+    if not isinstance(layers, dict):
+        raise ValueError(f"{file}: layers are {{edges: FILE, drivable: FILE}}")
+    layers = {str(name): str(picture) for name, picture in layers.items()}
+    resolution_m, (x_m, y_m, yaw) = _number(about["resolution"], "resolution", file), [_number(value, "origin", file) for value in (*origin, 0)[:3]]
+    shares = {key: _number(about.get(key, default), key, file) for key, default in _SHARES.items()}
     for key, value in shares.items():
         if not 0 <= value <= 1:
             raise ValueError(f"{file}: {key} is {value}; it has to be from 0 to 1")
+    if shares["free_thresh"] > shares["occupied_thresh"]:
+        raise ValueError(f"{file}: free_thresh is {shares['free_thresh']}, above occupied_thresh ({shares['occupied_thresh']})")
     cells = None
     if about.get("image") and (file.parent / str(about["image"])).is_file() or not layers:
         cells = _cells(str(about.get("mode", "trinary")), shares, file.parent / str(about.get("image", "")), file)

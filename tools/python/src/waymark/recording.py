@@ -16,7 +16,7 @@ import yaml
 from PIL import Image
 
 from .avi import AviWriter, read_jpegs
-from .documents import read_yaml
+from .documents import read_mapping
 from .maps import FloorPlan, read_floor_plan, read_landmarks, write_floor_plan, write_landmarks
 from .tables import Array, Table, as_table, read_table, write_table
 
@@ -84,6 +84,10 @@ def _known_columns(name: str, table: Table, where: str) -> None:
     """ValueError for a column that the runtime wouldn't read, or that it needs."""
     if not isinstance(table, Mapping):
         raise TypeError(f"{where}: a table is columns by name, and not {type(table).__name__}")
+    if unnamed := [column for column in table if not isinstance(column, str)]:
+        raise ValueError(f"{where}: the column {unnamed[0]!r} has no name: names are text")
+    if not name.endswith(".csv"):
+        raise ValueError(f"{where}: a table's file is called NAME.csv")
     if name not in COLUMNS:
         alike = [known for known in COLUMNS if len(known) == len(name)]  # a longer name is one of the user's own
         if near := difflib.get_close_matches(name, alike, n=1, cutoff=0.8):
@@ -101,16 +105,6 @@ def _known_columns(name: str, table: Table, where: str) -> None:
         raise ValueError(f"{where}: the column {missing[0]} is missing")
 
 
-def _read_yaml(path: Path) -> dict[str, Any]:
-    try:
-        content = read_yaml(path.read_text(encoding="utf-8"))
-    except yaml.YAMLError as error:
-        raise ValueError(f"{path}: {error}") from None
-    if not isinstance(content, dict):
-        raise ValueError(f"{path}: this is not a mapping of keys")
-    return content
-
-
 class Recording:
     """A recording's folder, read as it is asked for."""
 
@@ -118,7 +112,7 @@ class Recording:
         self.path = Path(path)
         if not (self.path / "recording.yaml").is_file():
             raise FileNotFoundError(f"{path}: there is no recording.yaml in it: is it a recording's folder?")
-        self.meta = _read_yaml(self.path / "recording.yaml")
+        self.meta = read_mapping(self.path / "recording.yaml")
         if self.meta.get("format") != FORMAT:
             raise ValueError(f"{path}/recording.yaml: its format is '{self.meta.get('format')}', not {FORMAT}")
 
@@ -126,7 +120,7 @@ class Recording:
     def calibration(self) -> dict[str, Any]:
         """calibration.yaml; empty without one."""
         path = self.path / "calibration.yaml"
-        return _read_yaml(path) if path.is_file() else {}
+        return read_mapping(path) if path.is_file() else {}
 
     def streams(self) -> list[str]:
         """Names of the tables of sensors that are there."""
@@ -267,20 +261,22 @@ class RecordingWriter:
         if key is not None:
             order = np.argsort(key, kind="stable")
             table = {column: values[order] for column, values in table.items()}
-        path = self.path / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_table(path, table)
+        write_table(self._inside(name), table)
         if "t_ns" in table and len(table["t_ns"]):
             self._times += [int(table["t_ns"].min()), int(table["t_ns"].max())]
         self._streams.append(name)
 
     def file(self, name: str, data: bytes) -> None:
         """Writes another file below the folder."""
+        self._inside(name).write_bytes(data)
+
+    def _inside(self, name: str) -> Path:
+        """A file below the folder; its own folder is there then."""
         path = (self.path / name).resolve()
         if not path.is_relative_to(self.path.resolve()):
             raise ValueError(f"'{name}' is a name outside of the recording")
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(data)
+        return path
 
     def landmarks(self, table: Table) -> None:
         """Writes landmarks.csv: id, x_m, y_m, and where they are known z_m, sigma_m, yaw_rad and a covariance (map, m)."""

@@ -3,7 +3,7 @@
 
 import csv
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -36,38 +36,53 @@ def is_text(column: str) -> bool:
 def _column(name: str, fields: list[str], path: Path) -> Array:
     if is_text(name):
         return np.array(fields, dtype=str)
+    wanted = "whole number" if is_integer(name) else "number"
     for row, field in enumerate(fields):
         if "_" in field or not field.isascii():  # Python's own spellings of numbers
-            raise ValueError(f"{path}:{row + 2}: '{field}' is not a number (column {name})")
+            raise ValueError(f"{path}:{row + 2}: '{field}' is not a {wanted} (column {name})")
     try:
         if is_integer(name):
             return np.array([int(field) if field else ABSENT for field in fields], dtype=np.int64)
         return np.array([float(field) if field else np.nan for field in fields], dtype=np.float64)
-    except ValueError:
+    except (ValueError, OverflowError):
         for row, field in enumerate(fields):
             try:
-                float(field or "nan") if not is_integer(name) else int(field or "0")
+                float(field or "nan") if not is_integer(name) else np.int64(int(field or "0"))
             except ValueError:
-                raise ValueError(f"{path}:{row + 2}: '{field}' is not a number (column {name})") from None
+                raise ValueError(f"{path}:{row + 2}: '{field}' is not a {wanted} (column {name})") from None
+            except OverflowError:
+                raise ValueError(f"{path}:{row + 2}: '{field}' does not fit into 64 bits (column {name})") from None
         raise
+
+
+def _fields(rows: Iterator[list[str]], path: Path) -> tuple[list[str], list[list[str]]]:
+    """Names and fields of the columns."""
+    names = [name.strip() for name in next(rows, [])]
+    if not names or all(re.fullmatch(r"[-+.\d]*", name) for name in names):
+        raise ValueError(f"{path}:1: there is no header line")
+    if len(set(names)) < len(names):
+        raise ValueError(f"{path}:1: the column {max(names, key=names.count)} appears twice")
+    fields: list[list[str]] = [[] for _ in names]
+    for number, row in enumerate(rows, start=2):
+        if not row:
+            continue
+        if len(row) > len(names):
+            raise ValueError(f"{path}:{number}: {len(row)} fields, but {len(names)} columns")
+        for i, column in enumerate(fields):
+            column.append(row[i] if i < len(row) else "")
+    return names, fields
 
 
 def read_table(path: str | Path) -> Table:
     """The columns of a CSV file. ValueError names file and line of what can't be read."""
     path = Path(path)
     with path.open(newline="", encoding="utf-8-sig") as file:
-        rows = csv.reader(file)
-        names = next(rows, None)
-        if not names:
-            raise ValueError(f"{path}:1: there is no header line")
-        fields: list[list[str]] = [[] for _ in names]
-        for number, row in enumerate(rows, start=2):
-            if not row:
-                continue
-            if len(row) > len(names):
-                raise ValueError(f"{path}:{number}: {len(row)} fields, but {len(names)} columns")
-            for i, column in enumerate(fields):
-                column.append(row[i] if i < len(row) else "")
+        try:
+            names, fields = _fields(csv.reader(file), path)
+        except UnicodeDecodeError:
+            raise ValueError(f"{path}: this is no text in UTF-8 (UTF-16, or no text at all?); save it as UTF-8") from None
+        except csv.Error:
+            raise ValueError(f"{path}: this is no CSV: zero bytes, or a field without its end") from None
     return {name: _column(name, column, path) for name, column in zip(names, fields)}
 
 
@@ -135,7 +150,7 @@ def as_column(name: str, values: Any, where: str) -> Array:
         if bad is not None:
             raise ValueError(f"{where}: {name} is {bad!r}; names have no comma, quote or line end")
         return column
-    if column.dtype.kind not in "biuf":
+    if column.dtype.kind not in ("iuf" if is_integer(name) else "biuf"):
         kind = type(column.flat[0]).__name__ if column.dtype.kind == "O" and column.size else str(column.dtype)
         raise ValueError(f"{where}: {name} holds {kind}; {_needed(name)} are needed")
     if is_integer(name) and column.dtype.kind in "iu" and column.size:
