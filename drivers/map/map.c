@@ -125,7 +125,9 @@ static wm_status read_meaning(const wm_yaml_node *root, meaning *out, wm_error *
   return status;
 }
 
-#define RAW_OCCUPIED 100  // per cent; raw values above are unknown
+#define RAW_OCCUPIED 100   // per cent; raw values above are unknown
+#define SAVED_UNKNOWN 205  // of map_saver (ROS 1 and 2), whatever thresholds it writes beside
+#define SAVED_SHARE 100    // pixels, of which one is of that level, from which on it is said
 
 static int8_t cell_of(const meaning *m, int grey) {
   if (m->mode == MODE_RAW && grey > RAW_OCCUPIED) return WM_CELL_UNKNOWN;
@@ -133,13 +135,31 @@ static int8_t cell_of(const meaning *m, int grey) {
   return occupied > m->occupied_thresh ? WM_CELL_OCCUPIED : occupied < m->free_thresh ? WM_CELL_FREE : WM_CELL_UNKNOWN;
 }
 
+// Unknown places that the thresholds make free, as those of nav2's map_saver do.
+static void warn_of_unknown(const wm_yaml_node *image, const meaning *m, const wm_grey *grey, wm_warn_fn warn,
+                            void *context) {
+  size_t unknown = 0;
+  const size_t count = (size_t)grey->width_px * grey->height_px;
+  if (!warn || m->mode == MODE_RAW || cell_of(m, SAVED_UNKNOWN) != WM_CELL_FREE) return;
+  for (size_t i = 0; i < count; i++) unknown += grey->pixels[i] == SAVED_UNKNOWN;
+  if (unknown * SAVED_SHARE < count || unknown == 0) return;
+  char text[320];
+  (void)snprintf(text, sizeof text,
+                 "%s: %zu of 100 pixels are 205, which map savers write for unknown places, and free_thresh %g makes "
+                 "them free; write `free_thresh: 0.196`",
+                 wm_yaml_file(image), unknown * 100 / count, m->free_thresh);
+  warn(context, WM_NOTE_FILE, text);
+}
+
 // Cells of `image`, in the place of its pixels.
-static wm_status read_cells(const wm_yaml_node *root, const wm_yaml_node *image, wm_grey *out, wm_error *err) {
+static wm_status read_cells(const wm_yaml_node *root, const wm_yaml_node *image, wm_warn_fn warn, void *context,
+                            wm_grey *out, wm_error *err) {
   meaning m;
   uint8_t *opaque = NULL;
   wm_status status = read_meaning(root, &m, err);
   if (status == WM_OK) status = read_picture(image, out, &opaque, err);
   if (status != WM_OK) return status;
+  warn_of_unknown(image, &m, out, warn, context);
   const size_t count = (size_t)out->width_px * out->height_px;
   uint8_t cell[256];
   for (int grey = 0; grey < 256; grey++) cell[grey] = (uint8_t)cell_of(&m, grey);
@@ -149,11 +169,12 @@ static wm_status read_cells(const wm_yaml_node *root, const wm_yaml_node *image,
   return WM_OK;
 }
 
-static wm_status drivable_of_image(const wm_yaml_node *root, wm_grey *out, wm_error *err) {
+static wm_status drivable_of_image(const wm_yaml_node *root, wm_warn_fn warn, void *context, wm_grey *out,
+                                   wm_error *err) {
   wm_yaml_node image = wm_yaml_get(root, "image");
   meaning ignored;
   if (out->pixels || !wm_yaml_there(&image)) return read_meaning(root, &ignored, err);
-  const wm_status status = read_cells(root, &image, out, err);
+  const wm_status status = read_cells(root, &image, warn, context, out, err);
   const size_t count = status == WM_OK ? (size_t)out->width_px * out->height_px : 0;
   for (size_t i = 0; i < count; i++) out->pixels[i] = (int8_t)out->pixels[i] == WM_CELL_FREE ? 255 : 0;
   return status;
@@ -169,7 +190,7 @@ static wm_status read_layers(const wm_yaml_node *root, wm_warn_fn warn, void *co
     if (status == WM_OK && wm_yaml_there(&drivable)) status = read_layer(&drivable, &self->drivable, err);
     if (status != WM_OK) return status;
   }
-  wm_status status = drivable_of_image(root, &self->drivable, err);
+  wm_status status = drivable_of_image(root, warn, context, &self->drivable, err);
   if (status != WM_OK) return status;
   const wm_grey *e = &self->edges;
   const wm_grey *d = &self->drivable;
@@ -232,7 +253,7 @@ wm_status wm_map_cells_load(const char *path, wm_raster *place, int8_t **cells, 
   if (!wm_yaml_is_map(&root)) status = wm_yaml_fail(&root, err, "a map with image, resolution and origin is needed");
   if (status == WM_OK) status = read_geometry(&root, place, err);
   if (status == WM_OK) status = need(&root, "image", "the picture of the map is needed", &node, err);
-  if (status == WM_OK) status = read_cells(&root, &node, &image, err);
+  if (status == WM_OK) status = read_cells(&root, &node, NULL, NULL, &image, err);
   wm_yaml_free(doc);
   if (status != WM_OK) return status;
   place->width_px = image.width_px;

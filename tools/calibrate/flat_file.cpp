@@ -82,15 +82,22 @@ size_t first_document(const std::string &text, size_t &further) {
 
 }  // namespace
 
+std::string FlatFile::behind_first(const std::string &text) {
+  size_t further = 0;
+  const size_t end = first_document(text, further);
+  const auto lines = std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(end), '\n');
+  return std::string(static_cast<size_t>(lines), '\n') + text.substr(end);
+}
+
 void FlatFile::read_yaml(const std::string &whole) {
   const std::string text = whole.substr(0, first_document(whole, further_documents_));
   wm_error error{};
   wm_yaml *parsed = nullptr;
   const wm_status status = wm_yaml_parse(text.data(), text.size(), path_.c_str(), &parsed, &error);
   const std::unique_ptr<wm_yaml, void (*)(wm_yaml *)> doc(parsed, wm_yaml_free);
-  if (status != WM_OK) throw Failure(error.text);
+  if (status != WM_OK) throw Failure(std::string(error.text) + "; " + kUnderstood);
   const wm_yaml_node root = wm_yaml_root(doc.get());
-  if (!wm_yaml_is_map(&root)) throw Failure(path_ + ": no calibration: KEY: VALUE lines are needed");
+  if (!wm_yaml_is_map(&root)) throw Failure(path_ + ": no calibration: KEY: VALUE lines are needed; " + kUnderstood);
   Flattener(*this).add(root, "");
 }
 

@@ -10,6 +10,11 @@
 
 namespace wm::calibrate {
 
+inline constexpr const char *kUnderstood =
+    "files of OpenCV, Kalibr (camchain), ROS (camera_info, ost.ini), PhotonVision and OCamCalib (calib_results.txt) "
+    "are "
+    "understood";
+
 class FlatFile {
  public:
   struct Entry {
@@ -39,6 +44,8 @@ class FlatFile {
   [[nodiscard]] FlatFile below(const std::string &key) const;
   // Documents of the YAML (parted by lines of ---) behind the first one, which alone is read.
   [[nodiscard]] size_t further_documents() const { return further_documents_; }
+  // A text without its first document, whose lines are blank then.
+  [[nodiscard]] static std::string behind_first(const std::string &text);
 
  private:
   friend class Flattener;

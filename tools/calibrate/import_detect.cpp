@@ -4,6 +4,7 @@
 
 #include "calibrate/foreign.h"
 #include "common/failure.h"
+#include "common/number.h"
 #include "common/unpacked.h"
 
 namespace wm::calibrate {
@@ -23,6 +24,30 @@ bool is_ros_ini(const std::string &text) {
 bool is_ros(const FlatFile &file) {
   return file.has("distortion_model") && file.first({"image_width", "width"}) != nullptr &&
          file.first({"camera_matrix.data", "K", "k"}) != nullptr;
+}
+
+// Drivers send a K of zeros, or ones, before a camera is calibrated, and `topic echo` prints that first.
+std::vector<ForeignCamera> read_ros_echo(const std::string &text, const FlatFile &first, const ImportHints &hints) {
+  const auto is_empty = [](const FlatFile &file) {
+    const FlatFile::Entry *k = file.first({"camera_matrix.data", "K", "k"});
+    const std::optional<double> focal = k->words.empty() ? std::nullopt : tools::number_of<double>(k->words.front());
+    return focal && *focal <= 1;
+  };
+  std::string rest = text;
+  FlatFile file = first;
+  size_t skipped = 0;
+  for (; is_empty(file) && file.further_documents() > 0; skipped++) {
+    rest = FlatFile::behind_first(rest);
+    FlatFile next = FlatFile::parse(rest, file.path());
+    if (!is_ros(next)) break;
+    file = next;
+  }
+  std::vector<ForeignCamera> out = read_ros(file, hints);
+  if (skipped > 0)
+    out.front().notes.insert(
+        out.front().notes.begin(),
+        "the first " + std::to_string(skipped) + " messages are of a camera that is not calibrated (K is 0)");
+  return out;
 }
 
 // PhotonVision's settings of a camera have a list with a calibration for each size of picture.
@@ -51,7 +76,7 @@ std::vector<ForeignCamera> read_foreign(const std::filesystem::path &path, const
   const FlatFile flat = FlatFile::parse(text, path.string());
   for (const std::string &name : flat.children(""))
     if (flat.has(name + ".camera_model")) return read_kalibr(flat, hints);
-  if (is_ros(flat)) return read_ros(flat, hints);
+  if (is_ros(flat)) return read_ros_echo(text, flat, hints);
   for (const std::string &name : flat.children(""))
     if (is_ros(flat.below(name))) return read_ros(flat.below(name), hints);  // {"camera_info": {...}}
   if (flat.has("calibrations.0.cameraIntrinsics")) return read_photonvision_settings(flat, hints);

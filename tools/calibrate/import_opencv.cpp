@@ -70,10 +70,7 @@ bool is_fisheye(const FlatFile &file, const ImportHints &hints, const std::strin
 std::vector<ForeignCamera> read_opencv(const FlatFile &file, const ImportHints &hints) {
   const std::string matrix = key_of(file, kMatrix), bending = key_of(file, kDistortion);
   if (matrix.empty())
-    throw tools::Failure(
-        file.path() +
-        ": no camera matrix in it (camera_matrix, cameraMatrix, K ...); files of OpenCV, Kalibr "
-        "(camchain), ROS (camera_info, ost.ini), PhotonVision and OCamCalib (calib_results.txt) are understood");
+    throw tools::Failure(file.path() + ": no camera matrix in it (camera_matrix, cameraMatrix, K ...); " + kUnderstood);
   const std::vector<double> k = file.numbers(matrix);
   const std::vector<double> d = bending.empty() ? std::vector<double>{} : file.numbers(bending);
   if (k.size() != 9) file.fail(matrix, "has " + std::to_string(k.size()) + " numbers; 9 of a 3 x 3 matrix are needed");

@@ -74,6 +74,21 @@ TEST(what_is_free_is_drivable_where_there_is_no_layer) {
   TEST_ASSERT_NULL(load()->edges);
 }
 
+TEST(unknown_places_that_the_thresholds_make_free_are_named) {
+  folder_write("map.yaml", GEOMETRY);
+  (void)load();
+  TEST_ASSERT_EQUAL_STRING("", warnings);
+  folder_write("map.yaml", GEOMETRY "free_thresh: 0.25\n");
+  const uint8_t with_unknown[6] = {255, 255, 0, 255, 255, 0};
+  TEST_ASSERT_EQUAL_UINT8_ARRAY(with_unknown, load()->drivable, 6);
+  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(warnings, "16 of 100 pixels are 205, which map savers write for unknown"),
+                               warnings);
+  warnings[0] = '\0';
+  folder_write("map.yaml", GEOMETRY "free_thresh: 0.25\nmode: raw\n");
+  (void)load();
+  TEST_ASSERT_EQUAL_STRING("", warnings);
+}
+
 // Pixels of 5 cm, the lower left one at the origin: edges in columns 1 (top row), 0 and 2 (bottom row).
 TEST(edges_within_an_ignored_area_do_not_count) {
   folder_write("map.yaml",

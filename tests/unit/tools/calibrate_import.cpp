@@ -187,6 +187,13 @@ TEST(test_topic_echo) {
     const ForeignCamera camera = read(echo + "---\n" + second + "---\n" + second + "---\n");
     is_pinhole(camera, kFive);
     TEST_ASSERT_EQUAL_STRING("the first of 3 messages is taken", camera.notes.at(0).c_str());
+    std::string empty = echo;  // as a driver sends it before it is calibrated
+    for (const char *number : {"500", "505"})
+      for (size_t at; (at = empty.find(number)) != std::string::npos;) empty.replace(at, 3, "0");
+    const ForeignCamera later = read(empty + "---\n" + empty + "---\n" + echo + "---\n");
+    is_pinhole(later, kFive);
+    TEST_ASSERT_EQUAL_STRING("the first 2 messages are of a camera that is not calibrated (K is 0)",
+                             later.notes.at(0).c_str());
   }
 }
 
@@ -296,6 +303,8 @@ TEST(test_what_is_no_calibration) {
   refused("is a calibration.yaml already", "cameras:\n  front: {model: equidistant}\n");
   refused("give --size WIDTHxHEIGHT", "K: [500, 0, 320, 0, 500, 240, 0, 0, 1]\n");
   refused("KEY: VALUE lines are needed", "[1, 2]\n");
+  for (const std::string text : {"[LEFT_CAM]\nfx=500\n", "PK\3\4 a, of numpy", "\x80\4 a pickle"})
+    refused("PhotonVision and OCamCalib (calib_results.txt) are understood", text);
 }
 
 TEST(test_a_fit_to_the_same_model_is_exact) {
