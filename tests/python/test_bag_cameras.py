@@ -83,6 +83,19 @@ CAMERAS = {
         ("/kinect2/sd/image_ir", "ir", "16UC1", 60, "kinect2_sd_ir"), ("/kinect2/sd/image_depth", "ir", "mono16", 60, None)],
     "TurtleBot 4": [("/oakd/rgb/preview/image_raw", "o", "bgr8", 60, "oakd_rgb_preview")],
     "Spot": [("/camera/frontleft/image", "l", "mono8", 60, "frontleft"), ("/camera/frontright/image", "r", "mono8", 61, "frontright")],
+    "pictures that a detector draws on": [
+        ("/detection/camera/image_raw", "c", "mono8", 60, "detection"), ("/apriltag/debug_image", "c", "bgr8", None, None),
+        ("/tag_detections_image", "c", "bgr8", None, None), ("/yolo/annotated/compressed", "c", "jpeg", None, None)],
+    "nothing but pictures that a detector draws on": [("/detector/result_image", "c", "bgr8", 60, "detector_result")],
+    "Pylon": [("/my_camera/pylon_ros2_camera_node/image_raw", "p", "bayer_rggb8", 60, "my_camera_pylon_ros2_camera_node")],
+    "Azure Kinect": [
+        ("/rgb/image_raw", "rgb", "bgra8", 60, "rgb"), ("/ir/image_raw", "d", "mono16", 61, "ir"), ("/depth/image_raw", "d", "16UC1", 61, None)],
+    "Autoware": [
+        ("/sensing/camera/camera0/image_rect_color/compressed", "c0", "jpeg", 60, "sensing_camera0"),
+        ("/sensing/camera/camera1/image_rect_color/compressed", "c1", "jpeg", 61, "sensing_camera1")],
+    "RealSense's own recorder": [
+        ("/device_0/sensor_1/Color_0/image/data", "0", "rgb8", 60, "device_0_sensor_1_Color_0_data", "/device_0/sensor_1/Color_0/info/camera_info"),
+        ("/device_0/sensor_0/Infrared_1/image/data", "0", "mono8", 62, "device_0_sensor_0_Infrared_1_data", "/device_0/sensor_0/Infrared_1/info/camera_info")],
     "no camera_info": [("/front/image_raw", "f", "mono8", None, "front")],
     "compressed alone, others of its transports": [
         ("/cam/image_raw/compressed", "cam", "jpeg", 60, "cam"), ("/cam/image_raw/compressedDepth", "cam", "depth", 60, None),

@@ -285,6 +285,11 @@ class WhichTopic(BagTest):
             crab.put("/vel", "TwistStamped", ns(t), crab.m.make("TwistStamped", header=crab.m.header(ns(t), "base_link"), twist=crab.twist(v, (0, 0, turn_rate(t)))))
         self.assertNotIn("finding", self.take(crab)[1])
 
+    def test_joints_are_named_with_what_to_record(self):
+        bag = self.bag().drive()
+        bag.put("/joint_states", "sensor_msgs/JointState", ns(0), bag.m.make("sensor_msgs/JointState", name=["left"], position=np.ones(1), velocity=np.ones(1), effort=np.ones(1)))
+        self.assertIn("not taken: /joint_states: sensor_msgs/msg/JointState: angles and speeds of joints: record the odometry", self.take(bag)[1])
+
     def test_motion_that_tf_alone_has_is_named(self):
         bag = self.bag()
         for t in times():

@@ -9,6 +9,7 @@ _TRANSPORTS = {"compressed", "compressedDepth", "theora", "ffmpeg", "zstd", "dra
 _PICTURE_WORDS = {"image", "img", "picture", "frame", "video", "raw", "rect", "rectified", "undistorted", "mono", "color", "colour", "gray",
                   "grey", "rgb", "bgr", "compressed"}
 _RECTIFIED = {"rect", "rectified", "undistorted"}
+_DRAWN = {"debug", "overlay", "annotated", "detection", "detections", "visualization", "visualisation", "viz", "marked", "result", "results"}
 # Parts of a namespace that name no camera.
 _NO_NAMES = {"camera", "image", "image_raw", "image_rect", "image_mono", "image_color", "raw", "compressed", "camera_info", "detections",
              "tag_detections", "apriltag"}
@@ -73,6 +74,12 @@ def is_distance(topic: str) -> bool | None:
     if {"ir", "infra", "infrared"} & set(words):
         return False
     return True if {"depth", "disparity", "range"} & set(words) else None
+
+
+def is_drawn(topic: str) -> bool:
+    """Whether a topic's name says that a node has drawn on its pictures what it found."""
+    parts = [part for part in topic.split("/") if part and part not in _TRANSPORTS]
+    return bool(_DRAWN & {word for part in parts[-2:] for word in _words(part)})
 
 
 @dataclass(frozen=True)

@@ -29,6 +29,10 @@ TAKERS = {
 
 # Types that people look for in a recording, with what to do.
 _ELSEWHERE = {
+    "sensor_msgs/msg/JointState": "angles and speeds of joints: record the odometry that the base's controller makes of them (nav_msgs/Odometry)",
+    "gps_msgs/msg/GPSFix": "record the receiver's sensor_msgs/NavSatFix, too (gps_tools converts one into the other)",
+    "gps_common/msg/GPSFix": "record the receiver's sensor_msgs/NavSatFix, too (gps_common converts one into the other)",
+    "nmea_msgs/msg/Sentence": "sentences of a receiver: nmea_navsat_driver makes sensor_msgs/NavSatFix of them",
     "theora_image_transport/msg/Packet": "a video stream: `ros2 run image_transport republish theora raw` makes pictures of it",
     "ffmpeg_image_transport_msgs/msg/FFMPEGPacket": "a video stream: `ros2 run image_transport republish ffmpeg raw` makes pictures of it",
     "foxglove_msgs/msg/CompressedVideo": "a video stream: give the video itself to `waymark import VIDEO`, or record pictures",
