@@ -168,6 +168,8 @@ static wm_status bind_selectors(maker *m, const dbc_signal *s, const char *name,
   return WM_OK;
 }
 
+#define WHOLE_ID 0x1FFFFFFFu  // of 29 bits: a J1939 message is taken by its PGN alone
+
 static void add_no_value(bound_signal *out, uint64_t raw) {
   if (out->no_value_count < NO_VALUE_MAX) out->no_value[out->no_value_count++] = raw;
 }
@@ -196,6 +198,15 @@ static void find_no_values(const maker *m, const dbc_signal *s, bound_signal *ou
   }
 }
 
+// SAE J1939-71: the highest byte from FB on is no value (FE: an error, FF: not available), of one, two and four bytes.
+static void find_j1939_no_values(const maker *m, const dbc_signal *s, bound_signal *out) {
+  const uint32_t length = s->bits.length;
+  const int is_j1939 = m->message->is_extended && wm_dbc_match(m->dbc, m->message).mask != WHOLE_ID;
+  if (!is_j1939 || s->bits.kind != SIGNAL_UNSIGNED || (length != 8 && length != 16 && length != 32)) return;
+  const uint64_t from = UINT64_C(0xFB) << (length - 8);
+  if (s->min < s->max && signal_number(&s->bits, from) * s->factor + s->offset > s->max) out->no_value_from = from;
+}
+
 static wm_status bind_signal(maker *m, const char *name) {
   const dbc_signal *s = NULL;
   wm_status status = find_signal(m, name, &s);
@@ -216,7 +227,10 @@ static wm_status bind_signal(maker *m, const char *name) {
     return refuse(m, "%s has %u bits; a counter that wraps so soon cannot be followed (%d at least)", name,
                   s->bits.length, kTickBitsMin);
   if ((status = bind_unit(m, s, name, &out->si)) != WM_OK) return status;
-  if (!is_ticks(m->binding) && !is_gear(m->binding)) find_no_values(m, s, out);
+  if (!is_ticks(m->binding) && !is_gear(m->binding)) {
+    find_no_values(m, s, out);
+    find_j1939_no_values(m, s, out);
+  }
   return bind_selectors(m, s, name, out);
 }
 

@@ -98,7 +98,7 @@ static double unwrap(bound_signal *s, uint64_t raw, wm_time_ns t_ns, uint8_t *do
 static int says_no_value(const bound_signal *s, uint64_t raw) {
   for (uint32_t i = 0; i < s->no_value_count; i++)
     if (s->no_value[i] == raw) return 1;
-  return 0;
+  return s->no_value_from > 0 && raw >= s->no_value_from;
 }
 
 // ── one quantity ────────────────────────────────────────────────────────────────────────────────────────────────────

@@ -33,7 +33,8 @@ typedef struct bound_signal {
   uint64_t first_float;     // bits of the first one other than 0
   uint32_t no_value_count;  // raw values for "not available"
   uint64_t no_value[NO_VALUE_MAX];
-  int has_last;  // ticks only, as the rest
+  uint64_t no_value_from;  // of J1939: this one and all above; 0: none
+  int has_last;            // ticks only, as the rest
   uint64_t last;
   int64_t unwrapped;
   tick_rates rates;

@@ -368,6 +368,26 @@ TEST(no_value) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 327.67, value_of(&f, "c 101#FF7F"));  // -32769 has more bits
 }
 
+// SAE J1939-71: FB00 and above is no value of two bytes, where the range leaves it out.
+TEST(no_value_of_j1939) {
+  static const char kLater[] =
+      " SG_ V : 0|16@1+ (0.00390625,0) [0|%s] \"km/h\" X\nBA_DEF_ BO_ \"VFrameFormat\" ENUM \"%s\";\n"
+      "BA_DEF_DEF_ \"VFrameFormat\" \"%s\";\n";
+  static const struct {
+    const char *most, *format;
+    int is_value;
+  } kKinds[] = {{"250.996", "J1939PG", 0}, {"255.997", "J1939PG", 1}, {"250.996", "ExtendedCAN", 1}};
+  for (size_t i = 0; i < sizeof kKinds / sizeof kKinds[0]; i++) {
+    char dbc[512] = "BO_ 2566844672 W: 8 X\n";
+    (void)snprintf(dbc + strlen(dbc), sizeof dbc - strlen(dbc), kLater, kKinds[i].most, kKinds[i].format,
+                   kKinds[i].format);
+    open_one(&f, dbc, binding(WM_Q_VEHICLE_SPEED, "W", "V"));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 250.99609375 / 3.6, value_of(&f, "c 18FEF100#FFFA"));
+    TEST_ASSERT_EQUAL_MESSAGE(kKinds[i].is_value ? WM_OK : WM_BAD_DATA, feed(&f, "c 18FEF100#00FE"), kKinds[i].format);
+    TEST_ASSERT_EQUAL_MESSAGE(kKinds[i].is_value ? WM_OK : WM_BAD_DATA, feed(&f, "c 18FEF100#00FB"), kKinds[i].format);
+  }
+}
+
 TEST(what_is_not_decoded) {
   wm_can_binding b = binding(WM_Q_VEHICLE_SPEED, "W", "V");
   (void)snprintf(b.bus, sizeof b.bus, "can1");
