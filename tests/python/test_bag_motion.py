@@ -285,6 +285,10 @@ class WhichTopic(BagTest):
             crab.put("/vel", "TwistStamped", ns(t), crab.m.make("TwistStamped", header=crab.m.header(ns(t), "base_link"), twist=crab.twist(v, (0, 0, turn_rate(t)))))
         self.assertNotIn("finding", self.take(crab)[1])
 
+    def test_poses_and_twists_in_millimetres_are_named(self):
+        bag = self.bag().drive(pose=lambda t: place(t) * np.array([1000, 1000, 1]), twist=lambda t: ((1000 * SPEED, 0, 0), (0, 0, turn_rate(t))))
+        self.assertIn("finding: /odom: its largest speed is 1000 m/s, of no robot: is it in another unit", self.take(bag)[1])
+
     def test_joints_are_named_with_what_to_record(self):
         bag = self.bag().drive()
         bag.put("/joint_states", "sensor_msgs/JointState", ns(0), bag.m.make("sensor_msgs/JointState", name=["left"], position=np.ones(1), velocity=np.ones(1), effort=np.ones(1)))

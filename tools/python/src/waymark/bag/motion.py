@@ -38,6 +38,7 @@ _LEVER_R, _LEVER_M = 0.95, 0.05  # skid steer and legs slide, too, and their sid
 _OFF_WORLD = ("the direction of its speed turns by as much as it turns itself: its speeds are on axes that stay, as of 'odom', and not on the robot's: they are turned "
               "into these, as if it went ahead")
 _UPRIGHT = np.cos(np.radians(30))  # of the robot's z axis, in the mean of a drive: no slope is steeper
+_FASTEST_MPS = 100.0  # 360 km/h
 _NAMES = ("x", "y", "z")
 
 
@@ -410,6 +411,9 @@ def write(into: Collection, motion: Motion, has_gyro: bool) -> None:
     if not np.nan_to_num(motion.twist).any():
         into.refuse(motion.topic, "its twist is always 0" + (", and its poses stand still" if motion.poses is not None else ""))
         return
+    fastest = float(np.nanmax(np.linalg.norm(motion.twist[:, :3], axis=1)))
+    if fastest > _FASTEST_MPS:
+        into.find(motion.topic, f"its largest speed is {fastest:.4g} m/s, of no robot: is it in another unit (mm/s, cm/s)? A run refuses what can't be: mend the node")
     missing = int((~_is_whole(motion.twist)).sum())
     if missing and not motion.by_poses:
         into.note(motion.topic, f"{missing} of its {len(motion.t_ns)} messages have no number as speed or turn rate: left out")
