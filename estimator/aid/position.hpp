@@ -18,9 +18,10 @@ class position_aid {
  public:
   static constexpr int kStates = 6;  // at most
   static int count_states(const wm_setup &setup);
-  // add(value, sigma) appends a state to the filter and returns its index.
+  // add(value, sigma) appends a state to the filter and returns its index. `at_antenna`: the filter's pose is that of
+  // the antenna when a position comes, and not base_link's.
   template <class Add>
-  void init(const wm_setup &setup, planar_motion *filter, Add add) {
+  void init(const wm_setup &setup, planar_motion *filter, Add add, bool at_antenna = false) {
     const auto pair_of = [&add](double sigma) {
       const int first = sigma > 0.0 ? add(0.0, sigma) : -1;
       if (first >= 0) add(0.0, sigma);
@@ -34,7 +35,7 @@ class position_aid {
     // Without motion data the heading is that of nothing: no place in base_link is learnt.
     antenna_ = setup.motion->model == WM_MOTION_CONSTANT_VELOCITY ? -1 : pair_of(mounted.sigma_m);
     antenna_sigma_m_ = mounted.sigma_m;
-    for (int i = 0; i < 2; i++) antenna_m_[i] = mounted.place_m[i];
+    for (int i = 0; i < 2; i++) antenna_m_[i] = at_antenna ? 0.0 : mounted.place_m[i];
     heading_bias_ = params.heading_bias_sigma_rad > 0.0 ? add(0.0, params.heading_bias_sigma_rad) : -1;
     has_heading_ = has_position_ = is_awake_ = unused_ = 0;
     receiver_.begin();

@@ -78,11 +78,14 @@ int sighting_aid::count_states(const wm_setup &setup) {
          map_states(setup) * map_slots(setup) + 2 * (s.use_elevation && s.tilt_sigma_rad > 0.0);
 }
 
-void sighting_aid::init(const wm_setup &setup, const arrays &behind) {
+void sighting_aid::init(const wm_setup &setup, const arrays &behind, bool at_sensor) {
   setup_ = &setup;
   markers_ = marker_params_of(setup);
   yaw_offset_ = has_yaw(setup) ? place_states(params()) : -1;
-  for (size_t i = 0; i < setup.sensor_count; i++) sensor_[i].init(setup.sensors[i]);
+  for (size_t i = 0; i < setup.sensor_count; i++) {
+    sensor_[i].init(setup.sensors[i]);
+    if (at_sensor) sensor_[i].x_m = sensor_[i].y_m = 0.0;
+  }
   components_ = params().states.sigma[WM_SENSOR_ROW_kAngleScale] > 0.0 ? kAngleScaled : 0u;
   index_.init(setup.landmarks, setup.landmark_count, behind.order);
   seen_ns_.set(behind.seen_ns);

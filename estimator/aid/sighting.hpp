@@ -33,7 +33,8 @@ class sighting_aid {
   static arrays place(memory_layout *layout, const wm_setup &setup);
   // The states of add_calibration() and of add_lent().
   static int count_states(const wm_setup &setup);
-  void init(const wm_setup &setup, const arrays &behind);
+  // `at_sensor`: the filter's pose is that of the sensor which an observation is of, and not base_link's.
+  void init(const wm_setup &setup, const arrays &behind, bool at_sensor = false);
   void add_calibration(planar_filter *filter);  // the sensors' errors
   void add_lent(planar_filter *filter);         // the other states
   // The sensors' calibration goes on as that of `from`, of another map; their states are at the same place.

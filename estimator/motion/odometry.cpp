@@ -143,12 +143,13 @@ void carry_spatial(const wm_motion_params &params, const spatial_point &from, co
   out->heading_rad = heading_of(end.q);
 }
 
-// The same of an estimate in the plane.
-void carry_planar(const wm_odom_point &from, const wm_odom_point &to, wm_estimate *out) {
+// The same of an estimate in the plane. `turns`: the way is in the robot's axes, and turns with the heading.
+void carry_planar(const wm_odom_point &from, const wm_odom_point &to, wm_estimate *out, bool turns = true) {
   const wm_pose2 step = wm::between(from.pose_odom_base, to.pose_odom_base);
   const wm_pose2 start = {out->pose_map_base.p_m[0], out->pose_map_base.p_m[1], out->heading_rad};
   wm::matrix<3> by_start, covariance, noise;
   const wm_pose2 end = wm::compose(start, step, &by_start, nullptr);
+  if (!turns) by_start(0, 2) = by_start(1, 2) = 0.0;
   const int index[3] = {0, 1, 5};
   for (int i = 0; i < 3; i++)
     for (int j = 0; j < 3; j++) covariance(i, j) = out->covariance[wm_cov_index(index[i], index[j])];
@@ -179,7 +180,8 @@ void carry_planar(const wm_odom_point &from, const wm_odom_point &to, wm_estimat
   out->w_radps[2] = to.w_radps;
 }
 
-// Without motion data the estimate's own velocity holds and walks; odom stays where it is.
+// Without motion data the estimate's own velocity holds and walks; odom stays where it is. In the plane it is one of
+// the map's axes, which does not turn with the heading.
 void carry_by_own_velocity(const wm_motion_params &params, const wm_estimate *fused, wm_time_ns t_ns, wm_estimate *out,
                            wm_odom_point *odom) {
   const double dt_s = wm_seconds_between(fused->t_ns, t_ns), walked_s3 = growth(0.0, dt_s * dt_s * dt_s / 3.0);
@@ -193,7 +195,7 @@ void carry_by_own_velocity(const wm_motion_params &params, const wm_estimate *fu
   carry_point(to, dt_s, twist, noise);
   *out = *fused;
   out->t_ns = t_ns;
-  carry_planar(from, to, out);
+  carry_planar(from, to, out, fused->dof == 6);
   if (odom) *odom = {t_ns, {}, twist.v, twist.u, twist.w, 0.0, 0.0, 0.0};
 }
 

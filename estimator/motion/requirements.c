@@ -62,6 +62,8 @@ void wm_motion_choose(wm_motion_params *params, uint32_t kinds) {
   if (params->model == WM_MOTION_AUTO && !(kinds & WM_MOTION_EVENTS)) params->model = WM_MOTION_CONSTANT_VELOCITY;
 }
 
+int wm_motion_is_unmeasured(const wm_motion_params *params) { return params->model == WM_MOTION_CONSTANT_VELOCITY; }
+
 const char *wm_motion_lacks(const wm_motion_params *params, const wm_wheels *wheels, uint32_t kinds,
                             uint32_t quantities) {
   if (!(kinds & WM_EVENT_BIT(WM_EVENT_QUANTITIES))) quantities = 0;

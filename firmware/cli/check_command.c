@@ -86,8 +86,13 @@ static void print_driving(const wm_assembly *assembly) {
   const wm_driving *driving = &assembly->driving;
   int count = 0;
   fact("driven by    ");
+  if (!(driving->kinds & WM_MOTION_EVENTS)) {
+    fact("nothing; the velocity is estimated: a row of the trajectory at each stamp\n");
+    return;
+  }
   if (!(driving->kinds & WM_EVENT_BIT(WM_EVENT_QUANTITIES))) {
-    fact("twists (motion*.csv): a row of the trajectory at each\n");
+    fact("%s: a row of the trajectory at each\n",
+         driving->kinds & WM_TWIST_EVENTS ? "twists (motion*.csv)" : "increments (increments.csv)");
     return;
   }
   for (unsigned q = 0; q < WM_Q_COUNT; q++)

@@ -57,7 +57,8 @@ wm_status wm_pipeline_start(wm_pipeline *self, wm_output output, wm_error *err) 
   wm_budget_init(&self->budget, config->runtime.publish_useless_m);
   self->integrity = (wm_integrity){.risk = config->runtime.integrity_risk_per_pose,
                                    .limit_m = config->runtime.integrity_alert_limit_m,
-                                   .limit_rad = config->runtime.integrity_alert_limit_heading_deg * M_PI / 180};
+                                   .limit_rad = config->runtime.integrity_alert_limit_heading_deg * M_PI / 180,
+                                   .without_motion = wm_motion_is_unmeasured(assembly->setup.motion)};
   return WM_OK;
 }
 

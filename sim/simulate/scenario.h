@@ -61,7 +61,8 @@ struct Motion {
   double imu_hz = 0;      // above 0: imu.csv
   // Accelerometer: noise of a sample; a constant error of each axis; an even shaking; bumps of that size, so many per s
   double accelerometer_noise_mps2 = 0, accelerometer_bias_mps2 = 0, vibration_mps2 = 0, bump_mps2 = 0, bumps_hz = 0;
-  bool is_there() const { return base != Base::rolling || twist_hz > 0 || imu_hz > 0; }
+  bool measured = true;  // false: neither bus nor twist, as of a tag that is carried
+  bool is_there() const { return base != Base::rolling || twist_hz > 0 || imu_hz > 0 || !measured; }
 };
 
 struct Robot {

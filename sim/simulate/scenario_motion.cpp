@@ -43,7 +43,7 @@ void read_imu(Reader &r, const wm_yaml_node &map, Motion &out) {
 
 void read_motion(Reader &r, const wm_yaml_node &map, Scenario &out) {
   static const char *const known[] = {"base",      "crab_deg", "crab_m", "track_scale", "log_hz",
-                                      "log_rates", "twist",    "imu",    nullptr};
+                                      "log_rates", "twist",    "imu",    "measured",    nullptr};
   static const char *const bases[] = {"rolling", "holonomic", "skid_steer", nullptr};
   if (!r.ok() || !wm_yaml_there(&map)) return;
   r.keys(map, known);
@@ -56,6 +56,7 @@ void read_motion(Reader &r, const wm_yaml_node &map, Scenario &out) {
   r.number(map, "track_scale", 0.5, 5, 1, m.track_scale);
   r.number(map, "log_hz", 0.5, 1000, 1, m.log_hz);
   r.flag(map, "log_rates", m.log_rates);
+  r.flag(map, "measured", m.measured);
   const wm_yaml_node twist = r.child(map, "twist", false), imu = r.child(map, "imu", false);
   read_twist(r, twist, m);
   read_imu(r, imu, m);
@@ -63,7 +64,9 @@ void read_motion(Reader &r, const wm_yaml_node &map, Scenario &out) {
   const bool six = out.swims() || out.world.kind == "seabed";
   if (six && (m.base != Motion::Base::rolling || m.twist_hz > 0))
     return r.fail(map, "a vehicle with six degrees of freedom has no base and no planar twist; `imu` alone is for it");
-  if (m.base == Motion::Base::holonomic && m.twist_hz <= 0)
+  if (!m.measured && (six || m.twist_hz > 0 || m.imu_hz > 0))
+    return r.fail(map, "`measured: false` is a carried tag on the ground: without twist and imu");
+  if (m.base == Motion::Base::holonomic && m.twist_hz <= 0 && m.measured)
     return r.fail(map, "counts of two wheels do not give a sideways speed: a holonomic base needs `twist`");
   if (out.robot.commanded && m.is_there())
     return r.fail(map, "`robot.commands` is a base whose motion is not measured; leave `motion` out");

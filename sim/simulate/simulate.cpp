@@ -176,7 +176,7 @@ void make_start(const Scenario &sc, const Random &random, Recording &out) {
 }  // namespace
 
 Messages messages_of(const Scenario &sc) {
-  if (sc.robot.commanded || sc.motion.twist_hz > 0) return {};
+  if (sc.robot.commanded || sc.motion.twist_hz > 0 || !sc.motion.measured) return {};
   Messages sent = {sc.robot.sends_speeds ? Bus_message::wheel_speeds : Bus_message::wheels};
   if (sc.bus.yaw_rate_hz > 0) sent.push_back(Bus_message::yaw_rate);
   if (sc.bus.steering_hz > 0 && sc.robot.wheels.steering_table_count >= 2) sent.push_back(Bus_message::steering);

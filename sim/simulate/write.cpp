@@ -86,16 +86,17 @@ bool has_map(const Scenario &sc, const Recording &r) {
 bool has_landmarks(const Scenario &sc, const Recording &r) { return !r.landmarks.empty() || has_map(sc, r); }
 
 bool has_twists(const Scenario &sc, const Recording &r) {
-  return r.motion6.empty() && (sc.robot.commanded || sc.motion.twist_hz > 0);
+  return sc.motion.measured && r.motion6.empty() && (sc.robot.commanded || sc.motion.twist_hz > 0);
 }
 
 // The files that are there, as `streams` of recording.yaml lists them.
 std::string streams(const Scenario &sc, const Recording &r) {
-  std::string text = !r.motion6.empty()  ? "motion6.csv"
-                     : has_twists(sc, r) ? "motion.csv"
-                                         : "can.log, vehicle.dbc, can-signals.yaml";
-  if (!r.imu.empty()) text += ", imu.csv";
-  text += ", calibration.yaml";
+  std::string text = !r.motion6.empty()   ? "motion6.csv, "
+                     : has_twists(sc, r)  ? "motion.csv, "
+                     : sc.motion.measured ? "can.log, vehicle.dbc, can-signals.yaml, "
+                                          : "";
+  if (!r.imu.empty()) text += "imu.csv, ";
+  text += "calibration.yaml";
   if (has_map(sc, r)) text += ", landmarks.csv";
   if (has_sightings(sc)) text += ", sightings.csv";
   if (has_markers(sc)) text += ", markers.csv";
@@ -191,7 +192,7 @@ wm_status write_calibration(const Scenario &sc, const Recording &r, const std::s
       f.print("motion6: {sigma_v_mps: [%.6g, %.6g, %.6g], sigma_w_radps: [%.6g, %.6g, %.6g]}\n", v, v, v, w, w, w);
     return f.close(err);
   }
-  if (has_twists(sc, r)) return f.close(err);
+  if (has_twists(sc, r) || !sc.motion.measured) return f.close(err);
   const wm_wheels &w = sc.robot.wheels;
   f.print("wheels:\n  radius_m: %.6g\n  ticks_per_turn: %.6g\n  track_m: %.6g\n", w.radius_m, w.ticks_per_turn,
           w.track_m);
@@ -352,7 +353,7 @@ wm_status write_sensors(const Scenario &sc, const Recording &r, const std::strin
     status = write_motion6(r, in("motion6.csv"), err);
   } else if (has_twists(sc, r)) {
     status = write_commands(sc, r, in("motion.csv"), err);
-  } else {
+  } else if (sc.motion.measured) {
     status = write_text(dbc_text(sent), in("vehicle.dbc"), err);
     if (status == WM_OK) status = write_text(can_signals_text(sent), in("can-signals.yaml"), err);
     if (status == WM_OK) status = write_can(r, in("can.log"), err);

@@ -73,13 +73,14 @@ double wrong_elsewhere(const wm_estimate &e, const wm_other_pose *others, size_t
   return larger(e.lost_probability - known, 0.0);
 }
 
-uint8_t why_not(const wm_estimate &e, const wm_bound &bound, double wrong, double untested) {
+uint8_t why_not(const wm_estimate &e, const wm_bound &bound, double wrong, double untested, bool without_heading) {
   if (e.state == WM_STATE_SEARCHING) return WM_UNUSABLE_NO_POSE;
   if (!finite(e.lost_probability)) return WM_UNUSABLE_UNMONITORED;
   if (!(wrong < bound.risk)) return WM_UNUSABLE_DOUBT;
   if (!(both(wrong, untested) < bound.risk)) return WM_UNUSABLE_UNTESTED;
   if (!finite(bound.horizontal_m) || bound.horizontal_m > bound.limit_m) return WM_UNUSABLE_POSITION;
-  return !finite(bound.heading_rad) || bound.heading_rad > bound.limit_rad ? WM_UNUSABLE_HEADING : WM_UNUSABLE_NOT;
+  const bool has_heading = without_heading || finite(bound.heading_rad);
+  return !has_heading || bound.heading_rad > bound.limit_rad ? WM_UNUSABLE_HEADING : WM_UNUSABLE_NOT;
 }
 
 }  // namespace
@@ -119,9 +120,10 @@ void wm_bound_of(const wm_estimate *estimate, double untested, const wm_integrit
   out->heading_rad =
       bound(std::sqrt(e.covariance[wm_cov_index(5, 5)]), &wm_other_pose::turn_rad, &wm_other_pose::sigma_rad);
   if (out->heading_rad > kPi) out->heading_rad = kUnbounded;
-  out->why = why_not(e, *out, wrong, untested);
+  out->why = why_not(e, *out, wrong, untested, integrity->without_motion != 0);
   out->usable = out->why == WM_UNUSABLE_NOT;
   const double wanted_rad = std::isfinite(out->limit_rad) ? out->limit_rad : kVague_rad;
   if (out->heading_rad > wanted_rad && std::isfinite(out->horizontal_m))
-    out->heading_after_m = drive_for(e, wanted_rad / ratio_of(out->risk));
+    out->heading_after_m = integrity->without_motion ? std::numeric_limits<double>::quiet_NaN()
+                                                     : drive_for(e, wanted_rad / ratio_of(out->risk));
 }

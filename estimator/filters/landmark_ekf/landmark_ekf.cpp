@@ -6,6 +6,7 @@
 #include "filters/core/contract.hpp"
 #include "filters/core/lasting_error.hpp"
 #include "filters/core/recovery.hpp"
+#include "filters/planar/arm.hpp"
 #include "filters/planar/set_pose.hpp"
 #include "filters/registry.h"
 #include "math/arc.hpp"
@@ -37,6 +38,14 @@ double spread_of(const wm_setup &setup) {
   return square(kAround_m) + (square(high[0] - low[0]) + square(high[1] - low[1])) / 12.0;
 }
 
+// Without motion data the velocity is one of the map's axes, and positions and ranges have no heading either.
+bool is_point(const wm_setup &setup) {
+  if (setup.motion->model != WM_MOTION_CONSTANT_VELOCITY) return false;
+  for (size_t i = 0; i < setup.sensor_count; i++)
+    if (!sensor_slots::gives_ranges_alone(setup.sensors[i])) return false;
+  return true;
+}
+
 }  // namespace
 
 landmark_ekf::arrays landmark_ekf::place(memory_layout *layout, const wm_setup &setup) {
@@ -63,9 +72,10 @@ void landmark_ekf::init(const wm_landmark_ekf_params &params, const wm_setup &se
   filter_.init(setup, setup.motion->states, count_states(setup), behind.filter);
   if (setup.motion->model != WM_MOTION_CONSTANT_VELOCITY) filter_.noise().init(setup.motion->noise_adapt_log_sigma);
   const auto add = [this](double value, double sigma) { return sigma > 0.0 ? filter_.add_state(value, sigma) : -1; };
-  aid_.init(setup, behind.aid);
+  is_point_ = is_point(setup);
+  aid_.init(setup, behind.aid, is_point_);
   aid_.add_calibration(&filter_);
-  positions_.init(setup, &filter_, add);
+  positions_.init(setup, &filter_, add, is_point_);
   filter_.set_correlated_position(positions_.error_state());
   calibration_states_ = filter_.states();
   localizer_.init(setup, &filter_, add);
@@ -94,7 +104,7 @@ void landmark_ekf::begin_life(bool pose_known) {
 // Known start: track from it. Unknown: the known part of it becomes an observation for the search.
 void landmark_ekf::start_again() {
   const wm_start &start = setup_->start;
-  if (place_is_known(start) && !finite(start.heading_rad) && !needs_heading()) {
+  if (place_is_known(start) && !finite(start.heading_rad) && is_point_) {
     const double xy = square(given_or_default(start.sigma_xy_m));
     return begin_at({start.p_m[0], start.p_m[1], 0.0}, xy);
   }
@@ -153,6 +163,7 @@ void landmark_ekf::carry(const landmark_ekf &from, const wm_pose2 *by) {
   inflated_ns_ = from.inflated_ns_;
   start_tested_ns_ = vague_ns_ = WM_TIME_NONE;
   misfit_ = 0.0;
+  for (int i = 0; i < 2; i++) at_m_[i] = from.at_m_[i];
   if (by) {
     filter_.change_axes(*by);
     observations_.clear();
@@ -193,6 +204,7 @@ wm_status landmark_ekf::correct(const wm_event &event, record_list records) {
 }
 
 wm_status landmark_ekf::take_pose(const wm_event &event) {
+  go_to(kBase_m);
   if (event.kind == WM_EVENT_RESET) {
     const wm_status status = reset_pose(filter_, setup_->start, event.t_ns);
     if (status == WM_OK) start_again();
@@ -205,11 +217,37 @@ wm_status landmark_ekf::take_pose(const wm_event &event) {
 
 void landmark_ekf::estimate(wm_estimate *out) const {
   filter_.estimate(out);
+  if (is_point_) put_base(out);
   out->resets = life_.resets();
   out->state = life_.state(filter_.now_ns(), params_.dead_reckoning_after_s);
   out->lost_probability = lost_probability();
   if (life_.lost()) widen(out);
   if (life_.tracking()) add_start_mixture(out);
+}
+
+void landmark_ekf::go_to(const double arm_m[2]) {
+  const double by_m[2] = {arm_m[0] - at_m_[0], arm_m[1] - at_m_[1]};
+  if (!is_point_ || (by_m[0] == 0.0 && by_m[1] == 0.0)) return;
+  filter_.move_place(by_m);
+  at_m_[0] = arm_m[0], at_m_[1] = arm_m[1];
+}
+
+void landmark_ekf::put_base(wm_estimate *out) const {
+  const double back_m[2] = {-at_m_[0], -at_m_[1]};
+  const arm_moments arm = arm_of(back_m, out->heading_rad, filter_.variance(kHeading));
+  double *p = out->covariance;
+  const double heading_rad2 = filter_.variance(kHeading);
+  for (int r = 0; r < 2; r++) {
+    out->pose_map_base.p_m[r] += arm.off_m[r];
+    for (int c = 0; c < 2; c++)
+      p[wm_cov_index(r, c)] += arm.noise_m2[r][c] + arm.by_heading[r] * filter_.covariance(c, kHeading) +
+                               arm.by_heading[c] * filter_.covariance(r, kHeading) +
+                               arm.by_heading[r] * arm.by_heading[c] * heading_rad2;
+    p[wm_cov_index(r, 5)] += arm.by_heading[r] * heading_rad2;
+    p[wm_cov_index(5, r)] = p[wm_cov_index(r, 5)];
+  }
+  out->v_mps[0] -= out->w_radps[2] * back_m[1];
+  out->v_mps[1] += out->w_radps[2] * back_m[0];
 }
 
 // Lost, the pose is anywhere among the landmarks with the probability of being lost.

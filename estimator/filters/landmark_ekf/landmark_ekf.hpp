@@ -24,6 +24,8 @@
 
 namespace wm {
 
+inline constexpr double kBase_m[2] = {};  // base_link's place on itself
+
 class landmark_ekf {
  public:
   static size_t bytes(const wm_landmark_ekf_params &params, const wm_setup &setup, const char **why);
@@ -76,13 +78,9 @@ class landmark_ekf {
   void search(wm_time_ns since_ns, const observation *prior, int prior_count);
   void begin_life(bool pose_known);
   void start_again();
-  // Without motion data the velocity is one of the map's axes, and positions and ranges have no heading either.
-  bool needs_heading() const {
-    if (setup_->motion->model != WM_MOTION_CONSTANT_VELOCITY) return true;
-    for (size_t i = 0; i < setup_->sensor_count; i++)
-      if (!sensor_slots::gives_ranges_alone(setup_->sensors[i])) return true;
-    return false;
-  }
+  // The filter's pose becomes that of the place `arm_m` in base_link, of which the next observation is.
+  void go_to(const double arm_m[2]);
+  void put_base(wm_estimate *out) const;
   void begin_at(const wm_pose2 &pose, double variance_m2);
   void begin_at(const localizer_aid::view &at);
   void begin_start_test();
@@ -126,6 +124,10 @@ class landmark_ekf {
   int32_t moved_id_;        // of the last one
   double map_variance_m2_;  // of a place anywhere among the landmarks, each axis
   double misfit_;           // of the newest sighting, to the map
+  // Without motion data, and by positions and ranges: places without a heading. The filter's pose is that of the place
+  // seen last, at_m_ in base_link, so that one place alone never gives a heading, and several do by their differences.
+  bool is_point_;
+  double at_m_[2];
 };
 
 }  // namespace wm

@@ -16,14 +16,15 @@ wm_status landmark_ekf::fuse_position(const wm_event &event, record_list records
   if (status != WM_OK) return status;
   filter_.move_to(event.t_ns);
   if (!positions_.params().use_position) return reject(records, record, WM_REJECTED_BY_CONFIG);
+  go_to(antenna_of(*setup_, positions_.params()).place_m);
   const position_aid::view at = positions_.look(p, &filter_);
   const observation seen = positions_.observe(p, at, filter_);
   buffer(seen);
   if (life_.searching()) {
-    if (needs_heading())
-      search_now(event.t_ns);
+    if (is_point_)
+      begin_at({p.p_m[0], p.p_m[1], 0.0}, square(seen.sigma_length_m));
     else
-      begin_at({p.p_m[0], p.p_m[1], 0.0}, square(seen.sigma_length_m) + square(at.arm_m[0]) + square(at.arm_m[1]));
+      search_now(event.t_ns);
     return reject(records, record, WM_REJECTED_SEARCHING);
   }
   residual rows[2];
@@ -62,6 +63,7 @@ wm_status landmark_ekf::fuse_localized(const wm_event &event, record_list record
   status = filter_.check_time(event.t_ns);
   if (status != WM_OK) return status;
   filter_.move_to(event.t_ns);
+  go_to(kBase_m);
   if (life_.searching() && !localizer_.is_in_map()) return reject(records, record, WM_REJECTED_SEARCHING);
   localizer_aid::view at;
   if (!localizer_.look(seen, &filter_, &at)) return WM_OK;

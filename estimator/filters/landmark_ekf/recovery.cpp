@@ -18,9 +18,9 @@ constexpr double kRecent_s = 2.0;  // a kidnapped robot's observations fit by ch
 // Kidnapped: the tracked pose explains less than one in so many observations, and the other pose is at least so far.
 constexpr int kFewOf = 3;                                   // one in three
 constexpr double kElsewhere_m = 0.5, kElsewhere_rad = 0.2;  // added to 3 sigma
-// Sigmas above which a pose is vague and a Kalman update far from linear: of the heading, and of the place over that of
-// one anywhere among the landmarks. It is searched for kVagueFor_s, and then updated nevertheless.
-constexpr double kVague_rad = 0.5, kVaguePlace = 0.5, kVagueFor_s = 5.0;
+// Sigma of a vague place over that of one anywhere among the landmarks. A vague pose is searched for kVagueFor_s, and
+// then updated nevertheless.
+constexpr double kVaguePlace = 0.5, kVagueFor_s = 5.0;
 // Largest sigma of a found place: where only bearings find it, and the least limit by accurate ranges. Not swept; 0.3 m
 // with bearings loses crossing-laps.
 constexpr double kFoundByBearings_m = 1.0, kFoundLeast_m = 0.3;

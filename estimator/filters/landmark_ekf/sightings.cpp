@@ -30,7 +30,7 @@ wm_status landmark_ekf::fuse_landmark(const wm_event &event, record_list records
   status = filter_.check_time(event.t_ns);
   if (status != WM_OK) return status;
   filter_.move_to(event.t_ns);
-
+  go_to(setup_->sensors[record.sensor].mounting.xyz_m);
   sighting_aid::view at;
   const bool tracking = life_.tracking();
   const wm_verdict verdict = aid_.look(event, filter_, tracking, &at, &record);

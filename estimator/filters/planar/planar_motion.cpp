@@ -3,6 +3,7 @@
 
 #include <cstring>
 
+#include "filters/planar/arm.hpp"
 #include "filters/planar/past_pose.hpp"
 #include "math/arc.hpp"
 
@@ -191,6 +192,28 @@ void planar_motion::forget(int state, double value, double variance) {
 
 void planar_motion::inflate_pose(double xy_m2, double heading_rad2) {
   for (int i = 0; i < kPoseStates; i++) state_.add_variance(i, i == kHeading ? heading_rad2 : xy_m2);
+}
+
+void planar_motion::move_place(const double by_m[2]) {
+  const double heading_rad2 = variance(kHeading);
+  const arm_moments arm = arm_of(by_m, value(kHeading), heading_rad2 > square(kVague_rad) ? heading_rad2 : 0.0);
+  const int velocity = motion_state_[kVelocityX], turn = motion_state_[kTurnState];
+  const double rate_radps = value(turn), across[2] = {-arm.off_m[1], arm.off_m[0]};
+  motion_row place[2], speed[2];
+  double places_m[2], speeds_mps[2];
+  for (int k = 0; k < 2; k++) {
+    place[k].add(kX + k, 1.0);
+    place[k].add(kHeading, arm.by_heading[k]);
+    places_m[k] = value(kX + k) + arm.off_m[k];
+    speed[k].add(velocity + k, 1.0);
+    speed[k].add(turn, across[k]);
+    speed[k].add(kHeading, -rate_radps * arm.off_m[k]);
+    speeds_mps[k] = value(velocity + k) + rate_radps * across[k];
+  }
+  state_.assign_rows(velocity, 2, speed, nullptr, 0, speeds_mps);
+  state_.assign_rows(kX, 2, place, arm.noise_m2[0], 2, places_m);
+  odom_ = compose(odom_, {by_m[0], by_m[1], 0.0});
+  take_calibration(state_.mean());
 }
 
 void planar_motion::put_pose(const wm_pose2 &pose, const double covariance[3][3]) {

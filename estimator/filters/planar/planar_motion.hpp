@@ -39,6 +39,8 @@ inline constexpr double kVelocityTau_s = 8.0;
 // Sigma of a gyro's scale by its data sheet (3 % at most), less than the default's of wheels and commands. Largest
 // error of canedge-1 after 60 s without GNSS: 1.9, 1.8, 1.7 and 1.9 % of the way with 0.01, 0.015, 0.02 and 0.04.
 inline constexpr double kGyroScaleSigma = 0.015;
+// A heading with a larger sigma is vague: an update by it is far from linear.
+inline constexpr double kVague_rad = 0.5;
 // Variance of a heading that may be any.
 inline constexpr double kAnyHeading_rad2 = kPi * kPi / 3.0;
 
@@ -112,6 +114,8 @@ class planar_motion {
   }
   // Adds variances of x and y, and of the heading, as noise of the motion does.
   void inflate_pose(double xy_m2, double heading_rad2);
+  // Without motion data: the pose becomes that of another place on the robot, `by_m` away in base_link's axes.
+  void move_place(const double by_m[2]);
   // A value of the calibration that the configuration states is wrong, and not known as well yet as it was stated.
   bool is_stated_wrongly(int state) const { return stated_.is_wrong(state, variance(state)); }
   // Fills time, mean, covariance and twist.

@@ -17,6 +17,7 @@ extern "C" {
 typedef struct wm_integrity {
   double risk;                // of each bound of a pose: above 0, below 1
   double limit_m, limit_rad;  // 0: none
+  int without_motion;         // no drive shows a heading, and a pose without one is usable where it has no limit
 } wm_integrity;
 
 // Another pose that may be the right one, as seen from the estimate.

@@ -24,8 +24,8 @@ wm_estimate estimate_of(double sigma_x_m, double sigma_y_m, double sigma_rad, do
 const double kFloor = wm::probability_of(wm::kMinLogOdds);
 
 wm_bound bound_of(const wm_estimate &e, const std::vector<wm_other_pose> &others = {}, double risk = kRisk,
-                  double untested = 0.0, double limit_m = 0.0, double limit_rad = 0.0) {
-  const wm_integrity integrity = {risk, limit_m, limit_rad};
+                  double untested = 0.0, double limit_m = 0.0, double limit_rad = 0.0, int without_motion = 0) {
+  const wm_integrity integrity = {risk, limit_m, limit_rad, without_motion};
   wm_bound out;
   wm_bound_of(&e, untested, &integrity, others.data(), others.size(), &out);
   return out;
@@ -164,6 +164,17 @@ TEST(an_unknown_heading_says_how_far_to_drive) {
   const double sigma_rad = std::sqrt(2.0) * 0.02 / b.heading_after_m;
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.1, bound_of(estimate_of(0.02, 0.02, sigma_rad, kFloor)).heading_rad);
   TEST_ASSERT_TRUE(std::isnan(bound_of(estimate_of(50.0, 50.0, 1.8, kFloor)).heading_after_m));
+}
+
+// Without motion data a drive shows no heading; a pose without one is usable, unless the configuration limits it.
+TEST(a_carried_tag_needs_no_heading) {
+  const wm_estimate tag = estimate_of(0.02, 0.02, 1.8, kFloor);
+  const wm_bound b = bound_of(tag, {}, kRisk, 0.0, 0.5, 0.0, 1);
+  TEST_ASSERT_EQUAL(WM_UNUSABLE_NOT, b.why);
+  TEST_ASSERT_EQUAL_DOUBLE(static_cast<double>(INFINITY), b.heading_rad);
+  TEST_ASSERT_TRUE(std::isnan(b.heading_after_m));
+  TEST_ASSERT_EQUAL(WM_UNUSABLE_HEADING, bound_of(tag, {}, kRisk, 0.0, 0.5, 0.1, 1).why);
+  TEST_ASSERT_EQUAL(WM_UNUSABLE_HEADING, bound_of(tag, {}, kRisk, 0.0, 0.5).why);
 }
 
 }  // namespace

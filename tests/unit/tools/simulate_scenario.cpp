@@ -84,6 +84,7 @@ TEST(test_each_mistake_is_refused_with_file_line_and_key) {
       {"outlier_percent: 5", "outlier_percent: 500", {"crossing.yaml:", "outlier_percent", "500"}},
       {"landmark_m: 0.02", "landmarks_m: 0.02", {"crossing.yaml:", "landmarks_m", "landmark_m"}},
       {"seed: 37 ", "seed: one ", {"crossing.yaml:", "seed", "one"}},
+      {"robot:\n", "motion: {measured: false, imu: {rate_hz: 100}}\nrobot:\n", {"crossing.yaml:", "measured", "imu"}},
   };
   for (const auto &c : cases) {
     Scenario s;
