@@ -18,7 +18,7 @@ KINDS = [
     ("underwater-vehicle", "seabed-easy", 1, 0.1),
     ("classroom-robot", "loops-commands", None, 0.15),
     ("indoor-patrol", "corridor-low", 2, 0.12),
-    ("tag", "tag", None, 0.3),
+    ("tag", "carried-tag", None, 0.3),
 ]
 TRACKING_LEAST = 0.5  # share of the drive: short ones begin with dead reckoning
 NAMED = re.compile(r"\bconfig/[\w./-]+\.(?:yaml|xml|service|dbc|pgm)\b")

@@ -9,9 +9,9 @@
 namespace wm {
 
 struct arm_moments {
-  double off_m[2];         // mean
-  double by_heading[2];    // regression on the heading's error, m/rad
-  double noise_m2[2][2];   // what that leaves of the covariance
+  double off_m[2];        // mean
+  double by_heading[2];   // regression on the heading's error, m/rad
+  double noise_m2[2][2];  // what that leaves of the covariance
 };
 
 // `arm_m`: on base_link's axes. `variance_rad2`: of the heading; 0 gives the linear model.
