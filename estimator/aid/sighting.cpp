@@ -462,6 +462,8 @@ observation sighting_aid::observe(const view &at, const sensor_errors &errors, c
   const wm_landmark &target = setup_->landmarks[at.landmark];
   const double *sigma = params().states.sigma;
   const double tilt_sigma = sigma[WM_SENSOR_ROW_kRoll], scale_sigma = sigma[WM_SENSOR_ROW_kAngleScale];
+  const bool has_place = slots_.at(s.sensor, kMountX) >= 0;
+  const double mount_sigma = has_place ? sigma[WM_SENSOR_ROW_kMountX] : 0.0;
   const wm_pose2 mounting = {seen_by.x_m + errors[kMountX], seen_by.y_m + errors[kMountY],
                              seen_by.yaw_rad + errors[kYaw]};
   observation seen = observation_now(filter, at.landmark * kMaxSensors + s.sensor);
@@ -491,7 +493,7 @@ observation sighting_aid::observe(const view &at, const sensor_errors &errors, c
   seen.sigma_angle_rad =
       std::sqrt(square(at.reading.bearing_sigma_rad) +
                 square(correlated_bearing(params(), at.reading.bearing_sigma_rad)) + square(scale_sigma * kHalfPi));
-  seen.sigma_place_m = std::sqrt(square(map_sigma(at.landmark)) + square(sigma[WM_SENSOR_ROW_kMountX]) +
+  seen.sigma_place_m = std::sqrt(square(map_sigma(at.landmark)) + square(mount_sigma) +
                                  square(tilt_sigma * (target.p_m[2] - seen_by.z_m)));
   const double by_slant = height_m == 0.0 ? 1.0 : slant_m / floor_m;  // derivative of the range on the floor
   seen.sigma_length_m =

@@ -24,8 +24,9 @@ extern "C" {
   ONE(kYaw, "sensor_yaw", "_rad", "yaw_rad", 0, -3.2, 3.2, WALK, -0.05, 3.2, \
       "Start sigma of each sensor's mounting yaw about calibration.yaml's, rad. 0: off. Below 0: see range_bias_sigma_m; " \
       "in slam at most 0.005 where ranges, bearings and the motion come with covariances.") \
-  TWO(kMountX, kMountY, "sensor_xy", "_m", "x_m", "y_m", 0, -100, 100, CONSTANT, 0, 10, \
-      "Start sigma of each sensor's place on the robot about calibration.yaml's, forwards and sideways, m. 0: off.") \
+  TWO(kMountX, kMountY, "sensor_xy", "_m", "x_m", "y_m", 0, -100, 100, CONSTANT, -0.02, 10, \
+      "Start sigma of each sensor's place on the robot about calibration.yaml's, forwards and sideways, m. 0: off. " \
+      "Below 0: of that size, of sensors with a range_sigma_m. 0.02: a tape measure.") \
   TWO(kRoll, kPitch, "sensor_tilt", "_rad", "roll_rad", "pitch_rad", 0, -1, 1, CONSTANT, 0, 1, \
       "Start sigma of each sensor's roll and of its pitch about calibration.yaml's, rad: they move bearings to " \
       "landmarks above or below the sensor, and the places of coded markers. 0: off.") \

@@ -103,6 +103,7 @@ class sensor_slots {
   static bool is_on(const wm_setup &setup, int sensor, int row) {
     const double sigma = setup.sightings->states.sigma[row];
     if (sigma < 0.0 && row == WM_SENSOR_ROW_kDepthAxis && !setup.sensors[sensor].range_is_depth) return false;
+    if (sigma < 0.0 && row == WM_SENSOR_ROW_kMountX && !finite(setup.sensors[sensor].range_sigma_m)) return false;
     const bool shown_by_motion = row == WM_SENSOR_ROW_kYaw || row == WM_SENSOR_ROW_kTimeOffset;
     const bool moves = setup.motion->model != WM_MOTION_CONSTANT_VELOCITY;
     return sigma > 0.0 || (sigma < 0.0 && (moves || !shown_by_motion));

@@ -421,3 +421,20 @@ void setUp(void) {
   traced = 0;
   fault = {};
 }
+
+// GIVEN no parameter, THEN a tape measure leaves the place of a sensor with ranges open, and the place of others is
+// exact.
+TEST(test_a_sensor_with_ranges_is_mounted_to_two_centimetres) {
+  for (const double range_sigma_m : {0.1, kAbsent}) {
+    prepare_ekf(make::sensor("eye", 0.01, range_sigma_m));
+    all_by_default();
+    begin();
+    int places = 0;
+    for (const wm_calibration_value &value : calibration())
+      if (std::strcmp(value.name, "eye.x_m") == 0 || std::strcmp(value.name, "eye.y_m") == 0) {
+        TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.02, value.sigma);
+        places++;
+      }
+    TEST_ASSERT_EQUAL(std::isnan(range_sigma_m) ? 0 : 2, places);
+  }
+}
