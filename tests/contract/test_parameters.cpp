@@ -227,7 +227,7 @@ std::vector<scenario> scenarios() {
           {"recover."}),
       row("landmark_ekf", "no start", motion::twist, kBearings, kNoStart | kOneMoved, 25, {}),
       row("landmark_ekf", "no start, two landmarks", motion::twist, kBearings, kNoStart | kFewBeacons, 20,
-          {{"sightings.correlated.slots", 0}, {"recover.sigma_xy_m", 1}}, {"recover."}),
+          {{"sightings.correlated.slots", 0}, {"recover.sigma_xy_m", 1.5}}, {"recover."}),
       row("landmark_ekf", "wrong start", motion::twist, kBearings, kWrongStart | kSilence, 20, {}),
       row("slam", "ranges", motion::twist, kBearings | kRanges, kNoMap | kOutliers | kBlind | kOneMoved, 25,
           all({kMotionStates, kSensorStates, kCorrelated})),

@@ -267,7 +267,7 @@ WITHOUT = {
                                  "bag.pictures.Depths.grey bag.tables.without_arrival bag.tags.corner_table causes.trial.Blocks.of causes.trial.Undo.original "
                                  "recording.jpeg_of recording.RecordingWriter.restamp",
         "NaN is absent: windows, updates and samples without a number are left out": "bag.clocks.goes_on bag.stuck.repeats bag.stuck.limit bag.compare.held bag.compare.Likeness.differs bag.compare.likeness "
-                                 "bag.compare.turns bag.compare.moves bag.collection.Collection.sample causes.trial.likelihoods causes.trial.judged causes.plan.judged mcapio.estimates.bounds "
+                                 "bag.compare.turns bag.compare.moves bag.course.off_world bag.collection.Collection.sample causes.trial.likelihoods causes.trial.judged causes.plan.judged mcapio.estimates.bounds "
                                  "mcapio.estimates.hypotheses mcapio.place.landmarks",
         "of calibrations and transforms, which are refused where one is NaN": "bag.frames.is_optical",
         "corners, whose reader refuses NaN": "bag.tags.of_another_picture",
