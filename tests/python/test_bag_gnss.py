@@ -68,6 +68,14 @@ class Fixes(BagTest):
             with self.subTest(name):
                 self.assert_driven(self.drive(lambda i, w, a, s=stale: (s(w) if i < 3 else w, a, 0)), "finding: /fix: its first 3 fixes are of a place")
 
+    def test_of_two_robots_one_has_all(self):
+        bag = self.bag().drive(topic="/robot2/odom")
+        for robot, away, variance in (("robot1", 40.0, 1e-5), ("robot2", 0.0, 1e-4)):
+            bag.turns(topic=f"/{robot}/imu")
+            for t in np.arange(16.0):
+                self.fix(bag, t, place_of(ORIGIN, place(t)[0], place(t)[1] + away)[:2], variance=variance, topic=f"/{robot}/fix")
+        self.assert_driven(bag, "/robot1/imu: the IMU is /robot2/imu", "/robot1/fix: positions come from /robot2/fix")
+
     def test_how_drivers_fill_latitude_and_longitude(self):
         minutes = lambda v: 100 * np.trunc(v) + 60 * (v - np.trunc(v))  # noqa: E731
         kinds = {"exchanged": lambda w: w[::-1], "in radians": lambda w: tuple(np.radians(w)), "ten-millionths": lambda w: tuple(1e7 * np.array(w)),

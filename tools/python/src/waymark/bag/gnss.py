@@ -9,7 +9,7 @@ import numpy as np
 
 from ..geometry import place_of, tangent_plane
 from ..tables import Array
-from . import compare
+from . import compare, names
 from .collection import Collection, NoSuchTopic
 from .frames import bare, mounting
 from .motion import Motion
@@ -73,7 +73,7 @@ def _stands(into: Collection, topic: str, motion: Motion | None) -> bool:
 
 
 def _choose(into: Collection, given: argparse.Namespace, motion: Motion | None) -> str | None:
-    """Of the receivers that move with the robot that of the smallest stated errors; a filter's answer only where there is no receiver."""
+    """Of the receivers that move with the robot, and have its namespace, that of the smallest stated errors; a filter's answer only where there is no receiver."""
     topics: dict[str, Samples] = into.samples.get("fixes", {})
     if given.gnss:
         if given.gnss not in topics:
@@ -84,8 +84,8 @@ def _choose(into: Collection, given: argparse.Namespace, motion: Motion | None) 
         values = topics[topic].values
         ok = (values[:, 7] != _NO_FIX) & np.isfinite(values[:, 0]) & (values[:, :2] != 0).any(axis=1)
         if not ok.any():
-            return 1.0, 0.0, 0.0, 0.0
-        return 0.0, float(_stands(into, topic, motion)), float(bool(_FUSED.search(topic))), float(np.median(_sigmas(values[ok], ok[ok])[0]))
+            return 1.0, 0.0, 0.0, 0.0, 0.0
+        return 0.0, float(_stands(into, topic, motion)), names.apart(topic, motion.topic) if motion else 0.0, float(bool(_FUSED.search(topic))), float(np.median(_sigmas(values[ok], ok[ok])[0]))
 
     return min(sorted(topics), key=rank) if topics else None
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..geometry import from_rpy, rotation_vectors, rotations, turned
 from ..tables import Array, Table
-from . import compare, stuck
+from . import compare, names, stuck
 from .collection import Collection, NoSuchTopic
 from .frames import mounting
 from .motion import Motion
@@ -406,9 +406,9 @@ def _judge(imu: Imu, motion: Motion | None) -> None:
     _scale(imu, size, fit.r, words)
 
 
-def _rank(imu: Imu) -> tuple[float, ...]:
-    """Smaller is better: one with a gyro, that fits the motion, whose place is known."""
-    return (float(not _is_there(imu.gyro)), float(not imu.usable), float(sum(finding for finding, _ in imu.said)), float(imu.rotation is None),
+def _rank(imu: Imu, motion: Motion | None) -> tuple[float, ...]:
+    """Smaller is better: one with a gyro, that fits the motion, of its robot, whose place is known."""
+    return (float(not _is_there(imu.gyro)), float(not imu.usable), names.apart(imu.topic, motion.topic) if motion else 0.0, float(sum(finding for finding, _ in imu.said)), float(imu.rotation is None),
             float(not _is_there(imu.accelerometer)), float("raw" in imu.topic))
 
 
@@ -425,7 +425,7 @@ def choose(into: Collection, given: argparse.Namespace, base: str, motion: Motio
                 _judge(imu, motion)
     if not found:
         return None
-    best = next((imu for imu in found if imu.topic == given.imu), None) or min(found, key=lambda imu: (*_rank(imu), imu.topic))
+    best = next((imu for imu in found if imu.topic == given.imu), None) or min(found, key=lambda imu: (*_rank(imu, motion), imu.topic))
     for other in found:
         if other is not best and other.usable:
             into.refuse(other.topic, f"the IMU is {best.topic}; --imu {other.topic} takes this one")

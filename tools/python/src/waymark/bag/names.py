@@ -115,3 +115,9 @@ def common(a: tuple[str, ...], b: tuple[str, ...]) -> int:
             break
         count += 1
     return count
+
+
+def apart(topic: str, motion: str) -> float:
+    """How many names of the motion's namespace a topic lacks: where two robots have theirs, those of the other one."""
+    own = tuple(part for part in motion.split("/") if part)[:-1]
+    return float(len(own) - common(tuple(part for part in topic.split("/") if part), own))
