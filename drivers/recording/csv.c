@@ -96,9 +96,9 @@ static wm_status fail_missing(const csv_reader *self, int column, wm_error *err)
   if (self->field_count == 1 && (memchr(self->fields[0].text, ';', self->fields[0].length) ||
                                  memchr(self->fields[0].text, '\t', self->fields[0].length)))
     snprintf(hint, sizeof hint, " (commas part the fields)");
-  if (self->field_count > 0 && self->fields[0].length > 1 &&
-      memchr("\xFF\xFE", (unsigned char)self->fields[0].text[0], 2))
-    snprintf(hint, sizeof hint, " (the file is in UTF-16: save it in UTF-8)");
+  const unsigned first =
+      self->field_count > 0 && self->fields[0].length > 1 ? (unsigned char)self->fields[0].text[0] : 0;
+  if (first == 0xFF || first == 0xFE) snprintf(hint, sizeof hint, " (the file is in UTF-16: save it in UTF-8)");
   snprintf(text, sizeof text, "the column '%s' is missing%s; needed in the header, in any order: %s", wanted[0], hint,
            columns_of(self->format, all, sizeof all));
   return csv_fail(self, err, WM_BAD_CONFIG, text);
