@@ -333,7 +333,7 @@ TEST(test_a_block_with_too_many_columns_is_refused) {
 // the camera is mounted, or when it looks, from pictures alone: the vehicle's pose makes up for either. With points
 // that are seen again and again and move by many corrections, these variances must stay what they were.
 TEST(test_what_cannot_be_seen_is_not_learnt) {
-  const auto nothing = static_cast<head_state>(-1);
+  const head_state nothing = kHeadStates;
   for (const head_state which : {nothing, kCameraRotation, kTimeOffset}) {
     const double sigma = which == kCameraRotation ? 0.02 : 0.05;
     head_model models[kHeadStates] = {};
