@@ -14,7 +14,7 @@ constexpr double kGateOfSix = 16.8, kGateNoise = 0.25;
 // Of the prediction's variance as a prior, where the tracks alone shall show what most of them follow: a lorry in front
 // hides the street, and those of its tracks that are near the prediction would pull the pose along.
 constexpr double kFreely = 1e4;
-// How much speaks for another scene, in pictures: one that contradicts the prediction adds 1, one that agrees takes
+// Evidence of another scene, in pictures: one that contradicts the prediction adds 1, one that agrees takes
 // kAgrees off, since tracks of another scene agree with all six numbers by chance alone. Behind a lorry that was there
 // for long, kOtherMost / kAgrees pictures have to agree before one is fused. On drives of cars with up to 90 % of the
 // tracks on a lorry, 2 and 3 with 10 and 30 give errors within 15 %.

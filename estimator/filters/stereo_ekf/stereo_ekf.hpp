@@ -262,7 +262,7 @@ class stereo_ekf {
   double sigma_px_[4];
   wm_time_ns now_ns_, start_ns_;
   wm_time_ns last_picture_ns_;  // whose tracks `tracks_` has
-  int64_t other_scene_;         // how much speaks for tracks of another scene (increments.cpp), pictures
+  int64_t other_scene_;         // evidence of another scene (increments.cpp), pictures
   wm_time_ns picture_ns_;       // the present picture; NONE between pictures
   picture_motion tracks_;
   travelled_pose odometry_;  // motion alone

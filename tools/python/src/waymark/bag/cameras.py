@@ -75,7 +75,7 @@ class Cameras:
                 known[topic.name] = (name, topic, count)
         drawn = {name for known in groups.values() for name in known if names.is_drawn(name)}
         if len(drawn) < sum(map(len, groups.values())):  # else they are all that there is
-            self.left_out.update({name: "a node has drawn on these pictures what it found, as their name says" for name in drawn})
+            self.left_out.update({name: "a node has drawn on these pictures what it found, by their name" for name in drawn})
             groups = {key: kept for key, known in groups.items() if (kept := {name: rest for name, rest in known.items() if name not in drawn})}
         taken: set[str] = set()
         for _, choices in sorted(groups.items(), key=lambda item: (len(item[0]), item[0])):

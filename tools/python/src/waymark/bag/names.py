@@ -77,7 +77,7 @@ def is_distance(topic: str) -> bool | None:
 
 
 def is_drawn(topic: str) -> bool:
-    """Whether a topic's name says that a node has drawn on its pictures what it found."""
+    """Whether a node has drawn on a topic's pictures what it found, by the topic's name."""
     parts = [part for part in topic.split("/") if part and part not in _TRANSPORTS]
     return bool(_DRAWN & {word for part in parts[-2:] for word in _words(part)})
 
