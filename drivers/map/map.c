@@ -127,7 +127,7 @@ static wm_status read_meaning(const wm_yaml_node *root, meaning *out, wm_error *
 
 #define RAW_OCCUPIED 100   // per cent; raw values above are unknown
 #define SAVED_UNKNOWN 205  // of map_saver (ROS 1 and 2), whatever thresholds it writes beside
-#define SAVED_SHARE 100    // pixels, of which one is of that level, from which on it is said
+#define SAVED_SHARE 100    // a note where one pixel in so many is of that level: fewer may be noise of a scanned plan
 
 static int8_t cell_of(const meaning *m, int grey) {
   if (m->mode == MODE_RAW && grey > RAW_OCCUPIED) return WM_CELL_UNKNOWN;

@@ -32,7 +32,7 @@ namespace {
 constexpr double kTags_m[3][2] = {{-0.07, -0.14}, {-0.07, 0.14}, {0.2, 0.14}};
 wm_sensor tags[3];
 
-// A cart on curves among anchors with so many tags, of which the first `heard` still speak. `stated_m`: the first tag's
+// A cart on curves among anchors with so many tags, of which the first `heard` give ranges. `stated_m`: the first tag's
 // place by the configuration, where it is another one. Returns the largest sigmas by which a heading that is claimed is
 // off; *known: the share of stamps at which one is.
 double drive_with(int count, int heard, const double *stated_m, double from_s, double to_s, double *known) {
