@@ -64,7 +64,8 @@ int error_slots(const wm_setup &setup) {
   return static_cast<size_t>(wanted) < pairs ? wanted : static_cast<int>(pairs);
 }
 
-constexpr int kTagHeadingKey = -16;  // of an observed heading, less the landmark's index
+constexpr double kHalfOfVariance = 0.70710678118654752;  // factor of a sigma
+constexpr int kTagHeadingKey = -16;                      // of an observed heading, less the landmark's index
 
 }  // namespace
 
@@ -318,9 +319,10 @@ void sighting_aid::add_errors(const view &at, const lent_slots &lent, const row_
     add_state(state, size);
     r->source.own += square(size) * filter.variance(state);
   };
-  if (lent.of_anchor >= 0) add_error(lent.of_anchor, of.error_size);
+  const double size = lent.of_anchor >= 0 ? kHalfOfVariance * of.error_size : of.error_size;
+  if (lent.of_anchor >= 0) add_error(lent.of_anchor, size);
   if (lent.error >= 0 && of.error_offset >= 0)
-    add_error(lent.error + of.error_offset, of.error_size);
+    add_error(lent.error + of.error_offset, size);
   else
     r->noise += lent.repeated_error * square(of.error_size);
   if (lent.map >= 0) {
@@ -496,11 +498,9 @@ observation sighting_aid::observe(const view &at, const sensor_errors &errors, c
   seen.sigma_place_m = std::sqrt(square(map_sigma(at.landmark)) + square(mount_sigma) +
                                  square(tilt_sigma * (target.p_m[2] - seen_by.z_m)));
   const double by_slant = height_m == 0.0 ? 1.0 : slant_m / floor_m;  // derivative of the range on the floor
-  seen.sigma_length_m =
-      std::sqrt(square(by_slant) *
-                    (square(at.reading.range_sigma_m) + square(correlated_range(params(), at.reading.range_sigma_m)) +
-                     square((params().range_sigma_rel + params().correlated_range_rel) * slant_m)) +
-                square(map_sigma(at.landmark)));
+  const double white_m2 = square(at.reading.range_sigma_m) + square(params().range_sigma_rel * slant_m);
+  const double lasting_m = correlated_range(params(), at.reading, slant_m);
+  seen.sigma_length_m = std::sqrt(square(by_slant) * (white_m2 + square(lasting_m)) + square(map_sigma(at.landmark)));
   return seen;
 }
 

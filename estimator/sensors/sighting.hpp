@@ -67,18 +67,15 @@ inline double correlated_bearing(const wm_sighting_params &p, const sighting_rea
 inline double correlated_range(const wm_sighting_params &p, double sigma_m) {
   return p.correlated_slots > 0 ? absolute_sigma(p.correlated_range_m, sigma_m) : 0.0;
 }
-// From here on an anchor's lasting error is the same at each range: 0.1 m by default. Eight anchors had 0.10 to 0.27 m.
-inline constexpr double kAlone_m = 10.0;
 inline double correlated_range(const wm_sighting_params &p, const sighting_reading &r, double range_m) {
   if (p.correlated_slots == 0 || (r.independent && p.correlated_range_m < 0.0)) return 0.0;
   // Of ranges alone (radio, sound) what grows with the range is the sensor's scale; a landmark's own error does not.
-  const double of_m = r.bearing || range_m < kAlone_m ? range_m : kAlone_m;
-  const double relative_m = p.correlated_range_rel * of_m;
+  const double relative_m = r.bearing ? p.correlated_range_rel * range_m : 0.0;
   return std::sqrt(square(correlated_range(p, r.range_sigma_m)) + square(relative_m));
 }
 
-// Of ranges alone each anchor has an error for a whole drive, too, as large as the one that fades: of its delay, of the
-// walls beside it. It takes the state that a bearing's error has else. Time constant, s; flat from 60 on.
+// Of ranges alone half of the variance is an error of the anchor for a whole drive: of its delay, of the walls beside
+// it; the other half fades. It takes the state that a bearing's error has else. Time constant, s; flat from 60 on.
 inline constexpr double kOfAnchor_s = 300.0;
 
 // The states of a slot of time-correlated errors: `width` of them; the offsets of the bearing's and the range's error

@@ -66,7 +66,7 @@ static const wm_param kParams[] = {
     F64("correlated.range_m", correlated_range_m, -0.5, -10, 100,
         "Sigma of a range's time-correlated error, m. Below 0: that multiple of the range's sigma."),
     F64("correlated.range_rel", correlated_range_rel, 0.01, 0, 1,
-        "The same as a fraction of the range, of ranges alone up to that of 10 m; the variances are added."),
+        "The same as a fraction of the range, where a sighting has a bearing, too; the variances are added."),
     F64("correlated.tau_s", correlated_tau_s, 2, 0.01, 1e6, "Time constant of these errors, s."),
     F64("gate.soft", gate_soft, 9, 1, 1e6,
         "Normalised innovation squared for two degrees of freedom above which the noise is inflated, as for a "

@@ -26,16 +26,9 @@ int count_states(const wm_setup &setup) {
          sighting_aid::count_states(setup) + position_aid::count_states(setup) + localizer_aid::count_states(setup);
 }
 
-// Variance of a place anywhere among the landmarks, each axis, m2.
-double spread_of(const wm_setup &setup) {
-  double low[2] = {0, 0}, high[2] = {0, 0};
-  for (size_t i = 0; i < setup.landmark_count; i++)
-    for (int k = 0; k < 2; k++) {
-      const double p = setup.landmarks[i].p_m[k];
-      if (i == 0 || p < low[k]) low[k] = p;
-      if (i == 0 || p > high[k]) high[k] = p;
-    }
-  return square(kAround_m) + (square(high[0] - low[0]) + square(high[1] - low[1])) / 12.0;
+void widen_to(double value, double *low, double *high) {
+  if (value < *low) *low = value;
+  if (value > *high) *high = value;
 }
 
 // Without motion data the velocity is one of the map's axes, and positions and ranges have no heading either.
@@ -82,7 +75,10 @@ void landmark_ekf::init(const wm_landmark_ekf_params &params, const wm_setup &se
   aid_.add_lent(&filter_);
   records_.set(behind.records);
   std::memset(behind.records, 0, setup.landmark_count * sizeof(landmark_record));
-  map_variance_m2_ = spread_of(setup);
+  for (int k = 0; k < 2; k++) {
+    low_m_[k] = HUGE_VAL, high_m_[k] = -HUGE_VAL;
+    for (size_t i = 0; i < setup.landmark_count; i++) widen_to(setup.landmarks[i].p_m[k], &low_m_[k], &high_m_[k]);
+  }
   moved_id_ = -1;
   rollback_.begin(filter_, kPoseStates, calibration_states_);
   start_tested_ns_ = inflated_ns_ = vague_ns_ = WM_TIME_NONE;
@@ -250,11 +246,22 @@ void landmark_ekf::put_base(wm_estimate *out) const {
   out->v_mps[1] += out->w_radps[2] * back_m[0];
 }
 
+// Variance of a place anywhere among the landmarks and the pose, each axis, m2: of a uniform density in their box.
+double landmark_ekf::anywhere_m2() const {
+  double sides_m2 = 0.0;
+  for (int k = 0; k < 2; k++) {
+    double low = low_m_[k], high = high_m_[k];
+    widen_to(filter_.value(k), &low, &high);
+    sides_m2 += square(high - low);
+  }
+  return square(kAround_m) + sides_m2 / 12.0;
+}
+
 // Lost, the pose is anywhere among the landmarks with the probability of being lost.
 void landmark_ekf::widen(wm_estimate *out) const {
-  const double p = evidence_.probability();
-  out->covariance[wm_cov_index(0, 0)] += p * map_variance_m2_;
-  out->covariance[wm_cov_index(1, 1)] += p * map_variance_m2_;
+  const double p = evidence_.probability(), anywhere_m2 = this->anywhere_m2();
+  out->covariance[wm_cov_index(0, 0)] += p * anywhere_m2;
+  out->covariance[wm_cov_index(1, 1)] += p * anywhere_m2;
   out->covariance[wm_cov_index(5, 5)] += p * square(kPi) / 3.0;
 }
 

@@ -72,6 +72,7 @@ class landmark_ekf {
   }
   void note(wm_time_ns t_ns, int key, double log_bayes, double angle_rad = NAN, double normalised = NAN);
   travelled_pose2 odometry() const { return {filter_.odom(), filter_.travelled_m(), filter_.turned_rad()}; }
+  double anywhere_m2() const;
   bool needs_search(wm_time_ns t_ns, bool by_bearing);
   void search_now(wm_time_ns t_ns);
   double found_sigma_m(wm_time_ns since_ns) const;
@@ -121,9 +122,9 @@ class landmark_ekf {
   observation vague_[2];  // the pose when it had become too vague to be corrected
   wm_time_ns start_tested_ns_, inflated_ns_, vague_ns_;
   uint32_t moved_;
-  int32_t moved_id_;        // of the last one
-  double map_variance_m2_;  // of a place anywhere among the landmarks, each axis
-  double misfit_;           // of the newest sighting, to the map
+  int32_t moved_id_;             // of the last one
+  double low_m_[2], high_m_[2];  // the landmarks' box
+  double misfit_;                // of the newest sighting, to the map
   // Without motion data, and by positions and ranges: places without a heading. The filter's pose is that of the place
   // seen last, at_m_ in base_link, so that one place alone never gives a heading, and several do by their differences.
   bool is_point_;

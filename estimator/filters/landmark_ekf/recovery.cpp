@@ -18,8 +18,8 @@ constexpr double kRecent_s = 2.0;  // a kidnapped robot's observations fit by ch
 // Kidnapped: the tracked pose explains less than one in so many observations, and the other pose is at least so far.
 constexpr int kFewOf = 3;                                   // one in three
 constexpr double kElsewhere_m = 0.5, kElsewhere_rad = 0.2;  // added to 3 sigma
-// Sigma of a vague place over that of one anywhere among the landmarks. A vague pose is searched for kVagueFor_s, and
-// then updated nevertheless.
+// Sigma of a vague place over that of one anywhere among the landmarks and the robot. A vague pose is searched for
+// kVagueFor_s, and then updated nevertheless.
 constexpr double kVaguePlace = 0.5, kVagueFor_s = 5.0;
 // Largest sigma of a found place: where only bearings find it, and the least limit by accurate ranges. Not swept; 0.3 m
 // with bearings loses crossing-laps.
@@ -162,7 +162,7 @@ void landmark_ekf::restore_calibration() {
 bool landmark_ekf::needs_search(wm_time_ns t_ns, bool by_bearing) {
   if (life_.searching()) return true;
   const double heading = filter_.variance(kHeading), spread = 0.5 * (filter_.variance(kX) + filter_.variance(kY));
-  const bool vague = (by_bearing && heading > square(kVague_rad)) || spread > square(kVaguePlace) * map_variance_m2_;
+  const bool vague = (by_bearing && heading > square(kVague_rad)) || spread > square(kVaguePlace) * anywhere_m2();
   if (!params_.recover || !life_.tracking() || !vague || filter_.is_overdue()) {
     vague_ns_ = WM_TIME_NONE;
     return false;

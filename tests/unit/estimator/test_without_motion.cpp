@@ -97,3 +97,28 @@ TEST(test_several_tags_have_a_heading) {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.2, known);
   TEST_ASSERT_GREATER_THAN_DOUBLE(1.5, std::sqrt(estimate().covariance[wm_cov_index(5, 5)]));
 }
+
+// GIVEN four anchors on a vehicle, WHEN their tag is carried far from them, THEN a place that is vague across the line
+// of sight is corrected and not searched.
+TEST(test_a_tag_far_from_its_anchors_is_tracked) {
+  constexpr double kAnchors_m[][2] = {{2.5, 0.9}, {2.5, -0.9}, {0.7, 0.9}, {-2.5, -0.9}},
+                   kOwn_m[] = {0.03, -0.02, 0.0, -0.04};
+  prepare_ekf(make::sensor("tag", NAN, 0.2));
+  all_by_default();
+  motion.model = WM_MOTION_CONSTANT_VELOCITY;
+  put_on_map({{2.5, 0.9}, {2.5, -0.9}, {0.7, 0.9}, {-2.5, -0.9}}, 0);
+  start_at({-3, -4, NAN}, 0.1, NAN);
+  truth.heading_rad = 0.2;
+  begin();
+  double sum_m2 = 0.0;
+  int steps = 0;
+  for (double t = 0.0; t < 120.0; t += 0.1, steps++) {
+    go_on(t < 50.0 ? 1.0 : t < 60.0 ? 0.0 : 0.8, t > 55.0 && t < 60.0 ? 0.6 : 0.0, 0.1);
+    for (int a = 0; a < 4; a++)
+      feed(make::sighting(now_s, a, NAN,
+                          view_of(kAnchors_m[a][0], kAnchors_m[a][1], truth).range_m + kOwn_m[a] + gauss(0.05)));
+    sum_m2 += wm::square(off_from(truth));
+    TEST_ASSERT_EQUAL(WM_STATE_TRACKING, published_state());
+  }
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.6, std::sqrt(sum_m2 / steps));
+}
