@@ -141,6 +141,39 @@ def versions(folder):
     check(not (site / "versions" / first).exists() and current(site) == second, "an older one is collected")
 
 
+def carried(folder):
+    """A robot's copy, which has versions alone, gets one from a stick; it is checked, and becomes current by --use."""
+    stick, copy = folder / "stick", folder / "carried"
+    shutil.copytree(folder / "office", stick)
+    copy.mkdir()
+    first = current(stick)
+    with open(stick / "first/landmarks.csv", "a") as rows:
+        rows.write("13,5,5,1,0.01,0\n")
+    run("waymark-map", "version", stick)
+    second = current(stick)
+    run("waymark-map", "version", copy, "--add", stick / "versions" / first)
+    check(not (copy / "versions/current").exists(), "an added version is not current")
+    run("waymark-map", "version", copy, "--use", first[:5])
+    check(current(copy) == first and f"* version {first}" in listed(copy), "until it is used; the copy has no files of its own")
+    run("waymark-map", "version", copy, "--add", f"{stick}/versions/{second}/")
+    check(current(copy) == first and f"  version {second}" in listed(copy), "the second one is there beside it")
+    inode = lambda version, file: (copy / "versions" / version / file).stat().st_ino
+    check(inode(first, "first/edges.png") == inode(second, "first/edges.png"), "and shares what did not change")
+    check("already" in run("waymark-map", "version", copy, "--add", stick / "versions" / second, expect=(1,)), "twice is refused")
+    check("is the one that robots take" in run("waymark-map", "version", copy, "--remove", first, expect=(1,)), "the current one is not removed")
+    run("waymark-map", "version", copy, "--remove", second)
+    check([p.name for p in sorted((copy / "versions").iterdir())] == sorted([first, "current"]), "another one is")
+    with open(stick / "versions" / second / "site.yaml", "a") as file:
+        file.write("\n")
+    check("its hash is not the version's" in run("waymark-map", "version", copy, "--add", stick / "versions" / second, expect=(1,)), "a damaged one is refused")
+    check([p.name for p in sorted((copy / "versions").iterdir())] == sorted([first, "current"]), "and nothing of it is left")
+    check("is no version's folder" in run("waymark-map", "version", copy, "--add", stick / "first", expect=(2,)), "another folder is named")
+    unusable = folder / "unusable/versions"
+    shutil.copytree(stick / "versions" / first, unusable / first)
+    (unusable / first / "ground/edges.png").unlink()
+    check("edges.png" in run("waymark-map", "version", copy, "--add", unusable / first, expect=(2,)), "one that lacks a file, too")
+
+
 def robot(folder):
     drive, site = folder / "drive", folder / "building"
     run("waymark-simulate", WORLD, "--seed", 1, "--no-video", "--out", drive)
@@ -305,6 +338,7 @@ def main(count):
         make_site(folder / "office")
         mistakes(folder)
         versions(folder)
+        carried(folder)
         robot(folder)
         origins(folder)
         reload(folder)

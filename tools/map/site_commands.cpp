@@ -3,12 +3,15 @@
 
 #include <cstdio>
 #include <cstdlib>
+#include <filesystem>
 
 #include "common/failure.h"
 #include "map/site.h"
 #include "map/versions.h"
 
 namespace wm::tools {
+
+namespace fs = std::filesystem;
 
 int check_site_command(const std::string &site) {
   const SiteReport report = check_site(site);
@@ -31,6 +34,16 @@ void parse_version(cli::App &app, VersionArguments &a) {
       ->check(cli::range(1, 100000))
       ->excludes("--use")
       ->excludes("--list");
+  app.add_option("--add", a.add,
+                 "takes a version from another copy of the building: its folder; robots go on with the one before")
+      ->excludes("--list")
+      ->excludes("--use")
+      ->excludes("--keep");
+  app.add_option("--remove", a.remove, "removes a version that robots don't take: its name, or how that begins")
+      ->excludes("--list")
+      ->excludes("--use")
+      ->excludes("--keep")
+      ->excludes("--add");
   (void)list;
   use->excludes("--list");
   app.footer(
@@ -38,6 +51,7 @@ void parse_version(cli::App &app, VersionArguments &a) {
       "  waymark map version office --author Jane --note 'lift B added'\n"
       "  waymark map version office --list\n"
       "  waymark map version office --use 1f3a\n"
+      "  waymark map version office --add /media/stick/office/versions/118f93d443b3ade5\n"
       "A version's name is the hash of its files; an older one stays until --keep removes it. A kill or a power cut\n"
       "leaves the version before or the new one. More: docs/building.md.\n"
       "Exit code: 0 done, 1 something is wrong with the maps, 2 usage.");
@@ -69,10 +83,18 @@ std::string user() {
 }  // namespace
 
 int version_command(const VersionArguments &a) {
-  (void)read_floors(a.site);  // a site?
+  if (!fs::is_directory(fs::path(a.site) / "versions") && a.add.empty()) (void)read_floors(a.site);  // a site?
   if (a.list) return list(a.site);
   if (!a.use.empty()) {
     std::printf("%s: version %s is current\n", a.site.c_str(), use_version(a.site, a.use).c_str());
+    return kDone;
+  }
+  if (!a.add.empty()) {
+    std::printf("%s: version %s is there\n", a.site.c_str(), add_version(a.site, a.add).c_str());
+    return kDone;
+  }
+  if (!a.remove.empty()) {
+    std::printf("%s: version %s removed\n", a.site.c_str(), remove_version(a.site, a.remove).c_str());
     return kDone;
   }
   if (a.keep > 0) {

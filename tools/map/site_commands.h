@@ -12,7 +12,7 @@ namespace wm::tools {
 int check_site_command(const std::string &site);
 
 struct VersionArguments {
-  std::string site, author, note, use;
+  std::string site, author, note, use, add, remove;
   bool list = false;
   int keep = 0;  // 0: nothing is removed
 };

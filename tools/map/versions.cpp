@@ -25,6 +25,7 @@ namespace wm::tools {
 namespace {
 
 namespace fs = std::filesystem;
+constexpr char kRecord[] = "version.yaml";
 constexpr char kStaged[] = ".new", kGone[] = ".gone";  // folders in versions/ that a killed program may leave
 // A file there: the new version's name, and the changed files with their hashes before. It is there from before the
 // version is current until the site's own files have its changes.
@@ -121,6 +122,14 @@ Draft draft_of(const fs::path &site) {
   return out;
 }
 
+// A robot's copy may have versions alone.
+bool has_files(const fs::path &site) {
+  wm_floors *floors = nullptr;
+  const bool has = wm_floors_read(site.c_str(), &floors, nullptr) != WM_NOT_FOUND;
+  std::free(floors);
+  return has;
+}
+
 std::string utc_now() {
   char out[24];
   timespec now{};
@@ -163,8 +172,10 @@ void set_current(const fs::path &site, const std::string &name) {
   write_through(site / "versions/current", name + "\n");
 }
 
-// Into the staged folder: by a link where the base has the same file, else a copy. True where it is shared.
-bool stage(const fs::path &site, const wm_map_version_file &file, const wm_map_version &base, const fs::path &staged) {
+// A file of the folder `from` into the staged one: by a link where the base, a version of the site, has the same file,
+// else a copy. True where it is shared.
+bool stage(const fs::path &from, const wm_map_version_file &file, const fs::path &site, const wm_map_version &base,
+           const fs::path &staged) {
   const fs::path to = staged / file.path;
   fs::create_directories(to.parent_path());
   const bool is_there = std::any_of(base.files, base.files + base.file_count, [&](const wm_map_version_file &other) {
@@ -173,9 +184,9 @@ bool stage(const fs::path &site, const wm_map_version_file &file, const wm_map_v
   std::error_code no_link;
   if (is_there) fs::create_hard_link(site / "versions" / base.name / file.path, to, no_link);
   if (is_there && !no_link) return true;
-  fs::copy_file(site / file.path, to);
+  fs::copy_file(from / file.path, to);
   if (hash_of(to) != file.hash)
-    throw Failure((site / file.path).string() + ": was changed while the version was made; make it again");
+    throw Failure((from / file.path).string() + ": was changed while the version was made; make it again");
   sync(to);
   return false;
 }
@@ -184,6 +195,22 @@ void sync_folders(const fs::path &staged) {
   for (const auto &entry : fs::recursive_directory_iterator(staged))
     if (entry.is_directory()) sync(entry.path());
   sync(staged);
+}
+
+// A staged folder becomes a version.
+void put_in_place(const fs::path &site, const fs::path &staged, const std::string &name) {
+  const fs::path version = site / "versions" / name;
+  sync_folders(staged);
+  if (const int problem = rename_through(staged.c_str(), version.c_str()); problem != 0)
+    throw Failure(version.string() + ": can't be written: " + std::strerror(problem));
+  sync(site);
+}
+
+// Never half of it is there under its name.
+void remove_one(const fs::path &site, const std::string &name) {
+  const fs::path gone = site / "versions" / (kGone + name);
+  fs::rename(site / "versions" / name, gone);
+  fs::remove_all(gone);
 }
 
 // Begins with `begin`.
@@ -195,6 +222,16 @@ std::vector<std::string> names_of(const fs::path &site, const std::string &begin
       if (name.rfind(begin, 0) == 0) out.push_back(name);
   std::sort(out.begin(), out.end());
   return out;
+}
+
+// The one that begins so.
+std::string one_name_of(const fs::path &site, const std::string &begin) {
+  const std::vector<std::string> found = names_of(site, begin);
+  if (found.empty())
+    throw Failure(site.string() + ": has no version " + begin + "; `waymark map version " + site.string() + " --list`",
+                  kUsage);
+  if (found.size() > 1) throw Failure(begin + ": " + std::to_string(found.size()) + " versions begin so", kUsage);
+  return found.front();
 }
 
 void need_sound(const fs::path &site, const std::string &name, Record *out) {
@@ -221,7 +258,7 @@ size_t stage_all(const fs::path &site, const Draft &draft, const FileChanges &ch
   size_t shared = 0;
   fs::create_directory(staged);
   for (const wm_map_version_file &file : draft.files)
-    if (changes.count(file.path) == 0) shared += stage(site, file, base, staged) ? 1 : 0;
+    if (changes.count(file.path) == 0) shared += stage(site, file, site, base, staged) ? 1 : 0;
   for (const auto &[path, bytes] : changes) {
     if (!bytes) continue;
     fs::create_directories((staged / path).parent_path());
@@ -295,7 +332,7 @@ std::string version_line(const VersionListed &v) {
 
 std::string draft_against_current(const fs::path &site) {
   const std::string current = current_of(site);
-  if (current.empty() || draft_of(site).name == current) return "";
+  if (current.empty() || !has_files(site) || draft_of(site).name == current) return "";
   return site.string() + ": its files differ from the current version, which robots take; `waymark map version " +
          site.string() + "` makes a version of them";
 }
@@ -330,11 +367,8 @@ MadeVersion make_version(const fs::path &site, const VersionWish &wish) {
     out.files = draft.files.size();
     out.is_new = !fs::exists(versions / draft.name);
     if (out.is_new) {
-      write_through(staged / "version.yaml", record_text(draft, base.name, wish.author, wish.note));
-      sync_folders(staged);
-      if (const int problem = rename_through(staged.c_str(), (versions / draft.name).c_str()); problem != 0)
-        throw Failure((versions / draft.name).string() + ": can't be written: " + std::strerror(problem));
-      sync(site);
+      write_through(staged / kRecord, record_text(draft, base.name, wish.author, wish.note));
+      put_in_place(site, staged, draft.name);
     } else {
       Record again;
       need_sound(site, draft.name, &again);
@@ -351,16 +385,49 @@ MadeVersion make_version(const fs::path &site, const VersionWish &wish) {
 }
 
 std::string use_version(const fs::path &site, const std::string &begin) {
-  const std::vector<std::string> found = names_of(site, begin);
-  if (found.empty())
-    throw Failure(site.string() + ": has no version " + begin + "; `waymark map version " + site.string() + " --list`",
-                  kUsage);
-  if (found.size() > 1) throw Failure(begin + ": " + std::to_string(found.size()) + " versions begin so", kUsage);
+  const std::string name = one_name_of(site, begin);
   const Lock lock(site);
   Record record;
-  need_sound(site, found.front(), &record);
-  set_current(site, found.front());
-  return found.front();
+  need_sound(site, name, &record);
+  set_current(site, name);
+  return name;
+}
+
+std::string add_version(const fs::path &site, const fs::path &version) {
+  const fs::path from = fs::absolute(version / ".").lexically_normal().parent_path(), versions = site / "versions";
+  const std::string name = from.filename();
+  if (from.parent_path().filename() != "versions")
+    throw Failure(version.string() + ": is no version's folder; .../versions/NAME is needed", kUsage);
+  Record record, base;
+  need_sound(from.parent_path().parent_path(), name, &record);
+  const Lock lock(site);
+  if (fs::exists(versions / name)) throw Failure(site.string() + ": has version " + name + " already");
+  wm_error damage{};  // of the current version: it shares no files then
+  if (const std::string current = current_of(site);
+      !current.empty() && wm_map_version_read(site.c_str(), current.c_str(), &base, &damage) != WM_OK)
+    base.file_count = 0;
+  const fs::path staged = versions / kStaged;
+  try {
+    fs::create_directory(staged);
+    for (size_t i = 0; i < record.file_count; i++) (void)stage(from, record.files[i], site, base, staged);
+    fs::copy_file(from / kRecord, staged / kRecord);
+    sync(staged / kRecord);
+    need_good(from, staged);
+    put_in_place(site, staged, name);
+  } catch (...) {
+    Lock::clean(site);
+    throw;
+  }
+  return name;
+}
+
+std::string remove_version(const fs::path &site, const std::string &begin) {
+  const std::string name = one_name_of(site, begin);
+  const Lock lock(site);
+  if (name == current_of(site))
+    throw Failure(site.string() + ": version " + name + " is the one that robots take; take another one first (--use)");
+  remove_one(site, name);
+  return name;
 }
 
 std::vector<std::string> collect_versions(const fs::path &site, size_t keep) {
@@ -369,9 +436,7 @@ std::vector<std::string> collect_versions(const fs::path &site, size_t keep) {
   std::vector<std::string> out;
   for (size_t i = 0; i + keep < all.size(); i++) {
     if (all[i].is_current) continue;
-    const fs::path gone = site / "versions" / (kGone + all[i].name);
-    fs::rename(site / "versions" / all[i].name, gone);
-    fs::remove_all(gone);
+    remove_one(site, all[i].name);
     out.push_back(all[i].name);
   }
   return out;

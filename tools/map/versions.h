@@ -52,6 +52,11 @@ MadeVersion make_version(const std::filesystem::path &site, const VersionWish &w
 void finish_version(const std::filesystem::path &site);
 // Takes the version whose name begins so for current. Throws Failure where there is none, several, or it is damaged.
 std::string use_version(const std::filesystem::path &site, const std::string &begin);
+// Takes a version from another copy of the building, whose folder is `version` (.../versions/NAME), whole or not at
+// all; it does not become current. Returns its name. Throws Failure where it is damaged, or there already.
+std::string add_version(const std::filesystem::path &site, const std::filesystem::path &version);
+// Removes the version whose name begins so. Throws Failure where there is none, several, or it is current.
+std::string remove_version(const std::filesystem::path &site, const std::string &begin);
 // Removes all but the newest `keep` versions and the current one; returns their names.
 std::vector<std::string> collect_versions(const std::filesystem::path &site, size_t keep);
 
