@@ -59,6 +59,8 @@ static const struct {
     {"ros2", "give a run's poses to ROS 2, and its data to the run", "waymark-ros2"},
     {"simulate", "make a recording of a drive with known truth", "waymark-sim"},
     {"suggest", "find noises and priors that fit a run better", "waymark, of Python (pip)"},
+    {"vda5050", "give a run's position to a fleet manager (VDA 5050, MQTT), and take maps from it",
+     "waymark, of Python (pip)"},
     {"web", "show a run as it goes, as a page for a browser", "waymark"},
 };
 #define DESK (sizeof kDesk / sizeof kDesk[0])

@@ -34,6 +34,8 @@ from waymark.causes import changes, fault
 from waymark.mcapio import estimates, place, streams
 from waymark.suggest import command as suggest_command
 from waymark.suggest import drive, parameters, search
+from waymark.vda5050 import command as vda5050_command
+from waymark.vda5050 import run as vda5050_run
 
 nans.REFUSALS = (HilError, plan.PlanError, BadMessage)
 MESSAGES = ros.Messages()
@@ -173,6 +175,8 @@ CASES = {
     "mavlink: --rate": (option(mavlink._parser(), "--link=udpout:a:1", "--rate"), [25.0]),
     "mavlink: --duration": (option(mavlink._parser(), "--link=udpout:a:1", "--duration"), [25.0]),
     "mavlink: --zero": (lambda x: option(mavlink._parser(), "--link=udpout:a:1", "--zero")(f"{x},1"), [25.0]),
+    "vda5050: --rate": (option(vda5050_command._parser(), "--broker=mqtt://a", "--manufacturer=A", "--serial=1", "--site=.", "--rate"), [25.0]),
+    "vda5050.run.heading_of": (lambda *xyzw: vda5050_run.heading_of(xyzw), [0.0, 0.0, 0.6, 0.8]),
     "bag.clocks.seconds": (clocks.seconds, [2e9]),
     "bag.frames.mounting": (frames.mounting, [POSE[:3]]),
     "bag.frames.camera_pose": (lambda matrix: frames.camera_pose("eye", matrix), [POSE]),
@@ -268,10 +272,11 @@ WITHOUT = {
                                  "recording.jpeg_of recording.RecordingWriter.restamp",
         "NaN is absent: windows, updates and samples without a number are left out": "bag.clocks.goes_on bag.stuck.repeats bag.stuck.limit bag.compare.held bag.compare.Likeness.differs bag.compare.likeness "
                                  "bag.compare.turns bag.compare.moves bag.course.off_world bag.collection.Collection.sample causes.trial.likelihoods causes.trial.judged causes.plan.judged mcapio.estimates.bounds "
-                                 "mcapio.estimates.hypotheses mcapio.place.landmarks",
+                                 "mcapio.estimates.hypotheses mcapio.place.landmarks vda5050.run.quality",
         "of calibrations and transforms, which are refused where one is NaN": "bag.frames.is_optical",
         "corners, whose reader refuses NaN": "bag.tags.of_another_picture",
         "poses, of which those of NaN are left out before": "bag.course.contradiction",
+        "bounds of options, written in their parsers": "numbers.between",
         "written by the table of mistakes": "causes.fault.discrete",
         "limits of time, whose options are read by numbers.finite": "avi.AviWriter.__init__ causes.search.Search.__init__ causes.search.Search.part_s causes.trial.Blocks.part "
                                  "causes.trial.Trials.run foxglove_server.serve live.Live.next mavlink.Bridge.run pool.Pool.run suggest.search.Search.__init__",

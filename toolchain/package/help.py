@@ -55,7 +55,7 @@ class Help:
                 if part is self.usage or is_table():
                     part = self.about
                 part.append(line.strip())
-        self.commands = [term for term, _ in self.options if re.fullmatch(r"[a-z]+", term) and term not in TOOLS]
+        self.commands = [term for term, _ in self.options if re.fullmatch(r"[a-z0-9]+", term) and term not in TOOLS + OPTIONAL]
 
     def flags(self):
         """(name, value's name or None, text) of each option."""

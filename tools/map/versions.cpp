@@ -385,7 +385,7 @@ MadeVersion make_version(const fs::path &site, const VersionWish &wish) {
 }
 
 std::string use_version(const fs::path &site, const std::string &begin) {
-  const std::string name = one_name_of(site, begin);
+  std::string name = one_name_of(site, begin);
   const Lock lock(site);
   Record record;
   need_sound(site, name, &record);
@@ -395,7 +395,7 @@ std::string use_version(const fs::path &site, const std::string &begin) {
 
 std::string add_version(const fs::path &site, const fs::path &version) {
   const fs::path from = fs::absolute(version / ".").lexically_normal().parent_path(), versions = site / "versions";
-  const std::string name = from.filename();
+  std::string name = from.filename();
   if (from.parent_path().filename() != "versions")
     throw Failure(version.string() + ": is no version's folder; .../versions/NAME is needed", kUsage);
   Record record, base;
@@ -422,7 +422,7 @@ std::string add_version(const fs::path &site, const fs::path &version) {
 }
 
 std::string remove_version(const fs::path &site, const std::string &begin) {
-  const std::string name = one_name_of(site, begin);
+  std::string name = one_name_of(site, begin);
   const Lock lock(site);
   if (name == current_of(site))
     throw Failure(site.string() + ": version " + name + " is the one that robots take; take another one first (--use)");

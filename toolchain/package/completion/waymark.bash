@@ -4,7 +4,7 @@ _waymark() {
   local word=${COMP_WORDS[COMP_CWORD]} command=${COMP_WORDS[1]:-} words= more=
   COMPREPLY=()
   if [ "$COMP_CWORD" -eq 1 ]; then
-    mapfile -t COMPREPLY < <(compgen -W 'run replay record watch check doctor stamps config causes export mavlink suggest batch bench calibrate compare detect diff eval hil import init map mine play reference report simulate web --help --version' -- "$word")
+    mapfile -t COMPREPLY < <(compgen -W 'run replay record watch check doctor stamps config causes export mavlink suggest vda5050 batch bench calibrate compare detect diff eval hil import init map mine play reference report simulate web --help --version' -- "$word")
     return
   fi
   case $command in
@@ -16,7 +16,7 @@ _waymark() {
     "calibrate mounting") words='--help --config --run --camera --map' ;;
     "calibrate camera") words='--help --camera --chessboard --aprilgrid --charuco --dictionary --square --second --second-name --floor --tag --gap --model --every --most --name --picture --out' ;;
     "map merge") words='--help --out --site --surveyed --one-frame --by-place --author --note --json' ;;
-    "map version") words='--help --author --note --list --use --keep' ;;
+    "map version") words='--help --author --note --list --use --keep --add --remove' ;;
     "map make") words='--help --resolution --origin --inside --walls-below --negate --fine --speck --clearance --out' ;;
     "map check") words='--help --recording --draw' ;;
     "map survey") words='--help --poses --out --json' ;;
@@ -37,6 +37,7 @@ _waymark() {
     "export") words='--help --mcap --recording --pictures --can --force' ;;
     "mavlink") words='--help --link --as --frame --north --zero --origin --rate --take --system --component --url --prefix --duration' ;;
     "suggest") words='--help --out --against --only --from --to --minutes --json' ;;
+    "vda5050") words='--help --broker --manufacturer --serial --site --commands --rate --state-every --interface --password-file --ca --factsheet --max-mb --url --prefix --duration' ;;
     "batch") words='--help --out --jobs --part --list' ;;
     "bench") words='--help --board --table --out --minutes --name' ;;
     "calibrate") words='--help --name --model --size --lens --out --config --run --camera --map --chessboard --aprilgrid --charuco --dictionary --square --second --second-name --floor --tag --gap --every --most --picture' ;;
@@ -47,7 +48,7 @@ _waymark() {
     "hil") words='--help --config --guest --host --local --out --faults --limits --from --until --can --ssh --record --program --package --mips --played --compare --json' ;;
     "import") words='--help --out --camera --stamps --begin-ns --quality' ;;
     "init") words='--help --motion --dbc --can-log --can --imu --gnss --sender-clock --wheel-radius --ticks --track --wheelbase --steering-ratio --tag-size --sees --camera --calibration --sensor --urdf --frame --mounting --tag-layout --tag-family --landmarks --map --stream --yes --force' ;;
-    "map") words='--help --out --site --surveyed --one-frame --by-place --author --note --json --list --use --keep --resolution --origin --inside --walls-below --negate --fine --speck --clearance --recording --draw --poses --id --picture --at --sigma --size --yaw --from --corners --calibration --camera --pose --sigma-deg --mounting-deg --family --ids --paper' ;;
+    "map") words='--help --out --site --surveyed --one-frame --by-place --author --note --json --list --use --keep --add --remove --resolution --origin --inside --walls-below --negate --fine --speck --clearance --recording --draw --poses --id --picture --at --sigma --size --yaw --from --corners --calibration --camera --pose --sigma-deg --mounting-deg --family --ids --paper' ;;
     "mine") words='--help --out --within --all --jobs --json' ;;
     "play") words='--config --can --camera --lcm --channel-prefix --speed --loop --from --until --faults --start-at --json --print-faults --print-streams --print-kinds' ;;
     "reference") words='--help --map --range --particles --passes --seed' ;;

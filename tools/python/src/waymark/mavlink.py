@@ -19,7 +19,7 @@ import numpy as np
 from .geometry import from_rpy, place_of, quaternion, rotation, to_rpy
 from .lcm_fields import build
 from .live import THIS_COMPUTER, Live
-from .numbers import finite
+from .numbers import between, finite
 from .tables import Array
 
 DOWN = np.diag([1.0, -1.0, -1.0])
@@ -347,16 +347,6 @@ def _numbers(least: int, most: int) -> Any:
     return read
 
 
-def _range(low: float, high: float, number: Any) -> Any:
-    """The type of an option whose number lies there."""
-    def read(text: str) -> Any:
-        value = finite(text)
-        if not low <= value <= high or number(value) != value:
-            raise argparse.ArgumentTypeError(f"{text} is not in range [{low:g} - {high:g}]")
-        return number(value)
-    return read
-
-
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="waymark mavlink", epilog=_EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter,
                                      description="Gives a run's poses to an autopilot (PX4, ArduPilot), and another localizer's poses to the run: "
@@ -372,15 +362,15 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--zero", metavar="X,Y", type=_numbers(2, 2), default=(0.0, 0.0), help="place of the frame's zero in the map, m (default 0,0)")
     parser.add_argument("--origin", metavar="LATITUDE,LONGITUDE,HEIGHT", type=_numbers(3, 3),
                         help="of the frame's zero, degrees and m above the ellipsoid, for --as global")
-    parser.add_argument("--rate", metavar="HZ", type=_range(1, 50, float), default=30.0, help="poses a second at most, 1 to 50 (default 30; PX4 needs 30 to 50)")
-    parser.add_argument("--take", metavar="COMPONENT", type=_range(1, 255, int),
+    parser.add_argument("--rate", metavar="HZ", type=between(1, 50, float), default=30.0, help="poses a second at most, 1 to 50 (default 30; PX4 needs 30 to 50)")
+    parser.add_argument("--take", metavar="COMPONENT", type=between(1, 255, int),
                         help="component whose ODOMETRY or VISION_POSITION_ESTIMATE is sent to the run as localizer (default none)")
-    parser.add_argument("--system", metavar="N", type=_range(1, 255, int), default=1, help="MAVLink's number of the vehicle (default 1)")
-    parser.add_argument("--component", metavar="N", type=_range(1, 255, int), default=197,
+    parser.add_argument("--system", metavar="N", type=between(1, 255, int), default=1, help="MAVLink's number of the vehicle (default 1)")
+    parser.add_argument("--component", metavar="N", type=between(1, 255, int), default=197,
                         help="of this program (default 197, MAV_COMP_ID_VISUAL_INERTIAL_ODOMETRY)")
     parser.add_argument("--url", help="LCM's (default: LCM_DEFAULT_URL, else this computer's)")
     parser.add_argument("--prefix", default="WAYMARK_", help="of LCM's channels (default WAYMARK_)")
-    parser.add_argument("--duration", metavar="S", type=_range(0, 1e9, float), default=0.0, help="seconds, then stop")
+    parser.add_argument("--duration", metavar="S", type=between(0, 1e9, float), default=0.0, help="seconds, then stop")
     return parser
 
 
