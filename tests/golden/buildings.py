@@ -141,6 +141,25 @@ def versions(folder):
     check(not (site / "versions" / first).exists() and current(site) == second, "an older one is collected")
 
 
+def fnv(data):
+    """64-bit FNV-1a, hexadecimal."""
+    out = 0xcbf29ce484222325
+    for byte in data:
+        out = (out ^ byte) * 0x100000001b3 % 2**64
+    return f"{out:016x}"
+
+
+def forge(version, file, old, new):
+    """A version with another content of a file, whose hashes, name and seal fit; its folder."""
+    path, record = version / file, version / "version.yaml"
+    before, text = fnv(path.read_bytes()), record.read_text()
+    path.write_text(path.read_text().replace(old, new, 1))
+    text = text[:text.index("# seal")].replace(before, fnv(path.read_bytes()))
+    record.write_text(f"{text}# seal {fnv(text.encode())}\n")
+    files = [line.strip().replace('"', "").split(": ") for line in text.split("files:\n")[1].splitlines()]
+    return version.rename(version.parent / fnv(b"".join(f"{name}\0{digits}\0".encode() for name, digits in files)))
+
+
 def carried(folder):
     """A robot's copy, which has versions alone, gets one from a stick; it is checked, and becomes current by --use."""
     stick, copy = folder / "stick", folder / "carried"
@@ -163,9 +182,14 @@ def carried(folder):
     check("is the one that robots take" in run("waymark-map", "version", copy, "--remove", first, expect=(1,)), "the current one is not removed")
     run("waymark-map", "version", copy, "--remove", second)
     check([p.name for p in sorted((copy / "versions").iterdir())] == sorted([first, "current"]), "another one is")
+    shutil.copytree(stick / "versions" / first, folder / "forged/versions" / first)
+    forged = forge(folder / "forged/versions" / first, "first/landmarks.csv", "\n11,0.3", "\n11,x")
+    said = run("waymark-map", "version", copy, "--add", forged, expect=(1,))
+    check(f"{forged}/first/landmarks.csv:2: x_m" in said, "a whole one that no robot could use is refused" + ("" if "csv:2" in said else f": {said}"))
+    check([p.name for p in sorted((copy / "versions").iterdir())] == sorted([first, "current"]), "and nothing of it is left")
     with open(stick / "versions" / second / "site.yaml", "a") as file:
         file.write("\n")
-    check("its hash is not the version's" in run("waymark-map", "version", copy, "--add", stick / "versions" / second, expect=(1,)), "a damaged one is refused")
+    check("its hash is not the version's" in run("waymark-map", "version", copy, "--add", stick / "versions" / second, expect=(1,)), "a damaged one, too")
     check([p.name for p in sorted((copy / "versions").iterdir())] == sorted([first, "current"]), "and nothing of it is left")
     check("is no version's folder" in run("waymark-map", "version", copy, "--add", stick / "first", expect=(2,)), "another folder is named")
     unusable = folder / "unusable/versions"

@@ -26,7 +26,7 @@ USES = [
     ("native", "`libwaymark.so` in Python", ("cffi", "numpy"), "python_native python_estimators"),
     ("types", "types of the Python package", ("mypy", "types-cffi", "types-pyyaml"), "python_types"),
     ("mavlink", "`waymark mavlink`", ("pymavlink", "pyserial", "lcm"), "python_mavlink"),
-    ("vda5050", "`waymark vda5050`", ("paho-mqtt", "lcm", "jsonschema"), "python_vda5050"),
+    ("vda5050", "`waymark vda5050`", ("paho-mqtt", "lcm", "jsonschema"), "python_vda5050 python_vda5050_parts"),
     ("ros2", "a listener of `waymark ros2`", ("cyclonedds", "rosbags"), "run_ros2"),
     ("can", "judges of DBC files and logs", ("cantools", "python-can"), "can_judge"),
     ("wheel", "the wheel of the Python package", ("hatchling",), "python_wheel_installed"),

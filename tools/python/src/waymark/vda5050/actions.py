@@ -24,7 +24,7 @@ class Action:
     def entry(self) -> dict[str, str]:
         """As `actionStates` has it."""
         out = {"actionId": self.wish.action_id, "actionType": self.wish.kind, "actionStatus": self.status}
-        return out | ({"resultDescription": self.result} if self.status in ("FINISHED", "FAILED") else {})
+        return out | ({"resultDescription": self.error().entry()["errorDescription"]} if self.status in ("FINISHED", "FAILED") else {})
 
     def error(self) -> Error:
         """As `errors` has a failed one."""
@@ -43,9 +43,11 @@ class Actions:
         self._actions: dict[str, Action] = {}
 
     def take(self, wish: Wish) -> bool:
-        """A new action; False where its actionId is known: it came twice."""
+        """A new action; False where its actionId is known: it came twice. Refused where too many wait."""
         if wish.action_id in self._actions:
             return False
+        if len(self._of("WAITING")) >= _KEPT:
+            raise Refused(f"instantActions: {wish.kind} '{wish.action_id}' is not taken: {_KEPT} actions wait")
         self._actions[wish.action_id] = Action(wish)
         return True
 

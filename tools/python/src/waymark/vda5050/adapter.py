@@ -3,7 +3,6 @@
 
 import json
 import select
-import sys
 import time
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
@@ -12,7 +11,7 @@ from ..live import Live
 from .actions import Action, Actions
 from .broker import Broker, Heard
 from .maps import Building
-from .protocol import Error, Heads, Refused, refusal_of_order, wishes_of
+from .protocol import Error, Heads, Refused, refusal_of_order, tell, wishes_of
 from .run import Place, Run
 
 TAKEN = ("order", "instantActions")
@@ -84,12 +83,12 @@ class Adapter:
                 self._wish(message)
         except Refused as error:
             self._mistakes[topic] = Error("validationError", "WARNING", str(error), references=(("topic", topic),))
-            print(f"waymark vda5050: refused: {error}", file=sys.stderr, flush=True)
+            tell(f"refused: {error}")
 
     def _wish(self, message: Mapping[str, Any]) -> None:
         for wish in wishes_of(message):
             if not self._actions.take(wish):
-                print(f"waymark vda5050: {wish.kind} '{wish.action_id}' came twice and is done once", file=sys.stderr, flush=True)
+                tell(f"{wish.kind} '{wish.action_id}' came twice and is done once")
         self._publish_state()  # WAITING
 
     def _ended(self, action: Action) -> None:
@@ -97,7 +96,7 @@ class Adapter:
         self._mistakes.pop(kind, None)
         if action.status == "FAILED":
             self._mistakes[kind] = action.error()
-        print(f"waymark vda5050: {kind} '{action.wish.action_id}': {action.status}: {action.result}", file=sys.stderr, flush=True)
+        tell(f"{kind} '{action.wish.action_id}': {action.status}: {action.result}")
         self._look()
         self._publish_state()
 

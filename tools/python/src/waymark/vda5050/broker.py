@@ -4,11 +4,12 @@
 import contextlib
 import importlib
 import queue
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 from urllib.parse import SplitResult
+
+from .protocol import tell
 
 KEEPALIVE_S = 15  # the standard's heartbeat
 _AGAIN_S = (1, 15)  # a lost broker is tried again after so long at first, and at most
@@ -57,7 +58,7 @@ class Broker:
         """Each state of the connection once."""
         if line != self._told:
             self._told = line
-            print(f"waymark vda5050: {line}", file=sys.stderr, flush=True)
+            tell(line)
 
     def _put(self, heard: Heard) -> None:
         try:

@@ -3,6 +3,7 @@
 
 import datetime
 import json
+import sys
 from collections import Counter
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -10,12 +11,19 @@ from typing import Any, NamedTuple
 VERSION = "2.1.0"
 MAJOR = VERSION.split(".", maxsplit=1)[0]
 _BYTES_MAX = 1 << 20  # of a message that is taken; an order of a thousand nodes has half of it
+_TEXT_MAX = 500  # characters of a reason, which may repeat what came
+_IDENTITY_MAX = 200  # of an actionId; a UUID has 36
 _NUMBER_MAX = 1e8  # m: the coordinates that a site may have (site.yaml)
 _DOES_NOT_DRIVE = "Waymark states where the robot is; it does not drive. Orders belong to the program that drives the robot"
 
 
 class Refused(Exception):
     """Why something is not done, in plain words."""
+
+
+def tell(line: str) -> None:
+    """A line of the log, without control characters of what came."""
+    print("waymark vda5050: " + "".join(c if c.isprintable() else "?" for c in line[:_TEXT_MAX]), file=sys.stderr, flush=True)
 
 
 class Parameter(NamedTuple):
@@ -52,11 +60,11 @@ class Error(NamedTuple):
 
     def entry(self) -> dict[str, Any]:
         """As the state has it."""
-        out: dict[str, Any] = {"errorType": self.kind, "errorLevel": self.level, "errorDescription": self.text}
+        out: dict[str, Any] = {"errorType": self.kind, "errorLevel": self.level, "errorDescription": self.text[:_TEXT_MAX]}
         if self.hint:
             out["errorHint"] = self.hint
         if self.references:
-            out["errorReferences"] = [{"referenceKey": key, "referenceValue": value} for key, value in self.references]
+            out["errorReferences"] = [{"referenceKey": key, "referenceValue": value[:_IDENTITY_MAX]} for key, value in self.references]
         return out
 
 
@@ -127,6 +135,8 @@ def wishes_of(message: Mapping[str, Any]) -> list[Wish]:
     for i, action in enumerate(need(message, "actions", list, "instantActions")):
         where = f"instantActions: actions[{i}]"
         names = [need(action, key, str, where) for key in ("actionId", "actionType", "blockingType")]
+        if not 0 < len(names[0]) <= _IDENTITY_MAX:
+            raise Refused(f"{where}: actionId: has {len(names[0])} characters; 1 to {_IDENTITY_MAX} are needed")
         if names[2] not in ("NONE", "SOFT", "HARD"):
             raise Refused(f"{where}: blockingType: '{names[2]}'; NONE, SOFT or HARD is needed")
         parameters = need({"actionParameters": [], **action}, "actionParameters", list, where)

@@ -49,7 +49,7 @@ class Run:
         """A message of the run."""
         self._newest[message.kind] = message
         data = message.data
-        if message.kind == "POSE" and max(map(abs, data.velocity_mps)) > _MOVES_MPS or message.kind == "POSE" and abs(data.rate_radps[2]) > _MOVES_RADPS:
+        if message.kind == "POSE" and (max(map(abs, data.velocity_mps)) > _MOVES_MPS or abs(data.rate_radps[2]) > _MOVES_RADPS):
             self._moved_s = time.monotonic()
         if message.kind == "REFUSED" and self._refused.get(text(data.source), (0,))[0] < data.count:
             self._refused[text(data.source)] = (data.count, text(data.reason), time.monotonic())
@@ -72,22 +72,20 @@ class Run:
 
     def position(self, floors: list[str]) -> dict[str, Any]:
         """agvPosition and velocity. Without a pose yet, zeros that are not initialized, as the standard leaves no other way."""
-        place = {"x": 0.0, "y": 0.0, "theta": 0.0, "mapId": self.floor(floors), "positionInitialized": False, "localizationScore": 0.0}
+        place = {"x": 0.0, "y": 0.0, "theta": 0.0, "mapId": self.floor(floors), "positionInitialized": False}
+        unknown = {"agvPosition": place | {"localizationScore": 0.0}}
         if "POSE" not in self._newest:
-            return {"agvPosition": place}
-        pose, is_fresh = self._newest["POSE"].data, self._fresh("POSE") is not None
-        x, y, _ = pose.position_m
-        theta = heading_of(pose.orientation_xyzw)
-        if not all(map(math.isfinite, (x, y, theta))):
-            return {"agvPosition": place}
-        is_there = is_fresh and pose.state not in (pose.STATE_SEARCHING, pose.STATE_LOST)
-        place |= {"x": x, "y": y, "theta": theta, "positionInitialized": is_there}
-        if is_there:
-            place |= quality(pose.lost_probability, self._newest["POSE_BOUND"].data.horizontal_m if "POSE_BOUND" in self._newest else math.inf)
-        speeds = (*pose.velocity_mps[:2], pose.rate_radps[2])
-        if not is_fresh or not all(map(math.isfinite, speeds)):
-            return {"agvPosition": place}
-        return {"agvPosition": place, "velocity": dict(zip(("vx", "vy", "omega"), speeds, strict=True))}
+            return unknown
+        pose, bound, is_fresh = self._newest["POSE"].data, self._fresh("POSE_BOUND"), self._fresh("POSE") is not None
+        numbers = (*pose.position_m[:2], heading_of(pose.orientation_xyzw), *pose.velocity_mps[:2], pose.rate_radps[2])
+        if not all(map(math.isfinite, numbers)):
+            return unknown
+        place |= dict(zip(("x", "y", "theta"), numbers, strict=False))
+        if not is_fresh or pose.state in (pose.STATE_SEARCHING, pose.STATE_LOST):
+            return {"agvPosition": place | {"localizationScore": 0.0}}
+        place["positionInitialized"] = True
+        place |= quality(pose.lost_probability, bound.horizontal_m if bound else math.inf)
+        return {"agvPosition": place, "velocity": dict(zip(("vx", "vy", "omega"), numbers[3:], strict=True))}
 
     def errors(self) -> list[Error]:
         """What is in doubt, and why."""
