@@ -491,12 +491,13 @@ class Whole(unittest.TestCase):
             self.assertIn(now, (current, new))
             self.assertNotIn("wrong", map_program("version", self.site, "--list"))
             if number:
+                needs_s *= 0.9 if now == new else 1.05  # the computer's load changes
                 outcomes["enabled" if now == new else "stored" if (self.site / "versions" / new).is_dir() else "before"] += 1
             if now != new:
                 map_program("version", self.site, "--keep", "1")
             current = now
-        print(f"killed {KILLS} times within {1.1 * needs_s:.2f} s: {outcomes}")
-        self.assertGreater(outcomes["before"], KILLS // 5)
+        print(f"killed {KILLS} times, at last within {1.1 * needs_s:.2f} s: {outcomes}")
+        self.assertGreater(outcomes["before"] + outcomes["stored"], KILLS // 5)
         self.fleet.messages.clear()
         self.start(runs=False)
         Server.files["new"] = self.desk.archive(new)
@@ -523,6 +524,8 @@ class Errors(unittest.TestCase):
             self.fails(2, "31 is not in range [0.2 - 30]", *good, "--state-every", "31")
             self.fails(2, "'nan' is not a finite number", *good, "--rate", "nan")
             self.fails(1, "/nowhere: is no folder", *good, "--site", "/nowhere")
+            self.fails(1, "/nowhere.pem", *good, "--ca", "/nowhere.pem", "--broker", "mqtts://localhost:9")
+            self.fails(1, "/nowhere.key", *good, "--password-file", "/nowhere.key")
             self.fails(1, "/nowhere.json", *good, "--factsheet", "/nowhere.json")
             (pathlib.Path(folder) / "sheet.json").write_text('{"typeSpecification": 5}')
             self.fails(1, "sheet.json: is no factsheet", *good, "--factsheet", f"{folder}/sheet.json")

@@ -40,11 +40,12 @@ class Broker:
         self._client: Any = mqtt.Client(mqtt.CallbackAPIVersion.VERSION2, client_id=client_id, protocol=mqtt.MQTTv311)
         if url.username:
             self._client.username_pw_set(url.username, password)
+        distrust = ", or its certificate is not trusted (--ca)" if url.scheme == "mqtts" else ""
         if url.scheme == "mqtts":
             self._client.tls_set(ca_certs=str(authority) if authority else None)
         self._client.reconnect_delay_set(*_AGAIN_S)
         self._client.on_connect, self._client.on_disconnect = self._connected, self._gone
-        self._client.on_connect_fail = lambda *_: self._tell(f"{self._name} can't be reached")
+        self._client.on_connect_fail = lambda *_: self._tell(f"{self._name} can't be reached{distrust}; it is tried again")
         self._client.on_message = lambda _client, _data, message: self._put(Heard(message.topic, message.payload))
         self._set_will()
         self._client.connect_async(url.hostname, port, KEEPALIVE_S)

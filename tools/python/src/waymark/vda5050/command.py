@@ -84,6 +84,8 @@ def _work(given: argparse.Namespace) -> None:
     if not shutil.which("waymark-map"):
         raise FileNotFoundError("there is no waymark-map in PATH, which keeps the versions of maps; the package waymark-tools has it")
     password = given.password_file.read_text(encoding="utf-8").partition("\n")[0] if given.password_file else ""
+    if given.ca:
+        given.ca.read_bytes()  # TLS does not name a file that is missing
     building, heads, sheet = Building(given.site, given.max_mb << 20), Heads(given.manufacturer, given.serial), _given_sheet(given.factsheet)
     live = Live(given.url, given.prefix, KINDS)
     pace = Pace(given.state_every, 1 / given.rate if given.rate else 0.0)
