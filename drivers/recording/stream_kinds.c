@@ -128,14 +128,21 @@ static const char *fill_sighting(const fill_context *self, const csv_row *row, w
 }
 
 static const char *fill_marker(const fill_context *self, const csv_row *row, wm_event *out) {
-  const double *p = &row->number[FIRST + 2];
-  out->as.marker = (wm_marker){.sensor = self->sensor_index,
-                               .id = (int32_t)row->whole[FIRST + 1],
-                               .p_m = {p[0], p[1], p[2]},
-                               .yaw_rad = wrapped(p[3]),
-                               .along_sigma_m = (double)NAN,
-                               .yaw_sigma_rad = (double)NAN,
-                               .bloom_px = (double)NAN};
+  const double *p = &row->number[FIRST + 2], *other = p + 6;
+  wm_marker *m = &out->as.marker;
+  *m = (wm_marker){.sensor = self->sensor_index,
+                   .id = (int32_t)row->whole[FIRST + 1],
+                   .p_m = {p[0], p[1], p[2]},
+                   .yaw_rad = wrapped(p[3]),
+                   .along_sigma_m = p[4],
+                   .yaw_sigma_rad = p[5],
+                   .bloom_px = (double)NAN};
+  const int empty = count_empty(row, FIRST + 8, 4);
+  if (empty == 4) return NULL;
+  if (empty > 0) return "one of other_x_m, other_y_m, other_z_m, other_yaw_rad is empty";
+  m->poses = 2;
+  memcpy(m->other_p_m, other, sizeof m->other_p_m);
+  m->other_yaw_rad = wrapped(other[3]);
   return NULL;
 }
 
@@ -358,7 +365,13 @@ const stream_kind kStreamMarkers = {"markers.csv",
                                       NEEDED("x_m", PLACE),
                                       NEEDED("y_m", PLACE),
                                       NEEDED("z_m", PLACE),
-                                      NEEDED("yaw_rad", ANGLE)}},
+                                      NEEDED("yaw_rad", ANGLE),
+                                      OPTIONAL("along_sigma_m", SIGMA),
+                                      OPTIONAL("yaw_sigma_rad", SIGMA),
+                                      OPTIONAL("other_x_m", PLACE),
+                                      OPTIONAL("other_y_m", PLACE),
+                                      OPTIONAL("other_z_m", PLACE),
+                                      OPTIONAL("other_yaw_rad", ANGLE)}},
                                     .fill = fill_marker,
                                     .has_sensors = 1};
 

@@ -23,12 +23,12 @@ use_library()
 import plan_robots  # noqa: E402
 from waymark.causes import changes, plan, search, trial  # noqa: E402
 from waymark.causes.faults import all_faults  # noqa: E402
-from waymark.causes.features import with_points  # noqa: E402
+from waymark.causes.features import with_features  # noqa: E402
 from waymark.causes.fault import Clock, Fault, discrete, factor_words  # noqa: E402
 from waymark.causes.robot import Robot  # noqa: E402
 from waymark.causes.trial import Blocks, Drive, Undo, likelihoods  # noqa: E402
 from waymark.maps import FloorPlan, write_floor_plan  # noqa: E402
-from waymark.replaying import replay  # noqa: E402
+from waymark.replaying import EventLog, replay  # noqa: E402
 
 SCENARIO = plan_robots.HEAD + plan_robots.CORRIDOR + "cameras: [{name: front, size: [320, 180], xyz_m: [0.33, 0, 0.5], rpy_deg: [0, 20, 0], rate_hz: 5}]\n"
 YAML = b"# a robot\nsensors:\n  front:   # screwed on by eye\n    mounting: {xyz_m: [0.1, 0, 0.2]}\nwheels: {radius_m: 0.05}\n"
@@ -122,11 +122,107 @@ class Rows(unittest.TestCase):
             return [round(row.start[0][0], 1) for name, row in rows.items() if name == "clock of gnss" and row.is_fact]
         self.assertEqual((late(2, 2), late(-3, -3), late(2, 0), late(2, 3), late(0.5, 0.5)), ([-2.0], [3.0], [], [], []))
 
+    def test_numbers_in_reverse_are_a_row(self):
+        seen = ["t_ns,sensor,id,bearing_rad,range_m", *(f"{10**9 + k},s,{26 - k},0.1,2" for k in range(6, 18))]
+        rows = self.rows_of(sightings=seen, landmarks=["id,x_m,y_m,z_m,sigma_m", *(f"{k},{k},0,0,0.1" for k in range(6, 21))])
+        edit, = rows["identities of sightings:s from 26"].edits((1.0,))
+        self.assertEqual(edit.apply("\n".join(seen).encode()).splitlines()[1], b"1000000006,s,6,0.1,2")
+
     def test_counters_of_fewer_bits_are_a_fact_and_a_restart_is_none(self):
         counters = [name for name in self.rows_of(ticks=self.ticks(20 * k % 256 for k in range(60))) if name.startswith("counters")]
         self.assertEqual(counters, ["counters of 8 bits"])
         restart = self.rows_of(ticks=self.ticks([*range(0, 50000, 20), *range(0, 2000, 20)]))
         self.assertFalse([name for name in restart if name.startswith("counters")])
+
+
+MARKERS = """format: waymark-config/1
+estimator: slam
+motion: {noise: {ticks_per_sqrt_m: 0.001}}
+vision: {apriltag: {}}
+sources:
+  - {name: "apriltag:ceiling", lateness_max_ms: 250}
+"""
+CAMERA = """cameras:
+  up:
+    model: pinhole-radtan
+    size: [640, 480]
+    intrinsics: [450, 452, 322, 237]
+    distortion: [0, 0, 0, 0]
+    mounting: {xyz_m: [0.1, 0, 0.3], rpy_deg: [0, -90, 0]}
+markers: {family: tag36h11, size_m: 0.2}
+"""
+
+
+class Pictures(Folder):
+    """What a detector finds in pictures is found once."""
+
+    def drive(self, family="tag36h11"):
+        """A robot under markers on a ceiling, for some seconds."""
+        drive, config = self.folder / "drive", self.folder / "robot.yaml"
+        subprocess.run([BIN / "waymark-simulate", BIN.parent.parent / "config/worlds/office-easy.yaml", "--duration", "5", "--out", drive], check=True, capture_output=True)
+        calibration = drive / "calibration.yaml"
+        calibration.write_text(calibration.read_text().replace("tag36h11", family))
+        config.write_text(MARKERS)
+        return Robot.read(drive, config, {})
+
+    @unittest.skipUnless((BIN / "waymark-simulate").exists(), "no simulator here")
+    def test_markers_give_the_same_drive_as_their_pictures(self):
+        robot = self.drive()
+        seen = with_features(robot, self.folder)
+        ends = [replay(r.files.recording, r.files.config) for r in (robot, seen)]
+        self.assertGreater(len(ends[0].innovations["t_ns"]), 100)
+        for name in ("observed", "variance"):
+            self.assertLess(np.abs(ends[0].innovations[name] - ends[1].innovations[name]).max(), 1e-6)
+        rows = {row.name: row for row in all_faults(seen)}
+        clock = rows["clock of apriltag:ceiling"]
+        self.assertTrue(clock.clock.is_of("markers:ceiling"))
+        self.assertEqual({place.file for place in robot.files.places(clock.edits((0.4,)))}, {"video/ceiling.csv"})
+        size = rows["size of the markers"].edits((0.5,))
+        self.assertEqual([{edit.file for edit in way(size)} for way in (changes.for_robot, changes.for_trial)], [{"calibration.yaml"}, {"calibration.yaml", "markers.csv"}])
+        self.assertFalse([name for name in rows if name.startswith(("identities", "family"))])  # a detector's own are right
+
+    @unittest.skipUnless((BIN / "waymark-simulate").exists(), "no simulator here")
+    def test_another_family_is_tried_where_no_marker_is_found(self):
+        seen = with_features(self.drive("tag25h9"), self.folder)
+        self.assertEqual([list(seen.families), seen.sources], [["tag36h11"], []])
+        edits = {row.name: row for row in all_faults(seen)}["family tag36h11"].edits((1.0,))
+        self.assertEqual([place.text for place in seen.original.files.places(edits)], ["family: tag36h11"])
+        self.assertGreater(len(changes.for_trial(edits)[1].apply(b"").splitlines()), 20)
+
+    def test_markers_are_measured_anew_as_their_corners_would_be(self):
+        # A print on a ceiling, seen by a camera that looks up: the reader of corners makes the pose by each calibration.
+        corners = "t_ns,sensor,id,u0_px,v0_px,u1_px,v1_px,u2_px,v2_px,u3_px,v3_px\n" + "".join(
+            f"{10**9 + k * 10**8},up,7,{400 + k},200,{442 + k},210,{432 + k},252,{390 + k},242\n" for k in range(3))
+
+        def read(name, *edits):
+            folder = self.folder / name
+            folder.mkdir()
+            files = {"calibration.yaml": CAMERA, "marker-corners.csv": corners, "motion.csv": "t_ns,v_mps,w_radps\n" + "".join(f"{10**9 + k * 10**7},0.1,0\n" for k in range(60)),
+                     "recording.yaml": "format: waymark-recording/1\nname: n\nstreams: [motion.csv, marker-corners.csv, calibration.yaml]\n"}
+            for edit in edits:
+                files[edit.file] = edit.apply(files[edit.file].encode()).decode()
+            for file, text in files.items():
+                (folder / file).write_text(text)
+            (self.folder / "slam.yaml").write_text("format: waymark-config/1\nestimator: slam\n")
+            replay(folder, self.folder / "slam.yaml", out=folder / "run")
+            event = EventLog(folder / "run/events.wmlog").events("marker")[0]
+            return [*event["p_m"], event["yaw_rad"]]
+
+        table = "t_ns,sensor,id,x_m,y_m,z_m,yaw_rad\n1,up,7,{},{},{},{}\n".format(*read("stated")).encode()
+        angles = (0.0, -math.pi / 2, 0.0)
+        focal = ((2.0, 0, 0), (322 / 450, 1, 0), (237 / 452, 0, 1))
+        for name, path, text, again in (("size", ("markers", "size_m"), "0.5", changes.Measured("f", "up", ((2.5, 0, 0), (0, 2.5, 0), (0, 0, 2.5)))),
+                                        ("down", ("cameras", "up", "mounting", "rpy_deg"), "[0, 90, 0]", changes.Measured("f", "up", before=angles, after=(0.0, math.pi / 2, 0.0))),
+                                        ("roll", ("cameras", "up", "mounting", "rpy_deg"), "[180, -90, 0]", changes.Measured("f", "up", before=angles, after=(math.pi, -math.pi / 2, 0.0))),
+                                        ("yaw", ("cameras", "up", "mounting", "rpy_deg"), "[0, -90, 40]", changes.Measured("f", "up", before=angles, after=(0.0, -math.pi / 2, 0.7))),
+                                        ("lens", ("cameras", "up", "intrinsics"), "[900, 904, 644, 474]", changes.Measured("f", "up", focal))):
+            right = read(name, changes.Value("calibration.yaml", path, text))
+            anew = [float(number) for number in again.apply(table).decode().splitlines()[1].split(",")[3:]]
+            for a, b in zip(anew[:3], right[:3]):
+                self.assertAlmostEqual(a, b, delta=0.02 * right[0], msg=name)
+            self.assertLess(abs(math.remainder(anew[3] - right[3], 2 * math.pi)), 0.02, name)
+        other = table.replace(b"up", b"down")
+        self.assertEqual(changes.Measured("f", "up", focal).apply(other), other)
 
 
 class Judgement(unittest.TestCase):
@@ -223,8 +319,44 @@ class Judgement(unittest.TestCase):
         self.assertEqual(self.search._settled(near, []).size, (0.001,))
         self.assertNotEqual(self.search._as_unit(far, []).size, (0.001,))  # that is no unit's
         worse = dataclasses.replace(near.drive, unusual=0.0)  # the states say that it is no mm
-        self.search.trials.run = lambda jobs, **_: [dataclasses.replace(drive(2.0), unusual=6.0)]
+        self.search.trials.run = lambda jobs, **_: [dataclasses.replace(drive(2.0), unusual=9.0)]
         self.assertEqual(self.search._as_unit(search.Candidate(ranges, (0.00106,), worse), []).size, (0.00106,))
+
+    def test_whole_seconds_are_named_in_place_of_a_clock_s_size_near_them(self):
+        clock = Fault("clock", ((0.0,),), lambda _: [], lambda _: "", step=(0.25,), smallest=(0.01,), clock=Clock("s", 0))
+        self.assertEqual([clock.unit((size,)) for size in (-2.27, -2.4, 0.3, 18.4, 3.0)], [(-2.0,), None, None, (18.0,), None])
+        worse = [dataclasses.replace(drive(2.0), unusual=nats) for nats in (6.0, 9.0)]
+        for again, size in zip(worse, (-2.0, -2.27)):
+            self.search.trials = SimpleNamespace(run=lambda jobs, has_states, again=again: [again] * len(jobs))
+            self.assertEqual(self.search._as_unit(search.Candidate(clock, (-2.27,), drive(2.0)), []).size, (size,))
+
+    def test_a_size_that_is_far_off_on_a_part_is_judged_beside_what_the_states_tell_and_beside_a_unit(self):
+        speed = Fault("speed", ((0.001,),), lambda _: [], lambda _: "", step=(0.04,), smallest=(0.004,), is_log=True, named=(0.001,),
+                      settled=lambda size, states: (size[0] * states["scale"],))
+        found = search.Candidate(speed, (0.00088,), dataclasses.replace(drive(2.0), states={"scale": 1.25}))
+        self.assertEqual([size for _, size in search._near(found)], [(0.0011,), (0.001,)])
+        self.assertEqual(search._near(search.Candidate(row("no size"), (1.0,), drive(2.0))), [])
+
+    def test_two_mistakes_are_found_by_the_part_that_both_explain(self):
+        first, second, other = (search.Candidate(row(name), (1.0,), drive(0.5)) for name in ("first", "second", "other"))
+        mended = search.Candidate(second.fault, (1.0,), drive(2.0))
+        self.search.trials = SimpleNamespace(settings={}, run=lambda jobs, *_, **__: [
+            drive(2.0) if {fault.name for fault, _ in job} == {"first", "second"} else dataclasses.replace(drive(0.5), explained=0.3) for job in jobs])
+        self.search.trials.blocks = Blocks(0, 1.0, 40)
+        self.search.robot = SimpleNamespace(config={}, vehicle={})
+        self.search.firsts, self.search.screened_s, self.search.duration_s = [other, first, second], 40.0, 40.0
+        self.search._round = lambda fixed, now: [mended] if [fault.name for fault, _ in fixed] == ["first"] else []
+        fixed, _ = self.search._pairs(drive(0.2), search.Verdict(None))
+        self.assertEqual([fault.name for fault, _ in fixed], ["first", "second"])
+        self.search.firsts = [other, first]
+        self.assertIsNone(self.search._pairs(drive(0.2), search.Verdict(None)))
+
+    def test_a_row_without_a_size_among_the_best_is_kept_though_a_size_gains_more(self):
+        self.search.trials = SimpleNamespace(blocks=Blocks(0, 1.0, 40))
+        sized = Fault("ranges", ((1.0,),), lambda _: [], lambda _: "", step=(0.1,), smallest=(0.01,))
+        weak = Fault("speed", ((1.0,),), lambda _: [], lambda _: "", step=(0.1,), smallest=(0.01,))
+        ordered = [search.Candidate(fault, (1.0,), drive(gain)) for fault, gain in ((sized, 2.0), (weak, 0.3), (row("turn"), 0.2), (row("worse"), -0.2))]
+        self.assertEqual([c.fault.name for c in self.search._within_reach(ordered, drive(0.0), 0.0)], ["ranges", "turn"])
 
     def test_a_size_takes_what_a_state_took_of_it_where_the_drive_is_as_good(self):
         clock = Fault("clock", ((0.0,),), lambda _: [], lambda _: "", step=(0.25,), smallest=(0.01,), settled=lambda size, states: (size[0] - states["offset"],))
@@ -328,7 +460,7 @@ class FloorPlans(Folder):
         subprocess.run([BIN / "waymark-simulate", self.folder / "scenario.yaml", "--duration", "8", "--out", drive], check=True, capture_output=True)
         config.write_text("format: waymark-config/1\nestimator: edge_mcl\nsources:\n  - {name: edges, lateness_max_ms: 250}\nvision: {edges: {}}\n")
         robot = Robot.read(drive, config, {})
-        seen = with_points(robot, self.folder)
+        seen = with_features(robot, self.folder)
         self.assertEqual(seen.floor_camera, (0.33, 0.0, 0.5))
         ends = [replay(r.files.recording, r.files.config) for r in (robot, seen)]
         self.assertEqual(*(len(e.innovations["t_ns"]) for e in ends))
@@ -336,10 +468,11 @@ class FloorPlans(Folder):
             self.assertLess(abs(ends[0].trajectory[axis][-1] - ends[1].trajectory[axis][-1]), 0.01)
         self.assertFalse((seen.files.recording / "video").exists())
         # The fix is of the robot's own files: the detector finds the points anew.
-        edits = [changes.Value("calibration.yaml", ("cameras", "front", "mounting", "rpy_deg"), "[0, 24, 0]"),
-                 changes.Seen("points.csv", ((0.33, 0, 0.5), (0, 0.35, 0)), ((0.33, 0, 0.5), (0, 0.42, 0)))]
-        self.assertEqual([place.file for place in robot.files.places(edits)], ["calibration.yaml"])
-        self.assertEqual([place.file for place in seen.files.places(edits)], ["calibration.yaml", "points.csv"])
+        rows = {row.name: row for row in all_faults(seen)}
+        for name, fixed, driven in (("pitch of points", "calibration.yaml", {"calibration.yaml", "points.csv"}), ("clock of points", "video/front.csv", {"points.csv"})):
+            edits = rows[name].edits(rows[name].start[0])
+            self.assertEqual({place.file for place in robot.files.places(edits)}, {fixed})
+            self.assertEqual({edit.file for edit in changes.for_trial(edits)}, driven)
 
     def test_points_are_seen_anew_by_another_mounting(self):
         # 0.5 m above the floor; 2 m ahead is 14.04 degrees below the horizon, or 4.04 where it looks up by 10 degrees less.

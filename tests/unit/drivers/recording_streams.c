@@ -417,6 +417,25 @@ TEST(columns_of_rates_may_be_absent) {
   TEST_ASSERT_EQUAL_DOUBLE(0, event.as.twist6.arm_m[0]);
 }
 
+TEST(a_marker_has_sigmas_and_a_second_pose_where_the_file_has) {
+  folder_write("markers.csv",
+               "t_ns,sensor,id,x_m,y_m,z_m,yaw_rad,along_sigma_m,yaw_sigma_rad,other_x_m,other_y_m,other_z_m,other_yaw_rad\n"
+               "1,up,10,1,2,3,0.4,0.05,0.06,5,6,7,-3.2\n2,up,10,1,2,3,0.4,,,5,6,,0.3\n3,up,10,1,2,3,0.4,,,,,,\n");
+  wm_source *markers = source("markers:up");
+  wm_event event = next(markers);
+  TEST_ASSERT_EQUAL(2, event.as.marker.poses);
+  TEST_ASSERT_EQUAL_DOUBLE(0.05, event.as.marker.along_sigma_m);
+  TEST_ASSERT_EQUAL_DOUBLE(0.06, event.as.marker.yaw_sigma_rad);
+  for (int i = 0; i < 3; i++) TEST_ASSERT_EQUAL_DOUBLE(5 + i, event.as.marker.other_p_m[i]);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-15, 2 * M_PI - 3.2, event.as.marker.other_yaw_rad);
+  event = next(markers);
+  TEST_ASSERT_EQUAL(3, event.t_ns);
+  TEST_ASSERT_EQUAL(0, event.as.marker.poses);
+  TEST_ASSERT_DOUBLE_IS_NAN(event.as.marker.along_sigma_m);
+  TEST_ASSERT_EQUAL_UINT64(1, markers->counts.malformed);
+  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(markers->counts.first_problem, "one of other_x_m"), markers->counts.first_problem);
+}
+
 TEST(other_streams) {
   folder_write("motion6.csv", "t_ns,vx_mps,vy_mps,vz_mps,wx_radps,wy_radps,wz_radps\n1,1,2,3,4,5,6\n");
   folder_write("markers.csv", "t_ns,sensor,id,x_m,y_m,z_m,yaw_rad\n1,up,10,1,2,3,-3.2\n");

@@ -50,6 +50,30 @@ class Edit:
 
 
 @dataclass(frozen=True)
+class Detected(Edit):
+    """An edit of what a detector found in pictures, for a trial alone: on the robot the detector finds it anew."""
+
+    edit: Edit
+
+
+@dataclass(frozen=True)
+class Pictured(Edit):
+    """The opposite of Detected: an edit of pictures' stamps or of a detector's settings, which a trial on what was found does without."""
+
+    edit: Edit
+
+
+def for_trial(edits: Iterable[Edit]) -> list[Edit]:
+    """Of these the edits of what a trial drives."""
+    return [edit.edit if isinstance(edit, Detected) else edit for edit in edits if not isinstance(edit, Pictured)]
+
+
+def for_robot(edits: Iterable[Edit]) -> list[Edit]:
+    """Of these the edits of the robot's own files."""
+    return [edit.edit if isinstance(edit, Pictured) else edit for edit in edits if not isinstance(edit, Detected)]
+
+
+@dataclass(frozen=True)
 class Place:
     """Where to write what: `text` in a line (0: none of a picture), or `words` for each row, of which `text` is the first."""
 
@@ -193,6 +217,46 @@ class Seen(Edit):
         columns = [fields[k::len(names)] for k in range(len(names))]
         columns[x], columns[y] = ([f"{value:.4f}" for value in floor[:, axis].tolist()] for axis in (0, 1))
         return "\n".join([head, *(",".join(row) for row, is_seen in zip(zip(*columns), down.tolist()) if is_seen), ""]).encode()
+
+
+Matrix = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
+
+
+@dataclass(frozen=True)
+class Measured(Edit):
+    """Coded markers as a detector would have measured them with another calibration: places times a matrix, in the sensor's frame, and yaws that
+    are seen from above by the angles of another mounting, rad."""
+
+    only: str  # this sensor
+    by: Matrix = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
+    before: tuple[float, float, float] = (0, 0, 0)
+    after: tuple[float, float, float] = (0, 0, 0)
+
+    def apply(self, before: bytes) -> bytes:
+        (old_roll, old_pitch, _), (roll, pitch, _) = self.before, self.after
+        turn = from_rpy(roll, pitch, 0) @ from_rpy(old_roll, old_pitch, 0).T  # of level axes
+
+        def moved(*texts: str) -> list[str]:
+            return [f"{value:.9g}" for value in np.array(self.by) @ [float(text) for text in texts]] if all(texts) else list(texts)
+
+        def turned(text: str) -> list[str]:
+            x, y, _ = turn @ (math.cos(float(text)), math.sin(float(text)), 0.0) if text else (0.0, 0.0, 0.0)
+            return [f"{math.atan2(y, x):.9g}" if text else text]
+
+        for prefix in ("", "other_"):
+            for columns, change in (((f"{prefix}x_m", f"{prefix}y_m", f"{prefix}z_m"), moved), ((f"{prefix}yaw_rad",), turned)):
+                before = Rows(self.file, columns, change, "", self.only, bool(prefix)).apply(before)
+        return column(self.file, "along_sigma_m", self.by[0][0], 0, self.only, True).apply(before)
+
+
+@dataclass(frozen=True)
+class Replaced(Edit):
+    """Other content."""
+
+    content: bytes
+
+    def apply(self, before: bytes) -> bytes:
+        return self.content
 
 
 @dataclass(frozen=True)
@@ -370,14 +434,10 @@ class Files:
             (out / file).write_bytes(self.edited(edits, file))
         return {file: out / file for file in changed if file in self.named}
 
-    def _own(self, edits: Sequence[Edit]) -> list[Edit]:
-        """Without changes of points that a detector finds in pictures: it finds them anew."""
-        return [edit for edit in edits if not isinstance(edit, Seen) or (self.recording / edit.file).is_file()]
-
     def places(self, edits: Sequence[Edit]) -> list[Place]:
         """What to write, and where."""
         out = []
-        for edit in self._own(edits):
+        for edit in for_robot(edits):
             before = self.read(edit.file)
             after = edit.apply(before)
             if after != before and not (isinstance(edit, Rows) and edit.optional):
@@ -388,7 +448,7 @@ class Files:
     def apply(self, edits: Sequence[Edit], out: Path) -> Path | None:
         """Writes the corrected copy that a person asked for: with a comment at what was changed. Returns the configuration in it
         where that is changed, or names a file that is."""
-        edits = self._own(edits)
+        edits = for_robot(edits)
         if out.exists():
             raise FileExistsError(f"{out}: is there already; name a new folder")
         moved = self.copy(edits, out)

@@ -11,7 +11,7 @@ from typing import Any
 
 from ..native import WaymarkError
 from .changes import NAMED, Impossible
-from .features import with_points
+from .features import with_features
 from .robot import Robot
 from .search import APART_MIN, GAIN_MIN, NAMED_MOST, Search, Verdict
 from .trial import Change, Drive, Trials, edits_of, scratch_folder
@@ -90,7 +90,7 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         robot = Robot.read(options.recording, options.config, named, options.clocks_apart)
         folder = scratch_folder()
-        driven = with_points(robot, folder)
+        driven = with_features(robot, folder)
         trials = Trials(driven, folder)
         verdict = Search(driven, trials, _progress if sys.stderr.isatty() else lambda share: None).run()
         found = report(robot, verdict)

@@ -14,6 +14,7 @@ NEAR = (0.8, 0.9, 0.95, 1.05, 1.1, 1.25)
 """Factors of a scale that is some per cent off; between them its size is fitted."""
 NAMED = 0.04  # of a factor: within it of a unit's, it is that unit
 UNIT_REACH = 1.5  # within it a unit is tried in place of a fitted factor
+WHOLE_REACH = 0.15  # of whole seconds: a clock is off by those of GPS, of a server that was not asked, of a field that has no others
 _UNITS = {0.001: "in mm", 0.01: "in cm", 0.0254: "in inches", 0.3048: "in feet", 0.1: "in dm", 1000.0: "in km", DEG: "in degrees", 1 / DEG: "in rad",
           1 / 3.6: "in km/h", 0.44704: "in mph"}
 
@@ -87,7 +88,10 @@ class Fault:
         return tuple((s * math.exp(way) if self.is_log else s + way) if k == axis else s for k, s in enumerate(size))
 
     def unit(self, size: Size) -> Size | None:
-        """The size of the nearest unit within UNIT_REACH; None: there is none, or this is it."""
+        """The size of the nearest unit within UNIT_REACH, of a clock whole seconds within WHOLE_REACH; None: there is none, or this is it."""
+        if self.clock and not self.clock.is_rate:
+            whole = float(round(size[0]))
+            return (whole,) if 0 < abs(size[0] - whole) < WHOLE_REACH * abs(whole) else None
         near = sorted((abs(math.log(size[0] / factor)), factor) for factor in self.named) if self.is_log and size[0] > 0 else []
         return (near[0][1], *size[1:]) if near and 0 < near[0][0] < math.log(UNIT_REACH) else None
 

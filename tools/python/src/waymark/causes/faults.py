@@ -13,7 +13,7 @@ from ..native import WaymarkError
 from ..replaying import parameters
 from ..tables import Array
 from . import motion_faults
-from .changes import CONFIG, TURNS, Edit, Seen, Sorted, Turned, Value, column, degrees, identities, numbers, stretched, swapped
+from .changes import CONFIG, TURNS, Detected, Edit, Matrix, Measured, Pictured, Replaced, Rows, Seen, Sorted, Turned, Value, column, degrees, identities, numbers, stretched, swapped
 from .fault import DEG, LENGTHS, NEAR, Clock, Fault, Size, discrete, factor_words
 from .robot import MOTION, OBSERVED, Robot, Source
 
@@ -30,8 +30,8 @@ STAMPS = ("t_ns", "from_ns", "arrival_ns")
 DISORDER_MIN_NS = 500_000_000  # of a step back: a smaller one is a late datum
 DRIFTS = (-0.01, 0.01, 0.02, 0.03, 0.04, 0.05)  # of a clock that is too fast, or of a lag that grows, s/s
 CRUMB = 0.03  # of a map's breadth
+WHITE_FRAME = (0.8, 1.25)  # taken for the edge of the black square, or the reverse: 8 of 10 cells
 SETTING_FAR = 4.0  # times a default, or a part of it: nearer ones are a matter of tuning, which `waymark suggest` does
-FAMILIES = ("tag36h11", "tag25h9", "tag16h5", "tagStandard41h12")
 
 
 def all_faults(robot: Robot) -> list[Fault]:
@@ -40,11 +40,12 @@ def all_faults(robot: Robot) -> list[Fault]:
     streams = [Source(file.removesuffix(".csv"), file) for file in MOTION if len(robot.table(file).get("t_ns", ()))]
     for stream in streams if len(streams) + robot.has("can.log") > 1 else []:  # of one alone, the clock is that of all observations
         found += _clocks(robot, stream)
-    common = {source.file: source for source in robot.sources if sum(other.file == source.file for other in robot.sources) > 1}
+    common = {source.file: source for source in robot.sources if not source.pictures and sum(other.file == source.file for other in robot.sources) > 1}
     for one in (Source(source.kind, file) for file, source in common.items()):  # a mistake of the whole file
         found += [*_clocks(robot, one), *_values(robot, one)]
     for source in robot.sources:
-        found += [*_clocks(robot, source), *_values(robot, source), *_ids(robot, source)]
+        found += _clocks(robot, source)
+        found += [] if source.pictures else [*_values(robot, source), *_ids(robot, source)]  # a detector's own are right
         if source.kind not in ("heading", "stereo") and (source.kind != "points" or robot.floor_camera):
             found += _mountings(robot, source)
     return found
@@ -66,9 +67,17 @@ def _settings(robot: Robot) -> Iterator[Fault]:
 
 # ── clocks ───────────────────────────────────────────────────────────────────────────────────────────────────────────
 
-def _stamps(source: Source, factor: float, offset_ns: float) -> list[Edit]:
+def _of_stamps(source: Source, change: Callable[[str, str, str, bool], Rows]) -> list[Edit]:
+    """The change of a file's column, of one sensor, of all stamps: of what was found in pictures for a trial, of the pictures for the robot."""
     only = source.sensor if source.kind != "pictures" else ""
-    return [column(source.file, name, factor, offset_ns, only, name != "t_ns") for name in STAMPS]
+    own: list[Edit] = [change(source.file, name, only, name != "t_ns") for name in STAMPS]
+    if not source.pictures:
+        return own
+    return [*(Detected(edit.file, edit) for edit in own), *(Pictured(source.pictures, change(source.pictures, name, "", name != "t_ns")) for name in STAMPS)]
+
+
+def _stamps(source: Source, factor: float, offset_ns: float) -> list[Edit]:
+    return _of_stamps(source, lambda file, name, only, optional: column(file, name, factor, offset_ns, only, optional))
 
 
 def _shifted_s(stamps: Array, span: tuple[int, int] | None) -> float:
@@ -86,7 +95,7 @@ def _clocks(robot: Robot, source: Source) -> Iterator[Fault]:
         return
     name, span = source.name, robot.motion_span
     arrivals = robot.rows(source).get("arrival_ns", stamps)
-    if (np.diff(arrivals) < -DISORDER_MIN_NS).any():
+    if not source.pictures and (np.diff(arrivals) < -DISORDER_MIN_NS).any():
         yield discrete(f"order of {name}", lambda _: [Sorted(source.file)], lambda _: f"the rows of {name} are not in the order of their stamps", is_fact=True)
 
     def shift(size: Sequence[float]) -> list[Edit]:
@@ -104,18 +113,18 @@ def _clocks(robot: Robot, source: Source) -> Iterator[Fault]:
         return
     shifted_s = _shifted_s(stamps, span) if source.file in OBSERVED else 0.0
     if shifted_s:
-        yield Fault(f"clock of {name}", ((-shifted_s,),), shift, late, clock=Clock(name, int(stamps.min())), group=f"along the way of {name}", is_fact=True)
+        yield Fault(f"clock of {name}", ((-shifted_s,),), shift, late, clock=Clock(source.run_name, int(stamps.min())), group=f"along the way of {name}", is_fact=True)
         return
     is_shown = robot.clocks_apart and source.file in MOTION
-    begin, only, offset = int(stamps.min()), source.sensor if source.kind != "pictures" else "", f"{source.sensor or source.kind}.time_offset_s"
+    begin, offset = int(stamps.min()), f"{source.sensor or source.kind}.time_offset_s"
     yield Fault(f"clock of {name}", tuple((s,) for s in (CLOCKS_S if source.file in OBSERVED and source.kind != "points" or source.kind == "pictures" else CLOCKS_FEWER_S)), shift, late, step=(0.25,), smallest=(0.01,),
-                is_possible=lambda size: abs(size[0]) <= CLOCK_MOST_S, clock=Clock(name, begin), group=f"along the way of {name}",
+                is_possible=lambda size: abs(size[0]) <= CLOCK_MOST_S, clock=Clock(source.run_name, begin), group=f"along the way of {name}",
                 settled=lambda size, states: (size[0] - states.get(offset, 0.0),), is_shown=is_shown)
     yield Fault(f"drift of {name}", tuple((rate,) for rate in DRIFTS),
-                lambda size: [stretched(source.file, n, size[0], begin, only, n != "t_ns") for n in STAMPS],
+                lambda size: _of_stamps(source, lambda file, n, only, optional: stretched(file, n, size[0], begin, only, optional)),
                 lambda size: f"the stamps of {name} run away: {abs(size[0]) * 1e3:.3g} ms {'more' if size[0] > 0 else 'less'} each second "
                              "(a queue that nobody empties, or a clock of its own)",
-                step=(0.01,), smallest=(1e-4,), is_possible=lambda size: abs(size[0]) < 0.3, clock=Clock(name, begin, is_rate=True, is_motion=source.file in MOTION), group=f"along the way of {name}",
+                step=(0.01,), smallest=(1e-4,), is_possible=lambda size: abs(size[0]) < 0.3, clock=Clock(source.run_name, begin, is_rate=True, is_motion=source.file in MOTION), group=f"along the way of {name}",
                 is_shown=is_shown, settled=lambda size, states: (size[0] - 2e9 * states.get(offset, 0.0) / max(1, int(stamps.max()) - begin),))  # the state is that of half the time
 
 
@@ -172,6 +181,10 @@ def _ids(robot: Robot, source: Source) -> Iterator[Fault]:
     for shift in sorted(shifts - {0}, key=abs):
         yield discrete(f"identities of {source.name} {shift:+d}", lambda _, s=shift: [column(source.file, "id", 1, s, source.sensor)],
                        lambda _, s=shift: f"the ids of {source.name} are off by {-s:d}", group=f"identities of {source.name}")
+    for total in sorted({int(theirs[0] + theirs[-1]), int(mine[0] + theirs[-1]), int(theirs[0] + mine[-1])}):
+        table = {int(i): total - int(i) for i in mine}
+        yield discrete(f"identities of {source.name} from {total}", lambda _, t=table: [identities(source.file, t, source.sensor)],
+                       lambda _: f"the ids of {source.name} are permuted against those of the map: reversed", group=f"identities of {source.name}")
 
 
 def exchanged(robot: Robot, source: Source, table: dict[int, int]) -> Fault:
@@ -182,20 +195,34 @@ def exchanged(robot: Robot, source: Source, table: dict[int, int]) -> Fault:
         return discrete(f"landmarks {a} and {b}", lambda _: [identities("landmarks.csv", table)],
                         lambda _: f"landmarks {a} and {b} are exchanged on the map (or their numbers where they stand)", group=f"identities {pairs}", is_local=True)
     return discrete(f"identities of {source.name} by a table", lambda _: [identities(source.file, table, source.sensor)],
-                    lambda _: f"the ids of {source.name} are permuted against those of the map", group=f"identities {pairs}", prior=-4.0)
+                    lambda _: f"the ids of {source.name} are permuted against those of the map", group=f"identities of {source.name}", prior=-4.0)
 
 
 # ── mountings ────────────────────────────────────────────────────────────────────────────────────────────────────────
+
+def _three(values: Array) -> tuple[float, float, float]:
+    x, y, z = values.tolist()
+    return x, y, z
+
 
 def _mountings(robot: Robot, source: Source) -> Iterator[Fault]:
     path, place, angles = robot.mounting(source)
     who, is_floor = source.sensor or (path[1] if source.kind == "points" else "the antenna"), source.kind == "points"
 
+    def seen(new: Array, turned: Array) -> list[Edit]:
+        """What a detector gives with this mounting, or who wrote points on the floor."""
+        if is_floor:
+            anew = Seen(source.file, (_three(place), _three(angles)), (_three(new), _three(turned)))
+            return [Detected(source.file, anew) if source.pictures else anew]
+        if source.kind != "markers" or not source.pictures:
+            return []
+        return [Detected(source.file, Measured(source.file, source.sensor, before=_three(angles), after=_three(turned)))]
+
     def remounted(by_m: Sequence[float] = (0, 0, 0), by_rad: Sequence[float] = (0, 0, 0)) -> list[Edit]:
         new, turned = np.round(place + by_m, 3), np.round([degrees(a) for a in angles + by_rad], 2)
         edits: list[Edit] = [Value("calibration.yaml", (*path, key), numbers(value)) for key, value, by in (("xyz_m", new, by_m), ("rpy_deg", turned, by_rad))
                              if any(by)]
-        return edits + [Seen(source.file, (tuple(place), tuple(angles)), (tuple(new), tuple(np.radians(turned))))] * is_floor
+        return edits + seen(new, np.radians(turned))
 
     def placed(size: Sequence[float]) -> list[Edit]:
         return remounted((size[0], size[1], 0))
@@ -230,7 +257,7 @@ def _mountings(robot: Robot, source: Source) -> Iterator[Fault]:
     yield Fault(f"yaw of {source.name}", tuple((y,) for y in yaws), turned(2), say("yaw"), step=(0.15,), smallest=(0.01,),
                 settled=lambda size, states: (size[0] + states.get(f"{who}.yaw_rad", 0.0),),
                 is_possible=lambda s: abs(math.remainder(s[0], 2 * math.pi)) > 0.03)
-    if source.kind in ("pictures", "corners", "markers", "points") or abs(angles[1]) > 0.02:
+    if source.kind in ("pictures", "corners", "markers", "points") or abs(angles[1]) > 0.02 and not source.pictures:
         pitches = [-2 * float(angles[1])] * (abs(angles[1]) > 0.02) + [-0.15, 0.15] + [-0.05, 0.05] * is_floor
         yield Fault(f"pitch of {source.name}", tuple((p,) for p in pitches), turned(1), say("pitch: positive looks down"), step=(0.05,), smallest=(0.005,),
                     settled=lambda size, states: (size[0] + states.get(f"{who}.pitch_rad", 0.0),), is_possible=lambda s: abs(s[0]) > 0.01)
@@ -238,11 +265,11 @@ def _mountings(robot: Robot, source: Source) -> Iterator[Fault]:
         yield Fault(f"height of {source.name}", tuple((float(place[2]) * (f - 1),) for f in (0.8, 0.9, 1.1, 1.25)), lambda size: remounted((0, 0, size[0])),
                     lambda size: f"{who} is {abs(size[0]):.3f} m {'higher' if size[0] > 0 else 'lower'} than its mounting says", step=(0.05,), smallest=(0.004,),
                     settled=lambda size, states: (size[0] + states.get(f"{who}.height_m", 0.0),), is_possible=lambda s: abs(s[0]) > 0.01 and place[2] + s[0] > 0.05)
-    if source.kind == "pictures" or abs(angles[0]) > 0.02 and not is_floor:
+    if source.kind == "pictures" or source.kind == "markers" and source.pictures or abs(angles[0]) > 0.02 and not is_floor:
         yield discrete(f"roll of {source.name}", turned(0), say("roll"), size=math.pi)
     largest = float(np.degrees(np.abs(angles).max()))
     if 0.02 < largest < 2 * math.pi and not is_floor:
-        yield discrete(f"angles of {source.name}", lambda _: [Value("calibration.yaml", (*path, "rpy_deg"), numbers(np.degrees(np.degrees(angles))))],
+        yield discrete(f"angles of {source.name}", lambda _: [Value("calibration.yaml", (*path, "rpy_deg"), numbers(np.degrees(np.degrees(angles)))), *seen(place, np.degrees(angles))],
                        lambda _: f"the mounting's angles of {who} are in radians")
 
 
@@ -303,39 +330,59 @@ def _maps(robot: Robot) -> Iterator[Fault]:
 # ── markers, lenses, satellites ──────────────────────────────────────────────────────────────────────────────────────
 
 def _calibrated(name: str, path: tuple[str, ...], value: float, grid: Sequence[float], words: str, file: str = "calibration.yaml",
-                settled: Callable[[Size, dict[str, float]], Size] = lambda size, states: size, scales: str = "") -> Fault:
-    return Fault(name, tuple((f,) for f in grid), lambda s: [Value(file, path, f"{value * s[0]:.6g}")],
-                 lambda s: f"{words} is {factor_words(s[0])}", step=(0.04,), smallest=(0.004,), is_log=True, named=LENGTHS,
+                settled: Callable[[Size, dict[str, float]], Size] = lambda size, states: size, scales: str = "",
+                anew: Callable[[float], list[Edit]] = lambda factor: [], named: Sequence[float] = LENGTHS) -> Fault:
+    """`anew`: what a detector gives with the value."""
+    def edits(size: Sequence[float]) -> list[Edit]:
+        stated = Value(file, path, f"{value * size[0]:.6g}")
+        return [Pictured(file, stated) if path[0] == "vision" else stated, *anew(size[0])]
+
+    return Fault(name, tuple((f,) for f in grid), edits,
+                 lambda s: f"{words} is {factor_words(s[0])}", step=(0.04,), smallest=(0.004,), is_log=True, named=named,
                  is_possible=lambda s: abs(math.log(s[0])) > 0.01, settled=settled, scales=scales)
+
+
+def _measured(sources: Sequence[Source], place: Matrix) -> list[Edit]:
+    """The markers that a detector found, measured anew."""
+    return [Detected(source.file, Measured(source.file, source.sensor, place)) for source in sources if source.kind == "markers" and source.pictures]
 
 
 def _markers(robot: Robot) -> Iterator[Fault]:
     sees_tags = any(source.kind in ("corners", "markers") or source.detector == "apriltag" for source in robot.sources)
     mine = robot.setting("vision", "apriltag", "size_m")
     size = mine or robot.number("markers", "size_m")
-    # The white frame taken for the edge, or the reverse: 8 of 10 cells.
     if sees_tags and size and any(source.kind == "corners" or source.detector for source in robot.sources):
         yield _calibrated("size of the markers", ("vision", "apriltag", "size_m") if mine else ("markers", "size_m"), size,
-                          (0.8, 1.25, *NEAR, 0.5, 2, *LENGTHS), "the markers' size", CONFIG if mine else "calibration.yaml",
-                          lambda s, states: (s[0] / next((v for name, v in states.items() if name.endswith(".range_scale")), 1.0),), "range")
-    family = (robot.calibration.get("markers") or {}).get("family")
-    if any(source.detector == "apriltag" for source in robot.sources):
-        for other in FAMILIES:
-            if other != family:
-                yield discrete(f"family {other}", lambda _, o=other: [Value("calibration.yaml", ("markers", "family"), o)],
-                               lambda _, o=other: f"the markers are of the family {o}")
+                          (*WHITE_FRAME, *NEAR, 0.5, 2, *LENGTHS), "the markers' size", CONFIG if mine else "calibration.yaml",
+                          lambda s, states: (s[0] / next((v for name, v in states.items() if name.endswith(".range_scale")), 1.0),), "range",
+                          lambda f: _measured(robot.sources, ((f, 0, 0), (0, f, 0), (0, 0, f))), (*WHITE_FRAME, *LENGTHS))
+    own = ("vision", "apriltag", "family")
+    for other, rows in robot.families.items():
+        stated = Pictured(CONFIG, Value(CONFIG, own, other)) if robot.choice(*own) else Value("calibration.yaml", ("markers", "family"), other)
+        yield discrete(f"family {other}", lambda _, s=stated, r=rows: [s, Detected("markers.csv", Replaced("markers.csv", r))],
+                       lambda _, o=other: f"the markers are of the family {o}")
     baseline = robot.number("stereo", "baseline_m")
     if baseline:
         yield _calibrated("stereo baseline", ("stereo", "baseline_m"), baseline, (0.5, 2, 0.1, 0.001, *NEAR), "the stereo pair's baseline")
     for source in robot.sources:
         camera = (robot.calibration.get("cameras") or {}).get(source.sensor)
-        lens = camera.get("intrinsics") if isinstance(camera, dict) else None
-        if camera is None or source.kind != "pictures" or not isinstance(lens, list) or camera.get("model") not in (None, "pinhole", "radtan", "equidistant", "kb4"):
+        camera = camera if isinstance(camera, dict) else {}
+        lens: Any = camera.get("intrinsics")
+        is_lens = isinstance(lens, list) and len(lens) == 4 and camera.get("model") in ("pinhole-radtan", "equidistant")
+        if not is_lens or source.kind not in ("pictures", "markers") or not source.detector:
             continue
         yield Fault(f"lens of {source.sensor}", ((0.5,), (2.0,)),
-                    lambda s, lens=lens, name=source.sensor: [Value("calibration.yaml", ("cameras", name, "intrinsics"), numbers(np.array(lens, float) * s[0]))],
+                    lambda s, lens=lens, one=source: [Value("calibration.yaml", ("cameras", one.sensor, "intrinsics"), numbers(np.array(lens, float) * s[0])),
+                                                      *_measured([one], _refocused(lens, s[0]))],
                     lambda s, name=source.sensor: f"the lens of {name} is of another resolution: its intrinsics are {1 / s[0]:.3g} times the true ones",
                     is_log=True)
+
+
+def _refocused(lens: Sequence[float], factor: float) -> Matrix:
+    """Of places that were seen with a lens fx, fy, cx, cy: with one of `factor` times the pixels. Distances are that times longer, and the
+    middle of the picture is elsewhere."""
+    fx, fy, cx, cy = map(float, lens)
+    return ((factor, 0, 0), ((factor - 1) * cx / fx, 1, 0), ((factor - 1) * cy / fy, 0, 1))
 
 
 def _satellites(robot: Robot) -> Iterator[Fault]:

@@ -30,12 +30,18 @@ class Source:
     kind: str  # a value of OBSERVED, or "pictures"
     file: str
     sensor: str = ""  # "": the only one
-    detector: str = ""  # of pictures
+    detector: str = ""  # of pictures, or what found these
+    pictures: str = ""  # the file with the stamps of the pictures in which these were found
 
     @property
     def name(self) -> str:
         """As `check` prints it."""
         return f"{self.detector or self.kind}:{self.sensor}" if self.sensor else self.kind
+
+    @property
+    def run_name(self) -> str:
+        """As the runs of trials have it."""
+        return f"{self.kind if self.pictures else self.detector or self.kind}:{self.sensor}" if self.sensor else self.kind
 
 
 @dataclass
@@ -45,6 +51,12 @@ class Robot:
     files: Files
     clocks_apart: bool = False
     """The clocks of two streams of motion run apart, as `waymark check` finds by their turns."""
+    original: "Robot | None" = None
+    """Whose pictures were looked at by detectors; this one has what these found."""
+    detectors: dict[str, str] = field(default_factory=dict)
+    """What found the rows of a table."""
+    families: dict[str, bytes] = field(default_factory=dict)
+    """Where no marker was found: the table of those of other families."""
     _tables: dict[str, Table] = field(default_factory=dict)
 
     @classmethod
@@ -117,7 +129,8 @@ class Robot:
             if not table or not len(table.get("t_ns", ())):
                 continue
             sensors = sorted({str(name) for name in table["sensor"]}) if "sensor" in table else [""]
-            out += [Source(kind, file, sensor) for sensor in sensors]
+            detector, camera = self.detectors.get(file, ""), next(iter(self.calibration.get("cameras") or {}), "")
+            out += [Source(kind, file, sensor, detector, f"video/{sensor or camera}.csv" if detector else "") for sensor in sensors]
         vision = self.config.get("vision")
         detectors = list(vision) if isinstance(vision, dict) else []
         cameras = sorted(path.stem for path in self.files.recording.glob("video/*.csv"))
@@ -162,11 +175,16 @@ class Robot:
         ends = [line[1:line.index(b")")] for line in (lines[0], *reversed(lines[-3:])) if line.startswith(b"(") and b")" in line]
         return (round(float(ends[0]) * 1e9), round(float(ends[1]) * 1e9)) if len(ends) > 1 else None
 
-    def setting(self, *path: str) -> float | None:
-        """A number of the configuration: vision.apriltag.size_m."""
-        node: Any = self.config
+    def choice(self, *path: str) -> Any:
+        """A value of the robot's own configuration; None: it has none."""
+        node: Any = (self.original or self).config
         for step in path:
             node = node.get(step) if isinstance(node, dict) else None
+        return node
+
+    def setting(self, *path: str) -> float | None:
+        """A number of the robot's own configuration: vision.apriltag.size_m."""
+        node = self.choice(*path)
         return float(node) if isinstance(node, int | float) and math.isfinite(node) else None
 
     def number(self, *path: str) -> float | None:

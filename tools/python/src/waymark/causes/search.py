@@ -29,6 +29,9 @@ BLOCK_S, BLOCKS_MIN = 2.0, 20  # longer than errors that last, as the correlated
 NAMED_MOST = 0.9999  # no probability is said to be more
 NAMED_FROM = 0.99  # probability that a cause predicts better than each other, and than none
 GAIN_MIN = 0.1  # nats an update, over no mistake
+# Nats by which a unit is likelier than the factors that one drive cannot tell from it: half of all scales are wrong by one of some ten units, the
+# others are spread over six natural logarithms, of which a drive leaves some four per cent.
+UNIT_LIKELIER = 3.0
 APART_MIN = 0.02  # nats an update, over another cause: below, the drive does not tell them apart
 # A drive is right with: 14 % of the updates refused, a mean square of 1.34, lost for 0.5 %: the most of 29 good drives.
 EXPLAINED_MIN, SQUARES_MOST, LOST_MOST, DEGRADED_MOST = 0.85, 1.7, 0.02, 0.2
@@ -40,7 +43,7 @@ LOCAL_MIN = 15.0
 EXPLAINED_ALL = 0.97  # then nothing is left for a second mistake
 LONGEST = 6.0  # of a drive's time without changes; one that searches for its pose all the time is no right one
 CAUSES_MOST = 3
-FIRSTS = 3  # where none helps alone: the best first ones, each together with all others
+FIRSTS = 6  # the best ones on a short part, of which two may explain it together
 VOTES_MIN, VOTES_SHARE = 4, 0.5  # of sightings that fit a landmark of another number
 UNEXPLAINED = 0.8  # share of the updates that fit, below which a table of identities is looked for
 CONTRADICTED = 0.5  # share of a landmark's updates that are refused, where it may be exchanged with another
@@ -90,6 +93,7 @@ class Search:
         self.robot, self.trials, self.progress = robot, trials, progress
         self.rows: list[Fault] = []
         self.facts: list[Change] = []
+        self.firsts: list[Candidate] = []
         self.cost = 0.0  # processor time of a second of the drive
         self.duration_s = 0.0
         self.trial_cost, self.stood_s = 0.0, 0.0  # the same of trials that do not search for their pose; what was spent on a standing robot
@@ -131,21 +135,28 @@ class Search:
         self.rows = all_faults(self.robot)
         before = self._begin()
         verdict = Verdict(before, rows=len(self.rows))
-        if before is None or not self.robot.sources:  # nothing is observed that a cause could explain
+        if before is None or not (self.robot.sources or self.robot.families):  # nothing is observed that a cause could explain
             return verdict
         self.facts = [(row, row.start[0]) for row in self.rows if row.is_fact]
         mended = self.trials.run([self.facts], keeps=True, has_states=True)[0] if self.facts else None
         self.facts = self.facts if mended else []
-        fixed: list[Change] = [*self.facts]
-        now: Drive = mended or before
         verdict.probability = NAMED_MOST if mended else 0.0
-        firsts: list[Candidate] = []
-        while len(fixed) < CAUSES_MOST and not self._is_done(fixed, now):
+        fixed, now = self._greedy([*self.facts], mended or before, verdict, len(self.facts) + 1)
+        if not self._is_right(now) and not verdict.undecided:
+            fixed, now = self._pairs(before, verdict) or self._greedy(fixed, now, verdict, CAUSES_MOST)
+        if fixed and self._is_right(now) and not verdict.undecided and self._are_needed(fixed, now):
+            if len(fixed) > 1:
+                fixed, now = self._together(fixed, now)
+            verdict.causes, verdict.after, verdict.gain = fixed, now, self._gain(now, before)
+        verdict.drives = self.trials.drives
+        return verdict
+
+    def _greedy(self, fixed: list[Change], now: Drive, verdict: Verdict, most: int) -> tuple[list[Change], Drive]:
+        """What is fixed with the best further mistake, and so on, up to `most`."""
+        while len(fixed) < most and not self._is_done(fixed, now) and (self.left_s() > 0 or fixed == self.facts):
             found = self._round(fixed, now)
-            if fixed == self.facts:
-                if not any(self._is_right(c.drive) for c in found) and self._may_screen_more():
-                    found = self._round(fixed, now)
-                firsts = found[:FIRSTS]
+            if fixed == self.facts and not any(self._is_right(c.drive) for c in found) and self._may_screen_more():
+                found = self._round(fixed, now)
             if not found or not self._helps(found[0], now):
                 break
             best, tied, probability = self._judge(found, now)
@@ -155,19 +166,9 @@ class Search:
                 if tied or probability < NAMED_FROM:
                     break
                 best = self._settled(best, fixed)
-            fixed.append((best.fault, best.size))
+            fixed, now = [*fixed, (best.fault, best.size)], best.drive
             verdict.probability = min(probability, verdict.probability or 1.0)
-            now = best.drive
-            if self.left_s() <= 0:
-                break
-        if not self._is_right(now) and not verdict.undecided:
-            fixed, now = self._pairs(firsts, before, verdict) or (fixed, now)
-        if fixed and self._is_right(now) and not verdict.undecided and self._are_needed(fixed, now):
-            if len(fixed) > 1:
-                fixed, now = self._together(fixed, now)
-            verdict.causes, verdict.after, verdict.gain = fixed, now, self._gain(now, before)
-        verdict.drives = self.trials.drives
-        return verdict
+        return fixed, now
 
     def _are_needed(self, fixed: list[Change], now: Drive) -> bool:
         """Whether each of several mistakes has a part in it; facts need none."""
@@ -213,6 +214,8 @@ class Search:
         tried = self._tried(starts, fixed, part_s)
         self.stood_s += (self.trials.spent_s - spent_s) * max(0.0, 1 - (self._moved_by(self.screened_s) + SCREEN_MIN_S) / self.screened_s)
         kept = self._within_reach(self._best_sizes(tried, part_s), base, part_s)[:ROWS_KEPT]
+        if fixed == self.facts:
+            self.firsts = kept[:FIRSTS]  # of a short part: what one mistake alone mends there the other one undoes later
         near = self._fitted(kept[:ROWS_FITTED], fixed, part_s)  # a size that is far off loses the rest of the drive
         # Where a row explains the part, no table of identities is looked for.
         proposed = [] if any(self._is_right(c.drive) for c in kept) else self._proposals(fixed, now)
@@ -225,6 +228,7 @@ class Search:
         others = [(c.fault, c.size) for c in ordered[ROWS_FITTED:ROWS_JUDGED]]
         self.trials.settings = {}
         judged = self._tried([*fitted, *others], fixed, 0.0, has_states=True, is_last=True)  # first: what follows may take all that is left
+        judged += self._tried([size for c in self._ordered(judged)[:1] for size in _near(c)], fixed, 0.0, has_states=True, is_last=True)
         # A filter that does not search, or that another change helped, may have taken the mistake up.
         best = [c.drive for c in self._ordered(judged)[:1]]
         told = list({row.name: (row, size) for drive in (now, *best, base) for row, size in self._by_states(rows, drive)}.values())
@@ -254,7 +258,9 @@ class Search:
         most = max(gains.values(), default=0.0)
         updates = max([1, int(now.seen[:part].sum()), *(int(c.drive.seen[:part].sum()) for c in ordered)]) / 2
         rivals = ordered[0].fault.family() if ordered else ""  # of the best row: their sizes are fitted, too, before one of them is named
-        return [c for c in ordered if most >= FIT_GAIN_MIN * updates and (gains[c.fault.name] >= REACH * most or c.fault.family() == rivals)]
+        # With stated sigmas that are too large, a size that is wrong may gain most on a part: rows without one are among the best.
+        near = [c for c in ordered[:ROWS_FITTED] if not c.fault.step and gains[c.fault.name] > 0]
+        return [c for c in ordered if most >= FIT_GAIN_MIN * updates and (gains[c.fault.name] >= REACH * most or c.fault.family() == rivals or c in near)]
 
     def _whole(self, fit_s: float) -> float:
         return 0.0 if self.cost * self.duration_s * 30 < self.left_s() else fit_s
@@ -328,7 +334,7 @@ class Search:
                 continue
             if rows is not None:
                 out += [(exchanged(self.robot, source, {a: b, b: a}), (1.0,)) for a, b in _contradicted(rows)]
-            table = self._table(source, fixed) if source.kind == "sightings" and now.explained < UNEXPLAINED else {}
+            table = self._table(source, fixed) if source.kind == "sightings" and not source.detector and now.explained < UNEXPLAINED else {}
             if table:
                 out.append((exchanged(self.robot, source, table), (1.0,)))
         unique = {change[0].name: change for change in out if change[0].name not in {f.name for f, _ in fixed}}
@@ -384,7 +390,8 @@ class Search:
         right with it, and the calibration's states are no further."""
         size = best.fault.unit(best.size)
         drive = self.trials.run([[*fixed, (best.fault, size)]], has_states=True)[0] if size else None
-        if size and drive and self._is_right(drive) and drive.unusual < best.drive.unusual + STATES_APART and self._gain(best.drive, drive) < GAIN_MIN:
+        most = best.drive.unusual + STATES_APART + UNIT_LIKELIER
+        if size and drive and self._is_right(drive) and drive.unusual < most and self._gain(best.drive, drive) < GAIN_MIN:
             return Candidate(best.fault, size, drive)
         return best
 
@@ -447,21 +454,27 @@ class Search:
         return (drive.explained >= EXPLAINED_MIN and drive.squares <= SQUARES_MOST and drive.lost <= LOST_MOST
                 and drive.degraded <= DEGRADED_MOST and drive.unusual < UNUSUAL_MOST)
 
-    def _pairs(self, firsts: list[Candidate], before: Drive, verdict: Verdict) -> tuple[list[Change], Drive] | None:
-        """Two mistakes of which neither explains the drive alone."""
-        for first in firsts:
-            if self.left_s() < 0.2 * self.budget_s():
-                break
-            fixed = [*self.facts, (first.fault, first.size)]
-            found = self._round(fixed, first.drive)
-            if not found or not self._helps(found[0], first.drive) or not self._helps(found[0], before):
-                continue
-            best, tied, probability = self._judge(found, first.drive)
-            if tied or probability < NAMED_FROM or not self._is_right(best.drive):
-                continue
-            verdict.probability = probability
-            return [*fixed, (best.fault, best.size)], best.drive
-        return None
+    def _pairs(self, before: Drive, verdict: Verdict) -> tuple[list[Change], Drive] | None:
+        """Two mistakes of which neither explains the drive alone: two of the best on a short part that explain it together."""
+        self.trials.settings = self._without_search()
+        both = [(a, b) for k, a in enumerate(self.firsts) for b in self.firsts[k + 1:] if a.fault.family() != b.fault.family()]
+        part_s = 0.0 if self.screened_s >= self.duration_s else self.screened_s
+        drives = self.trials.run([[*self.facts, *((c.fault, c.size) for c in pair)] for pair in both], part_s, most_s=2 + LONGEST * self.cost * self.screened_s)
+        self.trials.settings = {}
+        right = [(self._score(drive, part_s), pair) for pair, drive in zip(both, drives) if drive and self._is_right(drive)]
+        if not right:
+            return None
+        first, _ = max(right, key=lambda one: one[0])[1]
+        fixed: list[Change] = [*self.facts, (first.fault, first.size)]
+        alone = self.trials.run([fixed], has_states=True)[0]
+        found = self._round(fixed, alone) if alone else []
+        if not alone or not found or not self._helps(found[0], alone) or not self._helps(found[0], before):
+            return None
+        best, tied, probability = self._judge(found, alone)
+        if tied or probability < NAMED_FROM or not self._is_right(best.drive):
+            return None
+        verdict.probability = probability
+        return [*fixed, (best.fault, best.size)], best.drive
 
 
 def _moving(published: Table) -> tuple[Array, Array]:
@@ -480,6 +493,13 @@ def _moving(published: Table) -> tuple[Array, Array]:
 def _worth(drive: Drive) -> float:
     """Nats of the whole drive, of its calibration states, too."""
     return float(drive.gain.sum()) - drive.unusual
+
+
+def _near(found: Candidate) -> list[Change]:
+    """Sizes near a fitted one of a part of the drive: that with what the states took of it over the whole, and that of a unit."""
+    fault, drive = found.fault, found.drive
+    sizes = [fault.neat(fault.settled(found.size, drive.states)), fault.unit(found.size)] if fault.step else []
+    return [(fault, size) for size in dict.fromkeys(sizes) if size and size != found.size and fault.is_possible(size)]
 
 
 def _contradicted(rows: dict[str, Array]) -> list[tuple[int, int]]:

@@ -19,7 +19,7 @@ from ..pool import Pool
 from ..replaying import Estimate, replay
 from ..tables import Array
 from . import plan
-from .changes import CONFIG, NAMED, Edit, Impossible, Value, link
+from .changes import CONFIG, NAMED, Edit, Impossible, Value, for_trial, link
 from .fault import Fault, Size
 from .plan import Scans
 from .robot import OBSERVED, Place, Robot
@@ -247,7 +247,7 @@ class Trials:
 
     def _arguments(self, changes: Sequence[Change], copy: Path, until_s: float) -> dict[str, Any]:
         """Of the replay of a copy, which is written where files of the recording change."""
-        files, edits = self.robot.files, edits_of(changes)
+        files, edits = self.robot.files, for_trial(edits_of(changes))
         named = dict(files.named)
         later_s = sum(fault.clock.later_s(size) for fault, size in changes if fault.clock)
         named |= files.copy(edits, copy) if any(edit.file != CONFIG for edit in edits) else {}
