@@ -351,6 +351,12 @@ class Judgement(unittest.TestCase):
         self.search.firsts = [other, first]
         self.assertIsNone(self.search._pairs(drive(0.2), search.Verdict(None)))
 
+    def test_a_lag_is_not_fitted_where_a_row_of_another_family_leaves_nothing(self):
+        lag = Fault("drift", ((0.0,),), lambda _: [], lambda _: "", step=(0.01,), smallest=(1e-4,), group="along the way of s")
+        clock = Fault("clock", ((0.0,),), lambda _: [], lambda _: "", step=(0.25,), smallest=(0.01,), group="along the way of s")
+        best = [search.Candidate(fault, (1.0,), found) for fault, found in ((row("bearings"), drive(2.0)), (clock, drive(2.0)), (row("bearings"), drive(2.0, unusual=6.0)))]
+        self.assertEqual([self.search._is_explained([one], lag) for one in best], [True, False, False])
+
     def test_a_row_without_a_size_among_the_best_is_kept_though_a_size_gains_more(self):
         self.search.trials = SimpleNamespace(blocks=Blocks(0, 1.0, 40))
         sized = Fault("ranges", ((1.0,),), lambda _: [], lambda _: "", step=(0.1,), smallest=(0.01,))

@@ -418,9 +418,10 @@ TEST(columns_of_rates_may_be_absent) {
 }
 
 TEST(a_marker_has_sigmas_and_a_second_pose_where_the_file_has) {
-  folder_write("markers.csv",
-               "t_ns,sensor,id,x_m,y_m,z_m,yaw_rad,along_sigma_m,yaw_sigma_rad,other_x_m,other_y_m,other_z_m,other_yaw_rad\n"
-               "1,up,10,1,2,3,0.4,0.05,0.06,5,6,7,-3.2\n2,up,10,1,2,3,0.4,,,5,6,,0.3\n3,up,10,1,2,3,0.4,,,,,,\n");
+  folder_write(
+      "markers.csv",
+      "t_ns,sensor,id,x_m,y_m,z_m,yaw_rad,along_sigma_m,yaw_sigma_rad,other_x_m,other_y_m,other_z_m,other_yaw_rad\n"
+      "1,up,10,1,2,3,0.4,0.05,0.06,5,6,7,-3.2\n2,up,10,1,2,3,0.4,,,5,6,,0.3\n3,up,10,1,2,3,0.4,,,,,,\n");
   wm_source *markers = source("markers:up");
   wm_event event = next(markers);
   TEST_ASSERT_EQUAL(2, event.as.marker.poses);
@@ -433,7 +434,8 @@ TEST(a_marker_has_sigmas_and_a_second_pose_where_the_file_has) {
   TEST_ASSERT_EQUAL(0, event.as.marker.poses);
   TEST_ASSERT_DOUBLE_IS_NAN(event.as.marker.along_sigma_m);
   TEST_ASSERT_EQUAL_UINT64(1, markers->counts.malformed);
-  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(markers->counts.first_problem, "one of other_x_m"), markers->counts.first_problem);
+  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(markers->counts.first_problem, "one of other_x_m"),
+                               markers->counts.first_problem);
 }
 
 TEST(other_streams) {

@@ -232,8 +232,9 @@ class Search:
         # A filter that does not search, or that another change helped, may have taken the mistake up.
         best = [c.drive for c in self._ordered(judged)[:1]]
         told = list({row.name: (row, size) for drive in (now, *best, base) for row, size in self._by_states(rows, drive)}.values())
-        growing = [Candidate(*change, now) for change in told if change[0].clock and change[0].clock.is_rate]  # which the whole drive shows
-        by_states = self._tried([c for c in told if c[0] not in [g.fault for g in growing]], fixed, 0.0, has_states=True, is_last=True)
+        lags = [change for change in told if change[0].clock and change[0].clock.is_rate]  # which the whole drive shows
+        by_states = self._tried([change for change in told if change not in lags], fixed, 0.0, has_states=True, is_last=True)
+        growing = [Candidate(*change, now) for change in lags if not self._is_explained(self._ordered(judged)[:1], change[0])]
         late = [(row, size) for row in rows if row.clock and row.clock.is_rate and row.clock.is_motion for size in row.start]  # of motion, no state tells
         late_best = self._best_sizes(self._tried(late, fixed, 0.0), 0.0)
         growing += [c for c in late_best if c.fault.is_shown] or self._within_reach(late_best, now, 0.0)
@@ -261,6 +262,10 @@ class Search:
         # With stated sigmas that are too large, a size that is wrong may gain most on a part: rows without one are among the best.
         near = [c for c in ordered[:ROWS_FITTED] if not c.fault.step and gains[c.fault.name] > 0]
         return [c for c in ordered if most >= FIT_GAIN_MIN * updates and (gains[c.fault.name] >= REACH * most or c.fault.family() == rivals or c in near)]
+
+    def _is_explained(self, best: list[Candidate], other: Fault) -> bool:
+        """Whether the best row leaves nothing for one of another family, whose size is not fitted then."""
+        return any(c.drive.explained >= EXPLAINED_ALL and self._is_right(c.drive) and c.drive.unusual < STATES_APART and c.fault.family() != other.family() for c in best)
 
     def _whole(self, fit_s: float) -> float:
         return 0.0 if self.cost * self.duration_s * 30 < self.left_s() else fit_s
