@@ -10,6 +10,7 @@ import lzma
 import re
 import shutil
 import sqlite3
+import struct
 import subprocess
 import tarfile
 import unittest
@@ -305,6 +306,7 @@ class Refused(BagTest):
         (f / "pointer.bag").write_bytes(b"version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 1\n")
         (f / "page.mcap").write_bytes(b"<!DOCTYPE html><html></html>")
         (f / "bag.zip").write_bytes(b"PK\3\4" + bytes(60))
+        (f / "drive.lcmlog").write_bytes(b"\xed\xa1\xda\x01" + bytes(60))
         with tarfile.open(f / "bag.tar.gz", "w:gz") as archive:
             archive.add(f / "text.bag", "drive.bag")
         (f / "nothing").mkdir()
@@ -318,7 +320,7 @@ class Refused(BagTest):
         database.close()
         for name, word in (("empty.mcap", "is empty"), ("text.bag", "is no bag"), ("zeros.db3", "is no bag"), ("magic.mcap", "without its end"),
                            ("short.db3", "rosbag2"), ("ros1.bag", "nothing"), ("old.bag", "format 2.0"), ("junk.zst", "is no bag"), ("cut.zst", "nothing of what it holds"),
-                           ("pointer.bag", "git lfs pull"), ("page.mcap", "a web page"), ("bag.zip", "a zip archive"), ("bag.tar.gz", "a tar archive"),
+                           ("pointer.bag", "git lfs pull"), ("page.mcap", "a web page"), ("bag.zip", "a zip archive"), ("drive.lcmlog", "a log of lcm-logger"), ("bag.tar.gz", "a tar archive"),
                            ("nothing", "no file in this folder"), ("two", "2 bags"), ("missing.mcap", "no such file"), ("other.db3", "rosbag2")):
             with self.subTest(name):
                 text, out = self.take(f / name, code=1, out=f"out-{name}")
@@ -370,6 +372,44 @@ class Messages(BagTest):
         self.assertEqual(len(waymark.Recording(folder).table("motion.csv")["t_ns"]), 17, text)
         self.assertIn("3 of 20 messages are left out", text)
         self.assertIn("the bag's log has no time for it", text)
+
+    def test_messages_in_the_second_version_of_cdr(self):
+        """Packed by hand: numbers of 8 bytes begin at multiples of 4, in the delimited form a length stands before each structure."""
+        plain = "iiI5s3xI10s2x3d4d36d3d3d36d"
+        delimited = "4x4x4xiiI5s3xI10s2x4x4x4x3d4x4d36d4x4x4x3d4x3d36d"
+        for begin, codes in ((b"\0\x06", ">" + plain), (b"\0\x07", "<" + plain), (b"\0\x08", ">" + delimited), (b"\0\x09", "<" + delimited)):
+            def encode(data, begin=begin, codes=codes):
+                whole = M.store.deserialize_cdr(data, "nav_msgs/msg/Odometry")
+                stamp = whole.header.stamp
+                return begin + b"\0\0" + struct.pack(codes, stamp.sec, stamp.nanosec, 5, b"odom", 10, b"base_link", whole.pose.pose.position.x, *[0] * 5, 1,
+                                                     *[0] * 36, whole.twist.twist.linear.x, *[0] * 41)
+
+            with self.subTest(begin=begin):
+                text, folder = self.take(Events().drive(20).mcap(self.folder / "a.mcap", encode=encode), out=f"out-{begin.hex()}")
+                self.assertNotIn("left out", text)
+                table = waymark.Recording(folder).table("motion.csv")
+                self.assertEqual((len(table["t_ns"]), set(table["v_mps"])), (20, {0.5}))
+
+    def test_lists_in_the_second_version_of_cdr(self):
+        """Of structures, with a length before them: tags with their corners, packed by hand."""
+        corners = [10.0, 30.0, 30.0, 30.0, 30.0, 10.0, 10.0, 10.0]
+
+        def encode(data):
+            stamp = M.store.deserialize_cdr(data, "apriltag_msgs/msg/AprilTagDetectionArray").header.stamp
+            return b"\0\x07\0\0" + struct.pack("<iiI6s2x4xII9s3xiiff2d4x8d9d", stamp.sec, stamp.nanosec, 6, b"front", 1, 9, b"tag36h11", 7, 0, 0, 0, 20, 20,
+                                                *corners, *[0] * 9)
+
+        tags = Events()
+        for i in range(5):
+            tags.tags("/detections", START_NS + i * 50_000_000, "front", np.reshape(corners, (4, 2)))
+        first, second = (self.take(tags.mcap(self.folder / "a.mcap", encode=way), out=name)[1] for name, way in (("1", bytes), ("2", encode)))
+        self.assertEqual(*(next(folder.glob("marker-corners*.csv")).read_text() for folder in (first, second)))
+
+    def test_a_parameter_list_and_the_cut_second_version_are_named(self):
+        for begin, end, words in ((b"\0\x0b", None, "all 20 messages are bad; at 1700000000.003 s: it is a list of parameters (PL_CDR)"),
+                                  (b"\0\x07", -40, "bytes are no nav_msgs/msg/Odometry")):
+            text, _ = self.take(Events().drive(20).mcap(self.folder / "a.mcap", encode=lambda data, begin=begin, end=end: begin + data[2:end]), code=1)
+            self.assertIn(words, text)
 
     def test_topics_that_cant_be_read_cost_themselves(self):
         kind = "nav_msgs/msg/Odometry"

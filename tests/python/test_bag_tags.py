@@ -443,6 +443,86 @@ class Siblings(BagTest):
         self.assertIn("more than 900 m away", text)
 
 
+class Several(BagTest):
+    """Several tags in a message, of which one is bad; several cameras in a topic; several hypotheses of a tag."""
+
+    @staticmethod
+    def events(make, *, lenses=("cam",)):
+        """Three messages of make(stamp, place to pose)."""
+        events = Events()
+        for name in lenses:
+            events.put(f"/{name}/camera_info", "CameraInfo", START_NS, camera_info(START_NS, f"{name}_optical", SIZE, (F, F, *C)))
+        for i in range(3):
+            kind, message = make(START_NS + i * STEP_NS, lambda x, y=0.0: M.pose((x, y, 1), (1, 0, 0, 0)))
+            events.put("/seen/tags", kind, START_NS + i * STEP_NS, message, late_ns=300_000_000)
+        return events
+
+    def rows(self, make, name="markers.csv", **more):
+        self.count = getattr(self, "count", 0) + 1
+        text, folder = self.take(self.events(make, **more).mcap(self.folder / "a.mcap"), out=f"out-{self.count}")
+        table = waymark.Recording(folder).table(name)
+        return text, table, [(identity, *np.round([x, y], 6)) for identity, x, y in zip(table["id"], table["x_m"], table["y_m"])][:3] if "x_m" in table else []
+
+    def test_a_bad_tag_costs_itself(self):
+        def arucos(tags):
+            return lambda t_ns, pose: ("aruco_msgs/MarkerArray", M.make("aruco_msgs/MarkerArray", header=M.header(t_ns, "cam_optical"), markers=[
+                M.make("aruco_msgs/Marker", header=M.header(t_ns, "cam_optical"), id=number, pose=M.make("PoseWithCovariance", pose=pose(x))) for number, x in tags]))
+
+        for tags, why in (([(1, 0.1), (2, np.nan), (3, 0.3)], "the pose of tag 2 is none"), ([(1, 0.1), (4294967295, 0.2), (3, 0.3)], "a tag of the number 4294967295")):
+            text, table, rows = self.rows(arucos(tags))
+            self.assertIn(f"note: /seen/tags: 3 of its tags are left out; the first at 1700000000.000 s: {why}", text)
+            self.assertEqual((table["id"].tolist(), rows[1]), ([1, 3] * 3, (3, 1.0, -0.3)))
+
+    def test_a_bad_corner_costs_its_tag(self):
+        def fiducials(t_ns, _):
+            def tag(number, corners):
+                return M.make("Fiducial", fiducial_id=number, **{f"{axis}{k}": float(corners[k]["xy".index(axis)]) for k in range(4) for axis in "xy"})
+            square = [(100, 100), (140, 100), (140, 140), (100, 140)]
+            return "FiducialArray", M.make("FiducialArray", header=M.header(t_ns, "cam_optical"), fiducials=[tag(1, square[::-1]), tag(2, square)])
+
+        text, table, _ = self.rows(fiducials, "marker-corners.csv")
+        self.assertIn("3 of its tags are left out", text)
+        self.assertEqual((table["id"].tolist(), table["u2_px"].tolist()), ([2] * 3, [140.0] * 3))
+
+    def test_the_likeliest_hypothesis_counts(self):
+        def detections(t_ns, pose):
+            header = M.header(t_ns, "cam_optical")
+            results = [M.make("ObjectHypothesisWithPose", hypothesis=M.make("ObjectHypothesis", class_id=name, score=score), pose=M.make("PoseWithCovariance", pose=pose(x)))
+                       for name, score, x in (("3", 0.2, 0.5), ("7", 0.9, 0.1), ("4", np.nan, 0.4))]
+            return "Detection3DArray", M.make("Detection3DArray", header=header, detections=[M.make("Detection3D", header=header, results=results)])
+
+        self.assertEqual(self.rows(detections)[2][0], (7, 1.0, -0.1))
+
+    def test_two_cameras_in_a_topic(self):
+        def april(t_ns, _):
+            name = "back" if t_ns == START_NS + STEP_NS else "cam"
+            corners = [M.make("apriltag_msgs/Point", x=float(x), y=float(y)) for x, y in Rectified.POINTS]
+            return "AprilTagDetectionArray", M.make("AprilTagDetectionArray", header=M.header(t_ns, f"{name}_optical"), detections=[
+                M.make("AprilTagDetection", family="tag36h11", id=7, corners=corners, homography=np.zeros(9))])
+
+        self.assertEqual(self.rows(april, "marker-corners.csv", lenses=("cam", "back"))[1]["sensor"].tolist(), ["cam", "back", "cam"])
+
+    def test_stamps_that_the_markers_alone_have(self):
+        """As ar_track_alvar writes them."""
+        register({"ar_track_alvar_msgs/msg/AlvarMarker": "std_msgs/Header header\nuint32 id\nuint32 confidence\ngeometry_msgs/PoseStamped pose\n",
+                  "ar_track_alvar_msgs/msg/AlvarMarkers": "std_msgs/Header header\nar_track_alvar_msgs/AlvarMarker[] markers\n"})
+
+        def alvar(t_ns, pose):
+            marker = M.make("ar_track_alvar_msgs/AlvarMarker", header=M.header(t_ns, "cam_optical"), id=9, pose=M.make("PoseStamped", header=M.header(0, ""), pose=pose(0.1)))
+            return "ar_track_alvar_msgs/AlvarMarkers", M.make("ar_track_alvar_msgs/AlvarMarkers", header=M.header(0, ""), markers=[marker])
+
+        self.assertEqual(self.rows(alvar)[1]["t_ns"].tolist(), [START_NS + i * STEP_NS for i in range(3)])
+
+    def test_boards_are_named(self):
+        def boards(t_ns, pose):
+            return "ArucoDetection", M.make("ArucoDetection", header=M.header(t_ns, "cam_optical"), markers=[M.make("MarkerPose", marker_id=4, pose=pose(0.1))],
+                                            boards=[M.make("aruco_opencv_msgs/BoardPose", board_name="a", pose=pose(0.2))])
+
+        text, table, _ = self.rows(boards)
+        self.assertIn("/seen/tags: its boards are not taken", text)
+        self.assertEqual(table["id"].tolist(), [4] * 3)
+
+
 class Bad(BagTest):
     def test_what_gives_no_tag_is_named(self):
         nan = np.array([(np.nan, 1.0)] * 4)

@@ -43,8 +43,8 @@ int run(const wm::tools::ImportWish &wish) {
 }
 
 // How a bag begins: MCAP, rosbag2's SQLite, ROS 1; or one that was compressed as a whole, which no video is: zstd,
-// gzip, bzip2, xz, lz4.
-constexpr std::array<std::string_view, 8> kBeginnings{"\x89MCAP0\r\n",
+// gzip, bzip2, xz, lz4. A log of lcm-logger is neither, and named there.
+constexpr std::array<std::string_view, 9> kBeginnings{"\x89MCAP0\r\n",
                                                       "SQLite format 3",
                                                       "#ROSBAG",
                                                       "\x28\xb5\x2f\xfd",
@@ -52,7 +52,8 @@ constexpr std::array<std::string_view, 8> kBeginnings{"\x89MCAP0\r\n",
                                                       "BZh",
                                                       "\xfd"
                                                       "7zXZ",
-                                                      "\x04\x22\x4d\x18"};
+                                                      "\x04\x22\x4d\x18",
+                                                      "\xed\xa1\xda\x01"};
 constexpr std::array<std::string_view, 6> kEndings{".mcap", ".bag", ".db3", ".zstd", ".zst", ".active"};
 
 // By its content, for files that were renamed, else by its ending, for one that is empty.

@@ -3,7 +3,6 @@
 
 from array import array
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,6 +12,7 @@ from ..tables import Array
 from . import names
 from .can import CanLog
 from .clocks import GAP_NS, PAUSE_NS, SET_NS, Clock, excess, goes_on, once, seconds, settle, silences
+from .decoding import Bad
 from .frames import Frames
 from .parts import Absent
 from .samples import Samples
@@ -30,15 +30,6 @@ class NoSuchTopic(Exception):
 
     def __init__(self, option: str, topic: str, there: Iterable[str]):
         super().__init__(f"{option} {topic}: the bag has no such topic of that kind; it has: {', '.join(sorted(there)) or 'none'}")
-
-
-@dataclass
-class Bad:
-    """Messages of a topic that can't be taken: the first one's stamp and reason, and how many."""
-
-    t_ns: int
-    why: str
-    count: int = 0
 
 
 class Collection:

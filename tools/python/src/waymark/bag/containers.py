@@ -24,7 +24,8 @@ _PACKED: dict[bytes, str] = {b"\x28\xb5\x2f\xfd": "zstd", b"\x1f\x8b": "gzip", b
 _SKIPPABLE = b"\x2a\x4d\x18"  # behind one byte: a frame of zstd that holds nothing, with which pzstd begins (RFC 8878, 3.1.2)
 _TAR = (257, b"ustar")
 _OTHERS = {b"version https://": "a pointer of Git LFS: `git lfs pull` fetches the file that it stands for", b"<": "a web page: the download went wrong",
-           b"PK\3\4": "a zip archive: unpack it and give the bag in it", b"#ROSBAG V1": "a ROS 1 bag of format 1: `rosbag fix` makes format 2.0 of it"}
+           b"PK\3\4": "a zip archive: unpack it and give the bag in it", b"#ROSBAG V1": "a ROS 1 bag of format 1: `rosbag fix` makes format 2.0 of it",
+           b"\xed\xa1\xda\x01": "a log of lcm-logger: `lcm-logplayer` plays it to `waymark record`, whose configuration has `devices: {lcm: ...}`"}
 _BAG_NAME = re.compile(r"\.(mcap|db3|bag|active)(\.(zstd|zst|gz|bz2|xz|lz4))?$")
 _PIECE = 1 << 20  # bytes that are unpacked at once
 

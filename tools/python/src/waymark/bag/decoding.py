@@ -10,6 +10,7 @@ from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_
 from rosbags.typesys.store import Typestore
 
 from ..ros import typestore
+from . import xcdr2
 
 _ZSTD = b"\x28\xb5\x2f\xfd"  # RFC 8878; no CDR and no ROS 1 message of a header begins so
 _MESSAGE_MAX = 1 << 30  # bytes of a message that was compressed alone; more is damage
@@ -18,6 +19,15 @@ _RULE = "=" * 80
 
 class BadMessage(Exception):
     """Why one message can't be taken, as a sentence without its subject."""
+
+
+@dataclass
+class Bad:
+    """Messages of a topic, or tags, that can't be taken: the first one's stamp and reason, and how many."""
+
+    t_ns: int
+    why: str
+    count: int = 0
 
 
 @dataclass(eq=False)
@@ -97,7 +107,12 @@ def _decoder(kind: str, definition: str, style: str, wire: str) -> Callable[[Any
     def decode(data: Any) -> Any:
         if bytes(data[:4]) == _ZSTD:
             data = _unpacked(data)
+        begin = bytes(data[:2]) if wire == "cdr" else b""
+        if begin in xcdr2.PARAMETER_LISTS:
+            raise BadMessage("it is a list of parameters (PL_CDR), in which no ROS type is written; plain CDR is read")
         try:
+            if begin in xcdr2.PLAIN or begin in xcdr2.DELIMITED:
+                data = xcdr2.rewritten(bytes(data), store, kind)
             return read(data, kind)
         except Exception:  # what a decoder raises on bytes that don't fit the type is its own matter
             raise BadMessage(f"its {len(data)} bytes are no {kind}") from None

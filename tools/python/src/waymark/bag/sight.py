@@ -10,7 +10,7 @@ from ..recording import Frame, jpeg_size
 from ..tables import Array, Table
 from . import cameras, names, pictures, tables, tags
 from .collection import Collection, stamp_ns
-from .decoding import BadMessage, Topic
+from .decoding import Bad, BadMessage, Topic
 from .pictures import Depths
 from .views import TagRows
 
@@ -81,25 +81,30 @@ def detections(kind: str) -> Callable[[Collection, str, Any, int], None]:
     reader = tags.READERS[kind]
 
     def take(into: Collection, topic: str, message: Any, log_ns: int) -> None:
-        t_ns = stamp_ns(message, log_ns)
+        t_ns = tags.stamp_ns(message) or log_ns
         arrival_ns = into.arrival_ns(topic, t_ns, log_ns)
-        bad: BadMessage | None = None
-        found = reader.read(message)
-        while True:
+        found = tags.tags_of(message)
+        bad: list[str] = []
+        for tag in found:
             try:
-                seen = next(found)
-            except StopIteration:
-                break
+                seen = reader.read(tag)
             except BadMessage as problem:
-                bad = problem
-                break
-            rows = into.sight.tags.setdefault(topic, TagRows(kind, tags.frame_of(message), seen.corners is not None))
+                bad.append(str(problem))
+                continue
+            if seen is None:
+                continue
+            frame = tags.frame_of(tag, message)
+            rows = into.sight.tags.setdefault((topic, frame), TagRows(kind, frame, seen.corners is not None))
             rows.whole.extend((t_ns, arrival_ns, seen.id))
             rows.values.extend(seen.corners or seen.place or [])
             if seen.remark:
                 into.find(topic, seen.remark)
-        if bad:
-            raise bad
+        if getattr(message, "boards", ()):
+            into.note(topic, "its boards are not taken: a recording has single tags")
+        if bad and len(bad) == len(found):
+            raise BadMessage(bad[0])
+        for why in bad:
+            into.sight.bad_tags.setdefault(topic, Bad(t_ns, why)).count += 1
         if reader.families:
             for family in {tag.family for tag in message.detections}:
                 into.sight.families.add(tags.family_of(family))
@@ -130,7 +135,7 @@ def write(into: Collection, base: str, rectified_tags: bool | None) -> None:
         if twice:
             into.note(topic, f"{twice} of its pictures have the stamp of another one: a run takes the first")
     found = into.sight.cameras.found()
-    seeing = {id(cameras.of_detections(found, topic, rows.frame)) for topic, rows in into.sight.tags.items()}
+    seeing = {id(cameras.of_detections(found, topic, rows.frame)) for (topic, _), rows in into.sight.tags.items()}
     found = [camera for camera in found if not camera.is_spare or id(camera) in seeing]
     entries: dict[str, dict[str, Any]] = {}
     for camera in found:
@@ -160,9 +165,12 @@ def _write_tags(into: Collection, found: list[cameras.Found], rectified: bool | 
     """Corners in marker-corners.csv, poses in markers.csv; where a camera has both, its corners."""
     written: dict[str, list[Table]] = {"marker-corners.csv": [], "markers.csv": []}
     of_corners: set[str] = set()
-    for topic, rows in sorted(into.sight.tags.items(), key=lambda item: (not item[1].has_corners, item[0])):
+    for topic, bad in into.sight.bad_tags.items():
+        into.note(topic, f"{bad.count} of its tags {'is' if bad.count == 1 else 'are'} left out; the first at {bad.t_ns / 1e9:.3f} s: {bad.why}")
+    for (topic, frame), rows in sorted(into.sight.tags.items(), key=lambda item: (not item[1].has_corners, item[0])):
         camera = cameras.of_detections(found, topic, rows.frame)
-        name = camera.name if camera else into.camera(topic)
+        is_lone = sum(name == topic for name, _ in into.sight.tags) == 1
+        name = camera.name if camera else into.camera(topic if is_lone else frame)
         columns = rows.columns()
         columns[0], columns[-1] = into.clocks[topic](columns[0], columns[-1])
         if rows.has_corners:

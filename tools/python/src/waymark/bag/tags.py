@@ -16,7 +16,7 @@ Ours: the middle of a pixel is whole; corners from the upper left one on, clockw
 """
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -43,7 +43,14 @@ _NUMBER = re.compile(r"(\d+)\D*$")
 _OUTSIDE = 0.01  # share of tags with a corner beyond the picture: detectors read whole tags alone
 _MANY = 100  # tags; a robot that moves sees them in more than a quarter of the picture
 FARTHEST_M = 100.0  # a print of 1 m is 10 pixels wide there at a focal length of 1000, about the least that detectors read
+_IDENTITY_MOST = 2**31 - 1  # of a landmark
 _FACING_MIN = 0.05  # cosine; a print seen more askew than that, 87 degrees, isn't read by any detector
+
+
+def _identity(number: Any) -> int:
+    if not 0 <= int(number) <= _IDENTITY_MOST:
+        raise BadMessage(f"a tag of the number {int(number)}; 0 to {_IDENTITY_MOST} are possible")
+    return int(number)
 
 
 class Seen(NamedTuple):
@@ -88,6 +95,7 @@ def _corners(points: list[tuple[float, float]], order: tuple[int, ...], shift_px
 
 def _pose(identity: int, place: Any, turn: Any, half_turned: bool = False) -> Seen:
     """A pose in the optical frame."""
+    identity = _identity(identity)
     p = np.array([place.x, place.y, place.z], dtype=float)
     q = np.array([turn.x, turn.y, turn.z, turn.w], dtype=float)
     if not np.isfinite(p).all() or not np.isfinite(q).all() or not q.any() or not p[2] > 0:
@@ -116,69 +124,74 @@ def _first_by(homography: Any, points: list[tuple[float, float]]) -> int:
     return first if off[first] < _SAME_CORNER * np.ptp(seen, axis=0).max() else 0
 
 
-def apriltag(message: Any) -> Iterator[Seen]:
-    """apriltag_msgs/AprilTagDetectionArray."""
-    for tag in message.detections:
-        order = _HALF_TURNED_ORDER if _is_half_turned(tag.family) else _UPRIGHT_ORDER
-        points = [(c.x, c.y) for c in tag.corners]
-        first = _first_by(tag.homography, points)
-        remark = f"its corners begin {first} later than those of AprilTag's library, by their homography: they are taken in its order" if first else ""
-        yield Seen(int(tag.id), _corners(points[first:] + points[:first], order, _HALF_PX), remark=remark)
+def apriltag(tag: Any) -> Seen:
+    """A tag of apriltag_msgs/AprilTagDetectionArray."""
+    order = _HALF_TURNED_ORDER if _is_half_turned(tag.family) else _UPRIGHT_ORDER
+    points = [(c.x, c.y) for c in tag.corners]
+    first = _first_by(tag.homography, points)
+    remark = f"its corners begin {first} later than those of AprilTag's library, by their homography: they are taken in its order" if first else ""
+    return Seen(_identity(tag.id), _corners(points[first:] + points[:first], order, _HALF_PX), remark=remark)
 
 
-def isaac(message: Any) -> Iterator[Seen]:
-    """isaac_ros_apriltag_interfaces/AprilTagDetectionArray."""
-    for tag in message.detections:
-        turned = _is_half_turned(tag.family)
-        order = tuple(3 - k for k in (_HALF_TURNED_ORDER if turned else _UPRIGHT_ORDER))
-        corners = _corners([(c.x, c.y) for c in tag.corners], order, _HALF_PX)
-        pose = tag.pose.pose.pose
-        if pose.position.z > 0:
-            ahead, left, up, *right = _pose(int(tag.id), pose.position, pose.orientation, turned).place or [0.0] * 6
-            edge = np.array([left * right[0] - ahead * right[1], up * right[0] - ahead * right[2]])  # of the picture, by the derivative of -left/ahead, -up/ahead
-            by_corners = np.subtract(corners[2:4], corners[:2])
-            if edge @ by_corners < _ALIKE * np.linalg.norm(edge) * np.linalg.norm(by_corners):
-                raise BadMessage(f"the corners of tag {tag.id} and its pose contradict each other: they are of another version's order")
-        yield Seen(int(tag.id), corners)
+def isaac(tag: Any) -> Seen:
+    """A tag of isaac_ros_apriltag_interfaces/AprilTagDetectionArray."""
+    turned = _is_half_turned(tag.family)
+    order = tuple(3 - k for k in (_HALF_TURNED_ORDER if turned else _UPRIGHT_ORDER))
+    corners = _corners([(c.x, c.y) for c in tag.corners], order, _HALF_PX)
+    pose = tag.pose.pose.pose
+    if pose.position.z > 0:
+        ahead, left, up, *right = _pose(tag.id, pose.position, pose.orientation, turned).place or [0.0] * 6
+        edge = np.array([left * right[0] - ahead * right[1], up * right[0] - ahead * right[2]])  # of the picture, by the derivative of -left/ahead, -up/ahead
+        by_corners = np.subtract(corners[2:4], corners[:2])
+        if edge @ by_corners < _ALIKE * np.linalg.norm(edge) * np.linalg.norm(by_corners):
+            raise BadMessage(f"the corners of tag {tag.id} and its pose contradict each other: they are of another version's order")
+    return Seen(_identity(tag.id), corners)
 
 
-def fiducials(message: Any) -> Iterator[Seen]:
-    """fiducial_msgs/FiducialArray."""
-    for tag in message.fiducials:
-        yield Seen(int(tag.fiducial_id), _corners([(tag.x0, tag.y0), (tag.x1, tag.y1), (tag.x2, tag.y2), (tag.x3, tag.y3)], (0, 1, 2, 3), 0.0))
+def fiducial(tag: Any) -> Seen:
+    """A tag of fiducial_msgs/FiducialArray."""
+    return Seen(_identity(tag.fiducial_id), _corners([(tag.x0, tag.y0), (tag.x1, tag.y1), (tag.x2, tag.y2), (tag.x3, tag.y3)], (0, 1, 2, 3), 0.0))
 
 
-def fiducial_poses(message: Any) -> Iterator[Seen]:
-    """fiducial_msgs/FiducialTransformArray."""
-    for tag in message.transforms:
-        yield _pose(int(tag.fiducial_id), tag.transform.translation, tag.transform.rotation)
+def fiducial_pose(tag: Any) -> Seen:
+    """A tag of fiducial_msgs/FiducialTransformArray."""
+    return _pose(tag.fiducial_id, tag.transform.translation, tag.transform.rotation)
 
 
-def poses(message: Any, half_turned: bool = False) -> Iterator[Seen]:
-    """Lists of tags with a pose, or lists of identities and of poses. Of a bundle of tags (several identities) none has a pose."""
+def pose(tag: Any, half_turned: bool = False) -> Seen | None:
+    """A tag with a pose, or an identity and a pose. Of a bundle of tags (several identities) none has a pose."""
+    identity, at = tag if isinstance(tag, tuple) else (tag.marker_id if hasattr(tag, "marker_id") else tag.id, tag)
+    while hasattr(at, "pose"):
+        at = at.pose
+    return _pose(np.ravel(identity)[0], at.position, at.orientation, half_turned) if np.size(identity) == 1 else None
+
+
+def apriltag_pose(tag: Any) -> Seen | None:
+    """A tag of apriltag_ros for ROS 1, and its predecessors: half a turn from the library's way up."""
+    return pose(tag, half_turned=True)
+
+
+def tags_of(message: Any) -> list[Any]:
+    """The tags of a message, as it has them, or pairs of identities and poses."""
     if hasattr(message, "marker_ids"):
-        pairs = list(zip(message.marker_ids, message.poses))
-    else:
-        tags = message.markers if hasattr(message, "markers") else message.detections
-        pairs = [(tag.marker_id if hasattr(tag, "marker_id") else tag.id, tag) for tag in tags]
-    for identity, pose in pairs:
-        while hasattr(pose, "pose"):
-            pose = pose.pose
-        if np.size(identity) == 1:
-            yield _pose(int(np.ravel(identity)[0]), pose.position, pose.orientation, half_turned)
+        return list(zip(message.marker_ids, message.poses))
+    return next(list(getattr(message, name)) for name in ("detections", "markers", "fiducials", "transforms") if hasattr(message, name))
 
 
-def apriltag_poses(message: Any) -> Iterator[Seen]:
-    """apriltag_ros for ROS 1, and its predecessors: half a turn from the library's way up."""
-    return poses(message, half_turned=True)
+def _headers(tag: Any, message: Any) -> list[Any]:
+    parts: list[Any] = [getattr(tag, "pose", None), tag, message]
+    return [part.header for part in parts if hasattr(part, "header")]
 
 
-def frame_of(message: Any) -> str:
-    """The frame of a message's tags: that of its first tag's pose, of its first tag, or the message's."""
-    tags = getattr(message, "markers", getattr(message, "detections", []))
-    parts: list[Any] = [*(part for tag in tags[:1] for part in (getattr(tag, "pose", None), tag)), message]
-    headers = [part.header for part in parts if hasattr(part, "header")]
-    return next((name for header in headers if (name := header.frame_id.lstrip("/"))), "")
+def frame_of(tag: Any, message: Any) -> str:
+    """The frame of a tag: that of its pose, its own, or the message's."""
+    return next((name for header in _headers(tag, message) if (name := header.frame_id.lstrip("/"))), "")
+
+
+def stamp_ns(message: Any) -> int:
+    """The stamp of a message, or of its first tag, as ar_track_alvar writes it; 0: none has one."""
+    headers = _headers(next(iter(tags_of(message)), None), message)
+    return next((t_ns for header in reversed(headers) if (t_ns := header.stamp.sec * 10**9 + header.stamp.nanosec)), 0)
 
 
 def _number(found: Any, name: str) -> int:
@@ -190,27 +203,31 @@ def _number(found: Any, name: str) -> int:
     return int(number[1])
 
 
-def vision_poses(message: Any) -> Iterator[Seen]:
-    """vision_msgs/Detection2DArray and Detection3DArray whose first hypothesis has a number as its class, and a pose."""
-    for found in message.detections:
-        if not len(found.results):
-            continue
-        best = found.results[0]
-        about = getattr(best, "hypothesis", best)
-        number = _number(found, str(getattr(about, "class_id", getattr(about, "id", ""))))
-        where = best.pose.pose if hasattr(best.pose, "pose") else best.pose
-        place = where.position
-        if not any((place.x, place.y, place.z)):
-            raise BadMessage("a detection without a pose: a box alone gives no corners of a tag")
-        yield _pose(number, place, where.orientation)
+def _score(hypothesis: Any) -> float:
+    score = float(getattr(hypothesis, "hypothesis", hypothesis).score)
+    return score if np.isfinite(score) else -np.inf
+
+
+def vision_pose(found: Any) -> Seen | None:
+    """A detection of vision_msgs whose likeliest hypothesis has a number as its class, and a pose."""
+    if not len(found.results):
+        return None
+    best = max(found.results, key=_score)
+    about = getattr(best, "hypothesis", best)
+    number = _number(found, str(getattr(about, "class_id", getattr(about, "id", ""))))
+    where = best.pose.pose if hasattr(best.pose, "pose") else best.pose
+    place = where.position
+    if not any((place.x, place.y, place.z)):
+        raise BadMessage("a detection without a pose: a box alone gives no corners of a tag")
+    return _pose(number, place, where.orientation)
 
 
 @dataclass(frozen=True)
 class Reader:
-    """How a type is read. `is_of_rectified`: its node reads rectified pictures; `families`: whether its tags name theirs; `is_half_turned`: its poses
+    """How a tag of a type is read; None: it has no pose. `is_of_rectified`: its node reads rectified pictures; `families`: whether its tags name theirs; `is_half_turned`: its poses
     are taken as of a family that is drawn the other way up."""
 
-    read: Callable[[Any], Iterator[Seen]]
+    read: Callable[[Any], Seen | None]
     is_of_rectified: bool = False
     families: bool = False
     is_half_turned: bool = False
@@ -219,12 +236,12 @@ class Reader:
 READERS = {
     "apriltag_msgs/msg/AprilTagDetectionArray": Reader(apriltag, is_of_rectified=True, families=True),
     "isaac_ros_apriltag_interfaces/msg/AprilTagDetectionArray": Reader(isaac, is_of_rectified=True, families=True),
-    "fiducial_msgs/msg/FiducialArray": Reader(fiducials),
-    "fiducial_msgs/msg/FiducialTransformArray": Reader(fiducial_poses),
-    "vision_msgs/msg/Detection2DArray": Reader(vision_poses),
-    "vision_msgs/msg/Detection3DArray": Reader(vision_poses),
-} | {f"{package}/msg/AprilTagDetectionArray": Reader(apriltag_poses, is_half_turned=True) for package in ("apriltag_ros", "apriltags2_ros", "apriltags_ros")} | {
-    kind: Reader(poses) for kind in ("aruco_msgs/msg/MarkerArray", "aruco_markers_msgs/msg/MarkerArray", "aruco_opencv_msgs/msg/ArucoDetection",
+    "fiducial_msgs/msg/FiducialArray": Reader(fiducial),
+    "fiducial_msgs/msg/FiducialTransformArray": Reader(fiducial_pose),
+    "vision_msgs/msg/Detection2DArray": Reader(vision_pose),
+    "vision_msgs/msg/Detection3DArray": Reader(vision_pose),
+} | {f"{package}/msg/AprilTagDetectionArray": Reader(apriltag_pose, is_half_turned=True) for package in ("apriltag_ros", "apriltags2_ros", "apriltags_ros")} | {
+    kind: Reader(pose) for kind in ("aruco_msgs/msg/MarkerArray", "aruco_markers_msgs/msg/MarkerArray", "aruco_opencv_msgs/msg/ArucoDetection",
                                      "ros2_aruco_interfaces/msg/ArucoMarkers", "aruco_interfaces/msg/ArucoMarkers",
                                      "ar_track_alvar_msgs/msg/AlvarMarkers")}
 

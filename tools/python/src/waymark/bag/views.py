@@ -8,12 +8,13 @@ import numpy as np
 
 from ..tables import Array
 from .cameras import Cameras
+from .decoding import Bad
 from .pictures import Depths
 
 
 @dataclass
 class TagRows:
-    """Tags of a topic: whole numbers (stamp, arrival, identity) and pixels or places, a row each."""
+    """Tags of a topic in one frame: whole numbers (stamp, arrival, identity) and pixels or places, a row each."""
 
     kind: str
     frame: str
@@ -34,5 +35,6 @@ class Sight:
     cameras: Cameras = field(default_factory=Cameras)
     topics: dict[str, str] = field(default_factory=dict)  # of each camera's pictures
     depths: dict[str, Depths] = field(default_factory=dict)
-    tags: dict[str, TagRows] = field(default_factory=dict)
+    tags: dict[tuple[str, str], TagRows] = field(default_factory=dict)  # by topic and frame
+    bad_tags: dict[str, Bad] = field(default_factory=dict)  # among others that are taken
     families: set[str] = field(default_factory=set)
