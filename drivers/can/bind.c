@@ -66,6 +66,11 @@ static wm_status find_message(maker *m) {
                     m->binding->message, found->line, here->line);
     found = here;
   }
+  for (size_t i = 0; !found && i < dbc->message_count; i++)
+    if (dbc->messages[i].twin_line > 0 && text_compare(dbc->messages[i].twin, asked) == 0)
+      return refuse(m, "message '%s' (%s:%d) has the id of %s in line %d, which is taken; remove one of them",
+                    m->binding->message, dbc->path, dbc->messages[i].twin_line,
+                    wm_text_shown(dbc->messages[i].name).text, dbc->messages[i].line);
   if (!found && near.best.length)
     return refuse(m, "message '%s' is not in %s; did you mean %s?", m->binding->message, dbc->path,
                   wm_text_shown(near.best).text);
@@ -333,6 +338,15 @@ static wm_status refuse_twice_bound(maker *m, const wm_can_binding *bindings, si
   return WM_OK;
 }
 
+static void note_twins(maker *m) {
+  const dbc_message *is = m->message;
+  if (is->twin_line == 0 || m->self->twins[0]) return;
+  (void)snprintf(m->self->twins, sizeof m->self->twins,
+                 "%.100s:%d: BO_ %.40s has the id 0x%X of %.40s in line %d, which is taken; remove one of them",
+                 m->dbc->path, is->twin_line, wm_text_shown(is->twin).text, is->id, wm_text_shown(is->name).text,
+                 is->line);
+}
+
 // The lines of one message and bus, from bindings[first] on, become one bound_message.
 static wm_status bind_group(maker *m, const wm_can_binding *bindings, size_t count, size_t first, uint32_t *done) {
   wm_can_decoder *self = m->self;
@@ -350,6 +364,7 @@ static wm_status bind_group(maker *m, const wm_can_binding *bindings, size_t cou
     if (++out->quantity_count > WM_QUANTITIES_MAX)
       return refuse(m, "more than %d quantities from one message", WM_QUANTITIES_MAX);
   }
+  note_twins(m);
   out->match = wm_dbc_match(m->dbc, m->message);
   (void)snprintf(out->bus, sizeof out->bus, "%s", bindings[first].bus);
   (void)snprintf(out->name, sizeof out->name, "%s", bindings[first].message);
@@ -401,6 +416,8 @@ wm_status wm_can_decoder_make(const wm_dbc *dbc, const wm_can_binding *bindings,
   *out = m.self;
   return WM_OK;
 }
+
+const char *wm_can_decoder_twins(const wm_can_decoder *self) { return self->twins; }
 
 void wm_can_decoder_free(wm_can_decoder *self) {
   if (!self) return;

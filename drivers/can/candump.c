@@ -10,6 +10,12 @@
 //   (1.000001) can0 123#112233445566778899    more than 8 bytes: CAN FD, by a writer without ##
 //   (1.000001) can0 20000080#0000000000000000 error frame: bit 29 of the eight digits
 //   (1.000001) can0 123#DEADBEEF T            with its direction, R or T
+//
+// and of what candump shows on the screen with a time (-ta, -tz, -td, -tA), also with -x, -e and -a:
+//
+//   (1.000001)  can0  123   [2]  DE AD        [02]: CAN FD
+//   (1.000001)  can0  RX - -  12345678   [8]  11 22 33 44 55 66 77 88   '.."3DUfw'
+//   (1.000001)  can0  123   [8]  remote request
 #include "text.h"
 #include "waymark/can.h"
 
@@ -40,13 +46,6 @@ static int hex_value(int c) {
   if (c >= 'A' && c <= 'F') return c - 'A' + 10;
   if (c >= 'a' && c <= 'f') return c - 'a' + 10;
   return -1;
-}
-
-static wm_status screen_output(wm_error *err, const char *seen) {
-  return wm_fail(err, WM_BAD_DATA,
-                 "this is what candump shows on the screen (%s), not a log; record with `candump -l any`, or "
-                 "`candump -L any > can.log`, which give (SECONDS.MICROS) IFACE ID#DATA",
-                 seen);
 }
 
 // Days from 1970-01-01 to a date of the Gregorian calendar. A year begins with March, so that a leap day is its last;
@@ -147,16 +146,20 @@ static wm_status parse_time(cursor *in, wm_time_ns *out, wm_error *err) {
   return WM_OK;
 }
 
+// Whether "   [LENGTH]" follows: the screen's form.
+static int is_screen(const cursor *in) {
+  cursor rest = *in;
+  skip_blanks(&rest);
+  return rest.at > in->at && peek(&rest) == '[';
+}
+
 static wm_status parse_id(cursor *in, wm_can_frame *out, wm_error *err) {
   const char *from = in->at;
   uint64_t id = 0;
   size_t digits = 0;
   for (int v; (v = hex_value(peek(in))) >= 0 && digits <= 8; in->at++, digits++) id = id * 16 + (uint64_t)v;
   shown whole = wm_text_shown((wm_text){from, (size_t)(in->at - from)});
-  if (peek(in) != '#') {
-    cursor rest = *in;
-    skip_blanks(&rest);
-    if (digits > 0 && peek(&rest) == '[') return screen_output(err, "ID [LENGTH] BYTES");
+  if (peek(in) != '#' && !(digits > 0 && is_screen(in))) {
     return wm_fail(err, WM_BAD_DATA, "after the interface comes ID#DATA; there is no # behind '%s'",
                    wm_text_shown((wm_text){from, (size_t)(in->end - from)}).text);
   }
@@ -222,6 +225,47 @@ static wm_status parse_payload(cursor *in, wm_can_frame *out, wm_error *err) {
   return WM_OK;
 }
 
+// "   [LENGTH]  BYTES", and what candump adds behind them: ERRORFRAME, the bytes as letters.
+static wm_status parse_screen(cursor *in, wm_can_frame *out, wm_error *err) {
+  skip_blanks(in);
+  in->at++;  // '['
+  const char *from = in->at;
+  unsigned length = 0;
+  for (; is_digit(peek(in)) && length <= WM_CAN_DATA_MAX; in->at++) length = length * 10 + (unsigned)(*in->at - '0');
+  const size_t digits = (size_t)(in->at - from);
+  if (digits < 1 || digits > 2 || length > WM_CAN_DATA_MAX || !passed(in, ']'))
+    return wm_fail(err, WM_BAD_DATA, "id %X: [LENGTH] is 0 to %d bytes", out->id, WM_CAN_DATA_MAX);
+  out->is_fd = digits == 2;
+  cursor rest = *in;
+  if (text_is(next_word(&rest), "remote")) {
+    out->is_remote = 1;
+    out->length = (uint8_t)length;
+    in->at = in->end;
+    return WM_OK;
+  }
+  for (wm_text byte; out->length < length;
+       out->data[out->length++] = (uint8_t)(hex_value(byte.at[0]) * 16 + hex_value(byte.at[1]))) {
+    byte = next_word(in);
+    if (byte.length != 2 || hex_value(byte.at[0]) < 0 || hex_value(byte.at[1]) < 0)
+      return wm_fail(err, WM_BAD_DATA, "id %X: [%u] says %u bytes, two hex digits each; '%s' is none", out->id, length,
+                     length, wm_text_shown(byte).text);
+  }
+  rest = *in;
+  const wm_text more = next_word(&rest);
+  if (text_is(more, "ERRORFRAME") || (more.length > 0 && more.at[0] == '\'')) in->at = in->end;
+  return WM_OK;
+}
+
+// "RX - -" of candump -x, before the id.
+static void skip_direction(cursor *in) {
+  cursor rest = *in;
+  const wm_text direction = next_word(&rest);
+  if (!text_is(direction, "RX") && !text_is(direction, "TX")) return;
+  for (int i = 0; i < 2; i++) (void)next_word(&rest);
+  *in = rest;
+  skip_blanks(in);
+}
+
 static int is_interface(wm_text name) {
   for (size_t i = 0; i < name.length; i++)
     if (name.at[i] <= ' ' || name.at[i] > '~') return 0;
@@ -240,7 +284,9 @@ wm_status wm_candump_parse(const char *line, size_t length, wm_can_frame *out, w
     wm_text id = next_word(&rest);
     skip_blanks(&rest);
     if (id.length > 0 && hex_value((unsigned char)id.at[0]) >= 0 && peek(&rest) == '[')
-      return screen_output(err, "no time, ID [LENGTH] BYTES");
+      return wm_fail(err, WM_BAD_DATA,
+                     "this is what candump shows on the screen, without a time; record with `candump -l any`, or "
+                     "`candump -L any > can.log`");
   }
   wm_status status = parse_time(&in, &out->t_ns, err);
   if (status != WM_OK) return status;
@@ -252,8 +298,10 @@ wm_status wm_candump_parse(const char *line, size_t length, wm_can_frame *out, w
   memcpy(out->iface, iface.at, iface.length);
 
   skip_blanks(&in);
+  skip_direction(&in);
   if ((status = parse_id(&in, out, err)) != WM_OK) return status;
-  if ((status = parse_payload(&in, out, err)) != WM_OK) return status;
+  status = peek(&in) == '#' ? parse_payload(&in, out, err) : parse_screen(&in, out, err);
+  if (status != WM_OK) return status;
 
   wm_text direction = in.at < in.end && !is_blank(peek(&in)) ? (wm_text){0} : next_word(&in);
   if (text_is(direction, "R") || text_is(direction, "T")) direction.length = 0;

@@ -27,23 +27,51 @@ static int by_name(const void *a, const void *b) {
   return order ? order : (x->line > y->line) - (x->line < y->line);
 }
 
-static wm_status sort_and_refuse_twins(wm_dbc *dbc, wm_error *err) {
+static wm_status sort_signals(const wm_dbc *dbc, const dbc_message *m, wm_error *err) {
+  dbc_signal *signals = dbc->signals + m->first_signal;
+  if (m->signal_count > 0) qsort(signals, m->signal_count, sizeof *signals, by_name);
+  for (size_t k = 1; k < m->signal_count; k++)
+    if (text_compare(signals[k].name, signals[k - 1].name) == 0)
+      return wm_fail(err, WM_BAD_CONFIG, "%s:%d: SG_ %s: %s has a signal of this name already, in line %d", dbc->path,
+                     signals[k].line, wm_text_shown(signals[k].name).text, wm_text_shown(m->name).text,
+                     signals[k - 1].line);
+  return WM_OK;
+}
+
+static int is_same_number(double a, double b) { return a <= b && a >= b; }
+
+static int is_same_signal(const dbc_signal *a, const dbc_signal *b) {
+  return text_compare(a->name, b->name) == 0 && signal_same(&a->bits, &b->bits) &&
+         text_compare(a->unit, b->unit) == 0 && is_same_number(a->factor, b->factor) &&
+         is_same_number(a->offset, b->offset) && a->is_selector == b->is_selector && a->is_selected == b->is_selected &&
+         a->selected_by == b->selected_by;
+}
+
+// The same message again, as of a file that was put together of several.
+static int is_same_message(const wm_dbc *dbc, const dbc_message *a, const dbc_message *b) {
+  if (text_compare(a->name, b->name) != 0 || a->length != b->length || a->signal_count != b->signal_count) return 0;
+  for (uint32_t i = 0; i < a->signal_count; i++)
+    if (!is_same_signal(&dbc->signals[a->first_signal + i], &dbc->signals[b->first_signal + i])) return 0;
+  return 1;
+}
+
+// By id. Of several messages of one id the first is kept.
+static wm_status sort_messages(wm_dbc *dbc, wm_error *err) {
   if (dbc->message_count > 0) qsort(dbc->messages, dbc->message_count, sizeof *dbc->messages, by_id);
+  size_t kept = 0;
   for (size_t i = 0; i < dbc->message_count; i++) {
-    const dbc_message *m = &dbc->messages[i];
-    if (i > 0 && dbc_key(m->id, m->is_extended) == dbc_key(m[-1].id, m[-1].is_extended))
-      return wm_fail(err, WM_BAD_CONFIG, "%s:%d: BO_ %s: its id 0x%X is that of %s in line %d; one of them has to go",
-                     dbc->path, m->line, wm_text_shown(m->name).text, m->id, wm_text_shown(m[-1].name).text,
-                     m[-1].line);
-    if (m->signal_count == 0) continue;
-    dbc_signal *signals = dbc->signals + m->first_signal;
-    qsort(signals, m->signal_count, sizeof *signals, by_name);
-    for (size_t k = 1; k < m->signal_count; k++)
-      if (text_compare(signals[k].name, signals[k - 1].name) == 0)
-        return wm_fail(err, WM_BAD_CONFIG, "%s:%d: SG_ %s: %s has a signal of this name already, in line %d", dbc->path,
-                       signals[k].line, wm_text_shown(signals[k].name).text, wm_text_shown(m->name).text,
-                       signals[k - 1].line);
+    const dbc_message m = dbc->messages[i];
+    const wm_status status = sort_signals(dbc, &m, err);
+    if (status != WM_OK) return status;
+    dbc_message *before = kept > 0 ? &dbc->messages[kept - 1] : NULL;
+    if (!before || dbc_key(m.id, m.is_extended) != dbc_key(before->id, before->is_extended)) {
+      dbc->messages[kept++] = m;
+    } else if (before->twin_line == 0 && !is_same_message(dbc, before, &m)) {
+      before->twin = m.name;
+      before->twin_line = m.line;
+    }
   }
+  dbc->message_count = kept;
   return WM_OK;
 }
 
@@ -78,7 +106,7 @@ wm_status wm_dbc_parse(const char *source, size_t length, const char *path, wm_d
   dbc->source[length] = '\0';
 
   wm_status status = wm_dbc_read(dbc, length, DBC_DEFINITIONS, err);
-  if (status == WM_OK) status = sort_and_refuse_twins(dbc, err);
+  if (status == WM_OK) status = sort_messages(dbc, err);
   if (status == WM_OK) status = wm_dbc_read(dbc, length, DBC_DETAILS, err);
   if (status != WM_OK) {
     wm_dbc_free(dbc);

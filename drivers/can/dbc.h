@@ -42,6 +42,8 @@ typedef struct dbc_message {
   uint8_t format;   // dbc_format by VFrameFormat
   uint32_t length;  // bytes; above WM_CAN_DATA_MAX for multi-frame messages
   uint32_t first_signal, signal_count;
+  wm_text twin;  // the name of a later message of this id, which is left out, and its line; 0: none, or the same again
+  int twin_line;
 } dbc_message;
 
 struct wm_dbc {

@@ -79,6 +79,7 @@ struct wm_can_decoder {
   bound_selector *selectors;
   dbc_range *ranges;
   size_t message_count, quantity_count, signal_count, selector_count, range_count;
+  char twins[256];  // of the first bound message whose id the DBC has twice
 };
 
 #endif

@@ -28,6 +28,8 @@ int wm_can_survey_take(wm_can_survey *self, const wm_can_frame *frame) {
     memcpy(seen->iface, frame->iface, sizeof seen->iface);
     self->count++;
   }
+  self->runs += self->runs == 0 || self->newest != i;
+  self->newest = i;
   seen->frames++;
   seen->last_ns = frame->t_ns;
   return 1;

@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "arrival.h"
-#include "lines.h"
+#include "can_log.h"
 #include "waymark/can.h"
 
 typedef struct log_frame {
@@ -16,7 +16,7 @@ typedef struct log_frame {
 
 typedef struct can_stream {
   wm_source base;
-  line_reader lines;
+  can_log log;
   wm_can_decoder *decoder;
   wm_can_part part;
   wm_can_gnss gnss;
@@ -27,13 +27,11 @@ typedef struct can_stream {
   can_buses buses;
   size_t bus;  // its index
   wm_can_survey *survey;
-  int has_differences;  // its times are summed up
-  wm_time_ns sum_ns;
 } can_stream;
 
 static void keep_problem(can_stream *self, long line, const char *why) {
   char *first = self->base.counts.first_problem;
-  if (!first[0]) snprintf(first, sizeof self->base.counts.first_problem, "%s:%ld: %s", self->lines.path, line, why);
+  if (!first[0]) snprintf(first, sizeof self->base.counts.first_problem, "%s:%ld: %s", self->log.lines.path, line, why);
 }
 
 // In a log of several buses each stream takes its own frames; the first one counts frames of no stream.
@@ -48,17 +46,12 @@ static int is_mine(can_stream *self, const char *interface) {
 // The next frame of the log; other lines are counted, once.
 static wm_status read_frame(can_stream *self, log_frame *out, wm_error *err) {
   for (;;) {
-    const char *text;
-    size_t length;
-    const char *problem;
-    wm_error why = {0};
-    wm_status status = lines_next(&self->lines, &text, &length, &problem, err);
-    if (status != WM_OK) return status;
-    out->line = self->lines.number;
-    status = problem ? wm_fail(&why, WM_BAD_DATA, "%s", problem) : wm_candump_parse(text, length, &out->can, &why);
-    if (status == WM_OK && self->has_differences) out->can.t_ns = self->sum_ns += out->can.t_ns;
+    wm_error why;
+    const wm_status status = can_log_next(&self->log, &out->can, &why, err);
+    if (status != WM_OK && status != WM_AGAIN) return status;
+    out->line = self->log.line;
     if (status == WM_OK && is_mine(self, out->can.iface)) return WM_OK;
-    if (status == WM_OK || status == WM_AGAIN || self->bus > 0) continue;
+    if (status == WM_OK || !why.text[0] || self->bus > 0) continue;
     self->base.counts.malformed++;
     keep_problem(self, out->line, why.text);
   }
@@ -91,9 +84,8 @@ static void judge_whole(can_stream *self) {
   if (!is_missing && wm_can_decoder_floats(self->decoder, text, sizeof text) == 0) return;
   const int has_frames = self->survey->count > 0;  // 0: the first problem is that the lines are no log
   if (first[0] && (self->base.counts.received > 0 || !has_frames)) return;
-  const char *slash = strrchr(self->lines.path, '/');
-  (void)snprintf(first, sizeof self->base.counts.first_problem, "%.40s: %.210s", slash ? slash + 1 : self->lines.path,
-                 text);
+  const char *path = self->log.lines.path, *slash = strrchr(path, '/');
+  (void)snprintf(first, sizeof self->base.counts.first_problem, "%.40s: %.210s", slash ? slash + 1 : path, text);
 }
 
 static wm_status next_event(wm_source *base, wm_event *out, wm_error *err) {
@@ -117,7 +109,7 @@ static wm_status next_event(wm_source *base, wm_event *out, wm_error *err) {
 
 static void close_can(wm_source *base) {
   can_stream *self = (can_stream *)base;
-  lines_close(&self->lines);
+  can_log_close(&self->log);
   wm_can_decoder_free(self->decoder);
   free(self->survey);
   free(self);
@@ -125,30 +117,17 @@ static void close_can(wm_source *base) {
 
 static const wm_source_ops kCan = {next_event, close_can};
 
-// Reads the log's first frames, and warns of what they show.
-static wm_status survey_log(can_stream *self, const char *log, wm_warn_fn warn, void *context, wm_error *err) {
-  const char *line;
+// Opens the log, and warns of what its first frames show.
+static wm_status open_log(can_stream *self, const char *log, wm_warn_fn warn, void *context, wm_error *err) {
   char text[320], whole[WM_PATH_MAX + sizeof text];
-  size_t length;
-  const char *problem;
-  wm_can_frame frame;
-  line_reader lines;
-  wm_status status = lines_open(&lines, log, err);
-  if (status != WM_OK) return status;
-  while ((status = lines_next(&lines, &line, &length, &problem, err)) == WM_OK)
-    if (!problem && wm_candump_parse(line, length, &frame, NULL) == WM_OK && !wm_can_survey_take(self->survey, &frame))
-      break;
-  lines_close(&lines);
-  self->has_differences = wm_can_survey_has_differences(self->survey);
-  if (self->has_differences && self->bus == 0 && warn) {
-    (void)snprintf(whole, sizeof whole, "%s: its times are differences (candump -td): they are summed up", log);
-    warn(context, WM_NOTE_FILE, whole);
-  }
-  if (wm_can_decoder_senders(self->decoder, self->survey, text, sizeof text) > 0 && warn) {
-    (void)snprintf(whole, sizeof whole, "%s: %s", log, text);
-    warn(context, WM_NOTE_FILE, whole);
-  }
-  return status == WM_END ? WM_OK : status;
+  wm_status status = can_log_open(&self->log, log, self->survey, whole, sizeof whole, err);
+  if (status != WM_OK || !warn) return status;
+  if (whole[0] && self->bus == 0) warn(context, WM_NOTE_FILE, whole);
+  if (wm_can_decoder_twins(self->decoder)[0]) warn(context, WM_NOTE_FILE, wm_can_decoder_twins(self->decoder));
+  if (wm_can_decoder_senders(self->decoder, self->survey, text, sizeof text) == 0) return status;
+  (void)snprintf(whole, sizeof whole, "%s: %s", log, text);
+  warn(context, WM_NOTE_FILE, whole);
+  return status;
 }
 
 wm_status can_stream_open(const char *log, const can_buses *buses, size_t bus, wm_can_part part,
@@ -173,8 +152,7 @@ wm_status can_stream_open(const char *log, const can_buses *buses, size_t bus, w
   snprintf(self->base.name, sizeof self->base.name, "can%s%s%s", part == WM_CAN_GNSS ? "-gnss" : "",
            buses->count > 1 ? ":" : "", buses->count > 1 ? is->interface : "");
   wm_status status = wm_can_decoder_load(is->dbc, is->signals, part, &self->decoder, err);
-  if (status == WM_OK && self->decoder) status = survey_log(self, log, warn, context, err);
-  if (status == WM_OK && self->decoder) status = lines_open(&self->lines, log, err);
+  if (status == WM_OK && self->decoder) status = open_log(self, log, warn, context, err);
   if (status != WM_OK || !self->decoder) {
     close_can(&self->base);
     return status;

@@ -23,7 +23,7 @@ wm_status can_buses_read(const wm_yaml_node *list, const char *dir, can_buses *o
 
 // The stream of one of the buses: quantities, or the GNSS receiver's positions about `gnss_origin`. *quantities: bit
 // per wm_quantity that it can give. *out is NULL without bindings of that part. Warns of times that are differences,
-// and of messages with several senders.
+// of lines that are sorted by id, of messages with several senders and of ids that the DBC has twice.
 wm_status can_stream_open(const char *log, const can_buses *buses, size_t bus, wm_can_part part,
                           const double gnss_origin[3], wm_warn_fn warn, void *context, wm_source **out,
                           uint32_t *quantities, wm_error *err);

@@ -8,7 +8,9 @@ usage: can_judge.py CAN_JUDGE_PROGRAM [DATA_FOLDER]      (default: the environme
 Exit codes: 0 they agree, 1 they don't, 77 skipped (no data, or no judges: tests/judges/setup.sh installs them).
 """
 import copy
+import datetime
 import decimal
+import io
 import math
 import os
 import pathlib
@@ -106,12 +108,28 @@ def judge_candump_logs(program, folder, tally):
         tally.report(f"candump {path.name}", len(ours), wrong)
 
 
+def screen_fault(line, got):
+    """What is wrong with our answer to a line of candump's screen; "": nothing. Without a time it is refused; else cantools' reader judges
+    interface, id and bytes, but for error frames, which that one leaves out."""
+    from cantools.logreader import Parser
+    if not line.lstrip().startswith("("):
+        return "" if "candump -l" in got else "it is not refused"
+    frame = next(iter(Parser(io.StringIO(line + "\n"))), None)
+    if frame is None or "ERRORFRAME" in line or not re.search(r"\]\s+\S", line):
+        return ""
+    t_ns, channel, identifier, _, remote, *_, data = (got.split() + [""] * 10)[:10]
+    stated = re.match(r"\s*\(([\d.]+)\)", line)
+    want_ns = nanoseconds(stated[1]) if stated else (frame.timestamp - datetime.datetime(1970, 1, 1)) // datetime.timedelta(microseconds=1) * 1000
+    want = (str(want_ns), frame.channel, f"{frame.frame_id:X}", "" if remote == "1" else frame.data.hex().upper())
+    return "" if (t_ns, channel, identifier, data) == want else f"cantools has {want}"
+
+
 def judge_screen_output(program, folder, tally):
     for path in sorted(folder.glob("*.txt")):
         lines = [line for line in path.read_text().splitlines() if line.strip()]
         answers = run(program, "candump", text="\n".join(lines) + "\n")
-        wrong = [f"{line}: {got}" for line, got in zip(lines, answers) if "candump -l" not in got]
-        tally.report(f"screen output {path.name} is refused", len(answers), wrong)
+        wrong = [f"{line}: {got}: {fault}" for line, got in zip(lines, answers) if (fault := screen_fault(line, got))]
+        tally.report(f"screen output {path.name}", len(answers), wrong)
 
 
 def as_candump(message):

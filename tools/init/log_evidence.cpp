@@ -127,7 +127,7 @@ class Weigher {
 
   void read(const std::filesystem::path &path) {
     survey_ = survey_log(path);
-    facts_.notes = each_frame(path, *survey_, facts_.malformed, [&](const wm_can_frame &frame) {
+    facts_.notes = each_frame(path, facts_.malformed, [&](const wm_can_frame &frame) {
       if (facts_.frames++ == 0) start_ns_ = frame.t_ns;
       take(frame);
     });

@@ -296,7 +296,7 @@ static void read_nmea2000(Robot &robot) {
   if (!wish.can_log.empty()) {
     const auto survey = survey_log(wish.can_log);
     uint64_t malformed = 0;
-    if (survey->frames == 0) (void)each_frame(wish.can_log, *survey, malformed, [](const wm_can_frame &) {});  // throws
+    if (survey->frames == 0) (void)each_frame(wish.can_log, malformed, [](const wm_can_frame &) {});  // throws
     found = nmea2000_of(*survey);
   }
   if (found.dbc_text.empty())

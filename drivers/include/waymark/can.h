@@ -30,10 +30,10 @@ typedef struct wm_can_frame {
 
 // One line of `candump -l` ("(SECONDS.MICROS) IFACE ID#DATA ..."): classic (also with a raw DLC, _9 to _F), FD (##),
 // remote and error frames (bit 29 of eight digits), with or without a final direction (R, T). `line` needn't be
-// terminated. The time may be a date (`candump -L -tA`), which is taken as UTC. WM_AGAIN: an empty line, or one that
-// begins with '#'. WM_BAD_DATA, WM_OUT_OF_RANGE, WM_UNSUPPORTED (CAN XL): *err has the reason, without file and line.
-// candump's screen format is refused with a message of its own. The time is exact (integers), also a negative one. Cost
-// linear in `length`; no allocation. Any thread.
+// terminated. Or a line of candump's screen with a time, "(SECONDS.MICROS)  IFACE  ID   [LENGTH]  BYTES". The time may
+// be a date (`candump -tA`), which is taken as UTC. WM_AGAIN: an empty line, or one that begins with '#'. WM_BAD_DATA,
+// WM_OUT_OF_RANGE, WM_UNSUPPORTED (CAN XL): *err has the reason, without file and line. The time is exact (integers),
+// also a negative one. Cost linear in `length`; no allocation. Any thread.
 wm_status wm_candump_parse(const char *line, size_t length, wm_can_frame *out, wm_error *err);
 
 // The ids of a log's first frames, and whether its times are differences (`candump -L -td`).
@@ -48,8 +48,9 @@ typedef struct wm_can_seen {
 } wm_can_seen;
 typedef struct wm_can_survey {
   wm_can_seen seen[WM_CAN_SURVEY_IDS];  // in the order of their first frames; error and remote frames are left out
-  size_t count;
-  uint64_t frames, not_later;  // of all kinds; those whose stamp isn't later than that of the frame before
+  size_t count, newest;                 // newest: that of the last frame
+  uint64_t runs;                        // of frames of one id after each other: `count` where the log is sorted by id
+  uint64_t frames, not_later;           // of all kinds; those whose stamp isn't later than that of the frame before
   wm_time_ns first_ns, last_ns;
   wm_time_ns rise_ns;  // the largest from a stamp to the next one
 } wm_can_survey;
@@ -167,6 +168,8 @@ size_t wm_can_decoder_matches(const wm_can_decoder *self, wm_can_match *out, siz
 // Of the bound messages of which no frame has come: a text for people that names each wanted id, and those in the
 // survey that are like it, else the most frequent ones. "" where all came. Returns its length.
 size_t wm_can_decoder_missing(const wm_can_decoder *self, const wm_can_survey *seen, char *out, size_t capacity);
+// Of a bound message whose id the DBC has twice, with different contents: which one is taken. "": none.
+const char *wm_can_decoder_twins(const wm_can_decoder *self);
 // Of the bound messages that several senders (buses, J1939 source addresses) send: which one is taken. "": none.
 size_t wm_can_decoder_senders(const wm_can_decoder *self, const wm_can_survey *seen, char *out, size_t capacity);
 // Of the bound integer signals whose bits all are numbers as floating point, and none in range as an integer: the line

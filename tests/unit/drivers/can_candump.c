@@ -48,6 +48,21 @@ TEST(forms) {
   expect("(1.0) /dev/serial/by-id/usb-Adapter_0123456789-if00 123#00", 0x123, 0, 0, 0, 0, 1);
 }
 
+TEST(the_screen_with_a_time) {
+  expect(" (1700000000.000000)  can0  123   [2]  11 22", 0x123, 0, 0, 0, 0, 2);
+  TEST_ASSERT_EQUAL_HEX8(0x22, frame.data[1]);
+  TEST_ASSERT_EQUAL_INT64(INT64_C(1700000000000000000), frame.t_ns);
+  expect(" (2024-01-01 12:00:00.123456)  can0       123   [0]", 0x123, 0, 0, 0, 0, 0);
+  TEST_ASSERT_EQUAL_INT64(INT64_C(1704110400123456000), frame.t_ns);
+  expect(" (1.0)  vcan0  18FEF100   [8]  01 02 03 04 05 06 07 FF   '........'", 0x18FEF100, 1, 0, 0, 0, 8);
+  TEST_ASSERT_EQUAL_HEX8(0xFF, frame.data[7]);
+  expect(" (1.0)  can0  RX - -  123   [1]  7F", 0x123, 0, 0, 0, 0, 1);
+  expect(" (1.0)  can0  TX B E  123  [12]  00 01 02 03 04 05 06 07 08 09 0A 0B", 0x123, 0, 0, 0, 1, 12);
+  expect(" (1.0)  can0  123  [02]  00 01", 0x123, 0, 0, 0, 1, 2);
+  expect(" (1.0)  can0  123   [8]  remote request", 0x123, 0, 1, 0, 0, 8);
+  expect(" (1.0)  can0  20000004   [8]  00 04 00 00 00 00 00 00   ERRORFRAME", 0x4, 0, 0, 1, 0, 8);
+}
+
 TEST(contents) {
   good("(30.005041) vcan1 1C4D80A7##B12C20304 T");
   TEST_ASSERT_EQUAL_STRING("vcan1", frame.iface);

@@ -56,14 +56,13 @@ static const bad_input kTable[] = {
      "this is no log of candump, but a pointer of Git LFS: `git lfs pull` fetches the file that it stands for"},
     {"a web page", CANDUMP, "<html>", "this is no log of candump, but a web page or XML: did the download go wrong?"},
     {"screen output of candump", CANDUMP, "  can0  123   [2]  11 22",
-     "this is what candump shows on the screen (no time, ID [LENGTH] BYTES), not a log; record with `candump -l any`, "
-     "or `candump -L any > can.log`, which give (SECONDS.MICROS) IFACE ID#DATA"},
-    {"screen output with a time", CANDUMP, "(000.000000)  can0  123   [2]  11 22",
-     "this is what candump shows on the screen (ID [LENGTH] BYTES), not a log; record with `candump -l any`, or "
-     "`candump -L any > can.log`, which give (SECONDS.MICROS) IFACE ID#DATA"},
-    {"screen output with a date", CANDUMP, "(2020-12-19 12:04:45.485261)  can0  123   [1]  11",
-     "this is what candump shows on the screen (ID [LENGTH] BYTES), not a log; record with `candump -l any`, or "
-     "`candump -L any > can.log`, which give (SECONDS.MICROS) IFACE ID#DATA"},
+     "this is what candump shows on the screen, without a time; record with `candump -l any`, or `candump -L any > "
+     "can.log`"},
+    {"screen output, bytes missing", CANDUMP, "(000.000000)  can0  123   [3]  11 22",
+     "id 123: [3] says 3 bytes, two hex digits each; '' is none"},
+    {"screen output in bits", CANDUMP, "(000.000000)  can0  123   [1]  00010001",
+     "id 123: [1] says 1 bytes, two hex digits each; '00010001' is none"},
+    {"screen output, length", CANDUMP, "(000.000000)  can0  123   [65]  11", "id 123: [LENGTH] is 0 to 64 bytes"},
     {"time without its end", CANDUMP, "(1.5 can0 123#00", "the time's closing bracket is missing: (SECONDS.MICROS)"},
     {"time with too many digits", CANDUMP, "(1.0000000001) can0 123#00",
      "time (1.0000000001) needs 1 to 9 digits behind its point"},
@@ -93,8 +92,6 @@ static const bad_input kTable[] = {
      "car.dbc:1: BO_ M: 20000 bytes; a frame has 0 to 64, and what goes over several frames at most 1785"},
     {"29-bit id without its mark", DBC, "BO_ 4096 WHEELS: 8 ESP",
      "car.dbc:1: BO_ WHEELS: id 4096 is above 11 bits; a 29-bit id is written with bit 31 set, as 2147487744"},
-    {"two messages of one id", DBC, "BO_ 1 A: 8 X\nBO_ 1 B: 8 X",
-     "car.dbc:2: BO_ B: its id 0x1 is that of A in line 1; one of them has to go"},
     {"two signals of one name", DBC, SG "A : 0|8@1+ (1,0) [0|0] \"\" X\n SG_ A : 8|8@1+ (1,0) [0|0] \"\" X",
      "car.dbc:3: SG_ A: M has a signal of this name already, in line 2"},
     {"signal outside of a message", DBC, "SG_ A : 0|8@1+ (1,0) [0|0] \"\" X",

@@ -14,6 +14,33 @@ void tearDown(void) {
   close_it(&f);
 }
 
+#define TWIN "BO_ 1 CCVS1: 8 X\n SG_ V : 0|16@1+ (1,0) [0|0] \"m/s\" X\n"
+
+TEST(of_two_messages_of_one_id_the_first_is_taken_and_named) {
+  static const struct {
+    const char *more, *note;
+  } cases[] = {
+      {TWIN, ""},  // the same again
+      {"BO_ 1 CCVS1: 8 X\n SG_ V : 16|16@1+ (1,0) [0|0] \"m/s\" X\n",
+       "car.dbc:3: BO_ CCVS1 has the id 0x1 of CCVS1 in line 1, which is taken; remove one of them"},
+      {"BO_ 1 OTHER: 8 X\n SG_ V : 0|16@1+ (1,0) [0|0] \"m/s\" X\n",
+       "car.dbc:3: BO_ OTHER has the id 0x1 of CCVS1 in line 1, which is taken; remove one of them"},
+      {"BO_ 2 OTHER: 8 X\nBO_ 2 ELSE: 8 X\n", ""},  // not bound
+  };
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    char dbc[400];
+    (void)snprintf(dbc, sizeof dbc, "%s%s", TWIN, cases[i].more);
+    const wm_can_binding bound = binding(WM_Q_VEHICLE_SPEED, "CCVS1", "V");
+    TEST_ASSERT_EQUAL_MESSAGE(WM_OK, open_with(&f, dbc, &bound, 1), f.err.text);
+    TEST_ASSERT_EQUAL_STRING(cases[i].note, wm_can_decoder_twins(f.decoder));
+    TEST_ASSERT_EQUAL_DOUBLE(3.0, value_of(&f, "can0 001#0300000000000000"));
+  }
+  const wm_can_binding other = binding(WM_Q_VEHICLE_SPEED, "OTHER", "V");
+  TEST_ASSERT_EQUAL(WM_BAD_CONFIG, open_with(&f, TWIN "BO_ 1 OTHER: 8 X\n", &other, 1));
+  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(f.err.text, "message 'OTHER' (car.dbc:3) has the id of CCVS1 in line 1"),
+                               f.err.text);
+}
+
 #define SPEED " SG_ V : 8|16@1+ (0.00390625,0) [0|250.996] \"km/h\" X\n"
 
 static const wm_can_binding *speed_of(const char *bus) {

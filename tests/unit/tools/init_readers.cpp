@@ -227,8 +227,8 @@ const BadInput kTable[] = {
      "moves in drive.log; write can-signals.yaml by hand (docs/can.md)"},
     {"empty", kLog, "", "drive.log: has no frame; `candump -l any` records one"},
     {"output for the screen", kLog, "  can0  123   [2]  11 22\n",
-     "drive.log:1: this is what candump shows on the screen (no time, ID [LENGTH] BYTES), not a log; record with "
-     "`candump -l any`, or `candump -L any > can.log`, which give (SECONDS.MICROS) IFACE ID#DATA"},
+     "drive.log:1: this is what candump shows on the screen, without a time; record with `candump -l any`, or "
+     "`candump -L any > can.log`"},
 };
 
 bool is_built(Kind kind) { return kind != kUrdf || can_read_urdf(); }

@@ -55,6 +55,7 @@ _ERROR_FLAG = 0x20000000  # CAN_ERR_FLAG of linux/can.h, which candump prints in
 _CAN_DATE = re.compile(r"\((\d{4}-\d\d-\d\d)[ T](\d\d:\d\d:\d\d)")
 _CAN_LINE = re.compile(r"\((\d+)(?:\.(\d{1,9}))?\)\s+(\S+)\s+([0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})#(#[0-9A-Fa-f])?([Rr]\d?|[0-9A-Fa-f.]*)(?:_[9A-Fa-f])?"
                        r"(?:\s+[RT])?$")
+_CAN_SCREEN = re.compile(r"(\(.*?\))\s+(\S+)\s+(?:[RT]X \S \S\s+)?([0-9A-F]{3}|[0-9A-F]{8})\s+\[(\d\d?)\]\s*((?:[0-9A-F]{2}\s*)*)(remote request)?")
 
 
 @dataclass(frozen=True)
@@ -155,20 +156,36 @@ class Recording:
         return read_floor_plan(self.path)
 
     def can(self) -> Iterator[CanFrame]:
-        """The frames of can.log; times that are differences (candump -td) are summed up, as the runtime does."""
+        """The frames of can.log. As in the runtime, times that are differences (candump -td) are summed up, and a log that was sorted by id is
+        sorted by time."""
         path = self.path / "can.log"
         if not path.is_file():
             return
-        first = [frame.t_ns for frame in itertools.islice(_can_frames(path), _DIFFERENCES_LOOK)]
-        differences = _are_differences(first)
+        first = list(itertools.islice(_can_frames(path), _CAN_LOOK))
+        differences = _are_differences([frame.t_ns for frame in first])
         total = 0
-        for frame in _can_frames(path):
+        frames = _can_frames(path)
+        if not differences and _are_by_id(first):
+            whole = list(frames)
+            frames = iter(sorted(whole, key=lambda frame: frame.t_ns) if _are_by_id(whole) and _go_back(whole) else whole)
+        for frame in frames:
             total = total + frame.t_ns if differences else frame.t_ns
             yield dataclasses.replace(frame, t_ns=total) if differences else frame
 
 
-_DIFFERENCES_LOOK = 50_000
+_CAN_LOOK = 50_000
 """Frames of a log that are looked at for what its times are."""
+
+
+def _are_by_id(frames: list[CanFrame]) -> bool:
+    """Whether all frames of an id stand together (wm_can_survey's runs)."""
+    ids = [(frame.interface, frame.extended, frame.id) for frame in frames if not frame.error and not frame.remote]
+    return len(list(itertools.groupby(ids))) == len(set(ids))
+
+
+def _go_back(frames: list[CanFrame]) -> bool:
+    """Whether the time goes back from one id to the next."""
+    return any(b.id != a.id and b.t_ns < a.t_ns - 5 * 10**8 for a, b in zip(frames, frames[1:]))
 
 
 def _are_differences(stamps: list[int]) -> bool:
@@ -188,6 +205,9 @@ def _can_frames(path: Path) -> Iterator[CanFrame]:
             if date := _CAN_DATE.match(text):  # candump -L -tA: taken as UTC
                 seconds = np.datetime64(f"{date[1]}T{date[2]}", "s").astype(np.int64)
                 text = f"({int(seconds)}{text[date.end():]}"
+            if screen := _CAN_SCREEN.match(text):
+                at, name, code_text, length, screen_bytes, is_remote = screen.groups()
+                text = f"{at} {name} {code_text}#{'#0' if len(length) == 2 else ''}{'R' if is_remote else screen_bytes.replace(' ', '')[:2 * int(length)]}"
             match = _CAN_LINE.match(text)
             if not match:
                 raise ValueError(f"{path}:{number}: this is not a line of `candump -l`")
