@@ -14,6 +14,8 @@ constexpr double kDeadEncoderTurns = 1.0;
 constexpr double kBurstFraction = 0.5;
 // Later than so many periods it ends a gap.
 constexpr double kGapPeriods = 2.0;
+// A distance below this is rounding, not one that is still to be given out.
+constexpr double kRounding_m = 1e-9;
 
 }  // namespace
 
@@ -98,8 +100,11 @@ void motion_front_end::push_ticks(wm_time_ns t_ns, bool doubtful, bool miscounte
   double done_mps[2], next_mps[2];
   for (int side = 0; side < 2; side++) {
     const tick_wheel &wheel = wheel_[side];
+    const double left_m = wheel.position_m - wheel.integrated_m;
     const bool counted = wheel.t_ns == t_ns && dt > 0.0 && !miscounted;
-    done_mps[side] = counted ? (wheel.position_m - wheel.integrated_m) / dt : wheel.speed_mps;
+    // Its count came at the stamp of the other wheel's, in an event of its own: nothing was left of that segment.
+    const bool owed = wheel.t_ns == now_ns_ && dt > 0.0 && !miscounted && std::fabs(left_m) > kRounding_m;
+    done_mps[side] = counted ? left_m / dt : owed ? wheel.speed_mps + left_m / dt : wheel.speed_mps;
     next_mps[side] = wheel.speed_mps;
   }
   for (int side = 0; side < 2; side++) {

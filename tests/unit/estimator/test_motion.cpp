@@ -113,6 +113,19 @@ TEST(test_a_late_count_and_the_next_right_behind_it) {
   }
 }
 
+// As two frames of a log whose stamps are in milliseconds.
+TEST(test_counts_of_both_wheels_in_two_events_of_one_stamp) {
+  start(make::two_wheels());
+  for (int k = 0; k <= 100; k++) {
+    const double t = 0.02 * k, way = k < 50 ? 20.0 * k : 1000.0 + 5.0 * (k - 50);  // it brakes in the middle
+    feed(make::quantities(t, {{WM_Q_WHEEL_TICKS_LEFT, way}}));
+    feed(make::quantities(t, {{WM_Q_WHEEL_TICKS_RIGHT, way}}));
+  }
+  advance(2.02);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-5, 1255 * kTick, pose.x_m);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0, pose.heading_rad);
+}
+
 TEST(test_counts_of_both_wheels_may_come_one_after_the_other) {
   start(make::two_wheels());
   for (int i = 0; i <= 100; i++) {
