@@ -327,6 +327,10 @@ void add_overdue_noise(const motion_segment &segment, const wm_motion_params &p,
 
 }  // namespace wm
 
+double wm_motion_gyro_noise(const wm_motion_params *params) {
+  return wm::rate_noise_of(*params, wm::kKindGyro).yaw_rate_radps;
+}
+
 void wm_motion_unseen(const wm_motion_params *params, double blind_s, double *xy_m, double *heading_rad) {
   const double hold_s = params->hold_max_s, held_s = blind_s < hold_s ? blind_s : hold_s, unknown_s = blind_s - held_s;
   *xy_m = 0.5 * params->noise_hold_mps2 * held_s * (held_s + unknown_s);

@@ -52,7 +52,12 @@ __attribute__((format(printf, 1, 2))) static void fact(const char *format, ...) 
   va_end(arguments);
 }
 
-static void print_start(const wm_start *start) {
+static void print_start(const wm_assembly *assembly) {
+  const wm_start *start = &assembly->setup.start;
+  if (wm_assembly_lacks_start(assembly)) {
+    fact("start        unknown: %s\n", wm_assembly_lacks_start(assembly));
+    return;
+  }
   if (isnan(start->p_m[0]) || isnan(start->p_m[1]) || isnan(start->heading_rad)) {
     fact("start        unknown%s: the estimator has to find it\n", isnan(start->p_m[0]) ? "" : " in part");
     return;
@@ -148,7 +153,7 @@ static void print_setup(const wm_assembly *assembly, wm_recording *recording) {
   if (isfinite(wm_recording_duration_s(recording))) fact(", %.1f s", wm_recording_duration_s(recording));
   fact("\nsetup        %zu sensors, %zu landmarks\n", assembly->setup.sensor_count, assembly->setup.landmark_count);
   print_map(assembly->setup.map, assembly->map_path);
-  print_start(&assembly->setup.start);
+  print_start(assembly);
 }
 
 static void check_setup(const wm_assembly *assembly, wm_recording *recording, wm_status status, wm_findings *found) {

@@ -73,9 +73,10 @@ static int finished(const wm_run_report *report, const char *out_dir) {
   return EXIT_WORK_FAILED;
 }
 
-// What the recording has and the estimator doesn't take.
-static void tell_unused(void *context, const wm_assembly *assembly, wm_status status) {
+// What the recording has and the estimator doesn't take, or needs and lacks.
+static void tell_assembled(void *context, const wm_assembly *assembly, wm_status status) {
   (void)context;
+  if (status == WM_OK && wm_assembly_lacks_start(assembly)) print_note(NULL, wm_assembly_lacks_start(assembly));
   if (status != WM_OK || !wm_assembly_observes(assembly)) return;
   for (size_t i = 0; i < assembly->unused_count; i++) {
     const wm_unused *one = &assembly->unused[i];
@@ -108,7 +109,7 @@ static int replay_recording(const arguments *args) {
   if (status == WM_OK) {
     progress_line progress;
     progress_begin(&progress);
-    const wm_replay_watch watch = {.assembled = tell_unused};
+    const wm_replay_watch watch = {.assembled = tell_assembled};
     const wm_replay_options options = {.out_dir = args->out,
                                        .watch = &watch,
                                        .seed = args->seed,

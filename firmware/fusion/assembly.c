@@ -250,6 +250,15 @@ int wm_assembly_observes(const wm_assembly *self) {
   return (self->config->estimator->takes & observations) != 0;
 }
 
+const char *wm_assembly_lacks_start(const wm_assembly *self) {
+  const wm_start *start = &self->setup.start;
+  if (wm_assembly_observes(self) || (!isnan(start->p_m[0]) && !isnan(start->p_m[1]) && !isnan(start->heading_rad)))
+    return NULL;
+  return "no start is known, and this estimator finds none: there is no pose before a set_pose; fix: write "
+         "`initial_pose: {x_m: 0, y_m: 0, heading_rad: 0}` into the configuration, and the map begins where the robot "
+         "starts";
+}
+
 uint64_t wm_assembly_observers(const wm_assembly *self) {
   const uint32_t observed = self->config->estimator->takes & ~(uint32_t)WM_MOTION_EVENTS;
   uint64_t bits = 0;

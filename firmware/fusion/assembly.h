@@ -79,6 +79,8 @@ const wm_estimator *wm_assembly_estimator(const wm_assembly *self);
 void wm_assembly_follow(wm_assembly *self);
 // Whether the estimator takes any observation; one that takes none is chosen for dead reckoning.
 int wm_assembly_observes(const wm_assembly *self);
+// Of an estimator that can't find a pose, where no start is known: why there is none, and what to write. NULL: fine.
+const char *wm_assembly_lacks_start(const wm_assembly *self);
 // Bit for each source that gives observations for the estimator.
 uint64_t wm_assembly_observers(const wm_assembly *self);
 // "can", "sightings:laser" ... by index; "?" beyond.

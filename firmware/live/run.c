@@ -183,6 +183,7 @@ static void take_up_what_was(live *self) {
   } else {
     has_pose = start_where_it_was(self);
   }
+  if (wm_assembly_lacks_start(&self->assembly)) live_say(self, "start: %s", wm_assembly_lacks_start(&self->assembly));
   self->disk.keeps_pose = config->saved_pose[0] != '\0';
   self->disk.keeps_map =
       (config->saved_map[0] != '\0' || config->black_box[0] != '\0') && wm_keeper_of(config->estimator);

@@ -48,6 +48,8 @@ void wm_motion_unseen(const wm_motion_params *params, double blind_s, double *xy
 void wm_motion_choose(wm_motion_params *params, uint32_t kinds);
 // Whether motion.model is `constant_velocity`: no data, so that no drive shows a heading.
 int wm_motion_is_unmeasured(const wm_motion_params *params);
+// White noise of a gyro's turn rate as configured, else the default, rad/s per sqrt(s).
+double wm_motion_gyro_noise(const wm_motion_params *params);
 
 // Health of the motion sensors, bits of motion_health. None of these is standstill or a straight drive.
 #define WM_MOTION_HEALTH_ENCODER_LEFT_DEAD (1u << 0)

@@ -23,6 +23,8 @@
 #define OBEYED 0.98          // a command that fits better is no command
 #define BIAS_MAX_RADPS 0.05  // of a gyro beside another sensor's turn; below, the estimators' states hold it
 #define APART_SHARE 0.005    // of the time's sum, that the way leaves: a speed that varies by 7 %, or stops
+#define OPPOSED_MIN_M 10.0   // of each wheel: on the spot, with a track of half a metre, six whole turns
+#define OPPOSED_SHARE 0.9
 #define DEGREES (180 / M_PI)
 #define KMH 3.6
 #define MPH 2.237
@@ -486,11 +488,11 @@ static void judge_quantity(const scene *s, int of_way) {
     if (i == best) continue;
     const contradiction how = compare(of[i], of[best], &f);
     if (how != OTHER_SIGN && (has_bias(s, of[i], of[best]) || has_bias(s, of[best], of[i]))) continue;
-    if (how == FIRST_SHOWS_NOTHING)
+    if (how == FIRST_SHOWS_NOTHING && !comparisons_is_noisy(of[best], s->assembly))
       shows_nothing(s, of[i], of[best], &f);
-    else if (how == SECOND_SHOWS_NOTHING)
+    else if (how == SECOND_SHOWS_NOTHING && !comparisons_is_noisy(of[i], s->assembly))
       shows_nothing(s, of[best], of[i], &f);
-    else if (how > AGREE)
+    else if (how == OTHER_SIGN || how == OTHER_FACTOR)
       disagrees(s, of[i], of[best], &f, how);
   }
 }
@@ -521,8 +523,45 @@ static void judge_straight(const scene *s) {
       ->size = turned;
 }
 
+// Two wheels of which one counts backwards: the robot would turn on the spot all the time.
+static void judge_wheels(const scene *s, const channel *turn) {
+  const channel *way = way_of_wheels(s->all, turn);
+  const double track_m = turn->has_scale ? s->all->wheels->track_m : 1;
+  double moved = 0, opposed = 0, by_wheel[2] = {0, 0};
+  for (size_t i = 0; way && way->has_scale && i < turn->windows; i++) {
+    if (!has_window(turn, i) || !has_window(way, i)) continue;
+    const double half = (double)turn->sum[i] * track_m / 2;
+    const double left = (double)way->sum[i] - half, right = (double)way->sum[i] + half;
+    moved += fabs(left) + fabs(right);
+    opposed += left * right < 0 ? fabs(left) + fabs(right) : 0;
+    by_wheel[0] += left;
+    by_wheel[1] += right;
+  }
+  const int falls = by_wheel[1] < by_wheel[0];  // the wheel that goes backwards: 0 the left one, 1 the right one
+  if (moved < 2 * OPPOSED_MIN_M || opposed < OPPOSED_SHARE * moved || by_wheel[0] * by_wheel[1] >= 0) return;
+  fit f;
+  for (size_t i = 0; i < s->all->count; i++) {
+    const channel *c = &s->all->at[i];
+    if (c != turn && !channel_is_way(c->kind) && !channel_is_tilt(c->kind) && compare(c, turn, &f) == AGREE) return;
+  }
+  const char *wheel = falls ? "right" : "left";
+  char fix[WM_FINDING_FIX_MAX];
+  if (is_can(turn, s->assembly))
+    (void)snprintf(fix, sizeof fix, "can-signals.yaml: `scale: -1` at the %s wheel, or at the other one", wheel);
+  else
+    (void)snprintf(fix, sizeof fix, "%s.csv: %s times -1, or the other one", source_of(turn, s->assembly), wheel);
+  wm_find(s->out, WM_FOUND_SENSORS_DISAGREE, WM_SEVERITY_BAD, source_of(turn, s->assembly), fix,
+          "its wheels turn against each other on %.0f %% of their way (left %.1f m, right %.1f m): one of them counts "
+          "backwards, or the robot turned on the spot all the time",
+          100 * opposed / moved, by_wheel[0], by_wheel[1])
+      ->size = opposed / moved;
+}
+
 void comparisons_judge(const channels *self, const wm_assembly *assembly, wm_findings *out) {
   const scene s = {self, assembly, out};
+  for (size_t i = 0; i < self->count; i++)
+    if (is_of_track(&self->at[i]) && !comparisons_is_broken(&self->at[i], assembly, out))
+      judge_wheels(&s, &self->at[i]);
   judge_quantity(&s, 0);
   judge_quantity(&s, 1);
   judge_straight(&s);

@@ -20,6 +20,11 @@ const char *gravity_mounting(const wm_assembly *assembly, double roll_deg, doubl
 void gravity_judge(const channels *self, const wm_assembly *assembly, wm_findings *out);
 // Finds sensors that repeat a value while another one moves, and marks them.
 void stuck_judge(channels *self, const wm_assembly *assembly, wm_findings *out);
+// White noise of a rate by the drive, rad/s per sqrt(s); 0: what it shows is not white, or too short.
+double comparisons_white_noise(const channel *c);
+// Whether that is far above what is configured of a gyro. It then shows turns where there are none.
+int comparisons_is_noisy(const channel *c, const wm_assembly *assembly);
+void noise_judge(const channels *self, const wm_assembly *assembly, wm_findings *out);
 // Whether a finding names this channel's clock or counter as broken. Then no other channel is compared with it.
 int comparisons_is_broken(const channel *c, const wm_assembly *assembly, const wm_findings *found);
 // Findings about the sensors that contradict the others.

@@ -28,6 +28,9 @@
 #define SLOPE_WINDOWS 2.0        // to each side of a slope
 #define ROUNDS 8                 // of least squares
 #define SOURCES_MOST 8
+#define ENDS_MIN_S 0.5    // by which a clock that runs by itself ends later than another source
+#define ENDS_KNOWN_S 0.1  // of a stream that begins and ends with its recorder
+#define ENDS_SHARE 0.25   // by which the turns' delay may differ from that of such a clock
 
 // Two turn rates over the windows that both have.
 typedef struct pair {
@@ -156,6 +159,40 @@ static double sigmas_by_chance(double freedom) {
   return sqrt(freedom * expm1(z * z / freedom));
 }
 
+// First and last time that is covered, windows.
+static void extent_of(const channel *c, double at[2]) {
+  size_t first = 0, last = c->windows;
+  while (first < last && !((double)c->cover[first] > 0)) first++;
+  while (last > first && !((double)c->cover[last - 1] > 0)) last--;
+  at[0] = (double)first + 1 - (last > first ? (double)c->cover[first] / WINDOW_S : 1);
+  at[1] = last > first ? (double)last - 1 + (double)c->cover[last - 1] / WINDOW_S : (double)last;
+}
+
+// A drive with a turn or two shows a delay alone. A stream that begins with another one and ends later, by as much as
+// the turns' delay grows to, has a clock that runs.
+static int runs_by_ends(const pair *p, clock_fit *f) {
+  double a[2], b[2], weight = 0, left = 0, late = 0;
+  extent_of(p->a, a);
+  extent_of(p->b, b);
+  const double span = a[1] - a[0], ends = b[1] - a[1];
+  *f = (clock_fit){.rate = ends / span, .rate_sigma = ENDS_KNOWN_S / WINDOW_S / span};
+  f->delay = b[0] - a[0] + f->rate * ((double)p->first - a[0]);
+  if (fabs(ends) < ENDS_MIN_S / WINDOW_S || fabs(b[0] - a[0]) > ENDS_KNOWN_S / WINDOW_S || fabs(f->rate) > RATE_MOST)
+    return 0;
+  compare(p, f);
+  for (size_t i = 0; i < p->count; i++) {
+    const double from = (double)(p->first + i), to = moved(p, f, i);
+    const double slope = f->gain * slope_of(p->a, from), both = slope * slope_of(p->b, to);
+    const double off = slope * (f->gain * held(p->a, from) + f->zero - held(p->b, to));
+    if (isnan(both) || isnan(off)) continue;
+    weight += both;
+    left += off;
+    late += both * (to - from);
+  }
+  return f->r > ALIKE && weight > 0 && fabs(late / weight) > ENDS_KNOWN_S / WINDOW_S &&
+         fabs(left) < ENDS_SHARE * fabs(late);
+}
+
 // Whether b's clock is another one than a's, and which. A rate that is none is 0.
 static int is_apart(const channel *a, const channel *b, clock_fit *out) {
   size_t first = 0, end = a->windows < b->windows ? a->windows : b->windows;
@@ -171,6 +208,11 @@ static int is_apart(const channel *a, const channel *b, clock_fit *out) {
   const double middle_s = fabs(out->delay + out->rate * out->middle) * WINDOW_S;
   const int runs = fabs(out->rate) > sigmas * out->rate_sigma && grown_s > GROWN_MIN_S;
   const int is_late = middle_s > APART_MIN_S && middle_s > sigmas * out->delay_sigma * WINDOW_S;
+  clock_fit by_ends;
+  if (!runs && runs_by_ends(&p, &by_ends)) {
+    *out = by_ends;
+    return 1;
+  }
   if (!runs) out->delay += out->rate * out->middle;
   if (!runs) out->rate = 0;
   return out->r > LIKE && (runs || is_late);

@@ -38,7 +38,15 @@ static void take_range(source_facts *facts, const wm_setup *setup, const wm_even
   facts->far_ranges += range_m > setup->sensors[event->as.sighting.sensor].max_range_m;
 }
 
+#define ABSENT_BAD 50  // of 100: a sensor that hardly ever has a value
+
 static uint64_t of_hundred(uint64_t part, uint64_t whole) { return whole > 0 ? part * 100 / whole : 0; }
+
+// Frames whose sender marks that it has no value are no damage.
+static int are_absent(const wm_source *source) {
+  const wm_source_counts *c = &source->counts;
+  return source->is_bus && c->malformed == 0 && c->not_finite > 0 && c->first_problem_kind == WM_ROW_OTHER;
+}
 
 // The fix for rows that can't be read, by the first of them.
 static const char *mend_rows(const wm_source *source) {
@@ -53,6 +61,7 @@ static const char *mend_rows(const wm_source *source) {
     return "several units send it: for a certain one write its whole id into the DBC's BO_ line (docs/can.md, J1939)";
   if (c->first_problem_kind == WM_ROW_VALUE || c->first_problem_kind == WM_ROW_ANGLE)
     return "is it in the unit of the column's name? Leave a field empty where nothing was measured";
+  if (are_absent(source)) return "its sender has no value then, as a receiver without a fix, or a sensor that is off";
   return source->is_bus ? "the DBC and what is on the bus are not the same; or the file is damaged"
                         : "the file is damaged, or its columns differ from its first line";
 }
@@ -63,8 +72,9 @@ static void counted(const wm_assembled_source *s, const source_facts *facts, wm_
   if (c->first_problem[0] && skipped + c->frozen == 0)  // of the whole file, not of a row
     wm_find(out, WM_FOUND_NO_DATA, WM_SEVERITY_NOTE, s->name, mend_rows(s->source), "%s", c->first_problem);
   else if (c->first_problem[0] && skipped > 0)
-    wm_find(out, WM_FOUND_ROWS_SKIPPED, of_hundred(skipped, all) >= 2 ? WM_SEVERITY_BAD : WM_SEVERITY_NOTE, s->name,
-            mend_rows(s->source), "%s (%" PRIu64 " like it, %" PRIu64 " of 100)", c->first_problem, skipped,
+    wm_find(out, WM_FOUND_ROWS_SKIPPED,
+            of_hundred(skipped, all) >= (are_absent(s->source) ? ABSENT_BAD : 2) ? WM_SEVERITY_BAD : WM_SEVERITY_NOTE,
+            s->name, mend_rows(s->source), "%s (%" PRIu64 " like it, %" PRIu64 " of 100)", c->first_problem, skipped,
             of_hundred(skipped, all));
   if (c->bus_errors > 0)
     wm_find(out, WM_FOUND_DEVICE_TROUBLE, WM_SEVERITY_NOTE, s->name,
@@ -329,6 +339,7 @@ void source_data_judge(source_data *self, uint32_t bound, const wm_health *healt
   course_data_judge(&self->course, out);
   if (kinds & WM_EVENT_BIT(WM_EVENT_QUANTITIES)) motion_data_judge(&self->motion, self->assembly, bound, out);
   stuck_judge(&self->channels, self->assembly, out);
+  noise_judge(&self->channels, self->assembly, out);
   comparisons_judge(&self->channels, self->assembly, out);
   drifts_judge(&self->channels, self->assembly, out);
 }
