@@ -6,6 +6,7 @@
 
 import datetime
 import io
+import json
 import shutil
 import subprocess
 import unittest
@@ -257,6 +258,164 @@ class CanLogs(Folder):
         self.assertEqual([frame.t_ns for frame in got], [10_000_000 * i for i in range(21)])
         got = self.frames(*(f"(000.{10000 * i:06d}) can0 100#00" for i in range(20)))  # candump -tz
         self.assertEqual([frame.t_ns for frame in got], [10_000_000 * i for i in range(20)])
+
+
+class CanDrives(Folder):
+    """One drive on the CAN bus as the logs of several programs: 0.5 m/s for 20 s, of these 10 s at 0.2 rad/s."""
+
+    DBC = """BO_ 257 SPEED: 4 X
+ SG_ V : 0|16@1- (0.001,0) [0|0] "m/s" X
+ SG_ COUNT : 16|16@1+ (1,0) [0|0] "" X
+BO_ 258 TURN: 2 X
+ SG_ W : 0|16@1- (0.001,0) [0|0] "rad/s" X
+BO_ 259 OTHER: 1 X
+ SG_ A : 0|8@1- (1,0) [0|0] "" X
+"""
+    SIGNALS = "- {quantity: vehicle_speed, message: SPEED, signal: V}\n- {quantity: yaw_rate, message: TURN, signal: W}\n"
+
+    def frames(self):
+        for i in range(2001):
+            yield i * 10_000, 0x101, f"F401{i.to_bytes(2, 'little').hex().upper()}"
+            yield i * 10_000 + 2_000, 0x102, "C800" if i >= 1000 else "0000"
+            yield i * 10_000 + 4_000, 0x103, "00"
+
+    def replay(self, lines, dbc=None, config="estimator: odometry\n", start=True):
+        """x, y, heading at the end, and what was said."""
+        for name, text in (("can.log", "".join(f"{line}\n" for line in lines)), ("vehicle.dbc", dbc or self.DBC), ("can-signals.yaml", self.SIGNALS),
+                           ("recording.yaml", "format: waymark-recording/1\nname: a\n" + "vehicle: {initial_pose: {x_m: 0, y_m: 0, heading_rad: 0}}\n" * start),
+                           ("robot.yaml", "format: waymark-config/1\n" + config)):
+            (self.folder / name).write_text(text)
+        shutil.rmtree(self.folder / "run", ignore_errors=True)
+        done = subprocess.run([BIN / "waymark", "replay", self.folder, "--config", self.folder / "robot.yaml", "--out", self.folder / "run"],
+                              capture_output=True, text=True, check=False)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        rows = (self.folder / "run/trajectory.tum").read_text().splitlines()
+        end = [float(value) for value in rows[-1].split()] if rows else [np.nan] * 8
+        return (end[1], end[2], 2 * np.arctan2(end[6], end[7])), done.stdout + done.stderr
+
+    def assert_drive(self, lines, *words, **more):
+        end, said = self.replay(lines, **more)
+        for got, right in zip(end, (5 + 2.5 * np.sin(2), 2.5 * (1 - np.cos(2)), 2)):
+            self.assertAlmostEqual(got, right, delta=0.01, msg=said)
+        for word in words:
+            self.assertIn(word, said)
+        return said
+
+    def lines(self, form="({s}.{us:06d}) can0 {id:03X}#{data}"):
+        """The log's lines with their ids."""
+        for us, name, data in self.frames():
+            at = np.datetime64(T_S * 1_000_000 + us, "us")
+            yield form.format(s=T_S + us // 1_000_000, us=us % 1_000_000, id=name, data=data, date=str(at).replace("T", " "),
+                              bytes=bytes.fromhex(data).hex(" ").upper(), length=len(data) // 2)
+
+    def test_what_candump_shows_with_a_time(self):
+        for form in ("({s}.{us:06d}) can0 {id:03X}#{data}", " ({s}.{us:06d})  can0  {id:03X}   [{length}]  {bytes}", " ({date})  can0  {id:03X}   [{length}]  {bytes}",
+                     " ({s}.{us:06d})  can0  RX - -  {id:03X}   [{length}]  {bytes}", " ({s}.{us:06d})  can0  {id:03X}   [{length}]  {bytes}   '..'"):
+            with self.subTest(form):
+                said = self.assert_drive(self.lines(form))
+                self.assertNotIn("note", said)
+                frames = list(waymark.Recording(self.folder).can())
+                self.assertEqual((len(frames), frames[3].t_ns, frames[3].data), (6003, T_S * 10**9 + 10_000_000, bytes.fromhex("F4010100")))
+
+    def test_lines_sorted_by_id_are_read_by_their_times(self):
+        for key in (lambda line: line.split("#")[0].split()[-1], lambda line: line.split(maxsplit=2)[2]):  # sort -k3 compares the data, too
+            self.assert_drive(sorted(self.lines(), key=key), "its lines are sorted by id: they are read in the order of their times")
+            stamps = [frame.t_ns for frame in waymark.Recording(self.folder).can()]
+            self.assertEqual(stamps, sorted(stamps))
+
+    def test_a_clock_that_was_set_back_is_not_sorted(self):
+        lines = list(self.lines())
+        late = [line.replace(f"({T_S + 15}", f"({T_S + 7}") for line in lines]
+        _, said = self.replay(late)
+        self.assertNotIn("sorted", said)
+
+    def test_of_two_messages_of_one_id_the_first_is_taken_with_a_note(self):
+        self.assert_drive(self.lines(), "vehicle.dbc:8: BO_ SPEED has the id 0x101 of SPEED in line 1, which is taken",
+                          dbc=self.DBC + 'BO_ 257 SPEED: 4 X\n SG_ V : 16|16@1- (0.001,0) [0|0] "m/s" X\n')
+        self.assertNotIn("note", self.assert_drive(self.lines(), dbc=self.DBC + self.DBC))
+
+    def test_dead_reckoning_without_a_start_is_named(self):
+        end, said = self.replay(self.lines(), start=False)
+        self.assertTrue(np.isnan(end[0]))
+        self.assertIn("note: no start is known, and this estimator finds none", said)
+        done = subprocess.run([BIN / "waymark", "check", self.folder / "robot.yaml", self.folder, "--quick"], capture_output=True, text=True, check=False)
+        self.assertIn("start        unknown: no start is known, and this estimator finds none", done.stdout)
+        self.assert_drive(self.lines(), start=False, config="estimator: odometry\ninitial_pose: {x_m: 0, y_m: 0, heading_rad: 0}\n")
+        self.assertNotIn("no start", self.replay(self.lines(), config="estimator: landmark_ekf\n", start=False)[1])
+
+    def test_rows_of_truth_without_a_position_are_counted(self):
+        self.replay(self.lines())
+        rows = "".join(f"{T_S * 10**9 + i * 10**8},{'nan' if 50 <= i < 60 else 0.05 * i},{'' if i == 70 else 0}\n" for i in range(100))
+        (self.folder / "truth.csv").write_text("t_ns,x_m,y_m\n" + rows)
+        for options, words in (((), "left out: 11 rows of truth.csv without a position"), (("--json",), '"truth_left_out": 11')):
+            done = subprocess.run([BIN / "waymark-eval", self.folder / "run", self.folder, *options], capture_output=True, text=True, check=False)
+            self.assertIn(words, done.stdout, done.stderr)
+
+
+class Checked(Folder):
+    """What `check` makes of two motion sensors on a drive of a minute at 1 m/s, of which it turns at 0.3 rad/s from 20 to 25 s."""
+
+    T = np.arange(6001) / 100
+    TURN = np.where((T >= 20) & (T < 25), 0.3, 0.0)
+
+    def findings(self, files, more="", wheels="{radius_m: 0.1, ticks_per_turn: 4096, track_m: 0.5}"):
+        (self.folder / "robot.yaml").write_text(f"format: waymark-config/1\nestimator: odometry\ninitial_pose: {{x_m: 0, y_m: 0, heading_rad: 0}}\n{more}")
+        (self.folder / "calibration.yaml").write_text(f"wheels: {wheels}\n")
+        (self.folder / "recording.yaml").write_text("format: waymark-recording/1\nname: a\n")
+        for name in ("motion.csv", "imu.csv", "ticks.csv"):
+            (self.folder / name).unlink(missing_ok=True)
+        for name, table in files.items():
+            waymark.write_table(self.folder / name, table)
+        done = subprocess.run([BIN / "waymark", "check", self.folder / "robot.yaml", self.folder, "--quick", "--json"], capture_output=True, text=True, check=False)
+        return [(one["severity"], one["about"], one["text"], one["fix"]) for one in json.loads(done.stdout)["findings"] if one["severity"] != "note"]
+
+    def stamps(self, rate=1.0):
+        return T_S * 10**9 + np.round(self.T * rate * 1e9).astype(np.int64)
+
+    def imu(self, turn, noise=0.002, rate=1.0):
+        chance = np.random.default_rng(7)
+        wx, wy, wz = chance.normal(size=(3, len(self.T))) * noise
+        return {"t_ns": self.stamps(rate), "wx_radps": wx, "wy_radps": wy, "wz_radps": turn + wz}
+
+    def motion(self, turn):
+        return {"t_ns": self.stamps(), "v_mps": np.ones_like(self.T), "w_radps": turn}
+
+    def ticks(self, turn, signs=(1, 1), speed=1.0):
+        counts = [np.round(sign * np.cumsum(np.concatenate([[0], (speed + side * turn * 0.25)[:-1]])) * 0.01 * 4096 / (2 * np.pi * 0.1)).astype(np.int64)
+                  for sign, side in zip(signs, (-1, 1))]
+        return {"t_ns": self.stamps(), "left": counts[0], "right": counts[1]}
+
+    def test_a_gyro_that_is_far_noisier_than_configured(self):
+        """0.3 rad/s at 100 Hz is a density of 0.03 rad/s per sqrt(s); 0.004 is the default of a gyro."""
+        for turn in (self.TURN, 0 * self.TURN, 0.3 * np.sin(self.T / 3)):
+            drive = {"motion.csv": self.motion(turn), "imu.csv": self.imu(turn, 0.3)}
+            (found,) = self.findings(drive)
+            self.assertRegex(found[2], r"wz_radps of imu has a white noise of 0.0(2[4-9]|3\d*) rad/s per sqrt\(s\), [6-9]\.\d times as much as is configured \(0.004\)")
+            self.assertRegex(found[3], r"motion: \{noise: \{yaw_rate_radps: 0.0[23]")
+            self.assertEqual(self.findings(drive, "motion: {noise: {yaw_rate_radps: 0.03}}\n"), [])
+            self.assertEqual(self.findings({**drive, "imu.csv": self.imu(turn, 0.05)}), [])
+            shaken = self.imu(turn)
+            shaken["wz_radps"] = shaken["wz_radps"] + 0.5 * np.sin(2 * np.pi * 13.7 * self.T)  # an engine: the heading stays
+            self.assertEqual(self.findings({**drive, "imu.csv": shaken}), [])
+
+    def test_a_clock_that_runs_with_one_turn(self):
+        for rate in (1.02, 0.98):
+            (found,) = self.findings({"motion.csv": self.motion(self.TURN), "imu.csv": self.imu(self.TURN, rate=rate)})
+            self.assertRegex(found[2], f"its clock runs 2 % {'fast' if rate > 1 else 'slow'} .* against that of motion")
+        longer = self.imu(self.TURN)
+        longer["t_ns"] = longer["t_ns"] + np.where(self.T > 50, (self.T - 50) * 2e8, 0).astype(np.int64)  # two seconds more of it, without a delay
+        self.assertEqual(self.findings({"motion.csv": self.motion(self.TURN), "imu.csv": longer}), [])
+
+    def test_a_wheel_that_counts_backwards(self):
+        for signs, wheel in (((-1, 1), "left"), ((1, -1), "right")):
+            for turn in (self.TURN, 0 * self.TURN):
+                (found,) = self.findings({"ticks.csv": self.ticks(turn, signs)})
+                self.assertIn("its wheels turn against each other on 100 % of their way", found[2])
+                self.assertEqual(found[3], f"ticks.csv: {wheel} times -1, or the other one")
+        self.assertEqual(self.findings({"ticks.csv": self.ticks(self.TURN)}), [])
+        self.assertEqual(self.findings({"ticks.csv": self.ticks(self.TURN, (-1, -1))}), [])
+        spin = np.full_like(self.T, 2.0)  # on the spot, as the gyro shows
+        self.assertEqual(self.findings({"ticks.csv": self.ticks(spin, speed=0.0), "imu.csv": self.imu(spin)}), [])
 
 
 class FirstDrives(Folder):

@@ -195,7 +195,7 @@ class Sent(unittest.TestCase):
         self.assertTrue(out.take(self.pose(0), 0))  # a recording begins anew
 
     def test_quality_is_of_state_and_probability(self):
-        for state, lost, quality in ((1, 0.0, 100), (1, 0.25, 75), (4, 0.0, 50), (2, 1.0, 1), (1, math.nan, 0)):
+        for state, lost, quality in ((1, 0.0, 100), (1, 0.25, 75), (4, 0.0, 50), (2, 1.0, 1), (1, math.nan, 0), (1, -1.0, 0), (1, 1.5, 0), (1, math.inf, 0)):
             self.assertEqual(quality, mavlink.quality(self.pose(0, state=state, lost_probability=lost)))
 
 

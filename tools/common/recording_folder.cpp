@@ -18,7 +18,7 @@ void need_folder(const fs::path &recording) {
     throw Failure(recording.string() + ": is not a folder; REC is a recording's folder", kUsage);
 }
 
-std::vector<Pose> load_positions(const fs::path &file, bool must_rise) {
+std::vector<Pose> load_positions(const fs::path &file, bool must_rise, size_t *left_out) {
   const Csv csv = Csv::load(file);
   const size_t t = csv.need("t_ns");
   const size_t x = csv.need("x_m");
@@ -44,18 +44,19 @@ std::vector<Pose> load_positions(const fs::path &file, bool must_rise) {
     out.push_back(pose);
   }
   if (out.empty()) throw Failure(file.string() + ": has no position in it");
+  if (left_out) *left_out = csv.rows() - out.size();
   return out;
 }
 
 }  // namespace
 
-std::vector<Pose> load_truth(const fs::path &recording) {
+std::vector<Pose> load_truth(const fs::path &recording, size_t *left_out) {
   need_folder(recording);
   if (!fs::exists(recording / "truth.csv"))
     throw Failure(
         recording.string() + ": has no truth.csv" +
         (fs::exists(recording / "gnss.csv") ? "; `--against gnss` compares positions with its gnss.csv" : ""));
-  return load_positions(recording / "truth.csv", true);
+  return load_positions(recording / "truth.csv", true, left_out);
 }
 
 Eigen::Vector3d load_truth_offset(const fs::path &recording) {
@@ -72,9 +73,9 @@ Eigen::Vector3d load_antenna(const fs::path &recording) {
   return xyz.size() == 3 ? Eigen::Vector3d(xyz[0], xyz[1], xyz[2]) : Eigen::Vector3d::Zero();
 }
 
-std::vector<Pose> load_gnss(const fs::path &recording) {
+std::vector<Pose> load_gnss(const fs::path &recording, size_t *left_out) {
   need_folder(recording);
-  auto out = load_positions(recording / "gnss.csv", false);
+  auto out = load_positions(recording / "gnss.csv", false, left_out);
   std::stable_sort(out.begin(), out.end(), [](const Pose &a, const Pose &b) { return a.t_ns < b.t_ns; });
   for (Pose &fix : out) fix.oriented = false;
   return out;

@@ -96,7 +96,8 @@ Figures evaluate(const Arguments &a) {
   options.against_gnss = gnss;
   options.truth_offset_m = gnss ? load_antenna(recording) : load_truth_offset(recording);
 
-  std::vector<Pose> places = gnss ? load_gnss(recording) : load_truth(recording);
+  size_t left_out = 0;
+  std::vector<Pose> places = gnss ? load_gnss(recording, &left_out) : load_truth(recording, &left_out);
   std::optional<GnssDelay> delay;
   if (a.takes_out_delay) {
     delay = find_gnss_delay(trajectory, places, options);
@@ -104,6 +105,7 @@ Figures evaluate(const Arguments &a) {
   }
   const Comparison comparison = compare(trajectory, places, options);
   Figures figures = pose_figures(comparison, trajectory.has_covariance, gnss);
+  figures["truth_left_out"] = left_out;
   if (delay) {
     figures["gnss_delay_s"] = delay->delay_s;
     figures["gnss_delay_rms_before_m"] = delay->rms_before_m;

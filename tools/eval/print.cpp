@@ -49,6 +49,8 @@ std::string figures_table(const Figures &f, const std::string &title, const std:
   out += row("heading deg", {cell(f, "heading_mean_deg", 3), cell(f, "heading_mean_abs_deg", 3), "",
                              cell(f, "heading_rmse_deg", 3), "", "", cell(f, "heading_max_deg", 3)});
   out += row("rotation deg", {"", "", "", cell(f, "rotation_rmse_deg", 3), "", "", cell(f, "rotation_max_deg", 3)});
+  if (f.contains("truth_left_out") && f["truth_left_out"] > 0)
+    out += "\n  left out: " + cell(f, "truth_left_out", 0) + " rows of " + against + ".csv without a position\n";
   out += "\n  end error " + cell(f, "position_end_percent", 3, " %") + " of the way; lost " + cell(f, "lost_count", 0) +
          " times, " + cell(f, "lost_s", 1, " s") + "\n";
   if (f["anees_dof"].is_number())

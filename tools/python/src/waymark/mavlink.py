@@ -106,8 +106,8 @@ def full(numbers: Any) -> Array:
 
 
 def quality(pose: Any) -> int:
-    """1 to 100 by the probability that the robot is where the pose is, half of it while degraded; 0 where it is unknown."""
-    if math.isnan(pose.lost_probability):
+    """1 to 100 by the probability that the robot is where the pose is, half of it while degraded; 0 where it is unknown or no probability."""
+    if not 0 <= pose.lost_probability <= 1:
         return 0
     share = 0.5 if pose.state == pose.STATE_DEGRADED else 1.0
     return max(1, round(100 * share * (1 - float(pose.lost_probability))))
