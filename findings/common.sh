@@ -25,9 +25,32 @@ debian_packages() {
   export LD_LIBRARY_PATH=$root/usr/lib/$(uname -m)-linux-gnu:$root/lib/$(uname -m)-linux-gnu
 }
 
+# For drivers of MicroPython: its module, and `bus`, an I2C bus to a chip that is a table of registers. They are found from $work.
+micropython_bus() {
+  cd "$work"
+  echo 'def const(value): return value' >micropython.py
+  cat >bus.py <<'EOF'
+class I2C:
+    def __init__(self, identity_register, identity):
+        self.registers = bytearray(256)
+        self.registers[identity_register] = identity
+    def set(self, register, data): self.registers[register:register + len(data)] = data
+    def writeto_mem(self, address, register, data): self.set(register, bytes(data))
+    def readfrom_mem(self, address, register, count): return bytes(self.registers[register:register + count])
+    def readfrom_mem_into(self, address, register, into): into[:] = self.readfrom_mem(address, register, len(into))
+EOF
+}
+
 # A package of npm and its version, in $work/npm.
 npm_packages() {
   mkdir -p "$work/npm" && (cd "$work/npm" && npm install --silent --no-audit --no-fund --ignore-scripts "$@" >/dev/null) || exit 2
+}
+
+# Modules of Go as NAME@VERSION, required by the module in $work/go, whose main.go is written there afterwards.
+go_modules() {
+  mkdir -p "$work/go" && cd "$work/go" && export GOPATH=$work/gopath GOCACHE=$work/gocache GOFLAGS="-mod=mod -modcacherw" GOTOOLCHAIN=local
+  { printf 'module finding\ngo 1.19\n'; printf 'require %s\n' "${@/@/ }"; } >go.mod
+  go mod download || exit 2
 }
 
 # A command in a network of its own, in which nothing leaves the computer.
