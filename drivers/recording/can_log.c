@@ -46,7 +46,8 @@ static void take_order(order_by_id *self, const wm_can_frame *frame) {
 
 static int by_time(const void *a, const void *b) {
   const sorted_line *x = a, *y = b;
-  return x->t_ns != y->t_ns ? (x->t_ns > y->t_ns) - (x->t_ns < y->t_ns) : (x->number > y->number) - (x->number < y->number);
+  return x->t_ns != y->t_ns ? (x->t_ns > y->t_ns) - (x->t_ns < y->t_ns)
+                            : (x->number > y->number) - (x->number < y->number);
 }
 
 static void *grown(void *items, size_t needed, size_t *room, size_t item_bytes) {

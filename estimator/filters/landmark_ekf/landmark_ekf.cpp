@@ -16,7 +16,6 @@ namespace {
 
 // Probability of a wrong start below which the filter's covariance is published alone. Not swept.
 constexpr double kDoubtedStart = 0.1;
-constexpr double kAround_m = 5.0;  // sigma of a lost robot's distance from the landmarks; not swept
 
 const char *const kReads[] = {"!markers.stamp", "!markers.correlated", "motion.", "sightings.", "positions.",
                               "markers.",       "localizer.",          nullptr};
@@ -24,11 +23,6 @@ const char *const kReads[] = {"!markers.stamp", "!markers.correlated", "motion."
 int count_states(const wm_setup &setup) {
   return kPoseStates + planar_filter::count_motion_states(setup.motion->states, setup.motion->model) +
          sighting_aid::count_states(setup) + position_aid::count_states(setup) + localizer_aid::count_states(setup);
-}
-
-void widen_to(double value, double *low, double *high) {
-  if (value < *low) *low = value;
-  if (value > *high) *high = value;
 }
 
 // Without motion data the velocity is one of the map's axes, and positions and ranges have no heading either.
@@ -40,6 +34,26 @@ bool is_point(const wm_setup &setup) {
 }
 
 }  // namespace
+
+landmark_box::landmark_box(const wm_setup &setup) {
+  for (size_t i = 0; i < setup.landmark_count; i++) widen_to(setup.landmarks[i].p_m);
+}
+
+void landmark_box::widen_to(const double place_m[2]) {
+  for (int k = 0; k < 2; k++) {
+    if (place_m[k] < low_m_[k]) low_m_[k] = place_m[k];
+    if (place_m[k] > high_m_[k]) high_m_[k] = place_m[k];
+  }
+}
+
+double landmark_box::anywhere_m2(const wm_pose2 &pose) const {
+  constexpr double kAround_m = 5.0;  // sigma of a lost robot's distance from the landmarks; not swept
+  const double place_m[2] = {pose.x_m, pose.y_m};
+  landmark_box with = *this;
+  with.widen_to(place_m);
+  return square(kAround_m) +
+         (square(with.high_m_[0] - with.low_m_[0]) + square(with.high_m_[1] - with.low_m_[1])) / 12.0;
+}
 
 landmark_ekf::arrays landmark_ekf::place(memory_layout *layout, const wm_setup &setup) {
   return {layout->take<double>(planar_filter::doubles(count_states(setup))),
@@ -75,10 +89,7 @@ void landmark_ekf::init(const wm_landmark_ekf_params &params, const wm_setup &se
   aid_.add_lent(&filter_);
   records_.set(behind.records);
   std::memset(behind.records, 0, setup.landmark_count * sizeof(landmark_record));
-  for (int k = 0; k < 2; k++) {
-    low_m_[k] = HUGE_VAL, high_m_[k] = -HUGE_VAL;
-    for (size_t i = 0; i < setup.landmark_count; i++) widen_to(setup.landmarks[i].p_m[k], &low_m_[k], &high_m_[k]);
-  }
+  box_ = landmark_box(setup);
   moved_id_ = -1;
   rollback_.begin(filter_, kPoseStates, calibration_states_);
   start_tested_ns_ = inflated_ns_ = vague_ns_ = WM_TIME_NONE;
@@ -246,20 +257,9 @@ void landmark_ekf::put_base(wm_estimate *out) const {
   out->v_mps[1] += out->w_radps[2] * back_m[0];
 }
 
-// Variance of a place anywhere among the landmarks and the pose, each axis, m2: of a uniform density in their box.
-double landmark_ekf::anywhere_m2() const {
-  double sides_m2 = 0.0;
-  for (int k = 0; k < 2; k++) {
-    double low = low_m_[k], high = high_m_[k];
-    widen_to(filter_.value(k), &low, &high);
-    sides_m2 += square(high - low);
-  }
-  return square(kAround_m) + sides_m2 / 12.0;
-}
-
 // Lost, the pose is anywhere among the landmarks with the probability of being lost.
 void landmark_ekf::widen(wm_estimate *out) const {
-  const double p = evidence_.probability(), anywhere_m2 = this->anywhere_m2();
+  const double p = evidence_.probability(), anywhere_m2 = box_.anywhere_m2(filter_.pose());
   out->covariance[wm_cov_index(0, 0)] += p * anywhere_m2;
   out->covariance[wm_cov_index(1, 1)] += p * anywhere_m2;
   out->covariance[wm_cov_index(5, 5)] += p * square(kPi) / 3.0;

@@ -26,6 +26,19 @@ namespace wm {
 
 inline constexpr double kBase_m[2] = {};  // base_link's place on itself
 
+// The landmarks' box in the plane.
+class landmark_box {
+ public:
+  landmark_box() = default;
+  explicit landmark_box(const wm_setup &setup);
+  // Variance of a place anywhere among the landmarks and the pose, each axis, m2: of a uniform density in their box.
+  double anywhere_m2(const wm_pose2 &pose) const;
+
+ private:
+  void widen_to(const double place_m[2]);
+  double low_m_[2] = {HUGE_VAL, HUGE_VAL}, high_m_[2] = {-HUGE_VAL, -HUGE_VAL};
+};
+
 class landmark_ekf {
  public:
   static size_t bytes(const wm_landmark_ekf_params &params, const wm_setup &setup, const char **why);
@@ -72,7 +85,6 @@ class landmark_ekf {
   }
   void note(wm_time_ns t_ns, int key, double log_bayes, double angle_rad = NAN, double normalised = NAN);
   travelled_pose2 odometry() const { return {filter_.odom(), filter_.travelled_m(), filter_.turned_rad()}; }
-  double anywhere_m2() const;
   bool needs_search(wm_time_ns t_ns, bool by_bearing);
   void search_now(wm_time_ns t_ns);
   double found_sigma_m(wm_time_ns since_ns) const;
@@ -122,9 +134,9 @@ class landmark_ekf {
   observation vague_[2];  // the pose when it had become too vague to be corrected
   wm_time_ns start_tested_ns_, inflated_ns_, vague_ns_;
   uint32_t moved_;
-  int32_t moved_id_;             // of the last one
-  double low_m_[2], high_m_[2];  // the landmarks' box
-  double misfit_;                // of the newest sighting, to the map
+  int32_t moved_id_;  // of the last one
+  landmark_box box_;
+  double misfit_;  // of the newest sighting, to the map
   // Without motion data, and by positions and ranges: places without a heading. The filter's pose is that of the place
   // seen last, at_m_ in base_link, so that one place alone never gives a heading, and several do by their differences.
   bool is_point_;

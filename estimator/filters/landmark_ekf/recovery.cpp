@@ -162,7 +162,8 @@ void landmark_ekf::restore_calibration() {
 bool landmark_ekf::needs_search(wm_time_ns t_ns, bool by_bearing) {
   if (life_.searching()) return true;
   const double heading = filter_.variance(kHeading), spread = 0.5 * (filter_.variance(kX) + filter_.variance(kY));
-  const bool vague = (by_bearing && heading > square(kVague_rad)) || spread > square(kVaguePlace) * anywhere_m2();
+  const bool vague =
+      (by_bearing && heading > square(kVague_rad)) || spread > square(kVaguePlace) * box_.anywhere_m2(filter_.pose());
   if (!params_.recover || !life_.tracking() || !vague || filter_.is_overdue()) {
     vague_ns_ = WM_TIME_NONE;
     return false;

@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 // White noise of a gyro, against what is configured. Noise of the density N (rad/s per sqrt(s)) turns the heading by a
-// random walk: the turn in a time t has the variance N^2 t, and the second difference of three of them 6 N^2 t, in which
-// a steady turn is none. The quartile of their sizes is that of the calm parts of a drive. Vibrations and turns have
-// another density at each t; noise has the same.
+// random walk: the turn in a time t has the variance N^2 t, and the second difference of three of them 6 N^2 t, in
+// which a steady turn is none. The quartile of their sizes is that of the calm parts of a drive. Vibrations and turns
+// have another density at each t; noise has the same.
 #include <math.h>
 #include <stdlib.h>
 
 #include "cli/check/comparisons.h"
 #include "waymark/motion.h"
 
-#define COVER_MIN 0.8      // share of a window that has data
-#define SIZES_MIN 20       // second differences
-#define QUARTILE 0.3186    // of the size of a normal deviate
-#define LONG_WINDOWS 4     // of the longer one of the two times
-#define ALIKE 2.0          // densities of white noise at the two times: of twenty differences each is known to a half
-#define TIMES_CONFIGURED 4 // as much as temperature, a car's engine and the quartile's own error do not make
+#define COVER_MIN 0.8       // share of a window that has data
+#define SIZES_MIN 20        // second differences
+#define QUARTILE 0.3186     // of the size of a normal deviate
+#define LONG_WINDOWS 4      // of the longer one of the two times
+#define ALIKE 2.0           // densities of white noise at the two times: of twenty differences each is known to a half
+#define TIMES_CONFIGURED 4  // as much as temperature, a car's engine and the quartile's own error do not make
 
 static int by_size(const void *a, const void *b) {
   const float x = *(const float *)a, y = *(const float *)b;
@@ -36,7 +36,8 @@ static double density_of(const channel *c, size_t together) {
   float *sizes = calloc(c->windows + 1, sizeof *sizes);
   size_t count = 0;
   for (size_t i = 0; sizes && i + 3 * together <= c->windows; i++) {
-    const double second = turn_of(c, i, together) - 2 * turn_of(c, i + together, together) + turn_of(c, i + 2 * together, together);
+    const double second =
+        turn_of(c, i, together) - 2 * turn_of(c, i + together, together) + turn_of(c, i + 2 * together, together);
     if (isfinite(second)) sizes[count++] = (float)fabs(second);
   }
   if (count > 0) qsort(sizes, count, sizeof *sizes, by_size);
