@@ -5,14 +5,26 @@
 set -euo pipefail
 cd "$(dirname "$(readlink -f "$0")")"
 [ $# -gt 0 ] || set -- $(ls -- *.sh | grep -v -x -e common.sh -e bare.sh)
+# Packages that not every finding needs, by the helper of common.sh that it calls.
 more=""
-! grep -q ^go_modules "${@##*/}" || more+=" golang-go"
+while read -r helper packages; do
+  ! grep -q "^$helper " "${@##*/}" || more+=" $packages"
+done <<'EOF'
+npm_packages npm
+go_modules golang-go
+crates cargo-web
+maven_artifacts maven default-jdk-headless
+EOF
 code=0
 for round in 1 2; do
-  # All that the scripts need: Python for most, npm for packages of npm, g++ for tf2, ip for a network of its own, GLib for LCM, libusb for librealsense, Go where one asks for it.
+  # What the scripts need beside those: Python for most, g++ for tf2, ip for a network of its own, GLib for LCM, libusb for librealsense. This computer's
+  # authorities, as that of a company's proxy, are made the bare system's: Java and Debian's cargo heed no SSL_CERT_FILE.
   ../tests/package/fresh.sh --bind "$PWD:/findings" bash -uc '
+    authorities=/usr/local/share/ca-certificates
+    mkdir -p $authorities
+    [ -z "${SSL_CERT_FILE:-}" ] || awk -v to=$authorities "/BEGIN CERT/ { file = to \"/desk\" ++n \".crt\" } file { print >file } /END CERT/ { close(file) }" "$SSL_CERT_FILE"
     apt-get -qq update && DEBIAN_FRONTEND=noninteractive apt-get -qq install --no-install-recommends \
-      python3 python3-venv python3-pip npm g++ libc6-dev iproute2 libglib2.0-0 libusb-1.0-0 ca-certificates $2 >/tmp/apt.log 2>&1 || { tail -20 /tmp/apt.log >&2; exit 1; }
+      python3 python3-venv python3-pip g++ libc6-dev iproute2 libglib2.0-0 libusb-1.0-0 ca-certificates $2 >/tmp/apt.log 2>&1 || { tail -20 /tmp/apt.log >&2; exit 1; }
     round=$1 code=0
     shift 2
     for name in "$@"; do

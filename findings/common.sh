@@ -53,6 +53,22 @@ go_modules() {
   go mod download || exit 2
 }
 
+# Crates as NAME@VERSION, and what they need of the newest versions that this compiler takes, for the program in $work/rust, whose src/main.rs is written there afterwards.
+crates() {
+  mkdir -p "$work/rust/src" && cd "$work/rust" && export CARGO_HOME=$work/cargo
+  { printf '[package]\nname = "finding"\nversion = "0.0.0"\nedition = "2021"\nresolver = "3"\n[dependencies]\n'; printf '%s"\n' "${@/@/ = \"=}"; } >Cargo.toml
+  echo 'fn main() {}' >src/main.rs
+  cargo -q fetch || exit 2
+}
+
+# Artifacts of Maven as GROUP:NAME:VERSION, without what they depend on, for $java.
+maven_artifacts() {
+  for artifact in "$@"; do
+    mvn -q -B -Dmaven.repo.local="$work/maven" dependency:copy "-Dartifact=$artifact" "-DoutputDirectory=$work/jars" >"$work/maven.log" 2>&1 || { tail -5 "$work/maven.log" >&2; exit 2; }
+  done
+  java=(java -cp "$work/jars/*")
+}
+
 # A command in a network of its own, in which nothing leaves the computer.
 alone() {
   local user=(--user --map-root-user)
