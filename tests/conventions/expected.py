@@ -40,7 +40,7 @@ MISSED = {
     170: ("pymavlink: unit of RAW_IMU.",),
 }
 # In the text below a table, of this computer's settings, of our own programs, or of packages that the page leaves out.
-NO_ROW = {45, 57, 155, 192, 197, 199, 200, 203, 233, 234, 239, 242, 244, 256, 262, 267, 275, 308, 309, 310, 312, 313, 318}
+NO_ROW = {45, 57, 155, 192, 197, 199, 200, 203, 233, 234, 239, 242, 244, 256, 262, 267, 275}
 SCRIPT = re.compile(r"\([a-z0-9-]+[.]sh\)")  # a finding of its own, which needs no row
 
 
