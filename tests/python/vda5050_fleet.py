@@ -136,19 +136,19 @@ class Fleet:
             out += [entry["actionStatus"] for entry in state["actionStates"] if entry["actionId"] == identity and entry["actionStatus"] not in out]
         return out
 
-    def ends(self, kind, seconds=20, **given):
+    def ends(self, kind, seconds=60, **given):
         """Status and result of an action that was sent, at its end."""
         identity = self.act(kind, **given)
         return self.end_of(identity, seconds)
 
-    def end_of(self, identity, seconds=20):
+    def end_of(self, identity, seconds=60):
         def found():
             return next((entry for entry in self.newest("state").get("actionStates", []) if entry["actionId"] == identity
                          and entry["actionStatus"] in ("FINISHED", "FAILED")), None)
         entry = self.wait(found, seconds)
         return entry["actionStatus"], entry["resultDescription"]
 
-    def wait(self, condition, seconds=15):
+    def wait(self, condition, seconds=60):
         end = time.monotonic() + seconds
         while not (value := condition()):
             assert time.monotonic() < end, f"nothing within {seconds} s; the newest state: {json.dumps(self.newest('state'))}"
