@@ -37,7 +37,8 @@ static void take_order(order_by_id *self, const wm_can_frame *frame) {
   const uint64_t id = identity(frame);
   if (self->count == 0 || self->ids[self->count - 1] != id) {
     for (size_t i = 0; i < self->count; i++) self->is_mixed |= self->ids[i] == id;
-    if (self->is_mixed |= self->count == WM_CAN_SURVEY_IDS) return;
+    self->is_mixed |= self->count == WM_CAN_SURVEY_IDS;
+    if (self->is_mixed) return;
     self->ids[self->count] = id;
     self->goes_back |= self->count++ > 0 && frame->t_ns < self->last_ns - BACK_NS;
   }
