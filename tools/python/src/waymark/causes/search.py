@@ -29,8 +29,8 @@ BLOCK_S, BLOCKS_MIN = 2.0, 20  # longer than errors that last, as the correlated
 NAMED_MOST = 0.9999  # no probability is said to be more
 NAMED_FROM = 0.99  # probability that a cause predicts better than each other, and than none
 GAIN_MIN = 0.1  # nats an update, over no mistake
-# Nats by which a unit is likelier than the factors that one drive cannot tell from it: half of all scales are wrong by one of some ten units, the
-# others are spread over six natural logarithms, of which a drive leaves some four per cent.
+# Nats by which a unit is likelier than the factors near it that one drive allows, too. Half of all wrong scales are one of some ten units. The
+# others are spread over six natural logarithms, of which a drive allows some four per cent.
 UNIT_LIKELIER = 3.0
 APART_MIN = 0.02  # nats an update, over another cause: below, the drive does not tell them apart
 # A drive is right with: 14 % of the updates refused, a mean square of 1.34, lost for 0.5 %: the most of 29 good drives.
